@@ -10,6 +10,7 @@ the actuators that take part in it are undetermined.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from .arrays import FloatArray
 from .member import pseudo_inverse
-from .parts import Dimension
+from .parts import Dimension, JointScrews
 
 if TYPE_CHECKING:
     from .model import Model
@@ -111,6 +112,43 @@ def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: 
     is_zero = np.linalg.norm(driven * unit, axis=0) <= RANK_TOLERANCE * size
     is_zero = is_zero & (np.linalg.norm(kept, axis=0) <= RANK_TOLERANCE)
     return Drive(works, left[:, :rank].T, left[:, rank:].T, idle, is_zero, unit, inverse)
+
+
+def with_loops(
+    model: Model, velocities: Velocities, paths: Sequence[tuple[JointScrews, FloatArray, FloatArray]]
+) -> Velocities:
+    """Return velocity equations with the loops of nested members as they are at the point.
+
+    With ``L_p`` the loops' columns of passive joints, and ``L_a`` of actuators, ``B`` is what ``L_p`` cannot close of
+    ``L_a``. The expressions of a model have the rank of ``L_p`` at almost all points. Where it is smaller at the point,
+    the loops demand more of the actuators, and a rate may be determined that others leave free.
+
+    Args:
+        model: the robot.
+        velocities: at the point.
+        paths: members of nested loops with their screws (6, k) and loops (m, k) there.
+    """
+    names = [(each.limb, each.name) for each in model.actuators]
+    nested = {each.limb for each, *_ in paths}
+    driven, relations = velocities.driven.copy(), velocities.relations.copy()
+    relations[:, [k for k, (limb, _) in enumerate(names) if limb in nested]] = 0.0
+    found = [relations]
+    for each, screws, loops in paths:
+        own = [names.index((each.limb, each.joints[k].removeprefix(f"{each.limb}:"))) for k in each.driven]
+        rows = [k for k, row in enumerate(model.frame_rows) if row.member == each.member]
+        passive = [k for k in range(loops.shape[1]) if k not in each.driven]
+        left, values, right = np.linalg.svd(loops[:, passive])
+        rank = int(np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0)))
+        by_actuators = loops[:, each.driven]
+        closing = right[:rank].T @ ((left[:, :rank].T @ by_actuators) / values[:rank, None])
+        motions = screws[:, each.driven] - screws[:, passive] @ closing
+        driven[np.ix_(rows, own)] = velocities.jacobian[rows] @ np.vstack([motions[3:], motions[:3]])
+        demanded = np.zeros((len(left) - rank, len(names)))
+        demanded[:, own] = left[:, rank:].T @ by_actuators
+        least = np.zeros(len(names))
+        least[own] = RANK_TOLERANCE * np.abs(by_actuators).max(axis=0, initial=0.0)
+        found.append(np.where(np.abs(demanded) > least, demanded, 0.0))
+    return Velocities(velocities.jacobian, driven, np.vstack(found))
 
 
 class LimbDrive(NamedTuple):

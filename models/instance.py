@@ -22,7 +22,7 @@ from casadi import SX
 
 from .arrays import FloatArray
 from .limbjoints import LimbJoint, LimbLink, expressions_of
-from .member import Member, resisted_parts, scaled_twists
+from .member import Member, resistance
 from .model import Model
 from .parts import Actuator, Closure, Unknown, rate_relations
 from .wrench import Wrench, WrenchKind
@@ -233,13 +233,13 @@ def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ())
     """
     own = [_row_factor(row, length) * ca.vertcat(row.force, row.moment).T / ca.sqrt(row.square) for row in rows]
     unit_twists = ca.vertcat(ca.horzcat(SX(3, 3), SX.eye(3)), ca.horzcat(SX.eye(3), SX(3, 3)))
-    return ca.vertcat(SX(0, 6), *own, *[_resistance(member, unit_twists, length) for member in members])
+    return ca.vertcat(SX(0, 6), *own, *[resistance(member, unit_twists, length) for member in members])
 
 
 def rates(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Member] = ()) -> SX:
     """Return the work rates ``L_i ^ chi``, (m, 1), in a twist (6, 1); couples times the length."""
     own = [_scaled_rate(row, twist, length) / ca.sqrt(row.square) for row in rows]
-    return ca.vertcat(SX(0, 1), *own, *[_resistance(member, twist, length) for member in members])
+    return ca.vertcat(SX(0, 1), *own, *[resistance(member, twist, length) for member in members])
 
 
 def driven(rows: Sequence[Wrench], actuators: Sequence[Actuator], length: SX, members: Sequence[Member] = ()) -> SX:
@@ -254,7 +254,7 @@ def driven(rows: Sequence[Wrench], actuators: Sequence[Actuator], length: SX, me
         for member in members:
             screw = actuator.screw_in(member.label)
             if screw is not None:
-                found[at : at + member.size, k] = _resistance(member, screw, length)
+                found[at : at + member.size, k] = resistance(member, screw, length)
             at += member.size
     return found
 
@@ -272,7 +272,7 @@ def objective(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[M
         members: members of limbs, each of which adds ``|P x|^2``.
     """
     own = sum((_scaled_rate(row, twist, length) ** 2 / row.square for row in rows), SX(0))
-    return own + sum((ca.sumsqr(_resistance(member, twist, length)) for member in members), SX(0))
+    return own + sum((ca.sumsqr(resistance(member, twist, length)) for member in members), SX(0))
 
 
 def magnitude(rows: Sequence[Wrench], twist: SX, position: SX, length: SX, members: Sequence[Member] = ()) -> SX:
@@ -328,12 +328,6 @@ def homogenised(jacobian: Matrix, centre: Matrix, length: float) -> tuple[Matrix
     x, y, z = coordinates
     mx, my, mz = mx - (y * fz - z * fy), my - (z * fx - x * fz), mz - (x * fy - y * fx)
     return fx, fy, fz, mx / length, my / length, mz / length
-
-
-def _resistance(member: Member, twists: SX, length: SX) -> SX:
-    """Return ``P x``, (size, n), of a member for twists (6, n)."""
-    columns = scaled_twists(member.screws, member.centre, length, member.size)
-    return resisted_parts(columns, member.rank, scaled_twists(twists, member.centre, length, member.size))
 
 
 def _row_factor(row: Wrench, length: SX) -> SX:

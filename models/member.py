@@ -10,12 +10,14 @@ member's wrenches, and no basis is needed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
+from .rows import ColumnGroup
 from .wrench import WrenchKind
 
 
@@ -35,6 +37,7 @@ class Member:
         slide: (3, 1) current unit axis along which the centre could as well lie elsewhere, because it is any point of
             the last passive joint's; None for a centre that the joints or the user determine.
         name: its name where the limb has several members; empty for the limb's.
+        groups: of dependent screws, one after the other; without any they are taken all at once.
     """
 
     limb: str
@@ -45,6 +48,7 @@ class Member:
     is_pinned: bool = False
     slide: SX | None = None
     name: str = ""
+    groups: tuple[ColumnGroup, ...] = ()
 
     @property
     def label(self) -> str:
@@ -96,13 +100,13 @@ def pseudo_inverse(matrix: SX, rank: int) -> SX:
 
     It is Decell's formula ``A^+ = -A' N_(r-1)/c_r`` with the recursion of Faddeev and LeVerrier for ``A A'`` (H. P.
     Decell, "An application of the Cayley-Hamilton theorem to generalized matrix inversion", SIAM Review 7 (1965) 526).
-    One step ``X (2 I - A X)`` of Newton's method squares its relative error.
+    One step ``X (2 I - A X)`` of Newton's method squares its relative error, which one row does not have.
     """
     if rank == 0:
         return SX(matrix.shape[1], matrix.shape[0])
     powers = _powers(matrix, rank)
     found = -matrix.T @ powers.before / (powers.coefficient * powers.scale)
-    return 2 * found - found @ (matrix @ found)
+    return found if matrix.shape[0] == 1 else 2 * found - found @ (matrix @ found)
 
 
 def scaled_twists(twists: SX, centre: SX, length: SX, size: int) -> SX:
@@ -122,34 +126,49 @@ def scaled_twists(twists: SX, centre: SX, length: SX, size: int) -> SX:
     return ca.horzcat(SX(size, 0), *columns)
 
 
-def resisted_parts(columns: SX, rank: int, vectors: SX) -> SX:
+def resisted_parts(columns: SX, rank: int, vectors: SX, groups: Sequence[ColumnGroup] = ()) -> SX:
     """Return the parts (size, k) of vectors (size, k) that are orthogonal to the span of columns (size, n).
 
     Independent columns are made orthogonal one after the other without square roots, and their parts subtracted from
     the vectors themselves: the difference of two squares would lose a small result. Dependent columns have the
     projector ``P = N_r / c_r`` of Faddeev and LeVerrier's recursion for ``M = sum a a'``, which chooses no columns:
     ``N_0 = I``, ``c_k = -tr(M N_(k-1))/k``, ``N_k = M N_(k-1) + c_k I``. It is exact for every rank that does not
-    change.
+    change, but its relative error is up to that of rounding over ``c_r``, the product of the squared singular values in
+    parts of the largest one. So groups whose ranks add up are made orthogonal one after the other too.
 
     Args:
         columns: (size, n) spanning vectors.
         rank: of the columns.
         vectors: (size, k).
+        groups: of the columns, with ranks that add up to that of all; if left out, independent columns are taken one by
+            one, and dependent ones all at once.
     """
-    n = columns.shape[1]
-    if rank < n:
-        powers = _powers(columns, rank)
-        return powers.last @ vectors / powers.coefficient
-    orthogonal: list[tuple[SX, SX]] = []
-    for k in range(n):
-        column = columns[:, k]
-        for base, square in orthogonal:
-            column = column - base * (ca.dot(base, column) / square)
-        orthogonal.append((column, ca.sumsqr(column)))
-    parts = []
-    for k in range(vectors.shape[1]):
-        left = vectors[:, k]
-        for base, square in orthogonal:
-            left = left - base * (ca.dot(base, left) / square)
-        parts.append(left)
-    return ca.horzcat(SX(columns.shape[0], 0), *parts)
+    n, k = columns.shape[1], vectors.shape[1]
+    if not groups:
+        groups = [ColumnGroup((j,), 1) for j in range(n)] if rank == n else [ColumnGroup(tuple(range(n)), rank)]
+    parts = ca.horzcat(vectors, columns)
+    for group in groups:
+        own = parts[:, [k + j for j in group.columns]]
+        if len(group.columns) == 1:
+            square = ca.sumsqr(own)
+            parts = ca.horzcat(*[each - own * (ca.dot(own, each) / square) for each in ca.horzsplit(parts)])
+        else:
+            powers = _powers(own, group.rank)
+            parts = powers.last @ parts / powers.coefficient
+    return parts[:, :k]
+
+
+def resistance(member: Member, twists: SX, length: SX) -> SX:
+    """Return ``P x``, (size, n), of a member for twists (6, n)."""
+    if member.is_pinned:
+        velocities = (scaled_twists(each, member.centre, length, member.size) for each in (member.screws, twists))
+        return resisted_parts(next(velocities), member.rank, next(velocities), member.groups)
+    # In parts of the length, axes of rotations have the same components in every unit of length, and cancel alike. The
+    # size of a translation means nothing for the span.
+    columns = [
+        ca.vertcat(column[:3] if column[3:].is_zero() else column[:3] / length, column[3:])
+        for column in ca.horzsplit(scaled_twists(member.screws, member.centre, SX(1), member.size))
+    ]
+    vectors = scaled_twists(twists, member.centre, SX(1), member.size)
+    parts = ca.vertcat(vectors[:3, :] / length, vectors[3:, :])
+    return length * resisted_parts(ca.horzcat(SX(6, 0), *columns), member.rank, parts, member.groups)

@@ -226,7 +226,7 @@ def _check_symbols(model: Model) -> None:
             if part is not None
         ),
         *(part for each in model.actuators for part in (each.screws, each.relations)),
-        *(each.all for each in model.joint_screws),
+        *(part for each in model.joint_screws for part in (each.all, each.loops)),
         *(
             part
             for equation in (*model.closure, *model.loops, *model.distances)

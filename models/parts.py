@@ -217,16 +217,17 @@ def rate_relations(actuators: Sequence[Actuator]) -> SX:
 class JointScrews:
     """Current screws of a limb's joints, whose ranks tell a limb's singularities.
 
-    Nested loops leave no joint a screw of its own. The columns of one of their members are motions of the platform, one
-    for each rate of a joint: with the actuators locked, and as driven ones with all joints free.
+    Nested loops leave no joint a screw of its own. The columns of one of their members are motions of the platform by
+    rates of joints along a tree of links, of which its loops allow those with ``L q = 0``.
 
     Attributes:
         limb: name of the limb.
         joints: label of the joint of each column, such as ``2:3``.
         all: (6, k) screws of all its joints from base to platform as twists, the world's origin as reference.
         driven: indices of the columns of actuated joints.
-        passive_rank, all_rank: ranks of the passive joints' and of all screws at almost all dimensions and poses.
-        is_nested: whether the columns are motions that nested loops leave.
+        passive_rank, all_rank: ranks of the motions by passive joints, and by all, at almost all dimensions and poses.
+        member: name of the member of nested loops; empty for a path of joints.
+        loops: (m, k) ``L`` of nested loops, without a unit for rates of order 1.
     """
 
     limb: str
@@ -235,7 +236,13 @@ class JointScrews:
     driven: tuple[int, ...]
     passive_rank: int
     all_rank: int
-    is_nested: bool = False
+    member: str = ""
+    loops: SX = field(default_factory=lambda: SX(0, 0))
+
+    @property
+    def is_nested(self) -> bool:
+        """Whether the columns are motions along a tree of links with nested loops."""
+        return bool(self.member)
 
 
 @dataclass(frozen=True)

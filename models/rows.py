@@ -1,8 +1,9 @@
-"""Independent rows of a matrix that varies: one choice that is independent at several points."""
+"""Independent rows of a matrix that varies, and columns in groups whose spans are independent, from several points."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,18 @@ from .arrays import FloatArray
 
 #: Rows that are left with less than this part of the longest depend on the others: rounding leaves 1e-14.
 DEPENDENT = 1e-8
+#: Singular values of columns of unit length below this are zero.
+_ZERO = 1e-7
+#: Products of unit vectors that differ by less than this are the same, and columns depend on each other by more: those
+#: that are independent, with singular values above ``_ZERO``, do so by 1e-16 over the smallest one at most.
+_SAME = 1e-9
+
+
+class ColumnGroup(NamedTuple):
+    """Indices of columns of a matrix, and the rank that they add to that of the groups before."""
+
+    columns: tuple[int, ...]
+    rank: int
 
 
 def independent_rows(jacobians: Sequence[FloatArray]) -> tuple[int, ...]:
@@ -46,3 +59,66 @@ def _pivoted(jacobian: FloatArray) -> list[int]:
         unit = left[k] / lengths[k]
         left = left - np.outer(left @ unit, unit)
     return order
+
+
+def column_groups(matrices: Sequence[FloatArray], rank: int) -> tuple[ColumnGroup, ...]:
+    """Return groups of the columns of a matrix that varies, whose ranks add up wherever that of the matrix is the same.
+
+    First come rotations whose axes keep their angles to each other, one by one: such columns are independent
+    everywhere. Then come the smallest groups that depend on no column of another group, beyond those before. Where the
+    whole matrix keeps its rank each of them does, so that nothing is singular at a point for the choice of a column.
+    Columns that are zero are in the first group: they are more where the loops that hold their joints are singular.
+
+    Args:
+        matrices: (size, n) each, velocities and, where the size is 6, rotations of order 1: the same columns at
+            different points.
+        rank: of the matrix; other points than those of this rank say nothing.
+
+    Returns:
+        The groups; none where they are not known, or there would be one alone.
+    """
+    unit = [each / np.where((own := np.linalg.norm(each, axis=0)) > _SAME, own, np.inf) for each in matrices]
+    regular = [k for k, each in enumerate(unit) if _rank(each) == rank]
+    if len(regular) < 2 or not rank:
+        return ()
+    first = _fixed_rotations([matrices[k] for k in regular])
+    rest = [k for k in range(unit[0].shape[1]) if k not in first]
+    bases = [np.linalg.qr(unit[k][:, first])[0] for k in regular]
+    beyond = [(unit[k] - base @ (base.T @ unit[k]))[:, rest] for k, base in zip(regular, bases, strict=True)]
+    joined = np.any([_dependence(each) > _SAME for each in beyond], axis=0)
+    for _ in rest:  # columns that are joined through others
+        joined = joined @ joined | joined
+    sets = dict.fromkeys(tuple(np.flatnonzero(row).tolist()) for row in joined if row.any())
+    groups = [ColumnGroup((k,), 1) for k in first]
+    groups += [ColumnGroup(tuple(rest[k] for k in own), max(_rank(each[:, own]) for each in beyond)) for own in sets]
+    if sum(each.rank for each in groups) != rank:
+        return ()
+    zero = tuple(k for k in rest if not any(k in each.columns for each in groups))
+    groups[0] = ColumnGroup((*groups[0].columns, *zero), groups[0].rank)
+    return tuple(groups) if len(groups) > 1 else ()
+
+
+def _fixed_rotations(matrices: Sequence[FloatArray]) -> list[int]:
+    """Return the indices of the most rotations among columns (6, n), independent and always at the same angles."""
+    products = np.array([each[3:].T @ each[3:] for each in matrices])
+    is_same = np.ptp(products, axis=0) < _SAME
+    most: list[int] = []
+    for k in range(products.shape[1]):
+        own: list[int] = []
+        for j in (k, *range(products.shape[1])):
+            at = np.ix_([*own, j], [*own, j])
+            if is_same[at].all() and np.linalg.eigvalsh(products[0][at])[0] > _ZERO:
+                own.append(j)
+        most = max(most, sorted(own), key=len)
+    return most
+
+
+def _rank(columns: FloatArray) -> int:
+    """Return the rank of columns of at most unit length."""
+    return int(np.count_nonzero(np.linalg.svd(columns, compute_uv=False) > _ZERO))
+
+
+def _dependence(columns: FloatArray) -> FloatArray:
+    """Return how much columns depend on each other, (n, n): the sizes of the projector on the rows."""
+    right = np.linalg.svd(columns, full_matrices=False)[2][: _rank(columns)]
+    return np.asarray(np.abs(right.T @ right))

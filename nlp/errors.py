@@ -72,6 +72,16 @@ class CaseError(InputError):
 _SPACES = "\u00a0\u2009\u202f\u3000"
 
 
+def check_seconds(seconds: float | None) -> None:
+    """Refuse a time that is not positive.
+
+    Raises:
+        InputError: it is not.
+    """
+    if seconds is not None and not seconds > 0:
+        raise InputError(f"--time {seconds:g}: must be positive")
+
+
 def one_line(text: str) -> str:
     """Return a text with line breaks, control characters and marks of direction as escape sequences."""
     return "".join(

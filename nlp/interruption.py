@@ -1,4 +1,7 @@
-"""Requests to stop at once, such as by Ctrl-C, and the work that answers them itself.
+"""Requests to stop: at once, such as by Ctrl-C, or at the end of a time; and the work that answers them itself.
+
+The time of a command, or of a call, is stated once, with :func:`within`; every search of its block takes from what is
+left of it, and ends by itself.
 
 A request ends the process, unless work has begun that has something to show: that work asks now and then whether it is
 requested to stop. It is the command line that listens, with :func:`listen`; a program that imports this package gets
@@ -9,15 +12,18 @@ left; the searches that follow in the same call (:func:`one_call`) end at once. 
 from __future__ import annotations
 
 import enum
+import math
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from threading import Event, Lock
 from types import FrameType
+from typing import NamedTuple
 
 #: Exit status of an interrupted command, by the convention of shells: 128 and the number of the signal.
 INTERRUPTED = 130
@@ -51,6 +57,25 @@ _answers = Event()
 _requested = Event()
 #: Set once a search of the present call was interrupted by Python.
 _call: ContextVar[Event | None] = ContextVar("call", default=None)
+
+
+class _StoppedError(Exception):
+    """End of a search in the middle of its set-up."""
+
+
+#: Whether the work is that of a search, which answers a stop.
+_in_search: ContextVar[bool] = ContextVar("in_search", default=False)
+
+
+class _End(NamedTuple):
+    """When the work of a block ends, by the clock, and the part of the time left that one search of it may take."""
+
+    at: float = math.inf
+    part: float = 1.0
+
+
+_FOREVER = _End()
+_end: ContextVar[_End] = ContextVar("end", default=_FOREVER)
 #: Process that has something to say where it is ended, and the function that returns its sentence.
 _parting: list[tuple[int, Callable[[], str]]] = []
 
@@ -95,9 +120,51 @@ def kept() -> str:
 
 
 def is_requested() -> bool:
-    """Return whether the work is requested to stop."""
+    """Return whether the work is to stop: it is interrupted, or its time is over."""
+    return is_interrupted() or seconds_left() <= 0
+
+
+def is_interrupted() -> bool:
+    """Return whether the work is interrupted."""
     call = _call.get()
     return _requested.is_set() or (call is not None and call.is_set())
+
+
+def why_stopped() -> str:
+    """Return why work that is requested to stop does so."""
+    return STOPPED if is_interrupted() else "the time is over"
+
+
+def seconds_left() -> float:
+    """Return the seconds until the time of this block is over; infinite without a limit."""
+    end = _end.get().at
+    return end if end == math.inf else max(end - time.perf_counter(), 0.0)
+
+
+@contextmanager
+def within(seconds: float | None, part: float = 1.0) -> Iterator[None]:
+    """Let the work of this block end after so many seconds, and no later than that of the block around it.
+
+    No block yields values of a generator, whose reader would be within the block too.
+
+    Args:
+        seconds: the time; None for that of the block around it.
+        part: of the time left that one search takes at most, so that those after it have some too.
+    """
+    left = seconds_left()
+    limit = left if seconds is None else min(seconds, left)
+    # The clock is asked only where there is a limit.
+    token = _end.set(_End(limit if limit == math.inf else time.perf_counter() + limit, part))
+    try:
+        yield
+    finally:
+        _end.reset(token)
+
+
+def one_search(seconds: float | None = None) -> AbstractContextManager[None]:
+    """Let the work of a block be one search: it takes its part of the time left, and so many seconds at most."""
+    left, part = seconds_left(), _end.get().part
+    return within(left * part if seconds is None else min(seconds, left * part))
 
 
 @contextmanager
@@ -116,9 +183,11 @@ def one_call() -> Iterator[None]:
 def reason_of(search: Callable[[], str]) -> str:
     """Run a search; return its reason for stopping before its end, or that Python interrupted it.
 
-    Only a search that has returned an empty text is complete. What it claims otherwise must hold in the middle of a
-    step too: a step changes what is claimed by one assignment, its last.
+    Its set-up may stop it too, with :func:`stop_if_requested`. Only a search that has returned an empty text is
+    complete. What it claims otherwise must hold in the middle of a step too: a step changes what is claimed by one
+    assignment, its last.
     """
+    token = _in_search.set(True)
     try:
         return search()
     except KeyboardInterrupt:
@@ -126,19 +195,23 @@ def reason_of(search: Callable[[], str]) -> str:
         if call is not None:
             call.set()
         return STOPPED
+    except _StoppedError:
+        return why_stopped()
+    finally:
+        _in_search.reset(token)
 
 
-def reason_to_stop(
-    seconds: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool] = is_requested,
-    boxes: int = 0,
-    most_boxes: int | None = None,
-) -> str:
-    """Return the reason for stopping a search before its end; empty for none."""
-    if interrupted():
+def stop_if_requested() -> None:
+    """End the search around this call, in the middle of its set-up, where it is to stop; do nothing in other work."""
+    if _in_search.get() and is_requested():
+        raise _StoppedError
+
+
+def reason_to_stop(seconds: float, boxes: int = 0, most_boxes: int | None = None) -> str:
+    """Return the reason for stopping a search that began some seconds ago before its end; empty for none."""
+    if is_interrupted():
         return STOPPED
-    if time_limit is not None and seconds >= time_limit:
+    if seconds_left() <= 0:
         return f"stopped after {seconds:.3g} s"
     if most_boxes is not None and boxes >= most_boxes:
         return f"stopped after {boxes:,} boxes"

@@ -1,6 +1,5 @@
 """What all tests share: children that can be interrupted, and searches whose time is counted in looks at the clock."""
 
-import itertools
 import signal
 import threading
 from collections.abc import Callable
@@ -37,9 +36,20 @@ def children_can_be_interrupted() -> Callable[[], None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def clock_of_steps() -> None:
-    """Let a search of so many seconds take a number of steps: no test depends on how fast or busy the machine is."""
-    looks = itertools.count()
+    """Let a search of so many seconds take a number of steps: no test depends on how fast or busy the machine is.
+
+    A search's own looks at the clock move it; those at the time that is left, also of a solve, do not.
+    """
+    looks = [0]
+
+    def step() -> float:
+        looks[0] += 1
+        return STEP * looks[0]
+
     for name in SEARCHES:
         module = import_module(f"screwsynth.nlp.proof.{name}")
         assert module.time.perf_counter
-        module.time = SimpleNamespace(perf_counter=lambda: STEP * next(looks))  # type: ignore[attr-defined]
+        module.time = SimpleNamespace(perf_counter=step)  # type: ignore[attr-defined]
+    import_module("screwsynth.nlp.interruption").time = SimpleNamespace(  # type: ignore[attr-defined]
+        perf_counter=lambda: STEP * looks[0]
+    )

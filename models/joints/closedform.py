@@ -207,7 +207,7 @@ def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, 
         *[each.value for each in model.signs],
         *[quantity.values for quantity in model.quantities],
         *[part for member in model.members for part in (member.centre, member.screws)],
-        *[each.all for each in model.joint_screws],
+        *[part for each in model.joint_screws for part in (each.all, each.loops)],
         *expressions_of((*model.joints, *model.links)),
     ]
     following = iter(with_replaced(_symbols(model), outputs, 1, solved))
@@ -226,7 +226,7 @@ def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, 
     signs = tuple(replace(each, value=next(following)) for each in model.signs)
     quantities = tuple(replace(each, values=next(following)) for each in model.quantities)
     members = tuple(replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members)
-    screws = tuple(replace(each, all=next(following)) for each in model.joint_screws)
+    screws = tuple(replace(each, all=next(following), loops=next(following)) for each in model.joint_screws)
     return replace(
         model,
         wrenches=wrenches,

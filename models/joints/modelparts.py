@@ -15,6 +15,7 @@ from ..instance import Substitution, driven, jacobian
 from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
 from ..parts import Actuator, Dimension, GenericRanks, Parameter, Quantity, rate_relations
+from ..rows import column_groups
 from .chain import HomeRobot, Joint, Limb
 from .loops import ClosedPoint
 
@@ -60,22 +61,27 @@ def actuator_name(robot: HomeRobot, limb: Limb, joint: Joint, number: int) -> st
 
 
 def with_kinds(
-    member: Member, actuators: Sequence[Actuator], size: SX, numbers: Sequence[SX], point: ClosedPoint
+    member: Member, actuators: Sequence[Actuator], size: SX, numbers: Sequence[SX], points: Sequence[ClosedPoint]
 ) -> Member:
-    """Return a member with the kinds of its wrenches, measured at a closed configuration.
+    """Return a member with the kinds of its wrenches and groups of its screws, measured at closed configurations.
 
     Args:
         member: the member.
         actuators: of all limbs.
         size: (1, 1) the robot's size, length.
         numbers: symbols of dimensions, unknowns, rotation and position.
-        point: the configuration.
+        points: the configurations; the kinds are those of the first one.
     """
     columns = scaled_twists(member.screws, member.centre, size, member.size)
+    if member.rank < columns.shape[1]:
+        measured = ca.Function("screws", list(numbers), [ca.densify(columns / size)])
+        values = [measured(each.dimensions, each.unknowns, each.rotation, each.position).full() for each in points]
+        groups = column_groups([each for each in values if np.isfinite(each).all()], member.rank)
+        member = replace(member, groups=groups)
     driving = [screw for each in actuators if (screw := each.screw_in(member.label)) is not None]
     actuated = scaled_twists(ca.horzcat(SX(6, 0), *driving), member.centre, size, member.size)
-    vectors = resisted_parts(columns, member.rank, ca.horzcat(SX.eye(member.size), actuated))
-    function = ca.Function("kinds", list(numbers), [ca.densify(vectors)])
+    vectors = resisted_parts(columns, member.rank, ca.horzcat(SX.eye(member.size), actuated), member.groups)
+    function, point = ca.Function("kinds", list(numbers), [ca.densify(vectors)]), points[0]
     found = function(point.dimensions, point.unknowns, point.rotation, point.position).full()
     basis = basis_of_member(found[:, : member.size], found[:, member.size :], member.size - member.rank)
     return replace(member, kinds=basis.kinds)

@@ -4,7 +4,8 @@ With the rates ``q`` of a member's passive joints along a spanning tree from the
 the platform's twist is ``S q``. The member allows the twists ``S N`` with the projector ``N`` on the null space of
 ``L``, and the twist ``s - S L^+ l`` for a unit rate of an actuator with the columns ``s`` and ``l``. Projector and
 pseudo-inverse follow from the ranks of the loops for almost all configurations, without a choice of columns. Loops are
-taken one after the other: a recursion for all at once would lose half of the digits.
+taken one after the other, and equations of a loop that are independent too: a recursion for all at once would lose half
+of the digits.
 """
 
 from __future__ import annotations
@@ -196,44 +197,50 @@ class NullSpace:
 
     Attributes:
         projector: (n, n) on the rates that close all loops.
-        inverses: pseudo-inverse (n, m) of each loop's equations, among the rates that close those before it.
-        motions: loops and platform's twists.
+        equations: (m, n) those of each loop; of a loop whose equations are independent, each one alone.
+        inverses: pseudo-inverse (n, m) of each of these, among the rates that keep those before it.
+        platform: (6, n) the platform's twists.
     """
 
     projector: SX
+    equations: tuple[SX, ...]
     inverses: tuple[SX, ...]
-    motions: Motions
+    platform: SX
 
     @property
     def screws(self) -> SX:
         """Twists (6, n) of the platform that free joints allow, as many as there are rates."""
-        return self.motions.platform @ self.projector
+        return self.platform @ self.projector
 
-    def driven(self, screw: SX, loops: Sequence[SX]) -> DrivenMotion:
+    def driven(self, screw: SX, loops: SX) -> DrivenMotion:
         """Return the motion for a unit rate of an actuated joint, the other actuators at rest.
 
         Args:
             screw: (6, 1) of the joint in the platform's twist.
-            loops: (m, 1) of the joint in each loop.
+            loops: (m, 1) of the joint in all loops, one below the other.
         """
         rates = SX(self.projector.shape[0], 1)
         open_loops = [SX(0, 1)]
-        for own, inverse, loop in zip(loops, self.inverses, self.motions.loops, strict=True):
+        for inverse, loop in zip(self.inverses, self.equations, strict=True):
+            own, loops = loops[: loop.shape[0], :], loops[loop.shape[0] :, :]
             rates -= inverse @ (own + loop @ rates)
             open_loops.append(own + loop @ rates)
-        return DrivenMotion(screw + self.motions.platform @ rates, ca.vertcat(*open_loops))
+        return DrivenMotion(screw + self.platform @ rates, ca.vertcat(*open_loops))
 
 
 def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
     """Return the null space of a member's loops from their ranks."""
     projector = SX.eye(motions.platform.shape[1])
-    inverses = []
+    equations, inverses = [], []
     for loop, rank in zip(motions.loops, ranks.loops, strict=True):
-        left = ca.densify(loop @ projector)
-        inverse = pseudo_inverse(left, rank)
-        inverses.append(inverse)
-        projector -= inverse @ left
-    return NullSpace(projector, tuple(inverses), motions)
+        is_regular = rank == loop.shape[0]
+        for each in ca.vertsplit(loop) if is_regular else [loop]:
+            left = ca.densify(each @ projector @ projector)
+            inverse = pseudo_inverse(left, 1 if is_regular else rank)
+            equations.append(each)
+            inverses.append(inverse)
+            projector -= inverse @ left
+    return NullSpace(projector, tuple(equations), tuple(inverses), motions.platform)
 
 
 def member_of(limb: str, network: OpenNetwork, each: NestedMember, screws: SX, rank: int) -> Member:

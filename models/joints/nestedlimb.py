@@ -118,22 +118,22 @@ def resisting(
         free = motions_of(network, frame, each.joints, each.joints)
         free_ranks = measured_ranks(free, symbols, points, robot.size)
         null = null_space(locked, ranks)
-        allowed = null.screws
-        open_columns = []
+        free_loops, open_columns = ca.vertcat(SX(0, len(free.columns)), *free.loops), []
         for k in actuated:
             column = free.columns.index(k)
-            driven = null.driven(free.platform[:, column], [loop[:, column] for loop in free.loops])
+            driven = null.driven(free.platform[:, column], free_loops[:, column])
             open_columns.append(driven.open_loops)
             if not ca.sparsify(driven.screw).is_zero():
                 screws[k][label or limb.name] = driven.screw / rate_sizes[k]
         open_loops.append(ca.horzcat(*open_columns))
         if ranks.twists < 6:
-            found.members.append(replace(member_of(limb.name, network, each, allowed, ranks.twists), name=label))
-        labels = [f"{limb.name}:{network.graph.joints[k].name}" for k in (*locked.columns, *free.columns)]
-        columns = ca.horzcat(allowed, null_space(free, free_ranks).screws)
-        indices = tuple(range(allowed.shape[1], columns.shape[1]))
-        own = JointScrews(limb.name, tuple(labels), columns, indices, ranks.twists, free_ranks.twists, is_nested=True)
-        found.screws.append(own)
+            found.members.append(replace(member_of(limb.name, network, each, null.screws, ranks.twists), name=label))
+        labels = tuple(f"{limb.name}:{network.graph.joints[k].name}" for k in free.columns)
+        driving = tuple(i for i, k in enumerate(free.columns) if k in actuated)
+        sizes = ca.horzcat(*[rate_sizes.get(k, SX(1)) for k in free.columns])
+        motions, loops = (part / ca.repmat(sizes, part.shape[0], 1) for part in (free.platform, free_loops))
+        ends = ranks.twists, free_ranks.twists
+        found.screws.append(JointScrews(limb.name, labels, motions, driving, *ends, label or limb.name, loops))
         found.structure.append(_structure(limb, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     relations = _relations(ca.vertcat(*open_loops), symbols, points)
     for column, k in enumerate(actuated):

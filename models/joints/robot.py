@@ -310,7 +310,7 @@ def model_of_home(
         builder.structure += found.structure
     _check_carrying(builder)
     actuators = with_all_relations(builder.actuators)
-    members = [with_kinds(member, actuators, at_home.size, numbers, loops.points[0]) for member in builder.members]
+    members = [with_kinds(member, actuators, at_home.size, numbers, loops.points) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
     everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
     drawings = [network_drawing(e.name, e.network, carries=e.name in builder.carrying) for e in builder.networks]

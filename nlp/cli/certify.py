@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from .numbers import Number, WholeNumber
-from .options import AllAssemblies, CaseName, Jobs, JsonFile, SettingTexts, console, read_settings, write_json
+from .options import AllAssemblies, CaseName, Jobs, JsonFile, SettingTexts, Time, console, read_settings, write_json
 
 
 def certify(
@@ -17,10 +17,7 @@ def certify(
         float,
         typer.Option(parser=Number("--gap"), metavar="PART", help="Part of the best F that the bound may be off by."),
     ] = 1e-4,
-    time: Annotated[
-        float | None,
-        typer.Option(parser=Number("--time"), metavar="SECONDS", help="Stop then, with the bound reached."),
-    ] = None,
+    time: Time = None,
     above: Annotated[
         float | None,
         typer.Option(parser=Number("--above"), metavar="F", help="Prove that F is above this value on the whole box."),

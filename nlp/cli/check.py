@@ -11,7 +11,8 @@ from .options import JsonFile, console, write_json
 
 def check(
     cases: Annotated[
-        list[str] | None, typer.Argument(metavar="[CASE]...", help="All shipped cases if left out.")
+        list[str] | None,
+        typer.Argument(metavar="[CASE]...", help="Case files or names of shipped cases; all of these if left out."),
     ] = None,
     json_file: JsonFile = None,
     junit: Annotated[str | None, typer.Option(metavar="FILE", help="Write JUnit XML for a CI; - is stdout.")] = None,

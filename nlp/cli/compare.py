@@ -16,6 +16,7 @@ from .options import (
     Seed,
     SettingTexts,
     Starts,
+    Time,
     check_picture,
     console,
     read_settings,
@@ -44,10 +45,7 @@ def compare(
         ),
     ] = 0.25,
     certified: Annotated[bool, typer.Option("--certify", help="Prove each optimum too.")] = False,
-    time: Annotated[
-        float,
-        typer.Option("--time", parser=Number("--time"), metavar="SECONDS", help="Stop each search of a proof then."),
-    ] = 20.0,
+    time: Time = None,
     settings: SettingTexts = None,
     starts: Starts = None,
     seed: Seed = None,
@@ -66,7 +64,7 @@ def compare(
     from ..comparison.compare import compare as compare_robots
     from ..comparison.robots import read_robots
     from ..errors import InputError
-    from ..interruption import Milestone, answer_after, is_requested
+    from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..output.files import check_outputs
 
     if [json_file, csv_file, html].count("-") > 1:
@@ -106,12 +104,13 @@ def compare(
     finally:
         if show_progress:
             sys.stderr.write(CLEAR_LINE)
-    if is_requested():
+    is_stopped = is_requested()
+    if is_stopped:
         begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
-        typer.echo(f"interrupted: {begun}", err=True)
+        typer.echo(f"{why_stopped()}: {begun}", err=True)
     _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
-    raise typer.Exit(0 if found.ranked and is_proved else 1)
+    raise typer.Exit(0 if found.ranked and is_proved and not is_stopped else 1)
 
 
 def _write(

@@ -39,7 +39,9 @@ def import_(
         list[str] | None, typer.Option(metavar="JOINT...", help="Driven joints, instead of those of the model.")
     ] = None,
     out: Annotated[str | None, typer.Option(metavar="FILE", help="Robot file to write; - is stdout.")] = None,
-    close: Annotated[bool, typer.Option("--close", help="Close open loops by Newton's method.")] = False,
+    close: Annotated[
+        bool, typer.Option("--close", help="Close open loops by Newton's method, if need be from other starts.")
+    ] = False,
     keyframe: Annotated[
         str, typer.Option(metavar="NAME", help="Configuration of an MJCF file: one of its keyframes.")
     ] = "",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -47,8 +47,32 @@ Seed = Annotated[
 ]
 Jobs = Annotated[
     int | None,
-    typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads; the result does not depend on it."),
+    typer.Option(
+        parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads; what a search finds does not depend on them."
+    ),
 ]
+
+
+def _begin(context: typer.Context, seconds: float | None) -> float | None:
+    """Begin the time of a command: its searches take from what is left of it.
+
+    Raises:
+        InputError: the number is not positive.
+    """
+    from ..errors import check_seconds
+    from ..interruption import within
+
+    check_seconds(seconds)
+    context.with_resource(within(seconds))
+    return seconds
+
+
+def time_option(words: str) -> Any:  # noqa: ANN401 - typer's own type is not public
+    """Return the option ``--time``, with what the help says of it."""
+    return typer.Option("--time", parser=Number("--time"), metavar="SECONDS", callback=_begin, help=words)
+
+
+Time = Annotated[float | None, time_option("Seconds for the whole command, which then shows what it has.")]
 AllAssemblies = Annotated[
     bool,
     typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),

@@ -17,6 +17,7 @@ from .options import (
     Seed,
     SettingTexts,
     Starts,
+    Time,
     check_picture,
     console,
     read_settings,
@@ -34,12 +35,13 @@ def pareto(
         typer.Option(metavar="GOAL", help="Twice or more: max or min, then F:TASK or limits.KEY, as in 'max F:drive'."),
     ],
     points: Annotated[
-        int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front; 16.")
+        int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front.")
     ] = 16,
     settings: SettingTexts = None,
     starts: Starts = None,
     seed: Seed = None,
     jobs: Jobs = None,
+    _time: Time = None,
     certify: Annotated[bool, typer.Option("--certify", help="Prove each point's optimum too.")] = False,
     csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write the front as CSV.")] = None,
     json_file: JsonFile = None,
@@ -51,7 +53,7 @@ def pareto(
     from ..errors import InputError, UncoveredError
     from ..front.front import find_front
     from ..front.goals import read_goals
-    from ..interruption import Milestone, answer_after, is_requested
+    from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..output.files import check_outputs
 
     if [json_file, csv_file, html].count("-") > 1:
@@ -86,11 +88,12 @@ def pareto(
     finally:
         if show:
             sys.stderr.write(CLEAR_LINE)
-    if is_requested():
-        typer.echo(f"interrupted: {len(found.points)} of {points} points are found", err=True)
+    is_stopped = is_requested()
+    if is_stopped:
+        typer.echo(f"{why_stopped()}: {len(found.points)} of {points} points are found", err=True)
     _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
     is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
-    raise typer.Exit(0 if is_proved else 1)
+    raise typer.Exit(0 if is_proved and not is_stopped else 1)
 
 
 def _write(found: Front, *, json_file: str | None, csv_file: str | None, html: str | None, plot: str | None) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, Seed, SettingTexts, Starts, read_settings
+from .options import CaseName, Jobs, Seed, SettingTexts, Starts, Time, read_settings
 
 
 def report(
@@ -20,6 +20,7 @@ def report(
     starts: Starts = None,
     seed: Seed = None,
     jobs: Jobs = None,
+    _time: Time = None,
 ) -> None:
     """Solve a case and write a page about it.
 

@@ -18,6 +18,7 @@ from .options import (
     Seed,
     SettingTexts,
     Starts,
+    Time,
     check_csv,
     check_picture,
     console,
@@ -33,6 +34,7 @@ def solve(
     starts: Starts = None,
     seed: Seed = None,
     jobs: Jobs = None,
+    _time: Time = None,
     compiled: Annotated[
         bool, typer.Option("--compiled", help="Call the objective as compiled C; needs a C compiler.")
     ] = False,

@@ -9,8 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import Number, WholeNumber
-from .options import CLEAR_LINE, CaseName, Jobs, JsonFile, Seed, SettingTexts, check_picture, read_settings, write_json
+from .numbers import WholeNumber
+from .options import (
+    CLEAR_LINE,
+    CaseName,
+    JsonFile,
+    Seed,
+    SettingTexts,
+    check_picture,
+    read_settings,
+    time_option,
+    write_json,
+)
 
 if TYPE_CHECKING:
     from ..sweeps.points import Points
@@ -20,7 +30,7 @@ if TYPE_CHECKING:
 def sweep(
     case: CaseName,
     out: Annotated[
-        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a killed run is resumed.")
+        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a stopped run goes on.")
     ],
     over: Annotated[
         list[str] | None,
@@ -33,10 +43,17 @@ def sweep(
     settings: SettingTexts = None,
     starts: Annotated[
         int | None,
-        typer.Option(parser=WholeNumber("--starts", 1, 100_000), metavar="N", help="Starting points at each point; 8."),
+        typer.Option(
+            parser=WholeNumber("--starts", 1, 100_000),
+            metavar="N",
+            help="Starting points at each point; 8 if left out.",
+        ),
     ] = None,
     seed: Seed = None,
-    jobs: Jobs = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads, or processes of Ipopt."),
+    ] = None,
     engine: Annotated[
         str | None, typer.Option("--engine", metavar="WORD", help="compiled or ipopt; compiled where that covers it.")
     ] = None,
@@ -45,12 +62,9 @@ def sweep(
         typer.Option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://10.0.0.1:8786."),
     ] = None,
     certified: Annotated[bool, typer.Option("--certify", help="Prove the optimum at each point too.")] = False,
-    time: Annotated[
-        float,
-        typer.Option(
-            "--time", parser=Number("--time"), metavar="SECONDS", help="Stop each proof then, with its bound."
-        ),
-    ] = 60.0,
+    _time: Annotated[
+        float | None, time_option("Seconds for the whole command; the same one then goes on where it was.")
+    ] = None,
     json_file: JsonFile = None,
     html: Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")] = None,
     plot: Annotated[
@@ -62,7 +76,6 @@ def sweep(
     from ..errors import InputError
     from ..interruption import say_on_leaving
     from ..output.files import check_outputs
-    from ..output.sweepfunction import check_seconds
     from ..output.sweeptable import check_table, is_written, write_table
     from ..sweeps.engines import EngineKind
     from ..sweeps.source import CaseSource
@@ -73,7 +86,6 @@ def sweep(
         raise InputError(f"--engine {engine}: must be compiled or ipopt")
     chosen = _read_points(over, points)
     _check_files(chosen, plot, html, json_file)
-    check_seconds(time)
     check_table(out)
     read = read_case(case, read_settings(settings))
     inputs = dict(read.inputs)
@@ -83,7 +95,7 @@ def sweep(
         inputs[Path(points)] = "the file of the points"
     check_outputs(inputs, {"--out": out, "--json": json_file, "--html": html, "--plot": plot})
     with _named_points(chosen, points):
-        found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, time if certified else None)
+        found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, certified=certified)
     if is_written(out, found):
         typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
     else:
@@ -92,12 +104,7 @@ def sweep(
             before = len(chosen) - len(journal.missing)
             if before:
                 typer.echo(f"{before:,} of {len(chosen):,} points are in {journal.path} already", err=True)
-            say_on_leaving(
-                lambda: (
-                    f"{len(chosen) - len(journal.missing):,} of {len(chosen):,} points are in {journal.path}: "
-                    "the same command goes on from there"
-                )
-            )
+            say_on_leaving(lambda: journal.words)
             run_sweep(
                 found,
                 journal,
@@ -109,6 +116,9 @@ def sweep(
             )
             if show:
                 sys.stderr.write(CLEAR_LINE)
+            if len(journal.missing):
+                typer.echo(f"the time is over: {journal.words}", err=True)
+                raise typer.Exit(1)
             write_table(out, found, journal.rows())
             journal.remove()
     if json_file is not None or html is not None:
@@ -202,7 +212,7 @@ def _show(found: Sweep, out: str, plot: str | None, *, is_silent: bool) -> int:
     values = [row.F for row in rows if not math.isnan(row.F)]
     regions = len({row.active for row in rows if not math.isnan(row.F)})
     ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
-    if found.proof_seconds is not None:
+    if found.certified:
         from ..output.sweeptable import table_rows
 
         proved = sum(row.certificate == "proved" for row in table_rows(out, found))

@@ -16,6 +16,7 @@ from .options import (
     Seed,
     SettingTexts,
     Starts,
+    Time,
     check_picture,
     console,
     read_settings,
@@ -38,6 +39,7 @@ def tradeoff(
     starts: Starts = None,
     seed: Seed = None,
     jobs: Jobs = None,
+    _time: Time = None,
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write the curve as CSV.")] = None,
     plot: CurveFile = None,
@@ -46,7 +48,7 @@ def tradeoff(
     """Solve along one limit or number, and show F against it."""
     from ..case.reader import read_case
     from ..errors import InputError
-    from ..interruption import Milestone, answer_after, is_requested
+    from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..output.files import check_outputs, write_bytes, write_text
     from ..results.tradeoff import tradeoff_result
     from ..results.tradeoffwording import tradeoff_csv, tradeoff_summary
@@ -74,7 +76,7 @@ def tradeoff(
     if show_progress:
         sys.stderr.write(CLEAR_LINE)
     if is_requested() and not found.unsolved:
-        typer.echo("interrupted: every value is solved, but not all from the optima beside it", err=True)
+        typer.echo(f"{why_stopped()}: every value is solved, but not all from the optima beside it", err=True)
     loaded, result = found.points[0].solution.case, tradeoff_result(found)
     if json_file is not None:
         write_json(json_file, result)

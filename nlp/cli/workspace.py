@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .numbers import Number
-from .options import CaseName, Jobs, JsonFile, LegError, ResultFile, SettingTexts, console, read_settings
+from .options import CaseName, Jobs, JsonFile, LegError, ResultFile, SettingTexts, Time, console, read_settings
 from .workspacefiles import WorkspaceFiles
 
 if TYPE_CHECKING:
@@ -28,10 +28,7 @@ def workspace(
         float,
         typer.Option(parser=Number("--gap"), metavar="PART", help="Part of a value that its bound may be off by."),
     ] = 1e-3,
-    time: Annotated[
-        float,
-        typer.Option(parser=Number("--time"), metavar="SECONDS", help="Stop each search then, with the bound reached."),
-    ] = 20.0,
+    time: Time = None,
     leg_error: LegError = 0.0,
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
     proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
@@ -60,8 +57,6 @@ def workspace(
 
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
-    if not time > 0:
-        raise InputError(f"--time {time:g}: must be positive")
     record = paper_record(proof, json_file)
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
@@ -97,7 +92,7 @@ def _judge_with_progress(
     case: Case,
     quantities: list[str],
     gap: float,
-    time: float,
+    time: float | None,
     leg_error: float,
     jobs: int | None,
     paper: PaperRecord | None,
@@ -105,7 +100,9 @@ def _judge_with_progress(
     """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
     import sys
 
-    from ..proof.workspace.judge import judge_workspace
+    from ..proof.workspace.judge import TIME_LIMIT, judge_workspace
+
+    time = TIME_LIMIT if time is None else time
 
     if not sys.stderr.isatty():
         return judge_workspace(

@@ -12,9 +12,9 @@ from typing import Literal, TypeAlias
 from ...models import Model
 from ..case.case import Case
 from ..case.task import Sense
-from ..errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError, listing
+from ..errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError, check_seconds, listing
 from ..evidence.singularities import clause_of
-from ..interruption import Milestone, is_requested, one_call, reached
+from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, within
 from ..proof.workspace.judge import judge_workspace
 from ..proof.workspace.verdict import Outcome
 from ..solver.certified import certify
@@ -28,7 +28,7 @@ from .size import size_at, size_at_start, size_of_home
 #: Part of a typical dimension by which a design may differ from it, as for a starter's free numbers.
 RANGE = 0.25
 #: Seconds for each search of a proof, of a certificate or over a workspace.
-TIME_LIMIT = 20.0
+TIME_LIMIT = 60.0
 #: Measures of actuators and of legs whose strokes are told.
 _MEASURES = ("actuator_length", "actuator_angle", "leg_length")
 
@@ -79,7 +79,7 @@ def compare(
     scale: bool = True,
     part: float = RANGE,
     certified: bool = False,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     starts: int | None = None,
     seed: int | None = None,
     jobs: int | None = None,
@@ -97,7 +97,8 @@ def compare(
         scale: whether robots are scaled at all; typical lengths are otherwise lengths in the case's unit.
         part: of a typical dimension by which a design may differ from it; 0 holds typical dimensions fixed.
         certified: whether each optimum is proved too.
-        time_limit: seconds for each search of a proof.
+        time_limit: seconds for the whole call, of whose rest each robot takes an equal part at most. Without it
+            the certificate of a robot ends after 60 s, and its judgement over the workspace too.
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
         jobs: number of threads; the result does not depend on it.
@@ -111,29 +112,33 @@ def compare(
     """
     began = time.perf_counter()
     contenders = read_robots(robots, case)
-    _check_numbers(size, part, time_limit, scale=scale)
+    check_seconds(time_limit)
+    _check_numbers(size, part, scale=scale)
     common = (size or _own_size(case)) if scale else None
     length = case.characteristic_length if case.model.has_couples else (common or _own_size(case)) / 2
     entries = []
-    for done, contender in enumerate(contenders):
-        if is_requested():
-            break
-        if progress is not None:
-            progress(contender.label, done, len(contenders))
-        entry = _solved(case, contender, common, part, length, (starts, seed, jobs))
-        if certified:
-            entry = _with_certificate(entry, time_limit, jobs)
-        entries.append(_with_judgement(entry, time_limit, jobs))
-        reached(Milestone.ROBOT)
+    with within(time_limit):
+        for done, contender in enumerate(contenders):
+            if is_requested():
+                break
+            if progress is not None:
+                progress(contender.label, done, len(contenders))
+            with within(seconds_left() / (len(contenders) - done)):
+                entry = _solved(case, contender, common, part, length, (starts, seed, jobs))
+                if certified:
+                    entry = _with_certificate(entry, jobs)
+                entries.append(_with_judgement(entry, jobs))
+            reached(Milestone.ROBOT)
+        is_stopped = is_requested()
     answers = [each for each in entries if each.has_answer]
-    if answers and not is_requested() and all(each.can_move is False for each in answers):
+    if answers and not is_stopped and all(each.can_move is False for each in answers):
         names = listing(dict.fromkeys(task.name for each in answers for task in each.tasks if task.can_move is False))
         fault = "no robot of the comparison has the freedom for its motion"
         raise InputError(f"{case.source or case.name}: task {names}: {fault}")
     return Comparison(case, common, part, length, _in_order(entries), time.perf_counter() - began)
 
 
-def _check_numbers(size: float | None, part: float, time_limit: float, *, scale: bool) -> None:
+def _check_numbers(size: float | None, part: float, *, scale: bool) -> None:
     """Refuse numbers that are not allowed.
 
     Raises:
@@ -145,8 +150,6 @@ def _check_numbers(size: float | None, part: float, time_limit: float, *, scale:
         raise InputError("--size: cannot stand beside --no-scale")
     if not 0 <= part < 1:
         raise InputError(f"--range {part:g}: must be at least 0 and below 1")
-    if not time_limit > 0:
-        raise InputError(f"--time {time_limit:g}: must be positive")
 
 
 def _own_size(case: Case) -> float:
@@ -216,13 +219,18 @@ def _measures(contender: Contender) -> tuple[str, ...]:
     return tuple(each.name for each in contender.model.quantities if each.name in _MEASURES)
 
 
-def _with_certificate(entry: Entry, time_limit: float, jobs: int | None) -> Entry:
+def _proof_seconds() -> float | None:
+    """Return the seconds for one proof: no limit but the time left where there is one."""
+    return TIME_LIMIT if math.isinf(seconds_left()) else None
+
+
+def _with_certificate(entry: Entry, jobs: int | None) -> Entry:
     """Return a robot with the certificate of its answer, or the reason why it has none."""
     if entry.solution is None or not entry.has_answer:
         return entry
     began = time.perf_counter()
     try:
-        found = certify(entry.solution, time_limit=time_limit, jobs=jobs)
+        found = certify(entry.solution, time_limit=_proof_seconds(), jobs=jobs)
     except (UncoveredError, InputError) as error:
         return replace(entry, certificate_fault=str(error))
     if found.certificate is not None and found.certificate.was_beaten:
@@ -231,7 +239,7 @@ def _with_certificate(entry: Entry, time_limit: float, jobs: int | None) -> Entr
     return replace(entry, certified=found, seconds=entry.seconds + time.perf_counter() - began)
 
 
-def _with_judgement(entry: Entry, time_limit: float, jobs: int | None) -> Entry:
+def _with_judgement(entry: Entry, jobs: int | None) -> Entry:
     """Return a robot with the verdict on its design over the case's workspace, where the case has one."""
     if entry.placed is None or entry.solution is None or entry.placed.case.workspace is None or not entry.has_answer:
         return entry
@@ -246,7 +254,7 @@ def _with_judgement(entry: Entry, time_limit: float, jobs: int | None) -> Entry:
         return replace(entry, judgement=proof.judgement, outcome=verdict, strokes=strokes)
     try:
         design = design_of(entry.placed.case, outcome.own.nlp, outcome.x)
-        judged = judge_workspace(design, quantities=asked, time_limit=time_limit, jobs=jobs, with_objective=False)
+        judged = judge_workspace(design, quantities=asked, time_limit=_proof_seconds(), jobs=jobs, with_objective=False)
     except ScrewsynthError as error:
         return replace(entry, workspace_fault=str(error))
     strokes = proven_strokes(judged, names)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import casadi as ca
@@ -179,9 +180,8 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
 
 def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
     """Return a leg with the expressions of its joint centres at the first pose: no pose changes the centres."""
-    same = all(
-        ca.is_equal(here, there, _DEPTH) for here, there in ((leg.base, first.base), (leg.platform, first.platform))
-    )
+    pairs = (leg.base, first.base), (leg.platform, first.platform)
+    same = all(ca.is_equal(here, there, _DEPTH) for here, there in pairs)
     return replace(leg, base=first.base, platform=first.platform) if same else leg
 
 
@@ -200,8 +200,8 @@ def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> _RowInputs:
             pairs = ((row.force, along.force), (row.moment, along.moment), (row.square, along.square))
             if all(ca.is_equal(one, other, _DEPTH) for one, other in pairs):
                 return _RowInputs(_FORCE_OF_LEG, ca.vertcat(leg.base, leg.span))
-    form = _FORCE if row.kind is WrenchKind.FORCE else _COUPLE
-    return _RowInputs(form, ca.vertcat(row.force, row.moment, row.square))
+    kind = WrenchKind.FORCE if row.kind is WrenchKind.FORCE else WrenchKind.COUPLE
+    return _RowInputs(_OF_KIND[kind], ca.vertcat(row.force, row.moment, row.square))
 
 
 def _calls_of_rows(robot: RobotInstance, rows: Sequence[_RowInputs]) -> list[InnerCall]:
@@ -210,11 +210,8 @@ def _calls_of_rows(robot: RobotInstance, rows: Sequence[_RowInputs]) -> list[Inn
     at = robot.inputs.numel() - 6 * tasks
     length, calls = robot.inputs[at - 1], []
     for j in range(tasks):
-        twist, terms, sizes = (
-            robot.inputs[at + 6 * j : at + 6 * j + 6],
-            SX.sym("term", len(rows)),
-            SX.sym("size", len(rows)),
-        )
+        twist = robot.inputs[at + 6 * j : at + 6 * j + 6]
+        terms, sizes = SX.sym("term", len(rows)), SX.sym("size", len(rows))
         for i, row in enumerate(rows):
             inputs = ca.vertcat(length, twist, row.inputs)
             calls.append(InnerCall(Call(row.form, inputs), ca.vertcat(robot.rates[i, j], terms[i])))
@@ -229,12 +226,8 @@ def _force_of_leg(inputs: SX) -> Wrench:
     return force_along("", inputs[:3], inputs[3:])
 
 
-def _force(inputs: SX) -> Wrench:
-    return Wrench("", WrenchKind.FORCE, inputs[:3], inputs[3:6], inputs[6])
-
-
-def _couple(inputs: SX) -> Wrench:
-    return Wrench("", WrenchKind.COUPLE, inputs[:3], inputs[3:6], inputs[6])
+def _wrench(kind: WrenchKind, inputs: SX) -> Wrench:
+    return Wrench("", kind, inputs[:3], inputs[3:6], inputs[6])
 
 
 def _rate_of_row(inputs: SX, row: RowBuild) -> SX:
@@ -248,7 +241,8 @@ def _size_of_row(inputs: SX, row: RowBuild) -> SX:
     return magnitude([row(inputs[10:])], inputs[1:7], inputs[7:10], inputs[0])
 
 
-_FORCE_OF_LEG, _FORCE, _COUPLE = (Form(_rate_of_row, (row,)) for row in (_force_of_leg, _force, _couple))
+_FORCE_OF_LEG = Form(_rate_of_row, (_force_of_leg,))
+_OF_KIND = {kind: Form(_rate_of_row, (partial(_wrench, kind),)) for kind in (WrenchKind.FORCE, WrenchKind.COUPLE)}
 
 
 def _is_worthwhile(program: Program, members: Sequence[FinalCall], values: set[int]) -> bool:
@@ -271,4 +265,4 @@ def by_form(final: Iterable[FinalCall]) -> list[list[FinalCall]]:
     found: dict[tuple[Form, int], list[FinalCall]] = {}
     for item in final:
         found.setdefault((item.call.form, item.call.inputs.numel()), []).append(item)
-    return list(found.values())
+    return [*found.values()]

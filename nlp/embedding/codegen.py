@@ -27,14 +27,23 @@ from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
-from .apitexts import index_macros, version_texts
 from .casaditext import for_controllers
-from .ctext import comment_text, identifier, integer_table, matrix_table, number_table, string_literal, string_table
+from .ctext import (
+    comment_text,
+    identifier,
+    index_macros,
+    integer_table,
+    matrix_table,
+    number_table,
+    string_literal,
+    string_table,
+    version_texts,
+)
 from .held import held_by_fixed_numbers, held_texts
 from .loops import find_loops
 from .looptext import casadi_work, loop_texts, loop_work
 from .manifest import MANIFEST, manifest_text
-from .measured import header_texts
+from .measured import NOT_MEASURED
 from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words
@@ -97,19 +106,15 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     names, units = _substitutions(subject, staged), UnitData(nlp)
     names |= held_texts(held, limits)
     names |= limit_texts(limits, prefix, units.of_case.label, units.limit_multipliers(limits.limits))
-    parts = dict(_PARTS)
-    if staged.loops:
-        parts["-loops.c"] = "loops.c"
-    if staged.loops.spectra:
-        parts["-spectrum.c"] = "spectrum.c"
-    sources = [f"{prefix}{ending}" for ending in (*parts, *_CORE, "-casadi.c") if ending.endswith(".c")]
-    headers = [f"{prefix}{ending}" for ending in (*parts, *_CORE, "-casadi.h") if ending.endswith(".h")]
+    parts = _PARTS | ({"-loops.c": "loops.c"} if staged.loops else {})
+    parts |= {"-spectrum.c": "spectrum.c"} if staged.loops.spectra else {}
+    own = [f"{prefix}{ending}" for ending in (*parts, *_CORE, "-casadi.c", "-casadi.h")]
+    sources = [name for name in own if name.endswith(".c")]
     names |= {"sources": " ".join(sources), "objects": " ".join(f"{name[:-2]}.o" for name in sources)}
-    names["headers"] = " ".join(headers)
+    names["headers"] = " ".join(name for name in own if name.endswith(".h"))
     files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
     files |= {f"{prefix}{ending}": _core_text(ending, prefix, names) for ending in _CORE}
-    for name in _OTHERS:
-        files[name] = _fill_template(f"{name}.in", names)
+    files |= {name: _fill_template(f"{name}.in", names) for name in _OTHERS}
     casadi = _casadi_files((*staged.all, *limits.functions), f"{prefix}_CASADI")
     files |= {f"{prefix}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
     return files | {MANIFEST: manifest_text(nlp, limits.limits, names, files)}
@@ -137,7 +142,12 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
     return f"{words}, most of it for {key} and its derivatives: compiling it may take a minute"
 
 
-def _fill_template(template: str, names: dict[str, str]) -> str:
+def budget_files(prefix: str) -> dict[str, str]:
+    """Return C by which each of many problems has a budget of its own, for the library that Python loads."""
+    return {f"{prefix}-deadline.c": _fill_template("deadline.c.in", {"id": prefix})}
+
+
+def _fill_template(template: str, names: Mapping[str, str]) -> str:
     """Return a template's text with its placeholders replaced."""
     return Template((_TEMPLATES / template).read_text(encoding="utf-8")).substitute(names)
 
@@ -179,7 +189,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
     # Workspace of sqp.c, multipliers, numbers at a point. A test in solver.c keeps it from compiling with too little.
-    solver_work = work + 5 * n**2 + 19 * n + 15 * c + 3 * c * n + 1
+    solver_work = work + 5 * n**2 + 18 * n + 15 * c + 3 * c * n + 1
     solver_iwork = 3 * n + 2 * c + 1
     return {
         "id": prefix,
@@ -213,8 +223,9 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        **worst_case_texts(n, c, _SEEDS + 1, level >= 0),
-        **header_texts(),
+        **worst_case_texts(n, c, _SEEDS + 1),
+        "measured_macros": f"/* {NOT_MEASURED} */",
+        "measured_rows": NOT_MEASURED,
         "solver_work": str(solver_work),
         "solver_iwork": str(solver_iwork),
         "solver_bytes": str(8 * solver_work + 4 * solver_iwork),
@@ -242,7 +253,6 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
     units = UnitData(nlp)
-    lower, upper = (np.nan_to_num(bound, neginf=-1e300, posinf=1e300) for bound in (nlp.g_lower, nlp.g_upper))
     kinds = [list(Dimension).index(each.dimension) for each in program.variables]
     bounds = bounds_in_c(nlp)
     if program.places.epigraph is not None:
@@ -268,10 +278,11 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         "/* Rows of the Jacobian: the limb of each, and whether it is a force, a couple or another wrench. */",
         string_table(f"{prefix}_row_limbs", M, [row.limb for row in program.model.frame_rows]),
         string_table(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.frame_rows]),
-        "/* Constraints: names and bounds; 1e300 is none. */",
+        "/* Constraints: names, units of their multipliers, and bounds; 1e300 is none. */",
         string_table(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
-        number_table(f"{prefix}_constraint_lower", C, lower),
-        number_table(f"{prefix}_constraint_upper", C, upper),
+        string_table(f"{prefix}_constraint_multiplier_units", C, units.constraint_multipliers),
+        number_table(f"{prefix}_constraint_lower", C, nlp.g_lower),
+        number_table(f"{prefix}_constraint_upper", C, nlp.g_upper),
         "/* Tasks: names, and twists of six numbers each. */",
         string_table(f"{prefix}_task_names", T, [task.name for task in case.tasks]),
         number_table(

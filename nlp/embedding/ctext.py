@@ -1,4 +1,4 @@
-"""C text: constant tables, string literals, comments and identifiers, valid for any names of a case."""
+"""C text: tables, string literals, comments, identifiers and macros, valid for any names of a case."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Iterable
 
 from ...models import FloatArray
 from ..errors import one_line
+from ..program.program import Program
 
-#: Between two entries of a table: each has a line of its own, so that lines stay short and differences are seen.
-_BY_LINE = ",\n    "
+#: Size of a bound that is none, in tables of C.
+NO_BOUND = 1e300
 
 
 def identifier(name: str) -> str:
@@ -39,20 +40,24 @@ def c_names(names: Iterable[str]) -> list[str]:
 
 
 def string_table(name: str, size: str, values: Iterable[str]) -> str:
-    """Return a constant table of strings; it ends with a null, so that it is never empty."""
-    quoted = _BY_LINE.join([*(string_literal(text) for text in values), "0"])
-    return f"static const char *const {name}[{size} + 1] = {{\n    {quoted}}};"
+    """Return a constant table of strings."""
+    return _table(f"char *const {name}", size, [*map(string_literal, values), "0"])
 
 
 def number_table(name: str, size: str, values: Iterable[float]) -> str:
-    """Return a constant table of numbers; it ends with a zero, so that it is never empty."""
-    listed = _BY_LINE.join([*(repr(float(value)) for value in values), "0.0"])
-    return f"static const double {name}[{size} + 1] = {{\n    {listed}}};"
+    """Return a constant table of numbers; infinite ones become bounds that are none."""
+    return _table(f"double {name}", size, [repr(max(-NO_BOUND, min(float(each), NO_BOUND))) for each in [*values, 0]])
 
 
 def integer_table(name: str, size: str, values: Iterable[int]) -> str:
-    """Return a constant table of whole numbers; it ends with a zero, so that it is never empty."""
-    return f"static const int {name}[{size} + 1] = {{\n    {_BY_LINE.join(map(str, [*values, 0]))}}};"
+    """Return a constant table of whole numbers."""
+    return _table(f"int {name}", size, map(str, [*values, 0]))
+
+
+def _table(name: str, size: str, cells: Iterable[str]) -> str:
+    """Return a constant table, each entry in a line; it has one entry more at the end, so that it is never empty."""
+    lines = ",\n    ".join(cells)
+    return f"static const {name}[{size} + 1] = {{\n    {lines}}};"
 
 
 def short_table(name: str, values: Iterable[int]) -> str:
@@ -76,3 +81,25 @@ def string_literal(text: str) -> str:
     """Return a C string literal, with octal escapes for UTF-8 bytes outside of ASCII: they end after three digits."""
     plain = (chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode())
     return f'"{"".join(plain)}"'
+
+
+def index_macros(program: Program, prefix: str) -> str:
+    """Return a macro for the index of every entry of x and p, such as ``PREFIX_x_p_z``.
+
+    The macros continue the prefix by a small letter, as no other macro does: so they meet none of another case.
+    """
+    lines = ["/* Indices of the entries of x and of p. */"]
+    for vector, scalars in (("x", program.variables), ("p", program.arguments)):
+        names = c_names(scalar.name for scalar in scalars)
+        lines += [f"#define {prefix.upper()}_{vector}_{name} {index}" for index, name in enumerate(names)]
+    return "\n".join(lines) + "\n"
+
+
+def version_texts(version: str) -> dict[str, str]:
+    """Return the texts for the placeholders about a version such as ``1.2.3``; a part that is missing is 0."""
+    parts = [*(match.group() for match in re.finditer(r"\d+", version)), "0", "0", "0"]
+    named = dict(zip(("version_major", "version_minor", "version_patch"), parts, strict=False))
+    # Semantic versioning: with the major version 0 a minor one may break what was, with a later one it may not.
+    named["compatibility"] = "SameMinorVersion" if int(parts[0]) == 0 else "SameMajorVersion"
+    number = (int(parts[0]) * 1000 + int(parts[1])) * 1000 + int(parts[2])
+    return {"version": version, "version_number": str(number)} | named

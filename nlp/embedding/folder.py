@@ -85,27 +85,20 @@ def read_manifest(folder: Path) -> Manifest:
         InputError: the folder is no folder of generated C, is of another version, or lacks a file.
     """
     try:
-        data = value_of(Mapping[str, object], json_tree(read_limited(folder / MANIFEST, _LARGEST)))
-        found = data["format"]
+        text = read_limited(folder / MANIFEST, _LARGEST)
     except InputError as error:
         raise InputError(f"{folder}: is no folder that `screwsynth codegen` wrote: {error}") from None
-    except (ValueError, KeyError) as error:
-        raise _wrong(folder, error) from None
-    if found != FORMAT:
-        fault = f"format = {found!r} is not the format {FORMAT} of this version: generate the folder again"
-        raise InputError(f"{folder}: {MANIFEST}: {fault}")
     try:
-        return _manifest(data, folder)
+        data = value_of(Mapping[str, object], json_tree(text))
+        if data["format"] == FORMAT:
+            return _manifest(data, folder)
+        fault = f": format = {data['format']!r} is not the format {FORMAT} of this version: generate the folder again"
     except OSError as error:
         raise InputError(f"{folder}: {error.filename} cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError) as error:
-        raise _wrong(folder, error) from None
-
-
-def _wrong(folder: Path, error: Exception) -> InputError:
-    """Return the error of a manifest with a wrong value, or without a key."""
-    why = f"{error} is missing" if isinstance(error, KeyError) else f"{error}"
-    return InputError(f"{folder}: {MANIFEST} is not as `screwsynth codegen` writes it: {why}")
+        why = f"{error} is missing" if isinstance(error, KeyError) else f"{error}"
+        fault = f" is not as `screwsynth codegen` writes it: {why}"
+    raise InputError(f"{folder}: {MANIFEST}{fault}")
 
 
 def _manifest(data: Mapping[str, object], folder: Path) -> Manifest:

@@ -18,9 +18,6 @@ from ..program.nlp import Nlp
 from .ctext import integer_table, number_table
 from .runtimelimits import RunTimeLimits
 
-#: Size of a bound that is none, in tables of C.
-_NONE = 1e300
-
 
 @dataclass(frozen=True, eq=False)
 class Held:
@@ -59,10 +56,6 @@ def held_texts(held: Held, limits: RunTimeLimits) -> dict[str, str]:
     """Return the texts for the placeholders about what the fixed numbers make hold.
 
     A bound that C sets at run time is the tightest one of the constraints that it is a bound of.
-
-    Args:
-        held: the constraints.
-        limits: the limits that C sets.
     """
     bounds = [np.array([item.lower for item in held.items]), np.array([item.upper for item in held.items])]
     shared: list[tuple[int, int, int]] = []
@@ -72,20 +65,12 @@ def held_texts(held: Held, limits: RunTimeLimits) -> dict[str, str]:
             shared += [(k, is_upper, place) for place in places]
             if places:
                 bounds[is_upper][k] = np.inf if is_upper else -np.inf
-    lower, upper = (np.clip(each, -_NONE, _NONE) for each in bounds)
+    columns = zip(("shared_held", "shared_is_upper", "shared_constraints"), range(3), strict=True)
+    tables = [number_table(f"held_{end}", "HELD", own) for end, own in zip(("lower", "upper"), bounds, strict=True)]
+    tables += [integer_table(name, "SHARED", [each[column] for each in shared]) for name, column in columns]
     return {
         "nheld": str(len(held.items)),
         "nequations": str(held.equations),
         "nshared": str(len(shared)),
-        "held_tables": "\n".join(
-            [
-                number_table("held_lower", "HELD", lower),
-                number_table("held_upper", "HELD", upper),
-                integer_table("shared_held", "SHARED", [each[0] for each in shared]),
-                integer_table("shared_is_upper", "SHARED", [each[1] for each in shared]),
-                integer_table("shared_constraints", "SHARED", [each[2] for each in shared]),
-            ]
-        )
-        if held.items
-        else "",
+        "held_tables": "\n".join(tables) if held.items else "",
     }

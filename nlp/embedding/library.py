@@ -19,9 +19,9 @@ from ..case.task import Sense
 from ..errors import InputError, listing, nearest
 from ..solver.compiled import shared_library
 from .arguments import checked_budget, checked_numbers, checked_rows, is_between
-from .budget import budget_files
+from .codegen import budget_files
 from .folder import CompiledLimit, CompiledNumber, Manifest, read_manifest
-from .structures import Batch, Rows
+from .structures import COUNTS, Batch, Rows
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -203,24 +203,14 @@ class CompiledCase:
         for name, given in arrays.items():
             if given is not None:
                 setattr(batch, name, Rows(given.ctypes.data, given.shape[-1], int(given.ndim == 1)))
-        answers = CompiledSolutions(
-            F=np.zeros(count),
-            x=np.zeros((count, len(self.variables))),
-            status=np.zeros(count, dtype=np.intc),
-            R=np.zeros((count, 3, 3)),
-            axis=np.zeros((count, 3)),
-            angle=np.zeros(count),
-            violation=np.zeros(count),
-            residual=np.zeros(count),
-            runs=np.zeros(count, dtype=np.intc),
-            converged=np.zeros(count, dtype=np.intc),
-            iterations=np.zeros(count, dtype=np.intc),
-            lower_multipliers=np.zeros((count, len(self.variables))),
-            upper_multipliers=np.zeros((count, len(self.variables))),
-            g_lower_multipliers=np.zeros((count, len(self.constraints))),
-            g_upper_multipliers=np.zeros((count, len(self.constraints))),
-            limit_multipliers=np.zeros((count, len(self.limits))),
-        )
+        n, c = (len(self.variables),), (len(self.constraints),)
+        shapes = {"x": n, "R": (3, 3), "axis": (3,), "lower_multipliers": n, "upper_multipliers": n}
+        shapes |= {"g_lower_multipliers": c, "g_upper_multipliers": c, "limit_multipliers": (len(self.limits),)}
+        made: dict[str, Any] = {
+            name: np.zeros((count, *shapes.get(name, ())), dtype=np.intc if name in COUNTS else np.float64)
+            for name in CompiledSolutions._fields
+        }
+        answers = CompiledSolutions(**made)
         for name, values in answers._asdict().items():
             setattr(batch, name, values.ctypes.data)
         # The C reads and writes memory of these arrays: they must live as long as the batch.

@@ -85,8 +85,7 @@ class Loops:
 
 def find_loops(program: Program) -> Loops:
     """Return the loops of a program."""
-    calls = find_calls(program)
-    return _Tables(program, calls).loops()
+    return _Tables(program, find_calls(program)).loops()
 
 
 class _Group(NamedTuple):
@@ -108,12 +107,7 @@ class _Value(NamedTuple):
 
 
 class _Tables:
-    """Numbering of slots and constants.
-
-    Args:
-        program: the program.
-        calls: its calls.
-    """
+    """Numbering of slots and constants of a program and its calls."""
 
     def __init__(self, program: Program, calls: Calls) -> None:
         self._program, self._calls = program, calls
@@ -140,8 +134,8 @@ class _Tables:
             for members in by_form(self._calls.final)
         ]
         inner = self._inner_groups(final)
-        kinds = [self._kinds(group.calls) for group in (*inner, *final)]
-        for group, kind in zip((*inner, *final), kinds, strict=True):
+        groups = [(group, self._kinds(group.calls)) for group in (*inner, *final)]
+        for group, kind in groups:
             for call in group.calls:
                 for each, is_constant in zip(ca.vertsplit(call.inputs), kind, strict=True):
                     if is_constant is None:
@@ -153,7 +147,6 @@ class _Tables:
             for index in group.targets:
                 for i in group.wanted:
                     self._slots[_Value(index, i)] = len(self._entries) + len(self._slots)
-        groups = zip((*inner, *final), kinds, strict=True)
         made = [self._loop(group, kind, k < len(inner)) for k, (group, kind) in enumerate(groups)]
         places = {item.place for item in self._calls.final} | {place for place, _, _ in self._spectral}
         count = len(self._program.constraints)
@@ -226,8 +219,7 @@ class _Tables:
         value = self._values.get(element.element_hash())
         if value is not None:
             return self._slots[value]
-        same = self._same.get(element.element_hash(), element)
-        return list(self._entries).index(same.element_hash())
+        return list(self._entries).index(self._same.get(element.element_hash(), element).element_hash())
 
     def _constant_place(self, element: SX) -> int:
         """Return the place of an expression (1, 1) among the constants, which it is added to."""
@@ -248,17 +240,18 @@ class _Tables:
             inputs=ca.vertcat(SX(0, 1), *[symbols[i] for i in varying]),
             constants=ca.vertcat(SX(0, 1), *[symbols[i] for i in constant]),
             values=ca.vertcat(*[values[i] for i in group.wanted]),
-            slots=tuple(tuple(self._slot(call.inputs[i]) for i in varying) for call in group.calls),
-            constant_places=tuple(
-                tuple(self._constant_place(call.inputs[i]) for i in constant) for call in group.calls
-            ),
+            slots=tuple(tuple(map(self._slot, _parts(call, varying))) for call in group.calls),
+            constant_places=tuple(tuple(map(self._constant_place, _parts(call, constant))) for call in group.calls),
             outputs=tuple(outputs),
         )
+
+
+def _parts(call: Call, indices: Sequence[int]) -> list[SX]:
+    return [call.inputs[i] for i in indices]
 
 
 def _canonical(expressions: Sequence[SX]) -> dict[int, SX]:
     """Return one expression (1, 1) for all equal ones, by the hash of each."""
     joined = ca.vertcat(SX(0, 1), *expressions)
-    return {
-        each.element_hash(): same for each, same in zip(ca.vertsplit(joined), ca.vertsplit(ca.cse(joined)), strict=True)
-    }
+    both = zip(ca.vertsplit(joined), ca.vertsplit(ca.cse(joined)), strict=True)
+    return {each.element_hash(): same for each, same in both}

@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
-from casadi import SX
 
 from .ctext import short_table
 from .stages import LoopFunctions, StagedFunctions
 
 
 def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
-    """Return the texts for the placeholders about loops.
-
-    Args:
-        staged: the functions.
-        prefix: beginning of the names in C.
-    """
-    loops, parts = staged.loops, []
+    """Return the texts for the placeholders about loops."""
+    loops, most = staged.loops, _largest(staged)
+    rows = ""
     if loops:
-        parts.append("loops")
+        what = "limits that repeat, and F over several poses, by loops over functions of `-casadi.c`"
+        rows += f"| `{prefix}-loops.c` | {what} |\n"
     if loops.spectra:
-        parts.append("spectrum")
-    explained = {
-        "loops": "limits that repeat, and F over several poses, by loops over functions of `-casadi.c`",
-        "spectrum": "limits on singular values of J, with their derivatives, by loops",
-    }
+        rows += f"| `{prefix}-spectrum.c` | limits on singular values of J, with their derivatives, by loops |\n"
     return {
         "has_loops": str(int(bool(loops))),
         "nspectra": str(len(loops.spectra)),
         "spectrum_lengths": ", ".join(repr(float(each.spectral.length)) for each in loops.spectra),
         "spectrum_kinds": ", ".join(str(each.spectral.end.value) for each in loops.spectra),
-        "loop_rows": "".join(f"| `{prefix}-{part}.c` | {explained[part]} |\n" for part in parts),
+        "loop_rows": rows,
         "nentries": str(loops.entries.numel()),
         "nslots": str(loops.slot_count),
         "nplain": str(len(loops.plain)),
@@ -44,11 +36,7 @@ def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
         "constants_at": str(staged.prepare.numel_out(0) - loops.constants.numel()),
         "loop_tables": _tables(staged),
         "loop_cases": _cases(staged.of_loops),
-        "most_inputs": str(_most(loop.inputs for loop in loops.all)),
-        "most_constants": str(_most(loop.constants for loop in loops.all)),
-        "most_values": str(_most(loop.values for loop in loops.all)),
-        "most_slopes": str(_most_slopes(staged)),
-        "most_second": str(_most_second(staged)),
+        **{f"most_{name}": str(count) for name, count in most.items()},
         "ncolumns": str(len(_columns(staged).columns)),
         "casadi_work": str(casadi_work(staged)),
         # Eigenvalues by another order of operations, and by inverses, lose two digits more.
@@ -66,17 +54,9 @@ def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
     loops = staged.loops
     if not loops:
         return 0
-    k, q, r = (
-        _most(each)
-        for each in (
-            [loop.inputs for loop in loops.all],
-            [loop.constants for loop in loops.all],
-            [loop.values for loop in loops.all],
-        )
-    )
     plain, slots = len(loops.plain), loops.slot_count
-    first = slots + len(_columns(staged).columns) + k + q + r + _most_slopes(staged) + plain * (1 + n)
-    second = slots + plain + loops.entries.numel() + _most_second(staged) + n + n * n + n
+    first = slots + len(_columns(staged).columns) + sum(_largest(staged).values()) + plain * (1 + n)
+    second = slots + plain + loops.entries.numel() + n + n * n + n
     of_j = 6 * rows
     # The locals of spectrum.c: matrices (6, 6) along the variables, and second derivatives.
     spectrum = 10 * n * n + 115 * n + 1080 + of_j
@@ -107,29 +87,27 @@ def _columns(staged: StagedFunctions) -> _Columns:
     return _Columns(first, [column for columns in own for column in sorted(columns)])
 
 
-def _most_slopes(staged: StagedFunctions) -> int:
-    """Return the largest number of slopes of a loop, or of inputs: their place in the workspace has both."""
-    return max((max(len(own.slopes), own.values.numel_in(0)) for own in staged.of_loops), default=0) or 1
-
-
-def _most_second(staged: StagedFunctions) -> int:
-    """Return the largest number of second derivatives of a loop, at least 1."""
-    return max((len(own.second) for own in staged.of_loops), default=0) or 1
-
-
-def _most(vectors: Iterable[SX]) -> int:
-    """Return the largest length of vectors (k, 1), at least 1."""
-    return max((int(each.numel()) for each in vectors), default=0) or 1
+def _largest(staged: StagedFunctions) -> dict[str, int]:
+    """Return the largest numbers of inputs, values, derivatives and so on of a loop, each at least 1."""
+    counts = [
+        {
+            "inputs": loop.inputs.numel(),
+            "constants": loop.constants.numel(),
+            "values": loop.values.numel(),
+            # The place of the slopes in the workspace has derivatives by the inputs too.
+            "slopes": max(len(own.slopes), loop.inputs.numel()),
+            "second": len(own.second),
+        }
+        for loop, own in zip(staged.loops.all, staged.of_loops, strict=True)
+    ]
+    names = ("inputs", "constants", "values", "slopes", "second")
+    return {name: max((each[name] for each in counts), default=0) or 1 for name in names}
 
 
 def _tables(staged: StagedFunctions) -> str:
     """Return the constant tables of slots, constants and outputs."""
     loops = staged.loops
-    slots: list[int] = []
-    constants: list[int] = []
-    outputs: list[int] = []
-    slopes: list[int] = []
-    second: list[int] = []
+    slots, constants, outputs, slopes, second = tables = [list[int]() for _ in range(5)]
     lines = []
     for loop, own in zip(loops.all, staged.of_loops, strict=True):
         sizes = (len(loop.slots), loop.inputs.numel(), loop.constants.numel(), loop.values.numel())
@@ -141,8 +119,8 @@ def _tables(staged: StagedFunctions) -> str:
         for into, table in ((slots, loop.slots), (constants, loop.constant_places), (outputs, loop.outputs)):
             into.extend(value for row in table for value in row)
     rows = ",\n".join(f"    {{{line}}}" for line in (*lines, ", ".join("0" * 11)))
-    blocks = [short_table("slots", slots), short_table("constant_places", constants), short_table("outputs", outputs)]
-    blocks += [short_table("slope_places", slopes), short_table("second_places", second)]
+    names = ("slots", "constant_places", "outputs", "slope_places", "second_places")
+    blocks = [short_table(name, table) for name, table in zip(names, tables, strict=True)]
     columns = _columns(staged)
     blocks += [short_table("first_column", columns.first), short_table("columns", columns.columns)]
     blocks.append(f"static const loop loops[LOOPS + 1] = {{\n{rows}}};")

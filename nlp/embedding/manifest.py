@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,14 +24,7 @@ _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=r
 
 
 def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, str], files: Mapping[str, str]) -> str:
-    """Return the manifest's text.
-
-    Args:
-        nlp: the program.
-        limits: the limits that are set at run time.
-        names: texts of the templates' placeholders.
-        files: text of every other file of the folder by name.
-    """
+    """Return the manifest's text, from the texts of the templates' placeholders and of all other files by name."""
     case, program, prefix = nlp.case, nlp.program, names["id"]
     bounds = bounds_in_c(nlp)
     units = UnitData(nlp)
@@ -46,38 +39,32 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         "prefix": prefix,
         "sense": nlp.sense.value,
         "F_unit": units.F,
-        "variables": [
-            {"name": each.name, "unit": unit, "multiplier_unit": own, "lower": lower, "upper": upper, "start": start}
-            for each, unit, own, lower, upper, start in zip(
-                program.variables,
-                units.variables,
-                units.variable_multipliers,
-                bounds.lower.tolist(),
-                bounds.upper.tolist(),
-                nlp.start.tolist(),
-                strict=True,
-            )
-        ],
-        "parameters": [
-            {"name": each.name, "unit": unit, "default": default}
-            for each, unit, default in zip(program.arguments, units.parameters, nlp.arguments.tolist(), strict=True)
-        ],
-        "limits": [
-            {
-                "key": each.key,
-                "c_name": f"{prefix.upper()}_LIMIT_{each.name}",
-                "unit": units.of_case.label(each.dimension),
-                "multiplier_unit": own,
-                "default": each.default,
-                "above": _finite(each.above),
-                "most": _finite(each.most),
-            }
-            for each, own in zip(limits, units.limit_multipliers(limits), strict=True)
-        ],
-        "constraints": [
-            {"name": each.name, "lower": _finite(lower), "upper": _finite(upper)}
-            for each, lower, upper in zip(program.constraints, nlp.g_lower.tolist(), nlp.g_upper.tolist(), strict=True)
-        ],
+        "variables": _objects(
+            name=[each.name for each in program.variables],
+            unit=units.variables,
+            multiplier_unit=units.variable_multipliers,
+            lower=bounds.lower,
+            upper=bounds.upper,
+            start=nlp.start,
+        ),
+        "parameters": _objects(
+            name=[each.name for each in program.arguments], unit=units.parameters, default=nlp.arguments
+        ),
+        "limits": _objects(
+            key=[each.key for each in limits],
+            c_name=[f"{prefix.upper()}_LIMIT_{each.name}" for each in limits],
+            unit=[units.of_case.label(each.dimension) for each in limits],
+            multiplier_unit=units.limit_multipliers(limits),
+            default=[each.default for each in limits],
+            above=[each.above for each in limits],
+            most=[each.most for each in limits],
+        ),
+        "constraints": _objects(
+            name=[each.name for each in program.constraints],
+            multiplier_unit=units.constraint_multipliers,
+            lower=nlp.g_lower,
+            upper=nlp.g_upper,
+        ),
         "rows": [{"limb": row.limb, "kind": row.kind.value} for row in program.model.frame_rows],
         "tasks": [
             {"name": task.name, "twist": np.asarray(task.twist).tolist(), "rate_unit": unit}
@@ -91,9 +78,21 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         "headers": sorted(name for name in files if name.startswith(prefix) and name.endswith((".h", ".hpp"))),
         "files": sorted([*files, MANIFEST]),
     }
+    return json_text(manifest)
+
+
+def json_text(manifest: Mapping[str, object]) -> str:
+    """Return a manifest as JSON."""
     return json.dumps(manifest, indent=1, ensure_ascii=True, allow_nan=False) + "\n"
 
 
-def _finite(value: float) -> float | None:
-    """Return a number for JSON; None where it is infinite."""
-    return value if math.isfinite(value) else None
+def _objects(**columns: Iterable[str | float]) -> list[dict[str, str | float | None]]:
+    """Return objects of JSON from their values by key; None where a number is infinite."""
+    rows = zip(*columns.values(), strict=True)
+    return [{key: _plain(value) for key, value in zip(columns, row, strict=True)} for row in rows]
+
+
+def _plain(value: str | float) -> str | float | None:
+    if isinstance(value, str):
+        return value
+    return float(value) if math.isfinite(value) else None

@@ -3,34 +3,19 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 
 from ..errors import one_line
 from .ctext import comment_text
-from .manifest import MANIFEST
+from .manifest import MANIFEST, json_text
 from .measure import Figures
 
-#: The stack that other compilers and flags may take, in parts of the bound of the one measured: clang took 1.27.
-_ROOM = 1.5
 #: What stands in the place of the figures where no compiler was run.
 NOT_MEASURED = "Flash and stack were not measured when this folder was generated."
 
 
-def header_texts() -> dict[str, str]:
-    """Return the texts of the placeholders for figures, as they are before a measurement."""
-    return {"measured_macros": f"/* {NOT_MEASURED} */", "measured_rows": NOT_MEASURED}
-
-
 def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figures]) -> dict[str, str]:
-    """Return the files of a folder with figures in the header, the README and the manifest.
-
-    Args:
-        files: text by file name, as :func:`~screwsynth.nlp.generate_c` returns it.
-        prefix: of the case's names in C.
-        figures: of each target.
-    """
-    header, readme = f"{prefix}.h", "README.md"
+    """Return the files of a folder with figures in the header, the README and the manifest."""
     manifest = json.loads(files[MANIFEST])
     manifest["measured"] = [
         {
@@ -38,23 +23,19 @@ def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figure
             "compiler": each.compiler,
             "flash_bytes": each.flash,
             "stack_bytes": each.stack,
-            "stack_bytes_with_room": None if each.stack is None else with_room(each.stack),
+            "stack_bytes_with_room": each.with_room,
             "painted_stack_bytes": each.painted,
             "fault": each.fault,
         }
         for each in figures
     ]
+    header = f"{prefix}.h"
     return {
         **files,
-        header: files[header].replace(header_texts()["measured_macros"], _macros(prefix.upper(), figures)),
-        readme: files[readme].replace(NOT_MEASURED, _rows(figures)),
-        MANIFEST: json.dumps(manifest, indent=1, ensure_ascii=True, allow_nan=False) + "\n",
+        header: files[header].replace(f"/* {NOT_MEASURED} */", _macros(prefix.upper(), figures)),
+        "README.md": files["README.md"].replace(NOT_MEASURED, _rows(figures)),
+        MANIFEST: json_text(manifest),
     }
-
-
-def with_room(stack: int) -> int:
-    """Return the stack in bytes that other compilers may need, from the bound of one: a multiple of 16."""
-    return 16 * math.ceil(_ROOM * stack / 16)
 
 
 def figure_words(figures: Figures) -> str:
@@ -78,16 +59,10 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
             lines.append(f"#define {prefix}_FLASH_BYTES_{name} {each.flash} /* code and constants of the library */")
         if each.stack is not None:
             painted = "" if each.painted is None else f"; {each.painted} were measured with them, from all seeds"
-            lines += [
-                (
-                    f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} "
-                    f"/* bound of a solve by that compiler, without functions of math.h{painted} */"
-                ),
-                (
-                    f"#define {prefix}_STACK_BYTES_{name} {with_room(each.stack)} "
-                    "/* with room for other compilers, and for functions of math.h */"
-                ),
-            ]
+            said = f"bound of a solve by that compiler, without functions of math.h{painted}"
+            room = "with room for other compilers, and for functions of math.h"
+            lines.append(f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} /* {said} */")
+            lines.append(f"#define {prefix}_STACK_BYTES_{name} {each.with_room} /* {room} */")
         if each.fault:
             lines.append(f"/* {each.target.name}: not measured: {comment_text(each.fault)} */")
     return "\n".join(lines)
@@ -95,22 +70,11 @@ def _macros(prefix: str, figures: Sequence[Figures]) -> str:
 
 def _rows(figures: Sequence[Figures]) -> str:
     """Return a table for the README; a line says what is not measured."""
-    rows = [
-        (
-            "| machine | flash, bytes | bound of the stack, bytes | with room for others | stack measured, bytes "
-            "| compiler and flags |"
-        ),
-        "|---|---|---|---|---|---|",
-        *(
-            f"| {each.target.name} | {_cell(each.flash)} | {_cell(each.stack)} "
-            f"| {_cell(None if each.stack is None else with_room(each.stack))} | {_cell(each.painted)} "
-            f"| {comment_text(each.compiler) or '-'} |"
-            for each in figures
-        ),
-    ]
-    faults = [f"{each.target.name}: not measured: {comment_text(each.fault)}." for each in figures if each.fault]
-    return "\n".join([*rows, *(line for fault in faults for line in ("", fault))])
-
-
-def _cell(value: int | None) -> str:
-    return "-" if value is None else str(value)
+    heads = ("flash, bytes", "bound of the stack, bytes", "with room for others", "stack measured, bytes")
+    lines = [f"| machine | {' | '.join(heads)} | compiler and flags |", "|---|---|---|---|---|---|"]
+    for each in figures:
+        numbers = " | ".join("-" if own is None else str(own) for own in each.numbers)
+        lines.append(f"| {each.target.name} | {numbers} | {comment_text(each.compiler) or '-'} |")
+    for each in figures:
+        lines += ["", f"{each.target.name}: not measured: {comment_text(each.fault)}."] if each.fault else []
+    return "\n".join(lines)

@@ -8,7 +8,6 @@ bound belongs to.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -18,17 +17,15 @@ import numpy as np
 from casadi import SX
 
 from ...models import Dimension
-from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.limits.constraint import Constraint, Reading
 from ..case.pose import MAX_FREE_ROTATION
 from ..program.layout import WIDENING
 from ..program.nlp import Nlp
 from ..program.places import FreeRotation
-from .ctext import c_names, comment_text, integer_table, number_table, string_table
+from .ctext import NO_BOUND, c_names, comment_text, integer_table, number_table, string_table
 
 #: Depth to which two expressions of one limit are compared: above that of every reading.
 _DEPTH = 30
-#: Size of a number that stands for none in tables of C.
-_NONE = 1e300
 
 
 @dataclass(frozen=True)
@@ -104,29 +101,21 @@ class RunTimeLimits:
             return []
         (values,) = self.function.sx_in()
         number, converted = values[keys.index(key)], self.function(values)
-        same = [ca.is_equal(converted[k], reading.to_value(number), _DEPTH) for k in range(self.converted)]
-        return [each.constraint for each in self.sides if each.is_upper == is_upper and same[each.converted]]
-
-    @property
-    def work(self) -> int:
-        """Size of the functions' workspace in doubles."""
-        return max((int(each.sz_w()) for each in self.functions), default=0)
+        same = _equal(ca.vertsplit(converted), reading.to_value(number))
+        return [each.constraint for each in self.sides if each.is_upper == is_upper and each.converted in same]
 
 
 def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
     """Return the limits of a program that depend on its variables.
 
-    A limit that is also a constraint on fixed numbers alone cannot be set beyond what these numbers measure: the C does
-    not have that constraint.
+    Where a limit is a constraint on fixed numbers too, the C judges answers by that one with the number that is set. A
+    limit that it reads otherwise than the program does cannot be set.
 
-    Args:
-        nlp: the program.
-        prefix: beginning of the function's name.
+    The functions' names begin with the prefix.
     """
     balls = {id(each.ball): each for each in nlp.program.places.rotations if isinstance(each, FreeRotation)}
     symbols: dict[str, SX] = {}
     limits: dict[str, RunTimeLimit] = {}
-    places: dict[str, list[int]] = {}
     outputs: list[SX] = []
     owners: list[int] = []
     sides: list[Side] = []
@@ -135,20 +124,19 @@ def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
         ball = balls.get(id(constraint))
         reading = constraint.reading if ball is None else _ROTATION
         for key, is_upper in zip(_keys(nlp, index, ball), (False, True), strict=True):
-            if not key:
+            if not key or not _is_settable(nlp, key):
                 continue
             bound = float((nlp.g_upper if is_upper else nlp.g_lower)[index])
             value = float(constraint.reading.from_value(bound))
             if key not in limits:
-                symbols[key], places[key] = SX.sym(key), []
-                limits[key] = _limit(key, reading, value, _measured(nlp, key))
+                symbols[key] = SX.sym(key)
+                limits[key] = _limit(key, reading, value)
             expression = reading.to_value(symbols[key])
-            same = [k for k in places[key] if ca.is_equal(outputs[k], expression, _DEPTH)]
+            same = _equal(outputs, expression)
             if not same:
-                places[key].append(len(outputs))
                 outputs.append(expression)
                 owners.append(list(limits).index(key))
-            converted = same[0] if same else places[key][-1]
+            converted = same[0] if same else len(outputs) - 1
             sides.append(Side(index, is_upper, converted))
             if ball is not None and is_upper:
                 widenings += [Widening(variable, converted) for variable in ball.q]
@@ -165,11 +153,10 @@ def run_time_limits(nlp: Nlp, prefix: str) -> RunTimeLimits:
 
 
 def _squared_sine(angle: SX) -> SX:
-    """Return ``sin^2(angle / 2)``, the squared length of a rotation's ``q``."""
     return ca.sin(0.5 * angle) ** 2
 
 
-#: The angle of a rotation about a free axis, as it is set.
+#: The angle of a rotation about a free axis, as it is set: the squared length of ``q`` is ``sin^2(angle / 2)``.
 _ROTATION = Reading(Dimension.ANGLE, to_value=_squared_sine, above=0.0, most=MAX_FREE_ROTATION)
 
 
@@ -181,93 +168,69 @@ def _keys(nlp: Nlp, index: int, ball: FreeRotation | None) -> tuple[str, str]:
     return f"{constraint.name}.min" if math.isfinite(nlp.g_lower[index]) else "", f"{constraint.name}.max"
 
 
-class _Range(NamedTuple):
-    """Smallest and largest number that the constraints on fixed numbers allow a limit to have."""
-
-    least: float
-    most: float
-
-
-def _measured(nlp: Nlp, key: str) -> _Range:
-    """Return the range of a limit's number from its constraints that depend on fixed numbers alone."""
-    least, most = -math.inf, math.inf
-    program = nlp.program
-    found = [item for item in nlp.constant_limits if key in item.constraint.keys]
-    for item in found:
-        value = _value(item, program.x, program.p, nlp)
-        if item.constraint.keys[0] == key:
-            most = min(most, value)
-        if item.constraint.keys[1] == key:
-            least = max(least, value)
-    return _Range(least, most)
+def _is_settable(nlp: Nlp, key: str) -> bool:
+    """Return whether constraints on fixed numbers read a limit as one of the program's does, whose bound they share."""
+    number, others = SX.sym("number"), [item.constraint for item in nlp.constant_limits]
+    bounds, fixed = (
+        [each.reading.to_value(number) for each in constraints if key in each.keys]
+        for constraints in (nlp.program.constraints, others)
+    )
+    return all(_equal(bounds, each) for each in fixed)
 
 
-def _value(item: BoundedConstraint, x: SX, p: SX, nlp: Nlp) -> float:
-    """Return the number for people that a constraint on fixed numbers measures."""
-    function = ca.Function("constant", [x, p], [ca.densify(item.constraint.expression)])
-    return float(item.constraint.reading.from_value(float(function(nlp.start, nlp.arguments))))
+def _equal(expressions: Sequence[SX], wanted: SX) -> list[int]:
+    """Return the indices of the expressions (1, 1) that equal another one."""
+    return [k for k, each in enumerate(expressions) if ca.is_equal(each, wanted, _DEPTH)]
 
 
-def _limit(key: str, reading: Reading, value: float, measured: _Range) -> RunTimeLimit:
-    """Return a limit with its range, and as yet without a name in C; a measured number is itself allowed."""
-    above = max(reading.above, float(np.nextafter(measured.least, -math.inf)))
-    most = min(reading.most, measured.most)
-    # The case's own number is allowed, also where it differs from a measured one by rounding.
-    above = above if value > above else float(np.nextafter(value, -math.inf))
-    return RunTimeLimit(key, "", reading.dimension, value, above, max(most, value))
+def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
+    """Return a limit with its range, in which the case's own number always is, and as yet without a name in C."""
+    above = reading.above if value > reading.above else float(np.nextafter(value, -math.inf))
+    return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 
 
 def limit_texts(
     found: RunTimeLimits, prefix: str, unit_of: Callable[[Dimension], str], multiplier_units: Sequence[str]
 ) -> dict[str, str]:
-    """Return the texts for the placeholders about limits.
-
-    Args:
-        found: the limits.
-        prefix: of the case's names in C.
-        unit_of: unit of a dimension, empty for a pure number.
-        multiplier_units: unit of each limit's multiplier.
-    """
-    ID, L = prefix.upper(), f"{prefix.upper()}_LIMITS"
-    limits = found.limits
+    """Return the texts for the placeholders about limits."""
+    L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", found.limits, found.sides, found.widenings
+    units = [unit_of(each.dimension) for each in limits]
     members = [
-        f"    {ID}_LIMIT_{each.name} = {k}, /* {_description(each, unit_of(each.dimension))} */"
-        for k, each in enumerate(limits)
+        f"    {prefix.upper()}_LIMIT_{each.name} = {k}, /* {_description(each, unit)} */\n"
+        for k, (each, unit) in enumerate(zip(limits, units, strict=True))
+    ]
+    tables = [
+        string_table(f"{prefix}_limit_keys", L, [each.key for each in limits]),
+        string_table(f"{prefix}_limit_units", L, units),
+        string_table(f"{prefix}_limit_multiplier_units", L, multiplier_units),
+        number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
+        number_table(f"{prefix}_limit_above", L, [each.above for each in limits]),
+        number_table(f"{prefix}_limit_most", L, [each.most for each in limits]),
+    ]
+    of_sides = [
+        integer_table("side_constraints", "SIDES", [each.constraint for each in sides]),
+        integer_table("side_is_upper", "SIDES", [int(each.is_upper) for each in sides]),
+        integer_table("side_converted", "SIDES", [each.converted for each in sides]),
+        integer_table("converted_limits", "CONVERTED", found.owners),
+        integer_table("widened", "WIDENED", [each.variable for each in widenings]),
+        integer_table("widened_converted", "WIDENED", [each.converted for each in widenings]),
     ]
     return {
         "nlimits": str(len(limits)),
-        "limit_members": "".join(f"{member}\n" for member in members),
-        "limit_tables": "\n".join(
-            [
-                string_table(f"{prefix}_limit_keys", L, [each.key for each in limits]),
-                string_table(f"{prefix}_limit_units", L, [unit_of(each.dimension) for each in limits]),
-                string_table(f"{prefix}_limit_multiplier_units", L, multiplier_units),
-                number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
-                number_table(f"{prefix}_limit_above", L, [max(each.above, -_NONE) for each in limits]),
-                number_table(f"{prefix}_limit_most", L, [min(each.most, _NONE) for each in limits]),
-            ]
-        ),
+        "limit_members": "".join(members),
+        "limit_tables": "\n".join(tables),
         "nconverted": str(found.converted),
-        "limit_work": str(found.work),
-        "nsides": str(len(found.sides)),
-        "nwidened": str(len(found.widenings)),
+        "limit_work": str(max((int(each.sz_w()) for each in found.functions), default=0)),
+        "nsides": str(len(sides)),
+        "nwidened": str(len(widenings)),
         "widening": repr(WIDENING),
-        "limit_sides": "\n".join(
-            [
-                integer_table("side_constraints", "SIDES", [each.constraint for each in found.sides]),
-                integer_table("side_is_upper", "SIDES", [int(each.is_upper) for each in found.sides]),
-                integer_table("side_converted", "SIDES", [each.converted for each in found.sides]),
-                integer_table("converted_limits", "CONVERTED", found.owners),
-                integer_table("widened", "WIDENED", [each.variable for each in found.widenings]),
-                integer_table("widened_converted", "WIDENED", [each.converted for each in found.widenings]),
-            ]
-        ),
+        "limit_sides": "\n".join(of_sides),
     }
 
 
 def _description(limit: RunTimeLimit, unit: str) -> str:
     """Return a limit in words for a comment of C: its key, its unit, its default, and the allowed numbers."""
-    allowed = [f"above {limit.above:.6g}"] if limit.above > -_NONE else []
-    allowed += [f"at most {limit.most:.6g}"] if limit.most < _NONE else []
-    shown = re.sub(r"\s+$", "", f"{limit.default:.6g} {unit}")
+    allowed = [f"above {limit.above:.6g}"] if limit.above > -NO_BOUND else []
+    allowed += [f"at most {limit.most:.6g}"] if limit.most < NO_BOUND else []
+    shown = f"{limit.default:.6g} {unit}".rstrip()
     return comment_text(f"{limit.key}: {shown}{'; ' if allowed else ''}{', '.join(allowed)}")

@@ -89,11 +89,7 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
 
     Matrices are transposed, because CasADi writes column after column and C reads row after row.
 
-    Args:
-        program: the program.
-        size: (1, 1) size of the objective without cancellation.
-        prefix: beginning of the functions' names.
-        held: what the fixed numbers make hold.
+    Their names begin with the prefix; ``size`` is the size of the objective without cancellation, (1, 1).
     """
     x, loops = program.x, find_loops(program)
     several = len(program.robots) > 1
@@ -129,10 +125,7 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
     if several and loops.has_objective:
         del outputs["F"], outputs["F_gradient"]
     robots = _robot_expressions(program)
-    if len(program.robots) == 1:
-        outputs |= robots.expressions
-    else:
-        outputs["poses"] = [ca.veccat(*[robot.inputs for robot in program.robots])]
+    outputs |= {"poses": [ca.veccat(*[robot.inputs for robot in program.robots])]} if several else robots.expressions
     dense = {name: ca.cse([ca.densify(each) for each in expressions]) for name, expressions in outputs.items()}
     rest, k, prepared = _extract(program.p, [each for expressions in dense.values() for each in expressions])
     k, prepared = ca.vertcat(k, SX.sym("c", loops.constants.numel())), ca.vertcat(prepared, loops.constants)
@@ -140,7 +133,7 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
     for name, expressions in dense.items():
         own, rest = rest[: len(expressions)], rest[len(expressions) :]
         functions[name] = ca.Function(f"{prefix}_{name}", [x, k, *inputs.get(name, [])], own)
-    of_robot = {} if len(program.robots) == 1 else robots.expressions
+    of_robot = robots.expressions if several else {}
     return StagedFunctions(
         x,
         ca.Function(f"{prefix}_prepare", [program.p], [prepared]),

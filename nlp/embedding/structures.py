@@ -5,6 +5,9 @@ from __future__ import annotations
 import ctypes
 from typing import Any, ClassVar
 
+#: Whole numbers among the answers.
+COUNTS = ("status", "runs", "converged", "iterations")
+
 
 class Rows(ctypes.Structure):
     """Rows of numbers, as the C has them."""
@@ -29,7 +32,7 @@ class Batch(ctypes.Structure):
         *((name, Rows) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper", "limits")),
         *((name, ctypes.c_int) for name in ("maximise", "seeds")),
         ("options", Options),
-        *((name, ctypes.c_void_p) for name in ("status", "runs", "converged", "iterations")),
+        *((name, ctypes.c_void_p) for name in COUNTS),
         *((name, ctypes.c_void_p) for name in ("F", "x", "R", "axis", "angle", "violation", "residual")),
         *((name, ctypes.c_void_p) for name in ("lower_multipliers", "upper_multipliers")),
         *((name, ctypes.c_void_p) for name in ("g_lower_multipliers", "g_upper_multipliers", "limit_multipliers")),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -21,14 +21,13 @@ from ..proof.statement.standard_form import is_in_home_mode
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
+from .ctext import NO_BOUND
 
 #: Names of joints that a message shows.
 _MOST_SHOWN = 8
 
 #: Largest number of constraints on pairs of poses. The solver in C has all of them always: a dozen poses with six legs.
 _MOST_PAIRS = 1000
-#: Size of a bound that is none, in tables of C.
-NO_BOUND = 1e300
 #: Digits of numbers that come from a solve: few enough to be the same on every machine.
 _DIGITS = 9
 
@@ -129,22 +128,13 @@ def _rounded(nlp: Nlp) -> Nlp:
     epigraph = nlp.program.places.epigraph
     if epigraph is None:
         return nlp
-    arguments, lower, upper, start = (np.array(each) for each in (nlp.arguments, nlp.lower, nlp.upper, nlp.start))
-    for index in (epigraph.ceiling, *epigraph.best):
-        arguments[index] = _shortened(arguments[index])
-    for values in (lower, upper, start):
-        values[epigraph.level] = _shortened(values[epigraph.level])
-    return replace(
-        nlp,
-        arguments=frozen_vector(arguments),
-        lower=frozen_vector(lower),
-        upper=frozen_vector(upper),
-        start=frozen_vector(start),
-    )
-
-
-def _shortened(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+    level, best = [epigraph.level], [epigraph.ceiling, *epigraph.best]
+    places = {"lower": level, "upper": level, "start": level, "arguments": best}
+    vectors = {name: np.array(getattr(nlp, name)) for name in places}
+    for name, indices in places.items():
+        vectors[name][indices] = [float(f"{value:.{_DIGITS}g}") for value in vectors[name][indices]]
+    changed: dict[str, Any] = {name: frozen_vector(vector) for name, vector in vectors.items()}
+    return replace(nlp, **changed)
 
 
 def objective_words(nlp: Nlp) -> str:

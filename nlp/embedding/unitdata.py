@@ -15,11 +15,7 @@ from .runtimelimits import RunTimeLimit
 
 @dataclass(frozen=True)
 class UnitData:
-    """Units of a program's numbers in C, for the case's own tasks; empty for a plain number.
-
-    Args:
-        nlp: the program.
-    """
+    """Units of a program's numbers in C, for the case's own tasks; empty for a plain number."""
 
     nlp: Nlp
 
@@ -67,6 +63,14 @@ class UnitData:
     def variable_multipliers(self) -> tuple[str, ...]:
         """Unit of the multipliers of each variable's bounds."""
         return tuple(self._multiplier(unit) for unit in self.variables)
+
+    @property
+    def constraint_multipliers(self) -> tuple[str, ...]:
+        """Unit of the multipliers of each constraint's bounds."""
+        readings = [each.reading for each in self.nlp.program.constraints]
+        units = [self.of_case.label(each.dimension) if each.power else "" for each in readings]
+        squares = [f"{unit}²" if unit and each.power == 2 else unit for unit, each in zip(units, readings, strict=True)]
+        return tuple(map(self._multiplier, squares))
 
     def limit_multipliers(self, limits: Sequence[RunTimeLimit]) -> tuple[str, ...]:
         """Return the unit of each limit's multiplier."""

@@ -21,22 +21,20 @@ _CURVATURES = 3
 _DERIVATIVES = 4
 
 
-def worst_case_texts(n: int, c: int, searches: int, has_level: bool) -> dict[str, str]:
+def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
     A search counts its first derivatives, and may have a few for each point that it has judged beside those of one line
     search: it judges one point in each iteration, and one at the end of each part, of which it has one for each scale
-    of F and for each feasible point found. Before the first of them it evaluates once to scale the constraints,
-    and to set the level of a worst case, which it sets again after each search for a feasible point.
+    of F and for each feasible point found. The point where it begins, which scales the constraints, is counted too.
 
     Args:
         n: number of variables.
         c: number of constraints.
         searches: largest number of searches of a solve.
-        has_level: whether a level is optimised.
     """
     parts = _ROUNDS + _RESTORES
-    by_iteration, by_search = _DERIVATIVES, 1 + _RESTORES * has_level + _TRIALS + _DERIVATIVES * parts
+    by_iteration, by_search = _DERIVATIVES, _TRIALS + _DERIVATIVES * parts
     programs = len(_PARTS) + 1
     passes = 20 * (2 * (n + c) + 5)
     iterations = searches * _ITERATIONS

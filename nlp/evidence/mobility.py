@@ -16,6 +16,7 @@ import numpy as np
 
 from ...models import FloatArray, GenericRanks, LimbDrive, constraint_rows, limb_drive, rank_of_rows
 from ..program.nlp import Nlp
+from .paths import velocities_at
 from .singularities import Singularity, SingularityKind, limb_singularities, platform_singularities
 from .state import RobotState
 
@@ -67,9 +68,10 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
     J, length = numbers.jacobian, nlp.case.characteristic_length
     reach = float(np.abs(J[:, 3:]).max(initial=0.0)) or length
-    constraints = constraint_rows(model, numbers.velocities, state.position)
+    velocities = velocities_at(nlp, x, numbers, pose)
+    constraints = constraint_rows(model, velocities, state.position)
     constraint_rank = rank_of_rows(constraints, state.position, reach)
-    drives = {limb: limb_drive(model, numbers.velocities, state.position, limb) for limb in model.limbs}
+    drives = {limb: limb_drive(model, velocities, state.position, limb) for limb in model.limbs}
     rates = dict.fromkeys([each.name for each in model.actuators], float("inf"))
     parts: dict[str, LimbPart] = {}
     for limb, (rows, actuators, drive) in drives.items():

@@ -2,7 +2,8 @@
 
 Ranks at the point are compared with those at almost all dimensions and closed configurations:
 
-* passive: the passive screws of a limb have a smaller rank, so that its wrenches ``W`` gain a dimension and F jumps;
+* passive: the passive screws of a limb have a smaller rank, so that its wrenches ``W`` gain a dimension and F jumps; or
+  nested loops leave more motions with locked actuators, so that the wrenches lose one;
 * serial: all screws of a limb have a smaller rank, so that an actuator does no work in any wrench of the limb, and the
   platform loses a freedom; or those of each of its members keep their ranks, but the actuators can move without it;
 * constraint: all wrenches that do no work in the actuated joints have a smaller rank;
@@ -20,13 +21,15 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...models import FloatArray, JointScrews, frozen_array
 from ..program.nlp import Nlp
+from ..program.program import RobotNumbers
 from .linalg import echelon_basis
+from .paths import paths_at
 from .state import RobotState
 
 #: Screws of unit size whose singular values are below this part of the largest are dependent, as for the rank of J.
@@ -102,11 +105,9 @@ def limb_singularities(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0
         return []
     rows = [row.limb for row in model.rows]
     found: list[Singularity] = []
-    parameters = np.concatenate([np.zeros(0), *[state.parameters[item.name] for item in model.parameters]])
-    values = _screws_at(nlp, x, pose, parameters, state.rotation, state.position)
-    for each, screws in zip(model.joint_screws, values, strict=True):
-        own = state.jacobian[[k for k, limb in enumerate(rows) if limb == each.limb]]
-        singular = _singularity_of(each, screws, own, state.position)
+    for each in _motions_at(nlp, x, nlp.program.kernels.robot_states[pose](x, nlp.arguments), pose):
+        own = state.jacobian[[k for k, limb in enumerate(rows) if limb == each.path.limb]]
+        singular = _singularity_of(each, own, state.position)
         same = next((k for k, other in enumerate(found) if _are_alike(singular, other)), None)
         if singular is not None and same is None:
             found.append(singular)
@@ -120,12 +121,11 @@ def is_passive_singular(nlp: Nlp, x: FloatArray, pose: int = 0) -> bool:
     if not nlp.program.model.joint_screws:
         return False
     numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
-    values = _screws_at(nlp, x, pose, numbers.parameters, numbers.rotation, numbers.position)
-    for each, screws in zip(nlp.program.model.joint_screws, values, strict=True):
-        passive = [k for k in range(screws.shape[1]) if k not in each.driven]
-        if not np.isfinite(screws[:, passive]).all():
+    for each in _motions_at(nlp, x, numbers, pose):
+        passive = each.screws[:, each.passive]
+        if not np.isfinite(passive).all():
             return True
-        if _rank(_unit_columns(screws[:, passive], numbers.position.ravel())[0]) < each.passive_rank:
+        if _rank(_unit_columns(passive, numbers.position.ravel())[0]) != each.path.passive_rank:
             return True
     return False
 
@@ -156,18 +156,30 @@ def platform_singularities(
     return found
 
 
-def _screws_at(
-    nlp: Nlp, x: FloatArray, pose: int, parameters: FloatArray, rotation: FloatArray, position: FloatArray
-) -> list[FloatArray]:
-    """Return the screws (6, k) of each path of joints whose screws are known, at a point."""
-    unknowns = x[list(nlp.program.places.unknowns[pose])]
-    values = nlp.program.kernels.joint_screws.call([parameters, unknowns, rotation, position])
-    screws = [np.array(each) for each in values]
-    paths = nlp.program.model.joint_screws
-    return [
-        _without_rounding(own, np.ravel(position)) if each.is_nested else own
-        for each, own in zip(paths, screws, strict=True)
-    ]
+class _Motions(NamedTuple):
+    """Screws (6, k) of a path of joints; of nested loops the motions that they leave, first those of passive joints."""
+
+    path: JointScrews
+    screws: FloatArray
+    passive: list[int]
+
+
+def _motions_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int) -> list[_Motions]:
+    """Return the screws of each path of joints at a point."""
+    found = []
+    for each in paths_at(nlp, x, numbers, pose):
+        screws, passive = each.screws, each.passive
+        if each.path.is_nested:
+            locked = screws[:, passive] @ _null_space(each.loops[:, passive])
+            screws = np.hstack([locked, screws @ _null_space(each.loops)])
+            screws, passive = _without_rounding(screws, np.ravel(numbers.position)), list(range(locked.shape[1]))
+        found.append(_Motions(each.path, screws, passive))
+    return found
+
+
+def _null_space(loops: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (k, n) of the rates that close loops (m, k)."""
+    return np.asarray(np.linalg.svd(loops)[2][_rank(loops) :].T)
 
 
 def _without_rounding(screws: FloatArray, centre: FloatArray) -> FloatArray:
@@ -176,17 +188,16 @@ def _without_rounding(screws: FloatArray, centre: FloatArray) -> FloatArray:
     return np.asarray(np.where(lengths <= _NEGLIGIBLE * lengths.max(initial=0.0), 0.0, screws))
 
 
-def _singularity_of(each: JointScrews, screws: FloatArray, own: FloatArray, centre: FloatArray) -> Singularity | None:
+def _singularity_of(motions: _Motions, own: FloatArray, centre: FloatArray) -> Singularity | None:
     """Return the singularity of one path of joints; None without one.
 
     Args:
-        each: the path.
-        screws: (6, k) its screws; not finite for a joint whose axis has no direction at the point.
+        motions: the path; screws are not finite for a joint whose axis has no direction at the point.
         own: (m, 6) rows of its limb in J.
         centre: (3,) the platform's origin, length.
     """
+    each, screws, passive = motions
     every = list(range(screws.shape[1]))
-    passive = [k for k in every if k not in each.driven]
     for kind, columns, generic in (
         (SingularityKind.PASSIVE, passive, each.passive_rank),
         (SingularityKind.SERIAL, every, each.all_rank),
@@ -194,7 +205,7 @@ def _singularity_of(each: JointScrews, screws: FloatArray, own: FloatArray, cent
         known = [k for k in columns if np.isfinite(screws[:, k]).all()]
         unit, reach = _unit_columns(screws[:, known], centre)
         rank = _rank(unit)
-        if len(known) == len(columns) and rank >= generic:
+        if len(known) == len(columns) and (rank == generic or (rank > generic and kind is SingularityKind.SERIAL)):
             continue
         if each.is_nested:
             return Singularity(kind, each.limb)

@@ -23,8 +23,8 @@ import numpy as np
 from ...models import FloatArray
 from ..case.case import Case
 from ..case.settings import Search
-from ..errors import EvaluationError
-from ..interruption import Milestone, is_requested, one_call, reached
+from ..errors import EvaluationError, InputError
+from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, why_stopped, within
 from ..proof.certificate.branch_and_bound import certify_program
 from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution, solve_program
@@ -107,6 +107,8 @@ def find_front(
     ends: list[FrontPoint] = []
     for k in (1, 0, *range(2, len(goals))):
         end = builder.solve(k, nothing, [])
+        if is_requested():
+            raise InputError(f"{case.source or case.name}: {why_stopped()} before the ends of the front are found")
         if end is None:
             fault = f"the goal {goals[k].label} alone has no optimum within the limits"
             raise EvaluationError(f"{case.source or case.name}: {fault}")
@@ -121,7 +123,7 @@ def find_front(
     else:
         found, gaps = _spread_in_boxes(builder, ends, size, loosest, count, say), []
     if certify:
-        found = [replace(point, certificate=_certificate(point, jobs)) for point in found]
+        found = [replace(point, certificate=_certificate(point, jobs, len(found) - k)) for k, point in enumerate(found)]
     return Front(case, goals, tuple(found), tuple(gaps), builder.failed, time.perf_counter() - began)
 
 
@@ -312,6 +314,7 @@ def _undominated(points: list[FrontPoint], goals: tuple[Goal, ...], size: FloatA
     return [points[k] for k in sorted(kept, key=lambda k: (-costs[k][0], costs[k][1]))]
 
 
-def _certificate(point: FrontPoint, jobs: int | None) -> Certificate:
-    """Return the proven bound of a point's optimised goal."""
-    return certify_program(point.solution.nlp, point.solution.x, claimed=point.solution.F, jobs=jobs)
+def _certificate(point: FrontPoint, jobs: int | None, left: int) -> Certificate:
+    """Return the proven bound of a point's optimised goal, in an equal part of the time that so many points share."""
+    with within(seconds_left() / left):
+        return certify_program(point.solution.nlp, point.solution.x, claimed=point.solution.F, jobs=jobs)

@@ -11,16 +11,14 @@ import numpy as np
 
 from ...models import FloatArray
 from ..case.case import Case
-from ..errors import InputError
+from ..errors import InputError, check_seconds
+from ..interruption import within
 from ..sweeps.columns import SweepColumns, columns_of
 from ..sweeps.engines import EngineKind
 from ..sweeps.points import Points, grid_of
 from ..sweeps.source import CaseSource
 from ..sweeps.sweep import Sweep, SweepProgress, run_sweep
 from .sweeptable import check_table, is_written, table_rows, write_table
-
-#: Seconds for the certificate of a point where none are asked for.
-PROOF_SECONDS = 60.0
 
 
 def sweep(
@@ -34,7 +32,7 @@ def sweep(
     jobs: int | None = None,
     engine: str | None = None,
     certified: bool = False,
-    time_limit: float = PROOF_SECONDS,
+    time_limit: float | None = None,
     dask: str | None = None,
     progress: SweepProgress | None = None,
     notice: Callable[[str], None] | None = None,
@@ -53,26 +51,31 @@ def sweep(
         jobs: threads of the compiled engine, or processes of Ipopt.
         engine: ``"compiled"`` or ``"ipopt"``; left out, the compiled one where it covers the sweep.
         certified: whether the optimum at each point is proved too, which Ipopt's engine alone does.
-        time_limit: seconds for the proof of each point, which then has the bound reached.
+        time_limit: seconds for the whole call; where they are over before all points are done, there is no table. The
+            proof of a point takes an equal part of the time left, and 60 s at most; it then has the bound reached.
         dask: address of a Dask cluster that does the work.
         progress: called after each block of points.
         notice: called with the reason where Ipopt does the work of the compiled engine.
 
     Raises:
         CaseError: the case has no number of a name, does not allow its smallest or largest value, or cannot be written.
-        InputError: there are no points, an option is not allowed, or the file cannot be written or is something else.
+        InputError: there are no points, an option is not allowed, the file cannot be written or is something else, or
+            the time is over before all points are done.
     """
     if engine is not None and engine not in {kind.value for kind in EngineKind}:
         raise InputError(f"--engine {engine}: must be compiled or ipopt")
     check_seconds(time_limit)
     source = CaseSource(case.to_toml(), case.name, case.source or case.name)
     chosen = _points(over, points)
-    found = Sweep.of(source, chosen, starts, seed, time_limit if certified else None)
+    found = Sweep.of(source, chosen, starts, seed, certified=certified)
     kind = None if engine is None else EngineKind(engine)
 
     def run(target: str) -> None:
         with found.journal_of(target) as journal:
-            run_sweep(found, journal, engine=kind, jobs=jobs, dask=dask, progress=progress, notice=notice)
+            with within(time_limit):
+                run_sweep(found, journal, engine=kind, jobs=jobs, dask=dask, progress=progress, notice=notice)
+            if len(journal.missing):
+                raise InputError(f"time_limit {time_limit}: is over; {journal.words}")
             write_table(target, found, journal.rows())
             journal.remove()
 
@@ -85,16 +88,6 @@ def sweep(
         target = str(Path(folder) / "sweep.csv")
         run(target)
         return columns_of(found, table_rows(target, found))
-
-
-def check_seconds(time_limit: float) -> None:
-    """Refuse a time for proofs that is not positive.
-
-    Raises:
-        InputError: it is not.
-    """
-    if not time_limit > 0:
-        raise InputError(f"--time {time_limit:g}: must be positive")
 
 
 def _points(over: Mapping[str, Iterable[float]] | None, points: Mapping[str, Sequence[float]] | None) -> Points:

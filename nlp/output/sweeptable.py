@@ -117,7 +117,7 @@ def column_names(sweep: Sweep) -> list[str]:
     """Return the columns of a sweep's table: the numbers that change, the answer, its evidence."""
     middle = ["status", "F", *sweep.variables, "active", "multipliers", "verdict", "stationarity", "feasibility"]
     last = ["curvature", "starts", "converged", "engine", "seconds", "note"]
-    proof = [] if sweep.proof_seconds is None else ["certificate", "bound", "gap"]
+    proof = [] if not sweep.certified else ["certificate", "bound", "gap"]
     return ["index", *sweep.points.names, *middle, *last, *proof]
 
 
@@ -127,7 +127,7 @@ def _cells(sweep: Sweep, row: Row) -> list[Any]:
     sides = [_SEPARATOR.join(row.active), _SEPARATOR.join(map(repr, row.multipliers))]
     evidence = [row.verdict, row.stationarity, row.feasibility, row.curvature]
     run = [row.starts, row.converged, row.engine, row.seconds, row.note]
-    proof = [] if sweep.proof_seconds is None else [row.certificate, row.bound, row.gap]
+    proof = [] if not sweep.certified else [row.certificate, row.bound, row.gap]
     return [row.point, *sweep.points.values[row.point].tolist(), row.status, row.F, *x, *sides, *evidence, *run, *proof]
 
 
@@ -157,7 +157,7 @@ def _row(sweep: Sweep, cells: Sequence[Any]) -> Row:
         rest[len(sweep.variables) + 6 :],
     )
     starts, converged, engine, seconds, note = run[:5]
-    certificate, bound, gap = run[5:8] if sweep.proof_seconds is not None else (None, None, None)
+    certificate, bound, gap = run[5:8] if sweep.certified else (None, None, None)
     return Row(
         int(cells[0]),
         status,

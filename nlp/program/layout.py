@@ -141,7 +141,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     ]
     add = _add_pose if add_pose is None else add_pose
     stated = [add(pose, prefix, table) for prefix, pose in zip(case.pose_prefixes, case.poses, strict=True)]
-    reference = _reference(case)
+    reference = reference_of(case)
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
         [table.add(f"{at}{item.name}", item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
@@ -218,7 +218,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     )
 
 
-def _reference(case: Case) -> tuple[float, ...]:
+def reference_of(case: Case) -> tuple[float, ...]:
     """Return the middle of the range of each component of the parameters, at which sizes of equations are taken.
 
     The numbers are lengths of the case, so that its equations do not depend on its unit of length.

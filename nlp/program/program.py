@@ -14,7 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ...models import FloatArray, Model, RobotInstance, Substitution, Velocities
+from ...models import FloatArray, Model, RobotInstance, Substitution
 from ...models.whole import Whole
 from ..case.limits.constraint import Constraint
 from ..case.limits.form import Call
@@ -81,11 +81,6 @@ class RobotNumbers(NamedTuple):
         """Return the numbers from the outputs of :meth:`Program.robot_state`."""
         numbers, quantities = outputs[:11], outputs[11:]
         return cls._make((*numbers, quantities))
-
-    @property
-    def velocities(self) -> Velocities:
-        """Velocity equations of the platform and the actuators."""
-        return Velocities(self.jacobian, self.driven, self.relations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +207,7 @@ class Kernels:
 
     @cached_property
     def joint_screws(self) -> ca.Function:
-        """Parameters, unknowns, rotation and position to the screws (6, k) of each of the model's paths of joints."""
+        """Parameters, unknowns, rotation and position to the screws (6, k) and loops of each path of the model."""
         model = self._program.model
-        outputs = [ca.densify(each.all) for each in model.joint_screws]
+        outputs = [ca.densify(part) for each in model.joint_screws for part in (each.all, each.loops)]
         return ca.Function("joint_screws", Substitution.identity(model).all, outputs)

@@ -68,7 +68,8 @@ class OptimalityData(JsonObject):
         licq: whether the active normals are linearly independent.
         active: bounds and limits that the point lies on.
         reduced_hessian_eigenvalues: ascending; positive means that F gets worse on leaving the point.
-        flat_directions: rates of the variables along which F keeps its optimal value, the largest 1.
+        flat_directions: rates of the variables along which F keeps its optimal value, that of the variable that moves
+            most in its range 1.
     """
 
     kind: PointKind

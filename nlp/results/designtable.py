@@ -11,7 +11,7 @@ from ...models import Dimension, component_names
 from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
 from ..units import Units, slope_unit
-from .rounding import STATED, TURNED, listed, number, robot_size, settled, size_of_F
+from .rounding import STATED, TURNED, listed, number, ordered, robot_size, settled, size_of_F
 from .text import FEWEST_FOLDED, TextTable
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def design_table(
     folded = len(fixed) - _FIXED if len(fixed) < len(rows) else 0
     folded = folded if folded >= FEWEST_FOLDED else 0
     if folded:
-        fixed.sort(key=lambda row: -row.felt)
+        fixed.sort(key=lambda row: -ordered(row.felt))
         rows[len(rows) - len(fixed) :] = fixed
     headers = ("", "reached" if reached else "value", "unit", "free between", *(("held by",) if reasons.any else ()))
     cells = tuple(row.cells for row in rows)

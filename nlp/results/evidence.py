@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+import numpy as np
+
+from ...models.arrays import first_largest
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
 from ..proof.certificate.certificate import Certificate
@@ -40,14 +43,12 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
 
 
 def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
-    """Return a flat direction in the case's units, its largest rate 1."""
-    rates = {
-        variable.name: nlp.case.units.shown(direction[variable.name], variable.dimension)
-        for variable in nlp.program.variables
-        if variable.name in direction
-    }
-    largest = max(rates.values(), key=abs)
-    return MappingProxyType({name: rate / largest for name, rate in rates.items()})
+    """Return a flat direction in the case's units, the rate of the variable that moves most in its range 1."""
+    moved = [(k, each) for k, each in enumerate(nlp.program.variables) if each.name in direction]
+    rates = {each.name: nlp.case.units.shown(direction[each.name], each.dimension) for _, each in moved}
+    parts = np.array([abs(direction[each.name]) / nlp.scale[k] for k, each in moved])
+    most = rates[moved[int(first_largest(parts))][1].name]
+    return MappingProxyType({name: rate / most for name, rate in rates.items()})
 
 
 def certificate_data(certificate: Certificate | None) -> CertificateData | None:

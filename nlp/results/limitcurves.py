@@ -12,6 +12,7 @@ from ..interruption import is_requested
 from ..solver.solution import Solution
 from ..solver.tradeoff import tradeoff
 from .data import CaseResult, SolveResult
+from .rounding import ordered
 from .tradeoff import TradeoffResult, tradeoff_result
 
 #: Range of a curve to each side of the limit, as a part of it; number of values, odd so that the limit is among them.
@@ -37,7 +38,7 @@ def limit_curves(
     if not isinstance(result, SolveResult) or not solution.status.is_answer:
         return ()
     active = [row for row in result.limits if row.active and row.cost]
-    active.sort(key=lambda row: -abs((row.cost or 0.0) * row.limit))
+    active.sort(key=lambda row: -ordered(abs((row.cost or 0.0) * row.limit)))
     curves = []
     for row in active[:_CURVES]:
         name = f"limits.{row.key}"

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 NOISE = 1e-9
 #: Error bound of a number that a case states, as a part of the largest beside it: the rounding of a sine, some times.
 STATED = 1e-14
+#: Error bound of a residual in scaled terms: corrections end at a tenth of it.
+_RESIDUAL = 1e-12
+#: Significant digits by which numbers are put in an order: rounding decides on no order.
+_ORDERED = 6
 #: A rotation by less than this, radians, has no axis that means anything.
 TURNED = 1e-9
 
@@ -50,6 +54,16 @@ def listed(values: Iterable[float]) -> str:
     numbers = list(values)
     size = max(map(abs, numbers), default=0.0)
     return "  ".join(number(value, size, digits=5) for value in numbers)
+
+
+def residual(value: float) -> str:
+    """Return the text of a residual in scaled terms, of which no digit means anything below its error bound."""
+    return f"{value:.1e}" if value > _RESIDUAL else f"below {_RESIDUAL:.0e}"
+
+
+def ordered(value: float) -> float:
+    """Return a number as the key of an order, in which numbers that differ by rounding are equal."""
+    return float(f"{value:.{_ORDERED}g}")
 
 
 def size_of(dimension: Dimension, values: Iterable[float], units: Units) -> float:

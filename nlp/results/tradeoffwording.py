@@ -86,7 +86,7 @@ def _status_words(result: TradeoffResult, status: Status) -> str:
     """Return the values of a status; of those that an interrupted command has not solved, the last ones, the number."""
     own = [point.value for point in result.points if point.status is status]
     if status is Status.INTERRUPTED:
-        return f"interrupted: {len(result.points) - len(own)} of {len(result.points)} values are solved"
+        return f"stopped before the end: {len(result.points) - len(own)} of {len(result.points)} values are solved"
     return f"{status.value} at {', '.join(f'{value:.5g}' for value in own)} {result.unit}".rstrip()
 
 

@@ -13,7 +13,7 @@ from ..solver.status import Status
 from ..units import Units, objective_unit, slope_unit
 from .jointwording import convention_lines, joint_lines
 from .motionwording import motion_words, reach_of, screw_words, triple
-from .rounding import number, robot_size, settled, task_F
+from .rounding import number, ordered, residual, robot_size, settled, task_F
 from .text import Line, Tone
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def headline(result: SolveResult, case: Case) -> Line:
             if result.reached is None or result.reached.F is None
             else f": best F so far = {number(result.reached.F)}{unit}"
         )
-        return Line(f"interrupted{best}", tone=Tone.NO_ANSWER)
+        return Line(f"stopped before the end{best}", tone=Tone.NO_ANSWER)
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several
@@ -133,7 +133,9 @@ def evidence_lines(result: SolveResult) -> Iterator[Line]:
         for direction in evidence.flat_directions:
             yield Line(", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()), label="flat along")
         if evidence.stationarity is not None:
-            checks = f"stationarity {evidence.stationarity:.1e}, feasibility {evidence.feasibility:.1e}"
+            checks = (
+                f"stationarity {residual(evidence.stationarity)}, feasibility {residual(evidence.feasibility or 0.0)}"
+            )
             curvature = evidence.reduced_hessian_eigenvalues
             smallest = ", no free direction left"
             if curvature:
@@ -160,7 +162,7 @@ def costliest_words(limits: Sequence[LimitData]) -> str | None:
     costly = [(row, row.cost) for row in limits if row.active and row.cost]
     if not costly:
         return None
-    row, cost = max(costly, key=lambda each: abs(each[1] * (each[0].limit or 1.0)))
+    row, cost = max(costly, key=lambda each: ordered(abs(each[1] * (each[0].limit or 1.0))))
     return f"Per part of its own size, {row.key} costs most: {cost:+.4g} {slope_unit(row.unit)}."
 
 

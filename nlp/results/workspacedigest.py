@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..case.case import Case
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .rounding import number
+from .rounding import number, ordered
 from .text import Line, TextTable, Tone
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def machine_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:
 def tightest_table(extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
     """Yield the claims that are nearest to their limits: refuted ones first, then open ones."""
     limited = [each for each in extremes if each.limit is not None]
-    limited.sort(key=lambda each: (_ORDER.index(each.outcome), _room(each)))
+    limited.sort(key=lambda each: (_ORDER.index(each.outcome), ordered(_room(each))))
     seen: dict[str, ExtremeData] = {}
     for each in limited:
         # The nearest of each limit stands for all legs and joints.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .rounding import number
+from .rounding import number, ordered
 from .text import Line
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
     if singular is not None:
         return singular
     limited = [(_beyond(each), each) for each in result.extremes if each.limit is not None and each.reached is not None]
-    for _, each in sorted(limited, key=lambda pair: -pair[0]):
+    for _, each in sorted(limited, key=lambda pair: -ordered(pair[0])):
         found = next(_at_poses(result, each), None)
         if found is not None:
             return found

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from ...models import Dimension
 from ..case.case import Case
+from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .rounding import number
+from .motionwording import triple
+from .rounding import TURNED, number
 from .text import Line, TextTable, Tone
 from .wording import title_line
 from .workspacedigest import TONES, refuting_machine, verdict_lines
@@ -103,11 +106,13 @@ def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
 
 def pose_words(case: Case, pose: WorkspacePose) -> str:
     """Return a pose in a few words."""
-    position = ", ".join(f"{value:.5g}" for value in pose.position)
-    if abs(pose.angle) <= 1e-9:  # rounding of a rotation that is none
+    stated = () if case.workspace is None else case.workspace.position
+    ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]
+    size = max(map(abs, (*ends, *pose.position)))
+    position = ", ".join(number(value, size, digits=5) for value in pose.position)
+    if abs(case.units.to_internal(pose.angle, Dimension.ANGLE)) <= TURNED:
         return f"({position})"
-    axis = ", ".join(f"{part:.4g}" for part in pose.axis)
-    return f"({position}), {pose.angle:.5g} {case.units.angle} about ({axis})"
+    return f"({position}), {pose.angle:.5g} {case.units.angle} about {triple(pose.axis, 1.0)}"
 
 
 def _regular_lines(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -9,8 +10,8 @@ from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Sense
-from ..errors import InputError
-from ..interruption import is_requested, one_call
+from ..errors import InputError, check_seconds
+from ..interruption import is_requested, one_call, reason_of, seconds_left, within
 from ..program.formulation import formulate_each
 from ..program.nlp import Nlp
 from ..proof.boxes.proof_writer import ProofWriter
@@ -39,7 +40,7 @@ class CertifyOptions:
     Attributes:
         gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
         above: prove that F is above this value instead.
-        time_limit: seconds for each program.
+        time_limit: seconds for the whole call.
         jobs: threads.
 
     Raises:
@@ -54,8 +55,7 @@ class CertifyOptions:
     def __post_init__(self) -> None:
         if not 1e-10 <= self.gap < 1:
             raise OptionError(f"gap {self.gap:g}: must be at least 1e-10 and below 1")
-        if self.time_limit is not None and not self.time_limit > 0:
-            raise OptionError(f"time {self.time_limit:g}: must be positive")
+        check_seconds(self.time_limit)
         if self.above is not None and not abs(self.above) < float("inf"):
             raise OptionError(f"above {self.above:g}: must be finite")
 
@@ -114,7 +114,8 @@ def certify(
         found: a case, which is solved first, or its solution.
         gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
         above: prove, instead, that F of a case's only task is above this value on the whole box.
-        time_limit: seconds for each program; the search then stops with the bound reached.
+        time_limit: seconds for the whole call, the solve included; searches then stop with the bounds reached. Of the
+            time left, each of several programs takes an equal part at most.
         jobs: number of threads; the result does not depend on it.
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
@@ -128,6 +129,22 @@ def certify(
         UncoveredError: the case's expressions hold an operation without a rule.
     """
     options = CertifyOptions(gap, above, time_limit, jobs)
+    with within(time_limit):
+        return _certify(found, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=with_proof)
+
+
+def _certify(
+    found: Case | Solution,
+    options: CertifyOptions,
+    starts: int | None,
+    seed: int | None,
+    progress: Callable[[str], CertifyProgress] | None,
+    *,
+    all_assemblies: bool,
+    with_proof: bool,
+) -> Certified:
+    """Return what is proved within the time left; the rest is as for :func:`certify`."""
+    above, jobs = options.above, options.jobs
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
     several = len(case.tasks) > 1
@@ -142,10 +159,12 @@ def certify(
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
         # An operation without a rule is refused before a solve.
-        search_tape(standard_form(replace(nlps[0], in_home_mode=with_mode)))
+        form = standard_form(replace(nlps[0], in_home_mode=with_mode))
+        reason_of(lambda: "" if search_tape(form, is_short=False).op.size else "empty")
     search = case.search.but(starts, seed)
 
-    def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None) -> Certificate:
+    def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None, programs: int = 1) -> Certificate:
+        """Certify a program with an equal part of the time left, which so many programs share."""
         x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
         in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
         return certify_program(
@@ -153,9 +172,9 @@ def certify(
             x,
             claimed=claimed,
             gap=options.gap,
-            above=options.above,
-            time_limit=options.time_limit,
-            jobs=options.jobs,
+            above=above,
+            time_limit=None if math.isinf(seconds_left()) else seconds_left() / programs,
+            jobs=jobs,
             progress=None if progress is None else progress(name),
             recorder=recorder,
         )
@@ -172,7 +191,10 @@ def certify(
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
     solution = given or solve_programs(case, nlps, search, jobs=jobs)
-    alone = tuple(certify_one(outcome.own, outcome.task.name, None) for outcome in solution.outcomes)
+    count = len(solution.outcomes) + 1  # and the combined program
+    alone = tuple(
+        certify_one(outcome.own, outcome.task.name, None, count - k) for k, outcome in enumerate(solution.outcomes)
+    )
     if solution.combination is None or solution.combination.combined is None:
         return Certified(solution, alone, None, Statement(), None)
     combined = solution.combination.combined

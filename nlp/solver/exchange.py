@@ -88,15 +88,12 @@ class Exchanged(NamedTuple):
 
 
 @one_call()
-def solve_over_workspace(
-    case: Case, solve_one: SolveOne, *, time_limit: float | None = 60.0, progress: ExchangeProgress | None = None
-) -> Exchanged:
+def solve_over_workspace(case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None) -> Exchanged:
     """Return the solution of a case whose limits hold over its workspace, and the proof.
 
     Args:
         case: a case with one task and one stated pose.
         solve_one: solves a program.
-        time_limit: seconds for each search of a proof.
         progress: called after each exchange.
 
     Raises:
@@ -112,9 +109,9 @@ def solve_over_workspace(
     while found.status.is_answer:
         design = design_of(case, nlp, found.x)
         if others is None:
-            judged = judge_workspace(design, gap=_GAP, time_limit=time_limit, jobs=1, with_objective=False)
+            judged = judge_workspace(design, gap=_GAP, jobs=1, with_objective=False)
         else:
-            judged = judge(design, gap=_GAP, time_limit=time_limit)
+            judged = judge(design, gap=_GAP)
         first = judged if first is None else first
         faults = _faults(judged)
         history.append((found.F, len(faults)))

@@ -72,8 +72,10 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> Di
     remaining = sorted(converged, key=lambda start: nlp.sign * start.F)
     while remaining:
         phase(Phase.EVIDENCE, len(converged) - len(remaining), len(converged))
-        lead = remaining[0]
-        level = [start for start in remaining if abs(start.F - lead.F) <= same_value(nlp)]
+        best = remaining[0].F
+        # In the order of the starts: rounding chooses none of those with the same F.
+        level = [start for start in converged if start in remaining and abs(start.F - best) <= same_value(nlp)]
+        lead = level[0]
         evidence = examine(nlp, lead.x)
         # The lead is the first start of the level, and so of the first group: its evidence serves that group.
         isolated = evidence.kind is not PointKind.NOT_ISOLATED

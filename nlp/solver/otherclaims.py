@@ -10,7 +10,6 @@ import numpy as np
 from ...models import FloatArray
 from ...models.joints.closedform import closed_form
 from ..case.case import Case
-from ..interruption import is_requested
 from ..program.nlp import Nlp
 from ..proof.statement.closed_layout import reach_claims
 from ..proof.statement.machine import workspace_of_case
@@ -26,23 +25,22 @@ _REACH = "reach limb "
 _UNREACHED = "a limb does not reach every pose, so that J is not judged"
 
 
-def judge(case: Case, *, gap: float, time_limit: float | None) -> Judgement:
+def judge(case: Case, *, gap: float) -> Judgement:
     """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone.
 
     Args:
         case: with fixed dimensions.
         gap: of the bounds.
-        time_limit: seconds for each search.
     """
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     if closed.reaches:
         reach = reach_claims(case, closed, workspace)
-        prove = partial(prove_extreme, reach.layout, gap=gap, time_limit=time_limit, jobs=1, interrupted=is_requested)
+        prove = partial(prove_extreme, reach.layout, gap=gap, jobs=1)
         found = tuple(prove(claim) for claim in reach.claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
             unknown = not_judged(pose_box(workspace), _UNREACHED)
             return Judgement(case, workspace, unknown, found)
-    return judge_workspace(case, gap=gap, time_limit=time_limit, jobs=1, with_objective=False)
+    return judge_workspace(case, gap=gap, jobs=1, with_objective=False)
 
 
 class OtherClaims:

@@ -6,7 +6,7 @@ import enum
 
 
 class Status(enum.Enum):
-    """Status of a solve; each value is the word in results."""
+    """Status of a solve; each value is the word in results; interrupted is also one whose time was over."""
 
     OPTIMAL = "optimal"
     AVERAGED = "averaged"

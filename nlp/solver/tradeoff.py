@@ -16,7 +16,7 @@ from ...models import FloatArray
 from ..case.case import Case
 from ..case.settings import Search
 from ..errors import InputError
-from ..interruption import Milestone, is_requested, reached
+from ..interruption import Milestone, is_requested, reached, why_stopped
 from ..program.formulation import formulate_each
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
@@ -99,6 +99,8 @@ def tradeoff(
         reached(Milestone.VALUE)
         if progress is not None:
             progress(done, len(cases))
+    if not solutions:
+        raise InputError(f"{name}: {why_stopped()} before the first value is solved")
     for k in range(len(solutions) - 2, -1, -1):
         better = _whole(partial(_improved, solutions[k], solutions[k + 1], cases[k].search.but(starts, seed), jobs))
         if better is None:

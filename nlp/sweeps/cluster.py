@@ -8,8 +8,8 @@ from typing import Any
 
 from ..errors import InputError
 from .engines import Job, answer
+from .points import PointBlock
 from .rows import Row
-from .workers import PointBlock
 
 #: Seconds to wait for an answer of the cluster's scheduler.
 _WAIT = 5
@@ -48,7 +48,7 @@ def answer_on_cluster(job: Job, blocks: Iterable[PointBlock], address: str) -> I
         given: dict[str, tuple[PointBlock, int]] = {}
 
         def submit(block: PointBlock, tries: int) -> Any:  # noqa: ANN401 - a future of Dask's
-            future = client.submit(answer, job, list(block.indices), block.values, pure=False, retries=1)
+            future = client.submit(answer, job, block, pure=False, retries=1)
             given[future.key] = block, tries
             return future
 

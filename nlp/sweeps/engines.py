@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from ...models import FloatArray
 from ..errors import CaseError, InputError
+from ..interruption import within
 from .compiled import CompiledEngine
 from .interpreted import solve_point
 from .places import NotPlacedError
-from .points import Points
+from .points import PointBlock, Points
 from .rows import Row
 from .source import CaseSource
 
@@ -36,7 +35,7 @@ class Job(NamedTuple):
         starts: number of searches at each point.
         seed: seed instead of the case's.
         kind: of the engine.
-        proof_seconds: seconds for the certificate of each point; None for no certificates.
+        certified: whether the optimum at each point is proved too.
     """
 
     source: CaseSource
@@ -45,7 +44,7 @@ class Job(NamedTuple):
     starts: int
     seed: int | None
     kind: EngineKind
-    proof_seconds: float | None = None
+    certified: bool = False
 
 
 class Choice(NamedTuple):
@@ -67,9 +66,9 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
         CaseError: the case has no number of a name, or does not allow a value.
         InputError: the compiled engine is asked for and cannot be had.
     """
-    if job.proof_seconds is not None and wanted is EngineKind.COMPILED:
+    if job.certified and wanted is EngineKind.COMPILED:
         raise InputError("--engine compiled: has no certificates; leave it out, or leave out --certify")
-    if wanted is EngineKind.IPOPT or job.proof_seconds is not None:
+    if wanted is EngineKind.IPOPT or job.certified:
         for values in job.chosen:
             job.source.case_at(dict(zip(job.names, values, strict=True)))
         return Choice(EngineKind.IPOPT, "" if wanted else "a certificate is of one solve by Ipopt")
@@ -86,23 +85,17 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
     return Choice(EngineKind.COMPILED, "")
 
 
-def answer(job: Job, indices: Sequence[int], values: FloatArray) -> list[Row]:
-    """Return the rows of a block of points by one thread.
-
-    Args:
-        job: the job.
-        indices: of the points.
-        values: (N, m) their numbers.
-    """
+def answer(job: Job, block: PointBlock) -> list[Row]:
+    """Return the rows of a block of points by one thread."""
     if job.kind is EngineKind.COMPILED:
         engine = compiled_engine(job, 1)
-        return engine.rows(engine.solve(indices, values))
-    return [
-        solve_point(
-            job.source, dict(zip(job.names, row.tolist(), strict=True)), index, job.starts, job.seed, job.proof_seconds
-        )
-        for index, row in zip(indices, values, strict=True)
-    ]
+        return engine.rows(engine.solve(block.indices, block.values))
+    seconds, names = block.proof_seconds if job.certified else None, job.names
+    with within(block.seconds):
+        return [
+            solve_point(job.source, dict(zip(names, row.tolist(), strict=True)), index, job.starts, job.seed, seconds)
+            for index, row in zip(block.indices, block.values, strict=True)
+        ]
 
 
 @lru_cache(maxsize=2)

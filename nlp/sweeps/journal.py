@@ -58,6 +58,13 @@ class Journal:
             raise
 
     @property
+    def words(self) -> str:
+        """How many points it has, and what goes on from there."""
+        count = len(self._places)
+        done = f"{count - len(self.missing):,} of {count:,} points are in {self.path}"
+        return f"{done}: the same command goes on from there"
+
+    @property
     def missing(self) -> NDArray[np.intp]:
         """Indices of the points without a row, ascending."""
         return np.flatnonzero(self._places < 0)

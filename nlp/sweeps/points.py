@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,15 @@ MOST_POINTS = 10_000_000
 #: Number of points, evenly spread, that are read beside those with an extreme number.
 _BETWEEN = 3
 _FORMS = "NAME=FIRST:LAST:COUNT or NAME=V1,V2,..., such as x1=10:14:41"
+
+
+class PointBlock(NamedTuple):
+    """A block of points: indices, (N, m) values of their numbers, seconds until their end, and for the proof of one."""
+
+    indices: Sequence[int]
+    values: FloatArray
+    seconds: float = math.inf
+    proof_seconds: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)

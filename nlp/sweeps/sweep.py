@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -14,20 +15,21 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..interruption import is_requested, one_call
+from ..interruption import is_interrupted, is_requested, one_call, seconds_left
 from ..program.designnumbers import design_indices
 from ..program.formulation import formulate
 from .cluster import answer_on_cluster
-from .engines import EngineKind, Job, choose_engine, compiled_engine
-from .interpreted import solve_point
+from .engines import EngineKind, Job, answer, choose_engine, compiled_engine
 from .journal import ENDING, Journal
-from .points import Points
+from .points import PointBlock, Points
 from .rows import Row
 from .source import CaseSource
-from .workers import PointBlock, answer_in_processes
+from .workers import answer_in_processes
 
 #: Points that are solved and judged together: enough for arrays to pay, and about a third of a second of work.
 _BLOCK = 512
+#: Seconds that the proof of a point takes at most.
+PROOF_SECONDS = 60.0
 #: Searches at each point without ``--starts``.
 STARTS = 8
 
@@ -45,7 +47,7 @@ class Sweep:
         variables: names of the free numbers of a design.
         starts: number of searches at each point.
         seed: seed instead of the case's.
-        proof_seconds: seconds for the certificate of each point; None for no certificates.
+        certified: whether the optimum at each point is proved too.
     """
 
     source: CaseSource
@@ -53,7 +55,7 @@ class Sweep:
     variables: tuple[str, ...]
     starts: int = STARTS
     seed: int | None = None
-    proof_seconds: float | None = None
+    certified: bool = False
 
     @classmethod
     def of(
@@ -62,7 +64,8 @@ class Sweep:
         points: Points,
         starts: int | None = None,
         seed: int | None = None,
-        proof_seconds: float | None = None,
+        *,
+        certified: bool = False,
     ) -> Sweep:
         """Return the sweep of a case.
 
@@ -71,12 +74,12 @@ class Sweep:
         """
         program = formulate(source.case_at(points.settings(0))).program
         names = tuple(program.variables[k].name for k in design_indices(program))
-        return cls(source, points, names, STARTS if starts is None else starts, seed, proof_seconds)
+        return cls(source, points, names, STARTS if starts is None else starts, seed, certified)
 
     @property
     def fingerprint(self) -> str:
         """Hash of what the rows depend on: case, points, starts, seed, certificates and version."""
-        parts = (__version__, *self.source, self.points.names, self.starts, self.seed, self.proof_seconds)
+        parts = (__version__, *self.source, self.points.names, self.starts, self.seed, self.certified)
         hashed = hashlib.sha256(repr(parts).encode())
         hashed.update(np.ascontiguousarray(self.points.values).tobytes())
         return hashed.hexdigest()[:32]
@@ -101,7 +104,7 @@ def run_sweep(
     progress: SweepProgress | None = None,
     notice: Callable[[str], None] | None = None,
 ) -> None:
-    """Solve the points that a journal lacks, and append their rows as they finish.
+    """Solve the points that a journal lacks, and append their rows as they finish, until the time is over.
 
     Args:
         sweep: the sweep.
@@ -120,15 +123,13 @@ def run_sweep(
     if not len(missing):
         return
     chosen = tuple(map(tuple, sweep.points.chosen().values.tolist()))
-    job = Job(
-        sweep.source, sweep.points.names, chosen, sweep.starts, sweep.seed, EngineKind.COMPILED, sweep.proof_seconds
-    )
+    job = Job(sweep.source, sweep.points.names, chosen, sweep.starts, sweep.seed, EngineKind.COMPILED, sweep.certified)
     choice = choose_engine(job, engine, jobs)
     if choice.reason and notice is not None:
         notice(f"Ipopt solves each point by itself: {choice.reason}")
     job = job._replace(kind=choice.kind)
-    blocks = _blocks(sweep.points, missing, _BLOCK if choice.kind is EngineKind.COMPILED else 1)
     count = jobs or os.cpu_count() or 1
+    blocks = _blocks(sweep.points, missing, _BLOCK if choice.kind is EngineKind.COMPILED else 1, count)
     if dask is not None:
         answers = answer_on_cluster(job, blocks, dask)
     elif choice.kind is EngineKind.COMPILED:
@@ -136,29 +137,34 @@ def run_sweep(
     elif min(count, len(missing)) > 1:
         answers = answer_in_processes(job, blocks, min(count, len(missing)))
     else:
-        answers = ([_solve(job, block)] for block in blocks)
+        answers = (answer(job, block) for block in blocks)
     began, before, done = time.perf_counter(), len(sweep.points) - len(missing), 0
     for rows in answers:
-        if is_requested():  # an interrupted search is no answer
-            raise KeyboardInterrupt
+        if is_requested():  # a search that was stopped is no answer
+            if is_interrupted():
+                raise KeyboardInterrupt
+            return
         journal.append(rows)
         done += len(rows)
         if progress is not None:
             progress(before, done, len(missing), time.perf_counter() - began)
 
 
-def _blocks(points: Points, missing: np.ndarray[tuple[int, ...], np.dtype[np.intp]], size: int) -> Iterator[PointBlock]:
-    """Yield blocks of the missing points: those with the same quotient of their index by the size."""
+def _blocks(
+    points: Points, missing: np.ndarray[tuple[int, ...], np.dtype[np.intp]], size: int, count: int
+) -> Iterator[PointBlock]:
+    """Yield blocks of the missing points until the time is over: those with the same quotient of index by size.
+
+    So many points are answered at a time: each has an equal part of the time left for its proof.
+    """
+    left = len(missing)
     for _, group in groupby(missing.tolist(), key=lambda index: index // size):
-        indices = list(group)
-        yield PointBlock(indices, points.values[indices])
-
-
-def _solve(job: Job, block: PointBlock) -> Row:
-    """Return the row of a block of one point."""
-    (index,) = block.indices
-    settings = dict(zip(job.names, block.values[0].tolist(), strict=True))
-    return solve_point(job.source, settings, index, job.starts, job.seed, job.proof_seconds)
+        if is_requested():
+            return
+        # One more than needed: the last proof ends before the time does, after which no answer is taken.
+        indices, seconds, rounds = list(group), seconds_left(), 1 + math.ceil(left / count)
+        yield PointBlock(indices, points.values[indices], seconds, min(PROOF_SECONDS, seconds / rounds))
+        left -= len(indices)
 
 
 def _answer_in_threads(job: Job, blocks: Iterator[PointBlock], threads: int | None) -> Iterator[list[Row]]:
@@ -166,9 +172,9 @@ def _answer_in_threads(job: Job, blocks: Iterator[PointBlock], threads: int | No
     engine = compiled_engine(job, threads)
     with ThreadPoolExecutor(1) as ahead:
         following = next(blocks, None)
-        solving = None if following is None else ahead.submit(engine.solve, *following)
+        solving = None if following is None else ahead.submit(engine.solve, following.indices, following.values)
         while solving is not None:
             solved = solving.result()
             following = next(blocks, None)
-            solving = None if following is None else ahead.submit(engine.solve, *following)
+            solving = None if following is None else ahead.submit(engine.solve, following.indices, following.values)
             yield engine.rows(solved)

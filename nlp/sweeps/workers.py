@@ -8,28 +8,21 @@ from __future__ import annotations
 
 import signal
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import NamedTuple
 
-from ...models import FloatArray
 from ..errors import InputError
 from ..interruption import WRITING
 from .engines import Job, answer
+from .points import PointBlock
 from .rows import Row
 
 #: Number of workers that may die with one block: the block itself is then the cause.
 _DEATHS = 3
-
-
-class PointBlock(NamedTuple):
-    """A block of points: indices, and (N, m) values of their numbers."""
-
-    indices: Sequence[int]
-    values: FloatArray
 
 
 class _Worker(NamedTuple):
@@ -126,6 +119,6 @@ def _serve(pipe: Connection, job: Job) -> None:
     while True:
         try:
             block = pipe.recv()
-            pipe.send(answer(job, block.indices, block.values))
+            pipe.send(answer(job, block))
         except (EOFError, OSError):
             return

@@ -17,6 +17,7 @@ from screwsynth.models.mechanism.singularities import closed_configurations
 from screwsynth.nlp import Case, Nlp, Task, evaluate, formulate
 from screwsynth.nlp.case.pose import Rotation
 from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.evidence.paths import velocities_at
 
 Array = NDArray[np.float64]
 CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
@@ -45,16 +46,16 @@ def work(rows: Array) -> Array:
     return np.hstack([rows[:, 3:], rows[:, :3]])
 
 
-def is_regular(engine: Engine) -> bool:
+def is_regular(engine: Engine, regular: float) -> bool:
     """Whether no singular value of the engine's constraints, or of the platform in their null space, is near 0."""
     for locked in (False, True):
         rows = engine.rows(locked=locked)
         values = np.linalg.svd(rows, compute_uv=False)
-        if np.any((values > 1e-11 * values[0]) & (values < REGULAR * values[0])):
+        if np.any((values > 1e-11 * values[0]) & (values < regular * values[0])):
             return False
         motions = null_space(rows)[: engine.model.nv]
         values = np.linalg.svd(engine.motion(engine.mechanism.platform, np.zeros(3)) @ motions, compute_uv=False)
-        if np.any((values > 1e-11) & (values < REGULAR)):
+        if np.any((values > 1e-11) & (values < regular)):
             return False
     return True
 
@@ -186,7 +187,7 @@ def joined(sets: list[set[str]], more: list[set[str]]) -> list[set[str]]:
     return sets
 
 
-def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
+def compare(tables: dict[str, Any], driven: int = 3, regular: float = REGULAR) -> Differences:
     """Compare a robot's model, and its numbers as a mechanism, with the engine at home and at random configurations.
 
     Raises:
@@ -196,7 +197,7 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
     worst, count = np.zeros(3), 0
     for there in (home, *closed_configurations(home, count=driven)):
         engine = Engine(there)
-        if not is_regular(engine):
+        if not is_regular(engine, regular):
             continue
         count += 1
         free, locked = (engine.platform_twists(locked=each) for each in (False, True))
@@ -207,7 +208,7 @@ def compare(tables: dict[str, Any], driven: int = 3) -> Differences:
         state = evaluate(nlp, x)
         mobility = mobility_of(nlp, x, state)
         assert mobility is not None
-        velocities = nlp.program.kernels.robot_state(x, nlp.arguments).velocities
+        velocities = velocities_at(nlp, x, nlp.program.kernels.robot_state(x, nlp.arguments))
         constraints = constraint_rows(model, velocities, state.position)
         assert mobility.freedoms == free.shape[1], (mobility.freedoms, free.shape[1])
         assert state.rank == 6 - locked.shape[1], (state.rank, locked.shape[1])

@@ -13,6 +13,7 @@ from screwsynth.models.basis import basis_of_member
 from screwsynth.models.joints.expression import ExpressionError, evaluate
 from screwsynth.models.joints.motion import AxisKind, JointAxis, Motion
 from screwsynth.models.member import resisted_parts, scaled_twists
+from screwsynth.models.rows import column_groups
 from screwsynth.models.wrench import WrenchKind
 
 NO_EXPRESSIONS = [
@@ -159,3 +160,17 @@ def test_redundant_parallel_hinges_leave_the_robot_the_same() -> None:
 def test_messages_name_the_place() -> None:
     with pytest.raises(ValueError, match=re.escape("limb 1, joint 1 (R), axis: is 'q', which has the name 'q'")):
         robot(name="wrong", limb=[{"joints": [{"type": "R", "at": "x", "axis": "q"}]}])
+
+
+def test_columns_fall_into_the_smallest_groups_whose_ranks_add_up() -> None:
+    """Two columns of one direction, three of a plane, a lone one and a zero; a ball's axes first, where they stay."""
+    rng, points, balls = np.random.default_rng(6), [], []
+    for _ in range(4):
+        span = rng.normal(size=(6, 4))
+        parts = [span[:, :1] @ rng.normal(size=(1, 2)), span[:, 1:3] @ rng.normal(size=(2, 3)), span[:, 3:]]
+        points.append(np.hstack([*parts, np.zeros((6, 1))])[:, [0, 2, 1, 3, 4, 5, 6]])
+        ball = [np.vstack([ca.skew(ca.DM(rng.normal(size=3))).full(), np.eye(3)]) for _ in range(2)]
+        balls.append(np.hstack(ball))
+    assert column_groups(points, 4) == (((0, 2, 6), 1), ((1, 3, 4), 2), ((5,), 1))
+    assert column_groups(balls, 5) == (((0,), 1), ((1,), 1), ((2,), 1), ((3, 4, 5), 2))
+    assert column_groups(points[:1], 4) == ()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from casadi import SX
 from engine_comparison import Differences, compare
-from random_mechanisms import Builder, random_mechanism
+from random_mechanisms import Array, Builder, random_mechanism, unit
 
 from screwsynth.models import GenericRanks, robot
 from screwsynth.models.joints import RobotError
@@ -106,6 +106,71 @@ def test_actuators_of_a_branch_drive_that_branch_alone() -> None:
     assert [each.members for each in model.actuators] == [("1.1", "1.2", "1.3"), ("1.2",), ("1.3",)]
     assert model.generic == GenericRanks(6, 3)
     assert_equal(compare(tables, driven=1))
+
+
+def four_bar(builder: Builder) -> str:
+    """A driven four-bar from the base; return its coupler."""
+    coupler, z = builder.link(), np.array([0.0, 0.0, 1.0])
+    for side, driven in ((-0.5, True), (0.5, False)):
+        places = np.array([side, 0, 0]), np.array([1.4 * side, 0.6, 0])
+        builder.chain("base", coupler, [("R", places[0], [z], driven), ("R", places[1], [z], False)])
+    return coupler
+
+
+def strut(builder: Builder, start: str, foot: Array, way: Array) -> None:
+    """A driven strut to the platform."""
+    steps = [("U", foot, [np.eye(3)[0], np.eye(3)[1]], False), ("P", foot, [way], True), ("S", foot + way, [], False)]
+    builder.chain(start, "platform", steps)
+
+
+def test_short_rods_of_nested_loops_lose_no_digits() -> None:
+    """A platform on a coupler by one strut and five rods, of which two are short: it had one freedom, not two."""
+    builder = Builder(np.random.default_rng(1))
+    coupler = four_bar(builder)
+    for k in range(6):
+        foot, way = 0.4 * builder.rng.normal(size=3) + [0, 0.6, 0.3], builder.rng.normal(size=3)
+        way *= (1e-3 if k in (1, 2) else 0.5) / np.linalg.norm(way)
+        if k:
+            builder.chain(coupler, "platform", [("S", foot, [], False), ("S", foot + way, [], False)])
+        else:
+            strut(builder, coupler, foot, 0.5 * way / np.linalg.norm(way))
+    links = [*builder.links, "platform"]
+    tables = {"name": "rods", "home": [0.1, 0.2, 0.3], "links": links, "joint": builder.joints}
+    assert_equal(compare(tables, driven=1, regular=1e-8))
+
+
+@pytest.mark.parametrize(("kind", "near"), [("R", 1e-4), ("S", 1e-3)])
+def test_dependent_screws_that_nearly_lose_a_rank_keep_their_complement(kind: str, near: float) -> None:
+    """A four-bar carries a ball joint and, behind it, a hinge that nearly goes through the ball, or a ball joint."""
+    builder = Builder(np.random.default_rng(4))
+    coupler, at = four_bar(builder), np.array([0.2, 0.7, 0.4])
+    axes = [unit(builder.rng)] if kind == "R" else []
+    builder.chain(coupler, "platform", [("S", at, [], False), (kind, at + near * unit(builder.rng), axes, False)])
+    for _ in range(4 if kind == "R" else 5):
+        strut(builder, "base", 0.6 * builder.rng.normal(size=3), 0.3 * unit(builder.rng) + [0, 0, 0.5])
+    tables = {"name": "near", "home": [0.1, 0.2, 0.3], "links": [*builder.links, "platform"], "joint": builder.joints}
+    assert_equal(compare(tables, driven=1, regular=1e-8))
+
+
+def test_loops_at_a_dead_centre_determine_the_rates_that_they_hold() -> None:
+    """A crank and its rod in line hold a foot's motor at home, and with it the hip's: both were not determined."""
+    links = ["base", "thigh", "shin", "heel", "crank", "rod", "platform"]
+    ends = {
+        "hip": ("base", "thigh"),
+        "knee": ("thigh", "shin"),
+        "ankle": ("shin", "heel"),
+        "foot": ("heel", "platform"),
+        "low": ("heel", "crank"),
+        "middle": ("crank", "rod"),
+        "high": ("rod", "platform"),
+    }
+    places = [(0, 1, 0), (0.3, 0.7, 0), (-0.2, 0.4, 0), (0, 0, 0), (0, -0.5, 0), (0.15, -0.2, 0), (0.3, 0.1, 0)]
+    joints = [
+        table(name, "R", between, at, axis="z", actuated=name in ("hip", "foot"))
+        for (name, between), at in zip(ends.items(), places, strict=True)
+    ]
+    tables = {"name": "dead centre", "home": [0.1, -0.2, 0], "links": links, "joint": joints}
+    assert_equal(compare(tables, driven=2))
 
 
 def test_links_that_hang_on_one_joint_leave_a_network_as_it_is() -> None:

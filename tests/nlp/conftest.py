@@ -17,6 +17,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from generated import COMPILERS, STRICT
 
 from screwsynth.nlp import Case, Nlp, load_case
 from screwsynth.nlp.cli.main import run as command_line
@@ -97,10 +98,8 @@ Deadline = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
 MULTIPLIERS = ("lower_multipliers", "upper_multipliers", "g_lower_multipliers", "g_upper_multipliers")
 
 
-#: Flags by which generated C compiles without a warning.
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror"
 #: The first compiler there is; empty without one.
-COMPILER = next((name for name in ("gcc", "clang", "cc") if shutil.which(name)), "")
+COMPILER = next(iter(COMPILERS), "")
 
 
 def built(files: Mapping[str, str], root: Path, level: str) -> Path:

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from generated import COMPILERS, STRICT, made, needs_compiler, written
 
 from screwsynth.nlp import formulate, load_case, shipped_cases
-from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.task import Method
 from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
@@ -22,28 +22,12 @@ from screwsynth.nlp.embedding.subject import find_subject
 Run = Callable[..., tuple[int, str, str]]
 Embedded = Any
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
 #: An average optimises nothing: C is not generated for it.
 CASES = [
     name
     for name, case in ((name, load_case(name)) for name in shipped_cases())
     if len(case.tasks) == 1 or case.method is not Method.AVERAGE
 ]
-COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
-needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
-
-
-def folder(name: str, target: Path) -> Path:
-    target.mkdir(parents=True, exist_ok=True)
-    for file, text in generate_c(load_case(name), find_case(name).read_text(encoding="utf-8")).items():
-        (target / file).write_text(text, encoding="utf-8")
-    return target
-
-
-def made(where: Path, *words: str) -> str:
-    done = subprocess.run(["make", "-C", str(where), *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 @needs_compiler
@@ -55,9 +39,9 @@ def test_every_shipped_case_compiles_without_a_warning_and_passes_its_test(
     # The first compiler has made the library with the strict flags and -O2. Those of clang warn at any level.
     shared = embedded(name).folder
     if compiler == COMPILERS[0]:
-        where, flags = Path(shutil.copytree(shared, tmp_path / "c")), f"{STRICT} -fPIC"
+        where, flags = Path(shutil.copytree(shared, tmp_path / "c")), f"{STRICT} -O2 -fPIC"
     else:
-        where, flags = tmp_path, STRICT.replace("-O2", "-O0")
+        where, flags = tmp_path, f"{STRICT} -O0"
         for path in shared.iterdir():
             if path.suffix not in {".o", ".a", ".so"}:
                 shutil.copy(path, where)
@@ -76,7 +60,7 @@ def test_what_clang_optimises_passes_the_test_too(
     for path in embedded(name).folder.iterdir():
         if path.suffix not in {".o", ".a", ".so"}:
             shutil.copy(path, tmp_path)
-    assert " passed, 0 failed" in made(tmp_path, "CC=clang", f"CFLAGS={STRICT}", "test")
+    assert " passed, 0 failed" in made(tmp_path, "CC=clang", f"CFLAGS={STRICT} -O2", "test")
 
 
 @needs_compiler
@@ -129,6 +113,9 @@ def test_units_of_f_twists_rates_and_multipliers_are_data() -> None:
     header = next(text for name, text in files.items() if name.endswith(".h") and "_F_unit" in text)
     assert '_F_unit = "(in/rad)\\302\\262";' in header
     assert "_limit_multiplier_units[" in header
+    constraints = {each["name"]: each["multiplier_unit"] for each in data["constraints"]}
+    leg = next(name for name in constraints if "leg_length" in name)
+    assert constraints[leg] == f"{data['F_unit']}/in\N{SUPERSCRIPT TWO}"
     # A translation has no angle to be measured by.
     drill = json.loads(generate_c(load_case("drilling-spindle"), "")["manifest.json"])
     assert (drill["F_unit"], drill["tasks"][0]["rate_unit"]) == ("(mm/mm)\N{SUPERSCRIPT TWO}", "mm/mm")
@@ -189,7 +176,7 @@ def test_cmake_builds_it_too(tmp_path: Path) -> None:
     cmake = shutil.which("cmake")
     if cmake is None:
         pytest.skip("cmake is not installed")
-    where, build = folder("paper-4.2-translation", tmp_path / "c"), tmp_path / "build"
+    where, build = written("paper-4.2-translation", tmp_path / "c"), tmp_path / "build"
     for words in (["-S", str(where), "-B", str(build)], ["--build", str(build)]):
         done = subprocess.run([cmake, *words], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -207,7 +194,7 @@ def test_versions_are_compatible_as_semantic_versioning_says(
     if cmake is None or not COMPILERS:
         pytest.skip("cmake or a C compiler is not installed")
     monkeypatch.setattr("screwsynth.nlp.embedding.codegen.__version__", version)
-    where, name = folder("paper-4.2-translation", tmp_path / "c"), identifier("paper-4.2-translation")
+    where, name = written("paper-4.2-translation", tmp_path / "c"), identifier("paper-4.2-translation")
     words = [cmake, "-S", str(where), "-B", "build", "-DCMAKE_C_COMPILER_WORKS=1"]
     subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
     asked = ["0.3", "0.4", "0.4.1", "0.5", "1.0", "1.3", "1.4", "2", "2.0", "2.1", "3.0"]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from generated import STRICT, made, needs_compiler, written
 
 from screwsynth.nlp import case_from_tables, load_case, solve
 from screwsynth.nlp.case.source import find_case
@@ -17,10 +16,6 @@ from screwsynth.nlp.embedding.codegen import generate_c, size_words
 from screwsynth.nlp.embedding.ctext import identifier
 
 Run = Callable[..., tuple[int, str, str]]
-
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
-COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
-needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
 
 
 def test_size_is_said_before_the_folder_is_written(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,12 +60,8 @@ def test_what_a_case_says_cannot_break_the_c(tmp_path: Path) -> None:
         "pose": {"position": [0, 0, 40]},
         "task": [{"name": '??/"\n*/', "sense": "max", "axis": [0, 0, 1], "pitch": float("inf")}],
     }
-    for file, text in generate_c(case_from_tables(tables, name="3 legs!", source="bad.toml"), "").items():
-        (tmp_path / file).write_text(text, encoding="utf-8")
-    words = ["make", "-C", str(tmp_path), f"CFLAGS={STRICT} -Wno-trigraphs", "test"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "0 failed" in done.stdout
+    where = written(case_from_tables(tables, name="3 legs!", source="bad.toml"), tmp_path)
+    assert "0 failed" in made(where, f"CFLAGS={STRICT} -O2 -Wno-trigraphs", "test")
 
 
 def test_the_command_line_writes_the_folder(tmp_path: Path, cli: Run) -> None:

@@ -10,29 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from generated import COMPILERS, made, needs_compiler, written
 
-from screwsynth.nlp import load_case
-from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
 
 Embedded = Any
-
-COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
-needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
-
-
-def folder(name: str, target: Path) -> Path:
-    target.mkdir(parents=True, exist_ok=True)
-    for file, text in generate_c(load_case(name), find_case(name).read_text(encoding="utf-8")).items():
-        (target / file).write_text(text, encoding="utf-8")
-    return target
-
-
-def made(where: Path, *words: str) -> str:
-    done = subprocess.run(["make", "-C", str(where), *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 def run(where: Path, flags: str, *runner: str) -> subprocess.CompletedProcess[str]:
@@ -56,7 +38,7 @@ def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
     built = [COMPILERS[0], *flags.split(), str(probe), "-o", str(tmp_path / "probe")]
     if subprocess.run(built, check=False, capture_output=True).returncode:
         pytest.skip("the compiler has no sanitizers")
-    run(folder(name, tmp_path / "c"), f"-O0 {flags}")
+    run(written(name, tmp_path / "c"), f"-O0 {flags}")
 
 
 @needs_compiler
@@ -65,7 +47,7 @@ def test_valgrind_finds_nothing_and_no_heap(tmp_path: Path) -> None:
     valgrind = shutil.which("valgrind")
     if valgrind is None:
         pytest.skip("valgrind is not installed")
-    where = folder("paper-4.1-rotation", tmp_path)
+    where = written("paper-4.1-rotation", tmp_path)
     done = run(where, "-O1", valgrind, "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all")
     # What printf takes is one buffer; the library takes nothing.
     assert re.search(r"total heap usage: 1 allocs", done.stderr), done.stderr

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import re
-import shutil
 import subprocess
 import tomllib
 from collections.abc import Callable
@@ -12,18 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
+from generated import COMPILERS, STRICT, made, needs_compiler, written
 
 from screwsynth.nlp import Nlp, case_from_tables, formulate, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.program.sampling import starting_points
 
 Embedded = Any
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O2"
-COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
-needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
 
 SPECTRA = """
 [robot]
@@ -51,18 +46,10 @@ starts = 4
 """
 
 
-def made(where: Path, *words: str) -> str:
-    done = subprocess.run(["make", "-C", str(where), *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
-
-
 def spectral(target: Path) -> tuple[Path, Nlp]:
     """The folder of a case with limits on singular values, and its program."""
     case = case_from_tables(tomllib.loads(SPECTRA), name="spectra", source="spectra.toml")
-    for file, text in generate_c(case, SPECTRA).items():
-        (target / file).write_text(text, encoding="utf-8")
-    return target, formulate(case)
+    return written(case, target), formulate(case)
 
 
 @needs_compiler
@@ -70,10 +57,9 @@ def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_p
     tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8")) | {
         "limits": {"condition_number": {"max": 300, "length": 10}}
     }
-    for file, text in generate_c(case_from_tables(tables, name="alone", source="alone"), "").items():
-        (tmp_path / file).write_text(text, encoding="utf-8")
+    written(case_from_tables(tables, name="alone", source="alone"), tmp_path)
     for compiler in COMPILERS:
-        command = [compiler, *STRICT.split(), "-fsyntax-only", str(tmp_path / "screwsynth_alone-loops.c")]
+        command = [compiler, *STRICT.split(), "-O2", "-fsyntax-only", str(tmp_path / "screwsynth_alone-loops.c")]
         assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
 
 
@@ -81,7 +67,7 @@ def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_p
 def test_limits_on_singular_values_are_small_and_exact(tmp_path: Path) -> None:
     where, nlp = spectral(tmp_path)
     assert sum(path.stat().st_size for path in where.glob("screwsynth_spectra*")) <= 400_000
-    assert "0 failed" in made(where, f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -fPIC", "test")
+    assert "0 failed" in made(where, f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O2 -fPIC", "test")
     objects = sorted(str(path) for path in where.glob("screwsynth_spectra*.o"))
     lines = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout.splitlines()
     wanted = {line.split()[-1] for line in lines if " U " in line}

@@ -13,6 +13,7 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.conventions import dependence_of
 from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.evidence.paths import velocities_at
 from screwsynth.nlp.results.alltables import case_tables, table_names
 from screwsynth.nlp.results.summary import case_summary
 from screwsynth.nlp.results.text import Line, TextTable
@@ -42,7 +43,7 @@ def with_twist(nlp: Nlp, twist: np.ndarray) -> Nlp:
 def feasible(nlp: Nlp) -> np.ndarray:
     """The general twist, projected on the twists that the platform can make with free actuators."""
     numbers = nlp.program.kernels.robot_state(nlp.start, nlp.arguments)
-    rows = constraint_rows(nlp.program.model, numbers.velocities, numbers.position)
+    rows = constraint_rows(nlp.program.model, velocities_at(nlp, nlp.start, numbers), numbers.position)
     work = np.hstack([rows[:, 3:], rows[:, :3]])
     return GENERAL - np.linalg.pinv(work, rcond=1e-9) @ (work @ GENERAL)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import re
-import shutil
 import sys
 import tomllib
 from collections.abc import Callable
@@ -14,9 +13,10 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from generated import COMPILERS, written
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import Case, CompiledCase, case_from_tables, generate_c, load_case, load_compiled, shipped_cases
+from screwsynth.nlp import Case, CompiledCase, case_from_tables, load_case, load_compiled, shipped_cases
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.starter import starter_case
 
@@ -41,15 +41,12 @@ def ticks() -> ModuleType:
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory: pytest.TempPathFactory) -> Compiled:
-    if not any(shutil.which(name) for name in ("cc", "gcc", "clang")):
+    if not COMPILERS:
         pytest.skip("no C compiler is installed")
 
     @cache
     def made(name: str) -> CompiledCase:
-        folder = tmp_path_factory.mktemp("honest")
-        for file, text in generate_c(case_of(name), "").items():
-            (folder / file).write_text(text, encoding="utf-8")
-        return load_compiled(folder)
+        return load_compiled(written(case_of(name), tmp_path_factory.mktemp("honest")))
 
     return made
 
@@ -121,9 +118,7 @@ def test_the_largest_of_other_tasks_to_be_minimised_is_theirs(tmp_path: Path, ti
     for task in tables["task"]:
         task["sense"] = "min"
     del tables["expect"]
-    for file, written in generate_c(case_from_tables(tables, name="camera-mount", source="c.toml"), "").items():
-        (tmp_path / file).write_text(written, encoding="utf-8")
-    own = load_compiled(tmp_path)
+    own = load_compiled(written(case_from_tables(tables, name="camera-mount", source="c.toml"), tmp_path))
     robot, p = ticks.Robot(own, -1.0), tasks(own, 40, 4)
     p[:, robot.twists] *= 10
     found = own.solve(p=p)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import itertools
-import shutil
 import sys
 import tomllib
 from pathlib import Path
@@ -13,9 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from generated import COMPILERS, written
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import CompiledCase, case_from_tables, formulate, generate_c, load_compiled
+from screwsynth.nlp import CompiledCase, case_from_tables, formulate, load_compiled
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.embedding.held import held_by_fixed_numbers
 
@@ -57,11 +57,9 @@ def delta_tables() -> dict[str, Any]:
 
 
 def compiled(tables: dict[str, Any], name: str, folder: Path) -> CompiledCase:
-    if not any(shutil.which(each) for each in ("cc", "gcc", "clang")):
+    if not COMPILERS:
         pytest.skip("no C compiler is installed")
-    for file, text in generate_c(case_from_tables(tables, name=name, source=name), "").items():
-        (folder / file).write_text(text, encoding="utf-8")
-    return load_compiled(folder)
+    return load_compiled(written(case_from_tables(tables, name=name, source=name), folder))
 
 
 def numbers(own: CompiledCase, **changed: float) -> np.ndarray:
@@ -109,10 +107,41 @@ def test_limits_on_fixed_numbers_are_judged(tmp_path: Path) -> None:
     for x1, x3 in ((0.2, 10.0), (0.2, 5.0), (0.2, 5.75), (0.1, 10.0), (0.3, 5.0)):
         # In C an angle is in radians.
         p = numbers(own, x1=x1, x3=np.radians(x3))
-        for least in (None, 0.045, 0.06):
+        for least in (None, 0.045, 0.06, 0.1):
             limit = 0.04 if least is None else least
             found = own.solve(None, p, limits={} if least is None else {"joint_spacing.min": least})
             assert found.status[0] == (OK if spacing(x1, x3) >= limit else INFEASIBLE), (x1, x3, least)
+
+
+def test_pairs_of_fixed_lengths_are_judged(tmp_path: Path) -> None:
+    # Leg 1 alone is free. Of each other leg's 12 pairs of lengths, the tightest one of the case stands for all.
+    tables = tomllib.loads(starter_case(robot_function("hexapod")()))
+    heights = {"pose1_p_z": 35.0, "pose2_p_z": 36.0, "pose3_p_z": 37.0, "pose4_p_z": 38.0}
+    tables["pose"] = [{"position": [0, 0, height]} for height in heights.values()]
+    tables |= {"limits": {"actuator": {"stroke_max": 3.5}}, "combine": {"over_poses": "mean"}, "solve": {"starts": 2}}
+    own = compiled(tables, "strokes", tmp_path)
+    given = tables["robot"]["parameters"]
+
+    def stroke(leg: int, **changed: float) -> float:
+        """Longest less shortest length of a leg."""
+        across = np.subtract(given[f"platform_{leg}"], given[f"base_{leg}"])
+        lengths = [np.hypot(np.hypot(*across[:2]), across[2] + z) for z in (heights | changed).values()]
+        return float(max(lengths) - min(lengths))
+
+    verdicts = []
+    for changed in (
+        {},
+        {"pose2_p_z": 39.5},
+        {"pose2_p_z": 38.4},
+        {"pose3_p_z": 34.9},
+        {"pose3_p_z": 34.0},
+        {"pose1_p_z": 33.0, "pose4_p_z": 36.3},
+    ):
+        for limit in (3.0, 3.5, 4.0, 5.0):
+            found = own.solve(None, numbers(own, **changed), limits={"actuator.stroke_max": limit})
+            verdicts.append(max(stroke(leg, **changed) for leg in range(2, 7)) <= limit)
+            assert found.status[0] == (OK if verdicts[-1] else INFEASIBLE), (changed, limit)
+    assert 5 < sum(verdicts) < len(verdicts) - 5
 
 
 def test_what_fixed_numbers_make_hold_is_kept() -> None:

@@ -10,27 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from generated import COMPILERS, STRICT, WARNINGS, needs_compiler, run, written
 
-from screwsynth.nlp import generate_c, load_case
 from screwsynth.nlp.embedding.ctext import identifier
 
-STRICT = "-std=c99 -Wall -Wextra -Wpedantic -Werror -O1"
-STRICT_CPP = "-std=c++17 -Wall -Wextra -Wpedantic -Werror -O1"
-COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
-needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
-
-
-def write(name: str, target: Path) -> Path:
-    target.mkdir(parents=True, exist_ok=True)
-    for file, text in generate_c(load_case(name), "").items():
-        (target / file).write_text(text, encoding="utf-8")
-    return target
-
-
-def run(*words: str, where: Path) -> str:
-    done = subprocess.run(words, cwd=where, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{words}\n{done.stdout}{done.stderr}"
-    return done.stdout
+STRICT_CPP = f"-std=c++17 {WARNINGS} -O1"
 
 
 @pytest.fixture(scope="module")
@@ -38,8 +22,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The C of a case and its library, compiled."""
     if not COMPILERS:
         pytest.skip("no C compiler is installed")
-    where = write("paper-4.1-helical", tmp_path_factory.mktemp("helical"))
-    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT}", "library", where=where)
+    where = written("paper-4.1-helical", tmp_path_factory.mktemp("helical"))
+    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O1", "library", where=where)
     return where
 
 
@@ -116,7 +100,7 @@ def test_the_real_time_loop_compiles_and_keeps_within_its_steps(folder: Path) ->
             has_before = 1;
         }"""
     (folder / "realtime.c").write_text(source.replace(hook, check), encoding="utf-8")
-    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT}", "realtime", where=folder)
+    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O1", "realtime", where=folder)
     printed = run("./realtime", "200", where=folder)
     cycles, held = (int(each) for each in re.findall(r"^(\d+) cycles .* us; (\d+) held", printed)[0])
     assert cycles == 200
@@ -204,6 +188,7 @@ int main(void) {
 
 PROJECT = """cmake_minimum_required(VERSION 3.13)
 project(both C)
+add_compile_options(-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror)
 add_subdirectory(one)
 add_subdirectory(two)
 add_executable(both both.c)
@@ -249,8 +234,8 @@ def cmake() -> Callable[..., str]:
 
 @pytest.mark.slow
 def test_two_folders_are_one_project_are_installed_and_found(tmp_path: Path, cmake: Callable[..., str]) -> None:
-    write("paper-4.2-rotation", tmp_path / "one")
-    write("paper-4.2-translation", tmp_path / "two")
+    written("paper-4.2-rotation", tmp_path / "one")
+    written("paper-4.2-translation", tmp_path / "two")
     flags = f"-DCMAKE_C_COMPILER={COMPILERS[0]}"
     for name, text in (("CMakeLists.txt", PROJECT), ("both.c", BOTH)):
         (tmp_path / name).write_text(text, encoding="utf-8")
@@ -327,8 +312,8 @@ int main(void) {
 @needs_compiler
 @pytest.mark.skipif(not shutil.which("g++"), reason="g++ is not installed")
 def test_several_tasks_are_reached_from_cpp_and_simulink(tmp_path: Path) -> None:
-    where, prefix = write("peg-in-hole", tmp_path), identifier("peg-in-hole")
-    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT.replace('-O1', '-O0')}", "library", "realtime.o", where=where)
+    where, prefix = written("peg-in-hole", tmp_path), identifier("peg-in-hole")
+    run("make", f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O1", "library", "realtime.o", where=where)
     for name, text in (("e.cpp", EXCHANGED), ("simstruc.h", SIMSTRUC), ("simulink.c", SAMPLES)):
         (where / name).write_text(text, encoding="utf-8")
     run("g++", *STRICT_CPP.split(), "e.cpp", "-L.", f"-l{prefix}", "-lm", "-o", "e", where=where)

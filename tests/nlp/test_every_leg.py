@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import itertools
 import math
-import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from casadi import SX
+from generated import COMPILERS, written
 from numpy.typing import NDArray
 
 from screwsynth.nlp import (
@@ -21,7 +21,6 @@ from screwsynth.nlp import (
     Nlp,
     case_from_tables,
     formulate,
-    generate_c,
     load_case,
     load_compiled,
     sensitivities,
@@ -222,12 +221,10 @@ def test_no_solve_with_random_limits_answers_a_wrong_design(count: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["hexapod-machining", "free-wrist"])
 def test_no_c_with_random_limits_answers_a_wrong_design(name: str, tmp_path: Path) -> None:
-    if not any(shutil.which(each) for each in ("cc", "gcc", "clang")):
+    if not COMPILERS:
         pytest.skip("no C compiler is installed")
     case, count = load_case(name), 1000
-    for file, text in generate_c(case, "").items():
-        (tmp_path / file).write_text(text, encoding="utf-8")
-    compiled, nlp, rng = load_compiled(tmp_path), formulate(case), np.random.default_rng(8)
+    compiled, nlp, rng = load_compiled(written(case, tmp_path)), formulate(case), np.random.default_rng(8)
     names = [each.name for each in nlp.program.arguments]
     size = nlp.upper[0] / 32
     p = np.tile(nlp.arguments, (count, 1))

@@ -205,10 +205,7 @@ def planar() -> Case:
 
 def loops() -> Claim:
     case = planar()
-    found = loop_extremes(
-        case, closed_form(case.model), pose_box(workspace_of_case(case)),
-        gap=0.2, time_limit=None, interrupted=is_requested,
-    )  # fmt: skip
+    found = loop_extremes(case, closed_form(case.model), pose_box(workspace_of_case(case)), gap=0.2)
     assert found
     for each in found:
         sign = 1.0 if each.key.endswith("max") else -1.0

@@ -181,7 +181,7 @@ def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -
     ended = interrupted(", best ", "solve", case, "--json", str(result))
     assert ended.status == 130
     words = plain(ended.shown)
-    for word in ("interrupted: best F so far = ", "verdict", "evidence", "base_1_x"):
+    for word in ("stopped before the end: best F so far = ", "verdict", "evidence", "base_1_x"):
         assert word in words
     text = result.read_text(encoding="utf-8")
     assert '"status": "interrupted"' in text
@@ -203,7 +203,7 @@ def test_an_interrupted_tradeoff_keeps_what_is_solved(case: str, tmp_path: Path)
     assert {(point.status, point.F, point.tasks, point.parameters) for point in rest} == {
         (Status.INTERRUPTED, None, (None,), None)
     }
-    words = f"interrupted: {len(solved)} of 200 values are solved"
+    words = f"stopped before the end: {len(solved)} of 200 values are solved"
     assert words in plain(ended.shown)
     assert words in files["page"].read_text(encoding="utf-8")
     rows = list(csv.DictReader(files["csv"].read_text(encoding="utf-8").splitlines()))

@@ -11,25 +11,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from generated import COMPILERS, written
 
-from screwsynth.nlp import CompiledCase, InputError, formulate, generate_c, load_case, load_compiled
+from screwsynth.nlp import CompiledCase, InputError, formulate, load_case, load_compiled
 from screwsynth.nlp.program.sampling import starting_points
 
 NAME = "paper-4.1-helical"
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT = range(4)
 
 
-def write(folder: Path) -> Path:
-    for name, text in generate_c(load_case(NAME), "").items():
-        (folder / name).write_text(text, encoding="utf-8")
-    return folder
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if not any(shutil.which(name) for name in ("cc", "gcc", "clang")):
+    if not COMPILERS:
         pytest.skip("no C compiler is installed")
-    return write(tmp_path_factory.mktemp("helical"))
+    return written(NAME, tmp_path_factory.mktemp("helical"))
 
 
 @pytest.fixture(scope="module")

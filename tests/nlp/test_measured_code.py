@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from generated import COMPILERS, made, run, written
 
 from screwsynth.nlp import generate_c, load_case
 from screwsynth.nlp.embedding.callgraph import stack_bound
@@ -60,6 +61,21 @@ def test_the_command_writes_what_the_compilers_say(tmp_path: Path, cli: Run) -> 
     data = json.loads((tmp_path / "manifest.json").read_text(encoding="utf-8"))["measured"]
     assert [each["target"] for each in data] == [X86_64.name, CORTEX_M7.name]
     assert data[0]["stack_bytes"] == own.stack
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(set(COMPILERS) != {"gcc", "clang"}, reason="gcc and clang are not both installed")
+@pytest.mark.parametrize("name", ["paper-4.3", "hexapod-workspace"])
+def test_another_compiler_stays_within_the_room_for_others(name: str, tmp_path: Path) -> None:
+    where = written(name, tmp_path)
+    own = measure(generate_c(load_case(name), ""), identifier(name))[0]
+    if own.with_room is None:
+        pytest.skip(own.fault)
+    for level in ("-O0", "-O2", "-O3"):
+        made(where, "clean")
+        made(where, "CC=clang", f"CFLAGS=-std=c99 {level}", "stack")
+        (depth,) = re.findall(r"(\d+) bytes", run("./stack", where=where))
+        assert 1000 < int(depth) <= own.with_room, level
 
 
 def test_without_a_compiler_one_line_says_so(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:

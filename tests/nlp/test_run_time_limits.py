@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import ctypes
 import math
 import re
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ import pytest
 
 from screwsynth.models import screw_from_axis
 from screwsynth.nlp import Case, CaseError, __version__, case_from_tables, formulate, generate_c, solve
+from screwsynth.nlp.case.limits.constraint import LENGTH
 from screwsynth.nlp.embedding.ctext import c_names
 from screwsynth.nlp.embedding.runtimelimits import RunTimeLimits, run_time_limits
 from screwsynth.nlp.evidence.kkt import linearise, multipliers
@@ -144,21 +147,21 @@ def test_what_is_allowed_is_what_a_case_allows() -> None:
                 case_of(changed(alone, limit.key, float(np.nextafter(limit.most, math.inf))))
 
 
-def test_fixed_numbers_keep_their_limits() -> None:
-    # The base is fixed, so that its joints' spacing is no constraint of the C: it cannot be asked for more than it has.
+def test_limits_on_fixed_numbers_are_set_where_the_c_judges_by_them() -> None:
+    # The base is fixed, so that its joints' spacing is no constraint of the C, which judges answers by it.
     tables = tomllib.loads(ROBOT)
     tables["robot"]["parameters"] |= {"x1": 25, "x3": 0.1}
     del tables["limits"]["custom"]
     nlp = formulate(case_of(tables))
-    measured = [each for each in nlp.constant_limits if each.constraint.keys[0] == "joint_spacing.min"]
-    assert measured
+    of_base = [each for each in nlp.constant_limits if each.constraint.keys[0] == "joint_spacing.min"]
+    assert of_base
     (limit,) = [each for each in run_time_limits(nlp, "limited").limits if each.key == "joint_spacing.min"]
-    # Python makes it a constraint, which nothing can keep, where it is asked for.
-    counts = [
-        len(formulate(case_of(changed(tables, limit.key, limit.most * factor))).program.constraints)
-        for factor in (1 - 1e-6, 1 + 1e-6)
-    ]
-    assert counts[0] == len(nlp.program.constraints) < counts[1]
+    assert limit.most == math.inf
+    # Read otherwise than the platform's joints, it shares no bound with them: it cannot be set.
+    other = replace(of_base[0], constraint=replace(of_base[0].constraint, reading=LENGTH))
+    keys = [each.key for each in run_time_limits(replace(nlp, constant_limits=(other,)), "limited").limits]
+    assert "joint_spacing.min" not in keys
+    assert "leg_length.min" in keys
 
 
 class Bounds:
@@ -226,6 +229,48 @@ def test_the_solver_keeps_limits_that_were_set(limited: Embedded) -> None:
     assert solved.status == 0
     assert abs(solved.F - wanted.F) <= 1e-6 * wanted.F
     assert abs(limited.solve().F - wanted.F) > 1e-3 * wanted.F
+
+
+def test_units_of_multipliers_are_those_of_a_change_of_the_unit_of_lengths(embed: Embed) -> None:
+    plain = few(tomllib.loads(ROBOT))
+    doubled = copy.deepcopy(plain)
+    for table, keys in (
+        (doubled["robot"]["parameters"], ("x1", "x2")), (doubled["pose"], ("position",)),
+        (doubled["task"][0], ("point", "pitch")), (doubled["limits"], ("leg_length", "footprint")),
+    ):  # fmt: skip
+        table |= {key: twice(table[key]) for key in keys}
+    found, powers = [], {"mm": 1, "mm²": 2, "(mm/rad)²": 2, "rad": 0, "": 0}
+    for tables in (plain, doubled):
+        c = embed(case_of(tables), "-O0")
+        solved = c.solve()
+        assert solved.status == 0
+        found.append(solved.g_lower_multipliers + solved.g_upper_multipliers)
+    active, units = found[0] > 0, strings(c, "constraint_multiplier_units")
+    assert len(units) == c.c
+    assert strings(c, "F_unit") == ["(mm/rad)²"]
+    of_active = [unit for unit, is_active in zip(units, active, strict=True) if is_active]
+    assert len(set(of_active)) > 1
+    for unit, ratio in zip(of_active, found[1][active] / found[0][active], strict=True):
+        whole, _, by = unit.partition(")²/")
+        power = powers[f"{whole})²" if by else whole] - powers[by]
+        assert ratio == pytest.approx(2.0**power, rel=1e-5), unit
+
+
+def twice(value: object) -> object:
+    """Numbers of a case file, times 2."""
+    if isinstance(value, dict):
+        return {key: twice(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [twice(each) for each in value]
+    assert isinstance(value, int | float)
+    return 2 * value
+
+
+def strings(c: Embedded, name: str) -> list[str]:
+    """Strings of a table of the header."""
+    (text,) = re.findall(rf"{c.prefix}_{name}(?:\[\w+ \+ 1\])? = ([^;]*);", c.header)
+    words = re.findall(r'"([^"]*)"', text)
+    return [ast.literal_eval(f"b'{word}'").decode() for word in words]
 
 
 def test_limits_hold_at_every_pose_and_for_every_task(embed: Embed) -> None:

@@ -14,7 +14,7 @@ from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
 from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
-from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb, first_largest
+from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb, first_largest_of_lists
 from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
@@ -171,7 +171,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
         reached = found.reached + part * np.abs(found.reached)
         bounds = np.where(found.bounds < reached[own.of], -np.inf, found.bounds)
         best = np.maximum.reduceat(bounds, own.starts)
-        return replace(found, bounds=bounds, best=best, top=first_largest(bounds, own))
+        return replace(found, bounds=bounds, best=best, top=first_largest_of_lists(bounds, own))
 
     monkeypatch.setattr(sharedsearch, "bound_limb", careless)
     wrong = proof_of(best.nlp, GAP, best.x)

@@ -636,9 +636,13 @@ def test_wrong_options_are_refused_in_a_sentence(machine: Path, option: list[str
 
 
 def test_an_interrupt_keeps_what_is_proved(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = iter([False] * 6)
-    monkeypatch.setattr("screwsynth.nlp.proof.workspace.judge.is_requested", lambda: next(calls, True))
-    judged = judge_workspace(case, gap=0.05)
+    done = [0]
+    monkeypatch.setattr("screwsynth.nlp.interruption.is_interrupted", lambda: done[0] > 1)
+
+    def progress(_name: str, number: int, _count: int) -> None:
+        done[0] = max(done[0], number)
+
+    judged = judge_workspace(case, gap=0.05, progress=progress)
     assert judged.regularity is not None
     assert judged.regularity.outcome is Outcome.PROVED
     assert judged.extremes[0].outcome is Outcome.PROVED

@@ -167,7 +167,7 @@ def refuted(limited: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[st
     flags = [part for pair in zip(("--json", "--html", "--picture"), files, strict=True) for part in pair]
     numbers = ["x3=6", "limits.leg_clearance.min=6", "limits.base_joint_angle.max=8", "limits.actuator.stroke_max=5"]
     flags += [part for each in numbers for part in ("--set", each)]
-    run = CliRunner().invoke(app, ["workspace", str(limited), "--gap", "0.05", "--time", "0.1", *flags])
+    run = CliRunner().invoke(app, ["workspace", str(limited), "--gap", "0.05", "--time", "2", *flags])
     assert run.exit_code == 1
     result = load_result(folder / "result.json")
     assert isinstance(result, WorkspaceResult)

@@ -490,7 +490,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
         assert "wrong" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
-    options = {"gap": 0.1, "time_limit": 5.0, "interrupted": lambda: False, "shortest": 0.0}
+    options = {"gap": 0.1, "shortest": 0.0}
     for extreme in spectral_extremes(case, case.model, pose_box(judged.workspace), ASKED[1:], **options):  # type: ignore[arg-type]
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 

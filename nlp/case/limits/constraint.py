@@ -50,6 +50,11 @@ class Reading:
     above: float = -math.inf
     most: float = math.inf
 
+    @property
+    def power(self) -> int:
+        """Power of the number's unit that the bound has: 0 where it is a plain number, as a cosine is."""
+        return {_unchanged: 1, _square: 2}.get(self.to_value, 0)
+
 
 def squared(dimension: Dimension) -> Reading:
     """Return the reading of a square as the number itself, which is positive."""

@@ -19,23 +19,37 @@
 /* Part of a normal outside the span of the active ones below which it depends on them. */
 #define DEPENDENT 1e-11
 
-double screwsynth_QP_dot(const double *a, const double *b, int n) {
+static inline double dot(const double *a, const double *b, int n) {
     double sum = 0.0;
     int i;
     for (i = 0; i < n; ++i) sum += a[i] * b[i];
     return sum;
 }
 
-/* Distance of d from a side, negative outside. Sides: n lower bounds, n upper bounds, lower and upper bounds of c rows, of
- * which `along` has the products with d. */
-static double slack(const screwsynth_QP_data *q, int side, const double *d, const double *along) {
-    int n = q->n, c = q->c, j;
-    if (side < n) return d[side] - q->lower[side];
-    if (side < 2 * n) return q->upper[side - n] - d[side - n];
-    j = side - 2 * n;
-    if (j < c) return along[j] - q->row_lower[j];
-    j -= c;
-    return q->row_upper[j] - along[j];
+double screwsynth_QP_dot(const double *a, const double *b, int n) {
+    return dot(a, b, n);
+}
+
+/* Of sides that are not held, the one that d is farthest outside of, where that is farther than `worst`, which is negative;
+ * else -1. Sides: n lower bounds, n upper bounds, lower and upper bounds of c rows. `products` takes those of the rows and d. */
+static int most_violated(const screwsynth_QP_data *q, const double *d, const int *held, double *products, double *worst) {
+    const int n = q->n, c = q->c;
+    double least = *worst;
+    int found = -1, i;
+    for (i = 0; i < n; ++i)
+        if (d[i] - q->lower[i] < least && !held[i]) least = d[i] - q->lower[i], found = i;
+    for (i = 0; i < n; ++i)
+        if (q->upper[i] - d[i] < least && !held[n + i]) least = q->upper[i] - d[i], found = n + i;
+    for (i = 0; i < c; ++i) {
+        products[i] = dot(q->rows + i * n, d, n);
+        if (products[i] - q->row_lower[i] < least && !held[2 * n + i])
+            least = products[i] - q->row_lower[i], found = 2 * n + i;
+    }
+    for (i = 0; i < c; ++i)
+        if (q->row_upper[i] - products[i] < least && !held[2 * n + c + i])
+            least = q->row_upper[i] - products[i], found = 2 * n + c + i;
+    *worst = least;
+    return found;
 }
 
 static int is_equation(const screwsynth_QP_data *q, int side) {
@@ -100,7 +114,7 @@ static void let_go(double *J, double *R, int *active, double *u, int n, int coun
 
 int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, double *work, int *iwork) {
     const int n = q->n, sides = 2 * (q->n + q->c), most = 20 * (sides + 5); /* stated in the README */
-    double *J = work, *R = J + n * n, *t = R + n * n, *r = t + n, *u = r + n, *z = u + n, *products = z + n;
+    double *J = work, *R = J + n * n, *t = R + n * n, *r = t + n, *u = r + n, *products = u + n;
     int *active = iwork, *held = iwork + n;
     double lenient = LENIENT;
     int count = 0, next = 0, pass, i, k, side;
@@ -119,7 +133,7 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
     for (k = 0; k < n; ++k) t[k] = 0.0;
     for (i = 0; i < n; ++i)
         for (k = i; k < n; ++k) t[k] += J[i * n + k] * q->gradient[i];
-    for (i = 0; i < n; ++i) d[i] = -screwsynth_QP_dot(J + i * n + i, t + i, n - i);
+    for (i = 0; i < n; ++i) d[i] = -dot(J + i * n + i, t + i, n - i);
     for (i = 0; i < n; ++i) lenient = fmax(lenient, ROUNDING * fabs(d[i]));
     for (side = 0; side < sides; ++side) {
         multipliers[side] = 0.0;
@@ -132,27 +146,19 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
     for (pass = 0; pass < most; ++pass) {
         int entering = -1;
         double worst = -VIOLATED, sign = 1.0, fresh = 0.0;
-        for (k = 0; k < q->c; ++k) products[k] = screwsynth_QP_dot(q->rows + k * n, d, n);
         /* The entering side: equations first, those of fixed variables before all others, because rows that these variables
          * determine then hold but for rounding; then the side with the largest violation. Equations stay. */
         for (; next < 2 * n + q->c && entering < 0; ++next) {
             if (!is_equation(q, next)) continue;
             entering = next;
-            worst = slack(q, next, d, products);
+            k = next - 2 * n;
+            worst = k < 0 ? d[next] - q->lower[next] : dot(q->rows + k * n, d, n) - q->row_lower[k];
             if (worst > 0.0) {
                 worst = -worst;
                 sign = -1.0;
             }
         }
-        for (side = entering < 0 ? 0 : sides; side < sides; ++side) {
-            double room;
-            if (held[side]) continue;
-            room = slack(q, side, d, products);
-            if (room < worst) {
-                worst = room;
-                entering = side;
-            }
-        }
+        if (entering < 0) entering = most_violated(q, d, held, products, &worst);
         if (entering < 0) {
             for (k = 0; k < count; ++k) {
                 const double own = held[active[k]] * u[k];
@@ -176,7 +182,7 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
                 r[i] = sum / R[i * n + i];
             }
             for (k = 0; k < count; ++k) {
-                if (is_equation(q, active[k]) || !(r[k] > 0.0) || u[k] / r[k] >= partial) continue;
+                if (!(r[k] > 0.0) || u[k] / r[k] >= partial || is_equation(q, active[k])) continue;
                 partial = u[k] / r[k];
                 leaving = k;
             }
@@ -190,8 +196,7 @@ int screwsynth_QP(const screwsynth_QP_data *q, double *d, double *multipliers, d
             for (k = 0; k < count; ++k) u[k] -= step * r[k];
             fresh += step;
             if (full < HUGE_VAL) {
-                for (i = 0; i < n; ++i) z[i] = screwsynth_QP_dot(J + i * n + count, t + count, n - count);
-                for (i = 0; i < n; ++i) d[i] += step * z[i];
+                for (i = 0; i < n; ++i) d[i] += step * dot(J + i * n + count, t + count, n - count);
                 worst += step * outside;
             }
             if (full <= partial) {

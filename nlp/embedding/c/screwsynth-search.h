@@ -23,6 +23,7 @@ typedef struct {
     double *carried, *weights; /* multipliers of the constraints in the Lagrangian, and weights of the violations */
     double *basis, *spare, *qp_work;
     int *qp_iwork;
+    double curvature;            /* largest entry of the last H before it was restricted; 0 where there was none */
     double free_size;            /* largest entry of the restricted H */
     double size, shift, damping; /* of H: this, or 1 for a linear f; shift of its diagonal; least shift in parts of the size */
     double unit;                 /* of the quadratic program's variables */

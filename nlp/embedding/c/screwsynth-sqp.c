@@ -281,6 +281,8 @@ int screwsynth_SQP(const screwsynth_SQP_problem *p, double *s, screwsynth_SQP_en
         end->is_minimum = 1;
     }
     end->multipliers = of.u;
+    end->g = of.at.g;
+    end->rows = of.at.rows;
     if (of.at.s != s) memcpy(s, of.at.s, (size_t)p->n * sizeof *s);
     return 0;
 }

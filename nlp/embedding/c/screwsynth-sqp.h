@@ -15,7 +15,7 @@ typedef struct {
 } screwsynth_QP_data;
 
 /* Doubles and ints in the workspace of the quadratic program. */
-#define SCREWSYNTH_QPWORK(n, c) (2 * (n) * (n) + 4 * (n) + (c))
+#define SCREWSYNTH_QPWORK(n, c) (2 * (n) * (n) + 3 * (n) + (c))
 #define SCREWSYNTH_QPIWORK(n, c) ((n) + 2 * ((n) + (c)))
 
 /* Solution d and the multiplier of each side: n lower bounds, n upper bounds, lower and upper bounds of c rows. That of an
@@ -43,6 +43,7 @@ typedef struct {
 typedef struct {
     double f, violation, residual; /* recomputed at the point returned */
     const double *multipliers;     /* of its sides, in the order of the quadratic program; in the workspace */
+    const double *g, *rows;        /* the constraints and their gradients there; in the workspace */
     int iterations;
     int is_minimum; /* 0 where f falls, to second order, along the sides that the point lies on */
 } screwsynth_SQP_end;

@@ -50,17 +50,14 @@ static int cholesky(const double *M, double *L, int n, double shift, double leas
     return n;
 }
 
-/* Restricts H to the directions along the active sides, with curvature `size` across them. sides: multipliers or marks, not
- * 0 for an active side. Returns the largest entry of the restricted H. */
-static double reduce(const screwsynth_SQP_problem *p, const point *at, const double *sides, double size, double *H, double *basis,
-                   double *w) {
-    int n = p->n, c = p->c, count = 0, i, j, k;
-    double free_size;
-    for (i = 0; i < n; ++i) {
-        if (sides[i] == 0.0 && sides[n + i] == 0.0) continue;
-        for (k = 0; k < n; ++k) H[i * n + k] = H[k * n + i] = 0.0;
-    }
-    for (j = 0; j < c && count < n; ++j) {
+/* An orthonormal basis of the gradients of the active rows, across the active bounds. sides: multipliers or marks, not 0 for
+ * an active side. Returns the number of its vectors; `free` is the number of directions along all active sides. */
+static int span(const screwsynth_SQP_problem *p, const point *at, const double *sides, double *basis, int *free) {
+    const int n = p->n, c = p->c;
+    int count = 0, i, j, k;
+    *free = n;
+    for (i = 0; i < n; ++i) *free -= sides[i] != 0.0 || sides[n + i] != 0.0;
+    for (j = 0; j < c && *free > 0; ++j) {
         double *v = basis + count * n, length, before;
         if (sides[2 * n + j] == 0.0 && sides[2 * n + c + j] == 0.0 && p->g_lower[j] < p->g_upper[j]) continue;
         for (i = 0; i < n; ++i) v[i] = sides[i] == 0.0 && sides[n + i] == 0.0 ? at->rows[j * n + i] : 0.0;
@@ -72,11 +69,28 @@ static double reduce(const screwsynth_SQP_problem *p, const point *at, const dou
         length = sqrt(screwsynth_QP_dot(v, v, n));
         if (!(length > 1e-8 * before)) continue;
         for (i = 0; i < n; ++i) v[i] /= length;
+        ++count;
+        --*free;
+    }
+    return count;
+}
+
+/* Restricts H to the directions along the active sides, with curvature `size` across them. Returns the largest entry of the
+ * restricted H. */
+static double reduce(int n, const double *sides, const double *basis, int count, double size, double *H, double *w) {
+    double free_size;
+    int i, j, k;
+    for (i = 0; i < n; ++i) {
+        if (sides[i] == 0.0 && sides[n + i] == 0.0) continue;
+        for (k = 0; k < n; ++k) H[i * n + k] = H[k * n + i] = 0.0;
+    }
+    for (j = 0; j < count; ++j) {
+        const double *v = basis + j * n;
+        double length;
         for (i = 0; i < n; ++i) w[i] = screwsynth_QP_dot(H + i * n, v, n);
         length = screwsynth_QP_dot(v, w, n);
         for (i = 0; i < n; ++i)
             for (k = 0; k < n; ++k) H[i * n + k] += length * v[i] * v[k] - w[i] * v[k] - v[i] * w[k];
-        ++count;
     }
     free_size = screwsynth_SQP_largest(H, n * n);
     for (i = 0; i < n; ++i)
@@ -89,13 +103,23 @@ static double reduce(const screwsynth_SQP_problem *p, const point *at, const dou
 
 int screwsynth_SQP_curve(search *of) {
     const int n = of->p->n;
+    int free, i;
+    const int count = span(of->p, &of->at, of->u, of->basis, &free);
     int is_flat;
     double size;
+    /* No direction is along all active sides: the curvature across them may be as large as at the last point. */
+    if (free == 0 && of->curvature > 0.0) {
+        for (i = 0; i < n * n; ++i) of->H[i] = i % (n + 1) == 0 ? of->curvature : 0.0;
+        of->size = of->free_size = 1e-10 * of->curvature;
+        return 0;
+    }
     if (of->p->hessian(of->p->self, of->at.s, 1.0, of->carried, of->H)) return 1;
     size = screwsynth_SQP_largest(of->H, n * n);
     is_flat = !(size > FLAT);
     if (is_flat) size = FLAT;
-    of->free_size = reduce(of->p, &of->at, of->u, size, of->H, of->basis, of->spare);
+    else
+        of->curvature = size;
+    of->free_size = reduce(n, of->u, of->basis, count, size, of->H, of->spare);
     /* Below this, the curvature is rounding error of the whole Hessian. */
     if (!(of->free_size > 1e-10 * size)) of->free_size = 1e-10 * size;
     /* A linear f, as a level where no constraint is active, has no curvature to choose shifts by. Those of the variables' own

@@ -19,6 +19,7 @@ from ....models.mechanism import (
 )
 from ...errors import InputError, listing
 from .description import Description
+from .leastgaps import close_from_other_starts, least_gaps
 from .meeting import with_meeting_joints
 from .mjcf import read_mjcf
 from .newton import CLOSED, LEAST, Closed, Gap, close
@@ -91,11 +92,15 @@ def import_robot(request: Request) -> Imported:
     if worst > OPEN and not request.closes:
         raise InputError(f"{_open_loop(given, reduced)}{_advice(given, request.keyframe)}")
     if worst > CLOSED:
-        closed = close(_with_loops(given, gaps), reduced.size)
-        moved_to = replace(closed.description, closures=given.closures, couplings=given.couplings)
-        reduced = reduce(moved_to, request.ends)
-        if _worst(reduced) > LEAST:
-            raise InputError(f"{_open_loop(given, reduced)}; Newton's method did not close it")
+        loops = _with_loops(given, gaps)
+        closed = close(loops, reduced.size)
+        moved = _reduced_at(closed, given, request)
+        if _worst(moved) > LEAST:
+            found = close_from_other_starts(loops, reduced.size)
+            if found is None:
+                raise InputError(_not_closed(given, loops, moved, request))
+            closed, moved = found, _reduced_at(found, given, request)
+        reduced = moved
         notes.append(_closed_words(closed, reduced))
     mechanism = reduced.mechanism
     if request.snap:
@@ -141,6 +146,23 @@ def _with_loops(given: Description, gaps: Sequence[Gap]) -> Description:
     )
 
 
+def _reduced_at(closed: Closed, given: Description, request: Request) -> Reduced:
+    """Return a robot at the configuration in which its loops were closed, with all loops that the file has."""
+    return reduce(replace(closed.description, closures=given.closures, couplings=given.couplings), request.ends)
+
+
+def _not_closed(given: Description, loops: Description, reduced: Reduced, request: Request) -> str:
+    """Return the sentence about loops that stay open: the smallest gap found, which loops cannot close, what to do."""
+    apart = least_gaps(loops, reduced.size)
+    others = _other_keyframes(given, request.keyframe)
+    words = f"{_open_loop(given, reduced)} after Newton's method, which came no closer from other starts"
+    if apart:
+        each = [f"{name} by {value:.3g}" for name, value in list(apart.items())[:_MOST_NAMES]]
+        words += f"; even by itself, with every joint free, a loop stays open by parts of the size: {', '.join(each)}"
+        return f"{words}; correct the frames of these loops or the joints between them in the file{others}"
+    return f"{words}; each loop closes by itself, but not with the others: correct the lengths in the file{others}"
+
+
 def _open_loop(given: Description, reduced: Reduced) -> str:
     """Return the sentence that says which loop is open most."""
     worst = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size))
@@ -150,9 +172,13 @@ def _open_loop(given: Description, reduced: Reduced) -> str:
 
 def _advice(given: Description, keyframe: str) -> str:
     """Return what to do about open loops."""
+    return f"; --close closes it by Newton's method{_other_keyframes(given, keyframe)}"
+
+
+def _other_keyframes(given: Description, keyframe: str) -> str:
+    """Return the words on the other configurations that a file has; empty without any."""
     others = [each for each in given.keyframes if each != keyframe][:_MOST_NAMES]
-    more = f", --keyframe takes another configuration: {listing(others)}" if others else ""
-    return f"; --close closes it by Newton's method{more}"
+    return f", --keyframe takes another configuration: {listing(others)}" if others else ""
 
 
 def _closed_words(closed: Closed, reduced: Reduced) -> str:

@@ -136,7 +136,7 @@ def _derivatives(closure: LoopClosure, A: Frame, B: Frame, twist: FloatArray) ->
             return np.vstack([point, np.cross(other, z)[None] @ w])
 
 
-class _Mover:
+class Mover:
     """Positions of all joints, as displacements of their bodies from the stated configuration."""
 
     def __init__(self, given: Description, size: float, *, keeps_driven: bool) -> None:
@@ -265,32 +265,38 @@ def close(given: Description, size: float) -> Closed:
     Returns:
         The best that was reached; the gaps of its closures say how good it is.
     """
-    found: list[tuple[float, _Mover, bool]] = []
+    found: list[tuple[float, Mover, bool]] = []
     for rank in _RANKS:
         for keeps_driven in (True, False):
-            mover = _Mover(given, size, keeps_driven=keeps_driven)
-            error = _solve(mover, rank)
+            mover = Mover(given, size, keeps_driven=keeps_driven)
+            error = solve(mover, rank)
             found.append((error if keeps_driven or error <= CLOSED else error / _WORTH, mover, keeps_driven))
             if error <= CLOSED:
                 break
         if min(found, key=_first)[0] <= LEAST:
             break
     _, mover, keeps_driven = min(found, key=_first)
+    return closed_by(mover, kept=keeps_driven)
+
+
+def closed_by(mover: Mover, *, kept: bool) -> Closed:
+    """Return the description with all joints where they were moved; ``kept`` is as in :class:`Closed`."""
+    given = mover.given
     turns = [rotation_vector(mover.own[j.body].rotation) for j in given.joints if j.kind in ("R", "S")]
     ways = [abs(mover.coordinates[j.name]) for j in given.joints if j.kind == "P"]
     return Closed(
         _moved(given, mover),
         max((float(np.linalg.norm(each)) for each in turns), default=0.0),
         max(ways, default=0.0),
-        keeps_driven,
+        kept,
     )
 
 
-def _first(found: tuple[float, _Mover, bool]) -> float:
+def _first(found: tuple[float, Mover, bool]) -> float:
     return found[0]
 
 
-def _solve(mover: _Mover, rank: float) -> float:
+def solve(mover: Mover, rank: float = _RANKS[0]) -> float:
     """Move the joints until the loops are closed, or no step makes them closer; return the largest equation."""
     values, derivatives = mover.state()
     for _ in range(_MOST_STEPS):
@@ -313,7 +319,7 @@ def _solve(mover: _Mover, rank: float) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-def _moved(given: Description, mover: _Mover) -> Description:
+def _moved(given: Description, mover: Mover) -> Description:
     """Return a description with all its bodies and joints where they were moved."""
     moved = mover.moved()
     parents = {body.name: body.parent for body in given.bodies}
@@ -336,4 +342,4 @@ def _moved(given: Description, mover: _Mover) -> Description:
     )
 
 
-__all__ = ["CLOSED", "Closed", "Gap", "close", "gap_of", "gap_of_coupling"]
+__all__ = ["CLOSED", "LEAST", "Closed", "Gap", "Mover", "close", "closed_by", "gap_of", "gap_of_coupling", "solve"]

@@ -21,6 +21,7 @@ from ....models import (
     rate_relations,
     reporting_matrix,
 )
+from ....models.actuation import with_loops
 from ...program.kernel import Kernel, tuple_of
 
 #: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
@@ -73,11 +74,13 @@ class Linkage:
         self.model = model
         self._parameters = parameters
         own = Substitution.identity(model)
+        self._nested = [each for each in model.joint_screws if each.is_nested]
         outputs = [
             ca.horzcat(SX(3, 0), *[expression for _, expression in model.scene.expressions]),
             jacobian(model.wrenches, SX(characteristic_length), model.members),
             driven(model.wrenches, model.actuators, SX(characteristic_length), model.members),
             rate_relations(model.actuators),
+            *[part for each in self._nested for part in (each.all, each.loops)],
             *[quantity.values for quantity in model.quantities],
         ]
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
@@ -96,8 +99,11 @@ class Linkage:
         scene = self.model.scene
         arguments = self._parameters, unknowns, rotation.ravel(order="F"), position
         columns, rows, works, relations, *quantities = self._drawing(*arguments)
-        matrix = reporting_matrix(self.model, Velocities(rows, works, relations), position)
-        rows, works = matrix @ rows, np.abs(matrix @ works)
+        screws, quantities = quantities[: 2 * len(self._nested)], quantities[2 * len(self._nested) :]
+        paths = list(zip(self._nested, screws[::2], screws[1::2], strict=True))
+        velocities = with_loops(self.model, Velocities(rows, works, relations), paths)
+        matrix = reporting_matrix(self.model, velocities, position)
+        rows, works = matrix @ rows, np.abs(matrix @ velocities.driven)
         sizes = [mark.kind.size for mark in scene.marks]
         counts = [len(scene.points), 3 * len(scene.circles), 2 * len(scene.directions), sum(sizes)]
         points, circles, directions, marks, joints = np.split(columns.T, np.cumsum(counts))

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ....models.arrays import first_largest
 from ..enclosure.first_order import Enclosures, Midpoints, enclose, midpoints
 from ..enclosure.intervals import ULP
 from ..enclosure.quadratic_models import GradientModel, QuadraticModel, affine_ends_reaching, multipliers, ranges
@@ -303,7 +304,7 @@ class NumpyEngine:
         # Where nothing changes, the longest side.
         score = np.where((score > 0).any(axis=0), score, relative)
         score[~(left.upper > left.lower)] = -1.0
-        return np.asarray(score.argmax(axis=0), dtype=np.int32)
+        return first_largest(score.T).astype(np.int32)
 
 
 def _put(result: Examination, places: NDArray[np.intp], found: Examination) -> None:

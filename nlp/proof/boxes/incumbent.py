@@ -11,6 +11,7 @@ from ....models import FloatArray
 from ...errors import InputError
 from ...evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
 from ...evidence.state import loops_are_closed
+from ...interruption import is_requested
 from ...program.sampling import starting_points
 from ..statement.standard_form import StandardForm
 
@@ -20,6 +21,8 @@ _SAME_VALUE = 1e-9
 _POINTS = 8
 #: Improvement, in parts of the objective's scale, from which on a new point counts as better than the one given.
 _BETTER = 1e-9
+#: The same for points that a search finds by itself, of which the first one is kept: rounding of the objective.
+_TIE = 1e-13
 
 
 class IncumbentError(InputError):
@@ -95,6 +98,8 @@ class Incumbent:
         form, nlp = self._form, self._form.nlp
         if x is None:
             for point in starting_points(nlp, _POINTS, seed=0):
+                if is_requested():
+                    return
                 self.improve_near(form.point_of(point))
             return
         point = form.point_of(x)
@@ -146,5 +151,7 @@ class Incumbent:
 
     def _keep_if_better(self, point: FloatArray) -> None:
         value = self._form.value_at(point)
-        if value > self.value and self._violation(point, value) <= FEASIBLE:
+        # Rounding chooses none of several points with the same value.
+        better = value > self.value + _TIE * self._form.nlp.objective_size
+        if better and self._violation(point, value) <= FEASIBLE:
             self._best = _Point(np.array(point), value)

@@ -16,8 +16,10 @@ from .first_pass import MOST_VARIABLES, without_conditions
 _MANY_CONDITIONS = 4
 
 
-def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
+def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short: bool = True) -> Tape:
     """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
+
+    Equal parts are written once with ``is_short``; looking for them cannot be stopped, and takes as long as the rest.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule, or its value jumps.
@@ -25,7 +27,8 @@ def search_tape(form: StandardForm, rows: SearchRows | None = None) -> Tape:
     try:
         rows = search_rows(form, apart=False) if rows is None else rows
         refuse_jumps(rows.expressions, form.x)
-        return compile_tape(ca.Function("search", [form.x], ca.cse([rows.expressions, rows.jacobian.T])))
+        results = [rows.expressions, rows.jacobian.T]
+        return compile_tape(ca.Function("search", [form.x], ca.cse(results) if is_short else results))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
 

@@ -13,13 +13,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 from ....models import FloatArray, frozen_array
-from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
-from ...interruption import reason_of
+from ...interruption import one_search, reason_of, reason_to_stop
 from ...program.nlp import Nlp
 from ..boxes.engines import engine_for
 from ..boxes.incumbent import Incumbent, IncumbentError
@@ -83,36 +83,37 @@ def certify_program(
         UncoveredError: an expression holds an operation without a rule.
         ValueError: ``above`` for a maximisation, or an engine that does not exist here.
     """
-    effort = Effort(time_limit)
-    if above is not None and nlp.sense is not Sense.MIN:
-        raise ValueError("above is proved by minimising: the program's sense must be min")
-    if nlp.n == 0:
-        return _certify_point(nlp, above, effort.seconds)
-    form = standard_form(nlp)
-    incumbent = Incumbent(form)
-    method = _method(form, incumbent, engine, jobs, recorder)
-    search = _Search(form, incumbent, method, engine_name(engine), gap, above, effort)
-    try:
-        search.incumbent.start(x, claimed)
-    except IncumbentError as error:
-        return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-    search.first_value = incumbent.value
+    with one_search(time_limit):
+        effort = Effort()
+        if nlp.n == 0:
+            return _certify_point(nlp, above, effort.seconds)
+        form = standard_form(nlp)
+        incumbent = Incumbent(form)
+        # The method in use takes the place of this one: what it sets up can be stopped.
+        whole = optimum_search(form, partial(engine_for, form, engine, jobs), incumbent)
+        search = _Search(form, incumbent, whole, engine_name(engine), gap, above, effort)
+        try:
+            search.incumbent.start(x, claimed)
+        except IncumbentError as error:
+            return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
 
-    def run() -> str:
-        reason = search.run(progress)
-        while not reason and search.is_short():
+        def run() -> str:
+            reason = reason_to_stop(effort.seconds)
+            while not reason:
+                search.restart(_method(form, incumbent, engine, jobs, recorder))
+                reason = search.run(progress)
+                if reason or not search.is_short():
+                    break
+                search.method.close()
+                if recorder is not None:
+                    recorder.clear()
+            return reason
+
+        try:
+            reason = reason_of(run)
+        finally:
             search.method.close()
-            if recorder is not None:
-                recorder.clear()
-            search.restart(_method(form, incumbent, engine, jobs, recorder))
-            reason = search.run(progress)
-        return reason
-
-    try:
-        reason = reason_of(run)
-    finally:
-        search.method.close()
-    return search.certificate(reason)
+        return search.certificate(reason)
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
@@ -145,7 +146,8 @@ def _method(
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
-        return optimum_search(form, engine_for(form, engine, jobs, tangents=recorder is None), incumbent, recorder)
+        build = partial(engine_for, form, engine, jobs, tangents=recorder is None)
+        return optimum_search(form, build, incumbent, recorder)
     return shared_search(form, separation, incumbent, engine, jobs, recorder)
 
 

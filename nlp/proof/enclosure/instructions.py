@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ...errors import UncoveredError
+from ...interruption import stop_if_requested
 from .tape import Op, Tape
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ _UNARY = {
     ca.OP_ATAN: Op.ATAN,
 }
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
+#: Operations between two looks at whether to stop: about a tenth of a second.
+_LOOK = 2048
 #: The largest whole power that is written as products.
 _LARGEST_POWER = 64
 
@@ -135,6 +138,8 @@ def compile_tape(function: ca.Function) -> Tape:
     sizes = [function.numel_out(i) for i in range(function.n_out())]
     offset = np.concatenate([[0], np.cumsum(sizes)])
     for index in range(function.n_instructions()):
+        if index % _LOOK == 0:
+            stop_if_requested()
         op = function.instruction_id(index)
         source, target = function.instruction_input(index), function.instruction_output(index)
         if op == ca.OP_CONST:

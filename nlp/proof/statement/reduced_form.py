@@ -17,8 +17,10 @@ import numpy as np
 from casadi import SX
 
 from ....models import Dimension, FloatArray, Substitution, frozen_array
+from ....models.instance import sizes_at
 from ....models.joints.elimination import Eliminated, eliminated
 from ....models.joints.replacing import Solved, with_replaced
+from ...program.layout import reference_of
 from ...program.nlp import Nlp
 from .form import Condition, StandardForm
 from .lift import Lift
@@ -164,9 +166,22 @@ def _at_pose(nlp: Nlp, each: Eliminated, given: list[SX]) -> list[SX]:
     symbols = Substitution.identity(nlp.program.model).all
     solved, root = each.solved, each.root
     parts = [None] * 3 if solved is None else [solved.value, solved.sine, solved.cosine]
-    parts += [None] * 3 if root is None else [root.reach, root.value, root.slope]
+    parts += [None] * 3 if root is None else [root.reach * _at_size(nlp, each.place), root.value, root.slope]
     outputs = [SX(0) if part is None else part for part in parts]
     return list(ca.Function("unknown", symbols, outputs).call(given))
+
+
+def _at_size(nlp: Nlp, place: int) -> float:
+    """Return the factor of a limb's reach by an unknown, 1 at home with typical dimensions, in the size of a case.
+
+    The reach of a slide is one over the square of a length.
+    """
+    model, unknown = nlp.program.model, nlp.program.model.unknowns[place]
+    if unknown.dimension is Dimension.ANGLE:
+        return 1.0
+    typical = tuple(value for item in model.parameters for value in item.typical)
+    case, home = (float(sizes_at(model, [unknown], each, SX.ones(1))) for each in (reference_of(nlp.case), typical))
+    return (case / home) ** 2
 
 
 def _numbers(expression: SX) -> tuple[float, ...] | None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ....models.joints.closedform import ClosedForm, closed_form
 from ...case.case import Case
 from ...case.workspace import Workspace
-from ...interruption import is_requested, one_call
+from ...interruption import one_call, within
 from ...program.layout import Layout
 from ..statement.claims import SPECTRAL, Claim, claims_of
 from ..statement.closed_layout import closed_layout, reach_claims
@@ -35,9 +35,10 @@ from .verdict import Outcome, Regularity
 if TYPE_CHECKING:
     from .proof_record import PaperRecord
 
-#: Seconds for each search where none are asked for: the searches of singular values have no other end in six
-#: dimensions.
-TIME_LIMIT = 20.0
+#: Seconds for all searches together where none are asked for: those of singular values have no other end in six
+#: dimensions. Of what is left, each takes half at most.
+TIME_LIMIT = 60.0
+_PART = 0.5
 #: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
 _AS_NEEDED = 1.0
 
@@ -106,7 +107,8 @@ def judge_workspace(
         workspace: the poses; those of the case if left out.
         quantities: names of measures of the robot whose smallest and largest values are asked for.
         gap: allowed distance of a bound from the best value known, as a part of it.
-        time_limit: seconds for each search; it then stops with the bound reached.
+        time_limit: seconds for all searches together, which then stop with the bounds reached; None for no limit. A
+            search takes at most half of what is left.
         jobs: threads.
         engine: ``"c"`` or ``"numpy"`` for the search of singular poses; left out, the C kernel where it was built.
         with_limits: whether numbers are bounded at all, and not regularity alone.
@@ -126,32 +128,25 @@ def judge_workspace(
     own = workspace_of_case(case)
     check_leg_error(case, leg_error)
     workspace = own if workspace is None else workspace
-    box, legs = pose_box(workspace), legs_of(case)
-    closed = closed_form(case.model)
-    machines, unknown = _machines(case, closed, box, legs)
-    homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
-    ranks = (
-        Ranks(not_judged(box, unknown), None)
-        if unknown
-        else prove_ranks(
-            closed.model,
-            homes,
-            legs=legs,
-            engine=engine,
-            time_limit=time_limit,
-            progress=rank_progress,
-            paper=paper,
+    with within(time_limit, _PART):
+        box, legs = pose_box(workspace), legs_of(case)
+        closed = closed_form(case.model)
+        machines, unknown = _machines(case, closed, box, legs)
+        homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
+        ranks = (
+            Ranks(not_judged(box, unknown), None)
+            if unknown
+            else prove_ranks(closed.model, homes, legs=legs, engine=engine, progress=rank_progress, paper=paper)
         )
-    )
-    judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
-    if not with_limits or (until_fault and not judged.is_regular):
-        return judged
-    numbers = _Numbers(case, workspace, closed, legs, gap, time_limit, jobs, progress, paper, machines, unknown)
-    found: list[Extreme] = []
-    for each in numbers.add(found, quantities, leg_error, with_objective=with_objective):
-        if until_fault and each.fails:
-            break
-    return replace(judged, extremes=tuple(homes.shown(each) for each in found))
+        judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
+        if not with_limits or (until_fault and not judged.is_regular):
+            return judged
+        numbers = _Numbers(case, workspace, closed, legs, gap, jobs, progress, paper, machines, unknown)
+        found: list[Extreme] = []
+        for each in numbers.add(found, quantities, leg_error, with_objective=with_objective):
+            if until_fault and each.fails:
+                break
+        return replace(judged, extremes=tuple(homes.shown(each) for each in found))
 
 
 def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
@@ -173,7 +168,7 @@ class _Numbers:
         workspace: the poses.
         closed: its robot without unknowns in closed form.
         legs: joint centres; None for a robot that is not six straight legs.
-        gap, time_limit, jobs, progress, paper: as in :func:`judge_workspace`.
+        gap, jobs, progress, paper: as in :func:`judge_workspace`.
         machines: every machine within the tolerance, of a robot without legs; None where none are judged.
         unknown: reason why the machines that are meant are not judged; else empty.
     """
@@ -183,7 +178,6 @@ class _Numbers:
     closed: ClosedForm
     legs: Legs | None
     gap: float
-    time_limit: float | None
     jobs: int | None
     progress: Callable[[str, int, int], None] | None
     paper: PaperRecord | None
@@ -212,12 +206,10 @@ class _Numbers:
             family=family,
             unknown=self.unknown,
             gap=self.gap,
-            time_limit=self.time_limit,
-            interrupted=is_requested,
             paper=self.paper,
         )
         if self.machines is not None:
-            effort = Effort(self.gap, self.time_limit, self.jobs, is_requested, self.progress)
+            effort = Effort(self.gap, self.jobs, self.progress)
             yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
             yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
             return
@@ -237,10 +229,11 @@ class _Numbers:
         shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         decided: list[Extreme] = []
         if legs is None and not case.joint_centre_tolerance:
-            search = partial(loop_extremes, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-            decided = [each for each in search(case, self.closed, box) if each.outcome is not Outcome.OPEN]
+            decided = [
+                each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
+            ]
             if is_reached:
-                effort = Effort(self.gap, self.time_limit, self.jobs, is_requested)
+                effort = Effort(self.gap, self.jobs)
                 decided += shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective)
         yield from self._add_proved(found, layout, claims, decided)
         if legs is not None:
@@ -249,35 +242,27 @@ class _Numbers:
             before = len(found)
             found[:] = with_strokes(case, legs, found, refine)
             yield from found[before:]
-            others = partial(own_searches, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
-            yield from _add(found, others(case, legs, box, shortest=shortest, paper=self.paper))
+            others = own_searches(case, legs, box, gap=self.gap, shortest=shortest, paper=self.paper)
+            yield from _add(found, others)
         yield from self._add_others(found, spectral(case, self.closed.model, box, quantities, shortest=shortest))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
             least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
             shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
-            errors = partial(pose_errors, time_limit=self.time_limit, interrupted=is_requested, paper=self.paper)
-            yield from _add(found, errors(legs, box, eps, shortest))
+            yield from _add(found, pose_errors(legs, box, eps, shortest, paper=self.paper))
 
     def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Extreme]:
         """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
         if self.legs is None:
             family = None if self.machines is None else self.machines.family
-            own = partial(limited_spectrum, gap=self.gap, time_limit=self.time_limit, interrupted=is_requested)
             box = pose_box(self.workspace)
-            yield from _add(found, own(self.case, self.closed.model, box, family, self.unknown))
+            own = limited_spectrum(self.case, self.closed.model, box, family, self.unknown, gap=self.gap)
+            yield from _add(found, own)
         yield from _add(found, asked)
 
     def _prove(self, layout: Layout) -> Callable[..., Extreme]:
         """Return the function that proves a claim to a gap."""
-        return partial(
-            prove_extreme,
-            layout,
-            time_limit=self.time_limit,
-            jobs=self.jobs,
-            interrupted=is_requested,
-            legs=self.legs,
-        )
+        return partial(prove_extreme, layout, jobs=self.jobs, legs=self.legs)
 
     def _add_proved(
         self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import LARGEST_TURN, Workspace
-from ...interruption import is_requested, one_call
+from ...interruption import is_requested, one_call, within
 from ..statement.machine import workspace_of_case
 from .judge import Judgement, judge_workspace
 from .robot.pose_box import PoseNumbers, scaled
@@ -46,27 +46,31 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
 
     Args:
         case: a case with fixed dimensions.
-        time_limit: seconds for each search.
+        time_limit: seconds for all searches together; None for those of each judgement alone.
         jobs: threads.
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
     """
-    workspace = workspace_of_case(case)
+    with within(time_limit):
+        return _largest(case, workspace_of_case(case), jobs)
+
+
+def _largest(case: Case, workspace: Workspace, jobs: int | None) -> Scale:
+    """Return the largest factor within the time left."""
     proved, failed, fault = 0.0, float("inf"), None
     factor, most = 1.0, min(_MOST, largest_factor(workspace))
     while (failed == float("inf") or failed - proved > ACCURACY * failed) and not is_requested():
         judged = judge_workspace(
             case,
             workspace=scaled(workspace, factor),
-            time_limit=time_limit,
             jobs=jobs,
             with_objective=False,
             until_fault=True,
         )
         if judged.is_proved:
             proved = factor
-        elif is_requested() and not judged.is_refuted:  # an interrupted search shows no fault
+        elif is_requested() and not judged.is_refuted:  # a search that was stopped shows no fault
             break
         else:
             failed, fault = factor, judged

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .....models.arrays import first_largest
 from ...enclosure.first_order import midpoints
 from ...enclosure.intervals import ULP
 from ...enclosure.quadratic_models import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .boxes import OwnBoxes, SharedBoxes
 from .models import LimbEngine, LimbModels
-from .sums import LimbBound, first_largest
+from .sums import LimbBound, first_largest_of_lists
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -185,8 +186,8 @@ def cut_own(
     spread = np.where(np.isfinite(part.best), total[part.top], 0.0)
     is_near = (part.bounds > (part.best - _NEAR * total[part.top])[own.of]) & (total > 0)
     # The centre of the best box becomes the good point where its value is larger.
-    best = first_largest(found.value, own)
+    best = first_largest_of_lists(found.value, own)
     better = found.value[best] > part.value_of_good
     good = np.where(better, centre[:, best], good)
     left = OwnBoxes(lower[:, keep], upper[:, keep], own.of[keep], own.count)
-    return LeftOwn(left, spread, good, is_near[keep], change.argmax(axis=0)[keep])
+    return LeftOwn(left, spread, good, is_near[keep], first_largest(change.T)[keep])

@@ -106,7 +106,7 @@ class IndependentSearch:
         self._searches = [
             optimum_search(
                 limbs[group[0]].form,
-                engine_for(limbs[group[0]].form, engine, jobs, tangents=recorder is None),
+                partial(engine_for, limbs[group[0]].form, engine, jobs, tangents=recorder is None),
                 LimbPoint([limbs[each] for each in group], incumbent, parts),
                 None if recorder is None else recorder.limb(partial(self._limb_bound, k)),
             )

@@ -64,7 +64,7 @@ class LimbBound:
     top: NDArray[np.intp]
 
 
-def first_largest(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp]:
+def first_largest_of_lists(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp]:
     """Return the place (B,) of the first largest value (N,) of each list; NaN counts as -inf."""
     values = np.where(np.isnan(values), -np.inf, values)
     starts = own.starts
@@ -91,7 +91,7 @@ def bound_limb(
     with np.errstate(all="ignore"):
         L, usable = models.L, models.is_possible & models.defined
         promise = np.where(usable, L.middle + np.abs(L.b[m:]).sum(axis=0), -np.inf)
-        chosen = first_largest(promise, own)
+        chosen = first_largest_of_lists(promise, own)
         is_known = good.holds & good.defined
         g = np.where(is_known, good.L.b[:m], L.b[:m, chosen])
         Q = np.where(is_known, good.L.H[:m, :m], L.H[:m, :m, chosen])
@@ -115,7 +115,7 @@ def bound_limb(
         rest,
         bounds,
         np.maximum.reduceat(bounds, own.starts),
-        first_largest(bounds, own),
+        first_largest_of_lists(bounds, own),
     )
 
 

@@ -76,7 +76,7 @@ def inverse_rows(rows: BallSlopes) -> InverseRows:
         wide = ((both + PRODUCT * np.abs(slopes)) @ h[:, None, :, None])[..., 0]
         rest = (np.abs(C @ centre) + size @ (radius + 2 * PRODUCT * sizes + wide)) * UP
         Q = (rest + np.abs(T).sum(axis=3)) * UP
-        known, v = contraction(B)
+        known, v = contraction(B, found.units)
         known = known & np.isfinite(Q).all(axis=(1, 2))
         system = np.where(known[:, None, None], np.eye(6) - B, np.eye(6))
         right = np.where(known[:, None, None], B @ Q, 0.0) * UP

@@ -27,9 +27,14 @@ class Contraction(NamedTuple):
     v: FloatArray
 
 
-def contraction(B: FloatArray) -> Contraction:
-    """Return which nonnegative matrices (B, 6, 6) have a spectral radius below 1: a positive v with ``B v < v``."""
-    v = np.ones(B.shape[:2])
+def contraction(B: FloatArray, units: FloatArray | float = 1.0) -> Contraction:
+    """Return which nonnegative matrices (B, 6, 6) have a spectral radius below 1: a positive v with ``B v < v``.
+
+    Args:
+        B: the matrices.
+        units: (B, 6) sizes of the vectors' components, from which the power method begins.
+    """
+    v = np.broadcast_to(units, B.shape[:2]).astype(np.float64)
     holds = np.zeros(len(B), dtype=bool)
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
@@ -37,7 +42,7 @@ def contraction(B: FloatArray) -> Contraction:
             holds |= (w < v).all(axis=1)
             if holds.all() or (holds | (w >= v).all(axis=1)).all():
                 break
-            following = w / w.sum(axis=1, keepdims=True) + 1e-12
+            following = w / (w / units).sum(axis=1, keepdims=True) + 1e-12 * units
             v = np.where(holds[:, None], v, following)
     return Contraction(holds, v)
 

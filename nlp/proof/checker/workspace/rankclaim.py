@@ -35,11 +35,13 @@ class Preconditioned(NamedTuple):
         C: (B, 6, 6) near the inverse at the centre.
         T: (B, 6, 6, 6) middles of the slopes of C A, the last index that of the coordinate.
         B: (B, 6, 6) largest sizes of ``I - C A(y)``.
+        units: (B, 6) sizes of the components of twists: a length of the rows' for velocities, 1 for rotations.
     """
 
     C: FloatArray
     T: FloatArray
     B: FloatArray
+    units: FloatArray
 
 
 def preconditioned(rows: BallSlopes, change: FloatArray | float = 0.0) -> Preconditioned:
@@ -48,12 +50,14 @@ def preconditioned(rows: BallSlopes, change: FloatArray | float = 0.0) -> Precon
         C = inverses(rows.c)
         size = np.abs(C)
         count, h = len(C), rows.h
+        length = np.abs(rows.c[:, :, 3:]).max(axis=(1, 2)) / np.abs(rows.c[:, :, :3]).max(axis=(1, 2))
+        units = np.where(np.arange(6) < 3, length[:, None], 1.0)
         T = (C @ rows.s.reshape(count, 6, 36)).reshape(count, 6, 6, 6)
         radius = rows.ce + PRODUCT * np.abs(rows.c) + change
         radius = radius + ((rows.se + PRODUCT * np.abs(rows.s)) @ h[:, None, :, None])[..., 0]
         B = np.abs(np.eye(6) - C @ rows.c) * (1 + 2 * UNIT) + 2 * UNIT + size @ radius
         B = B + (np.abs(T) @ h[:, None, :, None])[..., 0]
-    return Preconditioned(C, T, B * UP)
+    return Preconditioned(C, T, B * UP, units)
 
 
 class RankClaim:
@@ -79,7 +83,7 @@ class RankClaim:
         rows = whole.rows
         change = change_of_rows(whole, self._joints, self._tolerance) if self._tolerance else 0.0
         found = preconditioned(rows, change)
-        holds, v = contraction(found.B)
+        holds, v = contraction(found.B, found.units)
         with np.errstate(all="ignore"):
             parts = np.abs(found.T) * v[:, None, :, None] / v[:, :, None, None]
             shares = rows.h * parts.sum(axis=(1, 2))

@@ -159,7 +159,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
     if (bound <= threshold)
         verdict = BOUNDED, reason = 0;
     /* The variable to bisect next. */
-    double best = -2.0;
+    double most = -1.0;
     int split = 0, finite = 1, flat = 1;
     for (int i = 0; i < n; i++) {
         Py_ssize_t end = i * B + at;
@@ -175,10 +175,13 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
     for (int i = 0; i < n; i++) {
         double left = report->left_upper[i * B + at] - report->left_lower[i * B + at];
         double score = finite && !flat ? x->left[i] : left / (form->high[i] - form->low[i]);
-        score = left > 0 ? score : -1.0;
-        if (score > best)
-            best = score, split = i;
+        x->left[i] = score = left > 0 ? score : -1.0;
+        most = score > most ? score : most;
     }
+    /* The first of the largest up to rounding, as in bounding.py. */
+    for (int i = n - 1; i >= 0; i--)
+        if (x->left[i] >= (1 - TIE) * most)
+            split = i;
     report->verdict[at] = verdict, report->reason[at] = reason, report->split[at] = split;
     report->bound[at] = bound, report->value[at] = value;
     return 0;

@@ -18,6 +18,7 @@
 #define ULP 0x1p-51
 #define TINY 1e-300
 #define LARGEST 1e150 /* intervals.py */
+#define TIE 1e-6 /* part by which sizes may differ and count as the same: models/arrays.py */
 
 enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, SIN, COS, EXP, LOG, ATAN, RAMP, STEP };
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -41,8 +41,6 @@ def spectral_extremes(
     names: Sequence[str],
     *,
     gap: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
     shortest: float = 0.0,
     family: Family | None = None,
     unknown: str = "",
@@ -58,8 +56,6 @@ def spectral_extremes(
         box: the poses.
         names: measures that are asked for, of which the others are left out.
         gap: allowed distance of a bound from the best value known, as a part of it.
-        time_limit: seconds for each search.
-        interrupted: whether the work is requested to stop.
         shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of its legs alone.
         family: all machines that are meant of a robot that is not six straight legs; None for the design alone.
         unknown: reason why the machines that are meant are not judged; else empty.
@@ -80,9 +76,7 @@ def spectral_extremes(
         if case.joint_centre_tolerance:
             allowed += _width(oracle, box)
         recorder = paper.own(asked_name(case, name)) if paper is not None and is_of_legs else None
-        found = prove_minimum(
-            oracle, box, gap=allowed, time_limit=time_limit, interrupted=interrupted, recorder=recorder
-        )
+        found = prove_minimum(oracle, box, gap=allowed, recorder=recorder)
         # A smallest singular value of at least 0, or an infinite condition number, says nothing.
         is_bound = math.isfinite(found.bound) and (is_condition or found.bound > 0)
         reason = found.reason or ("" if is_bound or not case.joint_centre_tolerance else _TOO_LARGE)

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
+from ....interruption import one_search
 from ...boxes.rows import Boxes, Columns, bisected, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
 from ..robot.pose_box import PoseBox
@@ -33,6 +35,8 @@ _POINTS, _STEPS, _AROUND = 256, 24, 32
 #: Factor of the size of steps from one to the next.
 _SHRINK = 0.7
 _SEED = 0
+#: Part of itself by which a value may be off by rounding: the first of several that are the same is taken.
+_TIE = 1e-11
 
 
 class Bounds(NamedTuple):
@@ -82,7 +86,6 @@ def prove_minimum(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
     recorder: TreeRecord | None = None,
 ) -> Minimum:
     """Prove the smallest value of a function over a box of poses.
@@ -95,15 +98,15 @@ def prove_minimum(
             while no value below it is known.
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
-        interrupted: whether the work is requested to stop.
         recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
     """
-    effort = Effort(time_limit, interrupted=interrupted)
+    effort = Effort()
     rule = _OracleRule(oracle, box, Goal(gap, limit, slack), recorder)
     lower, upper = box.lower[None], box.upper[None]
     root = Boxes(lower, upper, np.array([math.inf]), rule.split(lower, upper, oracle.bounds(lower, upper)), ())
-    search = Search(rule, root, block=_BLOCK, whole=box.upper - box.lower, least=(0.0, 0.0), order=Order.LARGEST)
-    reason = effort.run(search, rule.ending(search))
+    search = Search(rule, root, whole=box.upper - box.lower, least=(0.0, 0.0), order=Order.LARGEST)
+    with one_search(time_limit):
+        reason = effort.run(search, rule.ending(search))
     value, y = rule.best
     least = min(-search.bound, value)
     return Minimum(least, value, y, search.boxes, search.left, effort.seconds, reason)
@@ -174,6 +177,8 @@ class SmallestValue(Rule[Columns]):
 class _OracleRule(SmallestValue[tuple[()]]):
     """Rule of a function of the pose."""
 
+    block = _BLOCK
+
     def __init__(self, oracle: Oracle, box: PoseBox, goal: Goal, recorder: TreeRecord | None) -> None:
         super().__init__(goal, _good_point(oracle, box))
         self._oracle, self._box, self._recorder = oracle, box, recorder
@@ -181,7 +186,7 @@ class _OracleRule(SmallestValue[tuple[()]]):
     @staticmethod
     def split(lower: FloatArray, upper: FloatArray, found: Bounds) -> NDArray[np.intp]:
         """Return the coordinates (B,) with the largest shares in the slack of the bounds of boxes."""
-        return np.asarray(np.argmax(np.where(upper > lower, found.shares, -1.0), axis=1))
+        return first_largest(np.where(upper > lower, found.shares, -1.0))
 
     def divided(self, boxes: Boxes[tuple[()]]) -> Boxes[tuple[()]]:
         """Return the halves of boxes."""
@@ -199,10 +204,22 @@ class _OracleRule(SmallestValue[tuple[()]]):
         found = self._oracle.bounds(lower, upper)
         centres = self._box.clipped(0.5 * lower + 0.5 * upper)
         values = self._oracle.values(centres)
-        if len(values) and float(np.nanmin(values)) < self.best.value:
-            self.best = Value(float(np.nanmin(values)), centres[int(np.nanargmin(values))])
+        if len(values) and is_smaller(float(np.nanmin(values)), self.best.value):
+            best = first_smallest(values)
+            self.best = Value(float(values[best]), centres[best])
         bound = np.fmin(-found.lower, boxes.bound[kept])
         return self.verdicts(Boxes(lower, upper, bound, self.split(lower, upper, found), ()))
+
+
+def is_smaller(value: float, known: float) -> bool:
+    """Return whether a value is smaller than a known one by more than rounding."""
+    return value < (known - _TIE * abs(known) if math.isfinite(known) else known)
+
+
+def first_smallest(values: FloatArray) -> int:
+    """Return the place of the first of the smallest values (K,), up to rounding; NaN are left out."""
+    least = float(np.nanmin(values))
+    return int(np.argmax(values <= least + _TIE * abs(least)))
 
 
 def _good_point(oracle: Oracle, box: PoseBox) -> Value:
@@ -210,13 +227,13 @@ def _good_point(oracle: Oracle, box: PoseBox) -> Value:
     rng = np.random.default_rng(_SEED)
     points = np.concatenate([box.random(_POINTS, rng), _corners(box)])
     values = oracle.values(points)
-    best = int(np.nanargmin(values))
+    best = first_smallest(values)
     y, value, step = points[best], float(values[best]), 0.3
     for _ in range(_STEPS):
         around = box.clipped(y + step * (box.upper - box.lower) * rng.normal(size=(_AROUND, 6)))
         values = oracle.values(around)
-        best = int(np.nanargmin(values))
-        if values[best] < value:
+        best = first_smallest(values)
+        if is_smaller(float(values[best]), value):
             y, value = around[best], float(values[best])
         else:
             step *= _SHRINK

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,6 +16,7 @@ from casadi import SX
 from .....models import Dimension, FloatArray, axis_angle_from_matrix, frozen_array
 from ....case.task import Sense
 from ....errors import UncoveredError
+from ....interruption import is_requested, one_search, why_stopped
 from ....program.layout import Layout
 from ....program.nlp import Nlp
 from ...boxes.proof_writer import ProofWriter
@@ -94,7 +94,6 @@ def prove_extreme(
     gap: float = GAP,
     time_limit: float | None = None,
     jobs: int | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
     legs: Legs | None = None,
     paper: PaperRecord | None = None,
     again: bool = False,
@@ -109,13 +108,12 @@ def prove_extreme(
         gap: allowed distance of the bound from the best value known, as a part of it.
         time_limit: seconds after which the search stops with the bound reached.
         jobs: threads.
-        interrupted: whether the work is requested to stop.
         legs: joint centres with their tolerance, for a claim about every machine within it.
         paper: records the search for a proof.
         again: whether the record takes the place of an earlier one of the same number.
     """
-    if interrupted():
-        return _extreme(claim, _Found(reason="interrupted"), legs)
+    if is_requested():
+        return _extreme(claim, _Found(reason=why_stopped()), legs)
     expression = claim.expression if claim.worst is None or claim.worst.expression is None else claim.worst.expression
     nlp = extreme_program(layout, expression, claim.sense)
     if not varies(layout, [expression])[0]:
@@ -125,7 +123,8 @@ def prove_extreme(
         return _extreme(claim, _Found(value, value, _pose(nlp, nlp.start), is_met=True), legs)
     record = None if paper is None else _Record(paper, again)
     try:
-        return _extreme(claim, _search(nlp, claim, gap, time_limit, jobs, interrupted, record), legs)
+        with one_search(time_limit):
+            return _extreme(claim, _search(nlp, claim, gap, jobs, record), legs)
     except UncoveredError as error:
         return _extreme(claim, _Found(reason=str(error)), legs)
 
@@ -158,9 +157,7 @@ def _search(
     nlp: Nlp,
     claim: Claim,
     gap: float,
-    time_limit: float | None,
     jobs: int | None,
-    interrupted: Callable[[], bool],
     record: _Record | None,
 ) -> _Found:
     """Return the bound of an expression, to the gap or, where that leaves its limit open, as fine as the limit needs.
@@ -171,14 +168,11 @@ def _search(
     began = time.perf_counter()
     # A program of a claim has one function, and its search is that of certify with or without a record.
     writer = None if record is None else ProofWriter(1)
-    found = certify_program(nlp, gap=gap, time_limit=time_limit, jobs=jobs, recorder=writer)
+    found = certify_program(nlp, gap=gap, jobs=jobs, recorder=writer)
     boxes = found.boxes
-    while (finer := _finer_gap(nlp, claim, found)) is not None and not interrupted():
-        left = None if time_limit is None else time_limit - (time.perf_counter() - began)
-        if left is not None and left <= 0:
-            break
+    while (finer := _finer_gap(nlp, claim, found)) is not None and not is_requested():
         finer_writer = None if record is None else ProofWriter(1)
-        again = certify_program(nlp, found.x, gap=finer, time_limit=left, jobs=jobs, recorder=finer_writer)
+        again = certify_program(nlp, found.x, gap=finer, jobs=jobs, recorder=finer_writer)
         boxes += again.boxes
         sign = 1.0 if claim.sense is Sense.MAX else -1.0
         if sign * again.bound <= sign * found.bound:

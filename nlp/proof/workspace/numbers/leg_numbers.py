@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -39,8 +39,6 @@ def own_searches(
     box: PoseBox,
     *,
     gap: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
     shortest: float = 0.0,
     paper: PaperRecord | None = None,
 ) -> Iterator[Extreme]:
@@ -51,15 +49,13 @@ def own_searches(
         legs: its joint centres.
         box: the poses.
         gap: allowed distance of a bound from the best value known, as a part of it.
-        time_limit: seconds for each search.
-        interrupted: whether the work is requested to stop.
         shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of the legs alone.
         paper: records the searches for a proof.
     """
 
     def search(oracle: SingularValues | Clearance, least: float, name: str) -> Minimum:
         recorder = None if paper is None else paper.own(name)
-        return searched_minimum(oracle, box, least, gap, time_limit, interrupted, recorder)
+        return searched_minimum(oracle, box, least, gap, recorder)
 
     def with_errors(oracle: SingularValues | Clearance, found: Minimum, extreme: Extreme) -> Extreme:
         """Return an extreme with the errors of the machine that reaches it."""
@@ -93,22 +89,11 @@ def searched_minimum(
     box: PoseBox,
     limit: float,
     gap: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
     recorder: TreeRecord | None,
 ) -> Minimum:
     """Return the smallest value of a function, only as accurately as its limit needs."""
     allowed, slack = gap * max(abs(limit), _NEAR_ZERO), slack_of(limit)
-    return prove_minimum(
-        oracle,
-        box,
-        gap=allowed,
-        limit=limit,
-        slack=slack,
-        time_limit=time_limit,
-        interrupted=interrupted,
-        recorder=recorder,
-    )
+    return prove_minimum(oracle, box, gap=allowed, limit=limit, slack=slack, recorder=recorder)
 
 
 def from_minimum(
@@ -150,8 +135,6 @@ def pose_errors(
     eps: float,
     shortest: float,
     *,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
     paper: PaperRecord | None = None,
 ) -> Iterator[Extreme]:
     """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
@@ -161,8 +144,6 @@ def pose_errors(
         box: the poses.
         eps: largest error of a leg's length, those of its joint centres included, length.
         shortest: proven shortest length of a leg over the poses.
-        time_limit: seconds for each search.
-        interrupted: whether the work is requested to stop.
         paper: records the searches for a proof.
     """
     names = (("position error", Dimension.LENGTH), ("rotation error", Dimension.ANGLE))
@@ -172,11 +153,7 @@ def pose_errors(
     for each, (name, _) in zip(searches, names, strict=True):
         size = abs(float(each.values(0.5 * (box.lower + box.upper)[None])[0]))
         recorder = None if paper is None else paper.own(name)
-        found.append(
-            prove_minimum(
-                each, box, gap=_ERROR_GAP * size, time_limit=time_limit, interrupted=interrupted, recorder=recorder
-            )
-        )
+        found.append(prove_minimum(each, box, gap=_ERROR_GAP * size, recorder=recorder))
         if paper is not None:
             paper.firsts[name] = -found[-1].bound
     first = PoseErrors(*(-eps * each.bound for each in found))

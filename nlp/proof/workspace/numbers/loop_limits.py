@@ -9,7 +9,6 @@ beyond this value by more than the gap.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from .....models import FloatArray
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....errors import UncoveredError
+from ....interruption import one_search
 from ...boxes.rows import Boxes, joined, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
@@ -33,6 +33,8 @@ from .limit_values import Enclosed, LimitValues
 _BLOCK = 128
 #: Widths of a box, in parts of the whole box, below which it is not bisected.
 _LEAST_WIDTHS = 2.0**-24, 2.0**-24
+#: Derivative, as a part of the largest, that is rounding error and points to no end of a box.
+_FLAT = 1e-9
 #: Smallest size of a number that gaps are parts of.
 _NEAR_ZERO = 1e-6
 
@@ -43,8 +45,6 @@ def loop_extremes(
     box: PoseBox,
     *,
     gap: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
 ) -> list[Extreme]:
     """Return the extremes of numbers with a limit, in the assembly of home; none of a robot without open loops.
 
@@ -53,29 +53,28 @@ def loop_extremes(
         closed: its robot without unknowns in closed form.
         box: the poses.
         gap: allowed distance of a bound from a value beyond its limit, as a part of the value.
-        time_limit: seconds after which the search stops.
-        interrupted: whether the work is requested to stop.
     """
     if not closed.model.unknowns:
         return []
-    try:
-        problem = build_problem(case, closed.model, box)
-        values = LimitValues(case, closed, problem)
-        if not values.claims:
+    with one_search():
+        effort = Effort()
+        try:
+            problem = build_problem(case, closed.model, box)
+            values = LimitValues(case, closed, problem)
+            if not values.claims:
+                return []
+            rule = _LimitsRule(problem, values, gap)
+        except (NotJudgedError, UncoveredError):
             return []
-        rule = _LimitsRule(problem, values, gap)
-    except (NotJudgedError, UncoveredError):
-        return []
-    search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
+        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
 
-    def ending() -> str | None:
-        if search.state.small:
-            return TOO_SMALL
-        return None if search.is_open or rule.is_one_assembly() else APART
+        def ending() -> str | None:
+            if search.state.small:
+                return TOO_SMALL
+            return None if search.is_open or rule.is_one_assembly() else APART
 
-    effort = Effort(time_limit, interrupted=interrupted)
-    reason = effort.run(search, ending)
-    return rule.extremes(reason, search.boxes, effort.seconds)
+        reason = effort.run(search, ending)
+        return rule.extremes(reason, search.boxes, effort.seconds)
 
 
 class _Best(NamedTuple):
@@ -87,6 +86,8 @@ class _Best(NamedTuple):
 
 class _LimitsRule(LoopRule):
     """Rule of K numbers."""
+
+    block = _BLOCK
 
     def __init__(self, problem: Problem, values: LimitValues, gap: float) -> None:
         examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None, None)
@@ -140,9 +141,9 @@ class _LimitsRule(LoopRule):
         upper, slopes = enclosed.numbers.upper, np.nan_to_num(enclosed.numbers.slopes)
         best = np.argmax(upper, axis=0)
         rows = np.concatenate([np.arange(len(cells.lower)), best])
-        ends = np.concatenate(
-            [np.zeros((len(cells.lower), len(self._independent))), np.sign(slopes[best, np.arange(len(best))])]
-        )
+        own = slopes[best, np.arange(len(best))]
+        own = np.where(np.abs(own) > _FLAT * np.abs(own).max(axis=1, keepdims=True, initial=0.0), own, 0.0)
+        ends = np.concatenate([np.zeros((len(cells.lower), len(self._independent))), np.sign(own)])
         z, half = cells.centre[rows], 0.5 * (cells.upper - cells.lower)[rows]
         z[:, self._independent] += half[:, self._independent] * ends
         off, T, _, _ = (each[rows] for each in enclosed.relation)

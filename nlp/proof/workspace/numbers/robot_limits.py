@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from .....models import Dimension, Model
@@ -32,8 +32,6 @@ def limited_spectrum(
     unknown: str,
     *,
     gap: float,
-    time_limit: float | None,
-    interrupted: Callable[[], bool],
 ) -> Iterator[Extreme]:
     """Yield the extremes of limits with searches of their own of a robot that is not six straight legs.
 
@@ -46,8 +44,6 @@ def limited_spectrum(
         family: all machines that are meant; None for the design alone.
         unknown: reason why the machines that are meant are not judged; else empty.
         gap: allowed distance of a bound from the best value known, as a part of it.
-        time_limit: seconds for each search.
-        interrupted: whether the work is requested to stop.
     """
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue | ConditionNumber):
@@ -64,7 +60,7 @@ def limited_spectrum(
                 nothing = (-sign * math.inf, math.nan, None, Outcome.OPEN, 0, 0.0, str(error))
                 yield Extreme(limit.key, sense, Dimension.NUMBER, f"{limit.key}.{end}", value, *nothing)
                 continue
-            found = searched_minimum(oracle, box, sign * value, gap, time_limit, interrupted, None)
+            found = searched_minimum(oracle, box, sign * value, gap, None)
             yield from_minimum(limit.key, f"{limit.key}.{end}", sign * value, box, found, sign=sign)
         else:
             yield from _not_judged(limit)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .....models.arrays import first_largest
 from ...boxes.rows import Boxes, bisected, joined, some
 from ...boxes.search import Rule
 from ..robot.posed_robot import Problem
@@ -44,7 +45,7 @@ def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.in
     score[flat] = width[flat]
     # A coordinate that counts for little is divided where it is much wider than all others.
     score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
-    return np.asarray(np.argmax(score, axis=1))
+    return first_largest(score)
 
 
 class Contracted(NamedTuple):

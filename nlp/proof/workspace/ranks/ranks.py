@@ -46,7 +46,6 @@ def prove_ranks(
     *,
     legs: Legs | None = None,
     engine: str | None = None,
-    time_limit: float | None = None,
     progress: RankProgress | None = None,
     paper: PaperRecord | None = None,
 ) -> Ranks:
@@ -57,7 +56,6 @@ def prove_ranks(
         homes: the case, its poses and the machines that are meant.
         legs: joint centres of six straight legs; None for another robot.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
-        time_limit: seconds for each of the two searches.
         progress: called during them.
         paper: records the searches for a proof.
     """
@@ -65,7 +63,7 @@ def prove_ranks(
     try:
         family = _family(model, homes, legs)
         problem = build_problem(homes.case, model, box) if family is None else family.problem
-        prove = partial(prove_rank, problem, family=family, engine=engine, time_limit=time_limit, progress=progress)
+        prove = partial(prove_rank, problem, family=family, engine=engine, progress=progress)
         shown = partial(_is_shown, problem, family, homes)
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):

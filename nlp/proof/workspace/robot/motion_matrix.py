@@ -63,7 +63,8 @@ class Limbs:
             length: by which rotations are multiplied.
         """
         members = [
-            replace(each, screws=each.screws[:, list(kept)]) for each, kept in zip(self.members, columns, strict=True)
+            replace(each, screws=each.screws[:, list(kept)], groups=())
+            for each, kept in zip(self.members, columns, strict=True)
         ]
         return replace(self, members=members, length=length)
 

@@ -12,13 +12,14 @@ first; errors never are. Values are those of machines whose errors are along the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
+from ....interruption import one_search
 from ...boxes.rows import Boxes, some
 from ...boxes.search import Effort, Order, Search, Verdicts
 from ...enclosure.forms import Forms
@@ -95,7 +96,6 @@ def smallest_of_machines(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-    interrupted: Callable[[], bool] = lambda: False,
     engine: str | None = None,
 ) -> MachineMinimum:
     """Prove the smallest value of an expression over all machines and poses.
@@ -107,16 +107,16 @@ def smallest_of_machines(
         limit: the search ends once the bound is at least this, or a smaller value is known.
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
-        interrupted: whether the work is requested to stop.
         engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    effort = Effort(time_limit, interrupted=interrupted)
-    rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True), engine)
-    search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
-    reason = effort.run(search, rule.ending(search))
+    effort = Effort()
+    with one_search(time_limit):
+        rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True), engine)
+        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
+        reason = effort.run(search, rule.ending(search))
     bound, (value, z) = -search.bound, rule.best
     bound = min(bound, value)
     if math.isfinite(bound) and not rule.is_one_assembly():
@@ -134,6 +134,8 @@ def smallest_of_machines(
 class _MachineRule(LoopRule, SmallestValue[Followed]):
     """Rule of an expression over all machines."""
 
+    block = _BLOCK
+
     def __init__(self, family: Family, expression: SX, goal: Goal, engine: str | None) -> None:
         LoopRule.__init__(self, family.problem, Examiner(family.problem, _Bound(expression), engine, family))
         SmallestValue.__init__(self, goal, Value(math.inf, family.start))
@@ -150,7 +152,7 @@ class _MachineRule(LoopRule, SmallestValue[Followed]):
                 self.best = best
         width = self.widths(found)
         score = found.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-        split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
+        split = first_largest(np.where(width > 0, score, -1.0))
         # Nothing is known of a box in which dependent coordinates are not.
         bound = np.where(found.cells.is_known, -found.smallest, np.inf)
         return self.verdicts(self.boxes_of(found, bound, split))

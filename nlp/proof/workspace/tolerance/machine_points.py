@@ -15,6 +15,8 @@ from ..robot.tolerance_model import Family
 
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
 _INSIDE = 1e-13
+#: Slope, as a part of the largest at a point, that is rounding error.
+_FLAT = 1e-9
 
 
 class MachinePoints:
@@ -83,14 +85,16 @@ class MachinePoints:
         """Return errors (K, 3 m) as large as the tolerance, against the derivatives by them."""
         parts = slopes.reshape(len(slopes), -1, 3)
         sizes = np.linalg.norm(parts, axis=2, keepdims=True)
-        unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > 0)
+        unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > _FLAT * _sizes(sizes))
         return np.asarray((-INSIDE * self._family.tolerance * unit).reshape(slopes.shape))
 
     def _at_corner(self, z: FloatArray, slopes: FloatArray, cells: Cells) -> FloatArray:
         """Return points with the pose in the corner of a box that the derivatives point to."""
         own, count, problem = self._independent, len(self._free), self._family.problem
         z = z.copy()
-        z[:, own] = np.where(slopes[:, own] > 0, cells.lower[:, own], cells.upper[:, own])
+        change = slopes[:, own] * (cells.upper - cells.lower)[:, own]
+        # A slope that is rounding error points to the upper end.
+        z[:, own] = np.where(change > _FLAT * _sizes(change), cells.lower[:, own], cells.upper[:, own])
         # Ends of rotations are rounded outwards, and are no poses of the workspace.
         box = problem.box
         room = np.where(box.upper > box.lower, _INSIDE * np.maximum(np.abs(box.lower), np.abs(box.upper)), 0.0)
@@ -107,3 +111,8 @@ class MachinePoints:
         return np.array(
             [bool(good) and problem.box.holds(problem.pose_of(each)) for good, each in zip(own, z, strict=True)]
         )
+
+
+def _sizes(values: FloatArray) -> FloatArray:
+    """Return the largest size of the values at each of K points, with the shape (K, 1, ...)."""
+    return np.asarray(np.nan_to_num(np.abs(values)).max(axis=tuple(range(1, values.ndim)), keepdims=True, initial=0.0))

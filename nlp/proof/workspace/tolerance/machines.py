@@ -16,6 +16,7 @@ from ....case.case import Case
 from ....case.limits.constraint import Reading
 from ....case.task import Sense
 from ....errors import UncoveredError
+from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
 from ...statement.claims import REACH, Claim, claims_of
 from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
@@ -49,12 +50,10 @@ class Machines(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """How claims are proved: gap, seconds for each search, threads, whether to stop, and a function of the progress."""
+    """How claims are proved: gap, threads, and a function of the progress."""
 
     gap: float
-    time_limit: float | None
     jobs: int | None
-    interrupted: Callable[[], bool]
     progress: Callable[[str, int, int], None] | None = None
 
 
@@ -185,8 +184,8 @@ def _extreme(machines: Machines, exact: Layout | None, claim: Claim, number: SX,
         number: (1, 1) in the coordinates of the family.
         effort: how it is proved.
     """
-    if effort.interrupted():
-        return not_bounded(claim, "interrupted")
+    if is_requested():
+        return not_bounded(claim, why_stopped())
     try:
         if exact is not None and is_smooth(machines.family, number):
             found = _by_first_order(machines, exact, claim, number, effort)
@@ -216,9 +215,7 @@ def _by_first_order(machines: Machines, exact: Layout, claim: Claim, number: SX,
         exact,
         replace(claim, expression=design, worst=worst),
         gap=effort.gap,
-        time_limit=effort.time_limit,
         jobs=effort.jobs,
-        interrupted=effort.interrupted,
     )
 
 
@@ -236,8 +233,6 @@ def _by_search(machines: Machines, claim: Claim, number: SX, effort: Effort) -> 
         gap=effort.gap,
         limit=None if claim.limit is None else -sign * claim.limit,
         slack=slack,
-        time_limit=effort.time_limit,
-        interrupted=effort.interrupted,
     )
     return _of_minimum(machines.family, claim, found, slack)
 

@@ -101,7 +101,7 @@ def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
         chosen = independent_rows([values.T])
         if len(chosen) != each.rank:
             raise ProofError(f"the passive joints of limb {each.label} are singular in the middle of the workspace")
-        members.append(replace(each, screws=each.screws[:, sorted(chosen)]))
+        members.append(replace(each, screws=each.screws[:, sorted(chosen)], groups=()))
     return members
 
 

@@ -1,0 +1,39 @@
+"""Folders of generated C for tests: the compilers of this machine, strict flags, writing, and make."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from screwsynth.nlp import Case, generate_c, load_case
+from screwsynth.nlp.case.source import find_case
+
+COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
+#: Flags by which generated C compiles without a warning, as C and as C++.
+WARNINGS = "-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror"
+STRICT = f"-std=c99 {WARNINGS}"
+
+
+def written(case: Case | str, folder: Path) -> Path:
+    """Write the C of a case, or of a shipped one with its file, into a folder, and return the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = find_case(case).read_text(encoding="utf-8") if isinstance(case, str) else ""
+    for name, content in generate_c(load_case(case) if isinstance(case, str) else case, text).items():
+        (folder / name).write_text(content, encoding="utf-8")
+    return folder
+
+
+def run(*words: str, where: Path) -> str:
+    """Run a program in a folder, which has to succeed, and return its output."""
+    done = subprocess.run(words, cwd=where, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{words}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def made(where: Path, *words: str) -> str:
+    """Run make in a folder."""
+    return run("make", *words, where=where)
