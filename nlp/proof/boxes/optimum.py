@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,14 +23,13 @@ LEAST_WIDTHS = 2.0**-16, 2.0**-40
 
 
 def optimum_search(
-    form: StandardForm, engine: Engine, incumbent: PointKeeper, recorder: ProofWriter | None = None
+    form: StandardForm, engine: Callable[[], Engine], incumbent: PointKeeper, recorder: ProofWriter | None = None
 ) -> Search[OptimumRule]:
     """Return the search of the box of a form: see :class:`OptimumRule`."""
     root = Boxes(form.lower[None], form.upper[None], np.array([np.inf]), np.array([WHOLE]), np.zeros(1, dtype=np.int64))
     return Search(
         OptimumRule(form, engine, incumbent, recorder),
         root,
-        block=engine.block,
         whole=form.upper - form.lower,
         least=LEAST_WIDTHS,
         order=Order.LARGEST_CHUNK,
@@ -42,7 +41,8 @@ class OptimumRule(Rule[NDArray[np.int64]]):
 
     Args:
         form: the form.
-        engine: examines boxes.
+        engine: returns the engine that examines boxes. It takes seconds for long expressions, and so is built by the
+            first step, which can be stopped.
         incumbent: the best point known, which the search improves.
         recorder: records the search's tree for a proof.
 
@@ -51,15 +51,22 @@ class OptimumRule(Rule[NDArray[np.int64]]):
     """
 
     def __init__(
-        self, form: StandardForm, engine: Engine, incumbent: PointKeeper, recorder: ProofWriter | None = None
+        self,
+        form: StandardForm,
+        engine: Callable[[], Engine],
+        incumbent: PointKeeper,
+        recorder: ProofWriter | None = None,
     ) -> None:
         self.form, self.incumbent = form, incumbent
-        self._engine, self._recorder = engine, recorder
+        self._build, self._recorder = engine, recorder
+        self._engine: Engine | None = None
+        self.block = 1
         self._nodes, self._turn, self._closed = 1, 0, -math.inf
 
     def close(self) -> None:
         """Stop the engine."""
-        self._engine.close()
+        if self._engine is not None:
+            self._engine.close()
 
     def fault(self, small: Sequence[Boxes[NDArray[np.int64]]]) -> str:
         """Return the reason for stopping at boxes without a finite bound, with the place of the first; else empty."""
@@ -74,7 +81,9 @@ class OptimumRule(Rule[NDArray[np.int64]]):
     def examine(self, boxes: Boxes[NDArray[np.int64]]) -> Verdicts[NDArray[np.int64]]:
         """Return bounds of boxes, and improve the incumbent."""
         ends = np.ascontiguousarray(boxes.lower.T), np.ascontiguousarray(boxes.upper.T)
-        found = self._engine.examine(*ends, self.target)
+        engine = self._engine = self._engine or self._build()
+        self.block = engine.block
+        found = engine.examine(*ends, self.target)
         self._turn += 1
         self._improve(found)
         closed = found.verdict == Verdict.BOUNDED

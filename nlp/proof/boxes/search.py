@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from ...interruption import Milestone, one_search, reached, reason_of, reason_to_stop
+from ...interruption import Milestone, reached, reason_of, reason_to_stop
 from .rows import SMALL, WHOLE, Boxes, Columns, bisected, joined, some
 
 if TYPE_CHECKING:
@@ -74,9 +74,11 @@ class Rule(ABC, Generic[Columns]):
 
     Attributes:
         target: bound up to which boxes may be closed.
+        block: number of boxes examined at once.
     """
 
     target: float = -math.inf
+    block: int
 
     def divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
         """Return the halves of boxes, with what they carry: all lower ones, then all upper ones."""
@@ -139,7 +141,6 @@ class Search(Generic[AnyRule]):
     Args:
         rule: examines boxes.
         root: the whole box.
-        block: number of boxes examined at once.
         whole: (n,) widths of the whole box; those of 0 do not count.
         least: width, in parts of the whole box, below which a box is not bisected, without and with a finite bound.
         order: the boxes that are taken first.
@@ -154,12 +155,11 @@ class Search(Generic[AnyRule]):
         rule: AnyRule,
         root: Boxes[Any],
         *,
-        block: int,
         whole: FloatArray,
         least: tuple[float, float],
         order: Order,
     ) -> None:
-        self.rule, self._block, self._order = rule, block, order
+        self.rule, self._order = rule, order
         self._columns = np.flatnonzero(whole > 0)
         self._whole, self._least, self._newest = whole[self._columns], least, 0
         self.state: State[Any] = State([(math.inf, 0, root)], [], -math.inf, 0)
@@ -250,7 +250,7 @@ class Search(Generic[AnyRule]):
         Chunks are ordered by their largest bounds alone, so some other boxes may have larger bounds than these.
         """
         taken: list[Boxes[Any]] = []
-        room, count = self._block, self.left
+        room, count = self.rule.block, self.left
         if self._order is Order.LARGEST and count <= _FEW:
             waiting[:] = [(math.inf, 0, joined([boxes for _, _, boxes in waiting]))]
         while waiting and room > 0:
@@ -302,16 +302,14 @@ class SearchMethod(Protocol):
 
 @dataclass(frozen=True)
 class Effort:
-    """How long a search may take; its clock begins with it.
+    """How long a search may take beside its time; its clock begins with it.
 
     Attributes:
-        time_limit: seconds after which a search stops.
         most_boxes: number of boxes after which it stops.
         progress: called with the seconds, about ten times a second.
         began: time at the start.
     """
 
-    time_limit: float | None = None
     most_boxes: int | None = None
     progress: Callable[[float], None] | None = None
     began: float = field(default_factory=lambda: time.perf_counter())  # noqa: PLW0108 - tests have a clock of their own
@@ -331,8 +329,7 @@ class Effort:
             ending: returns the reason for ending, which is empty where the claim is decided; None for going on.
             target: returns the bound up to which boxes may be closed.
         """
-        with one_search(self.time_limit):
-            return reason_of(lambda: self._run(search, ending, target))
+        return reason_of(lambda: self._run(search, ending, target))
 
     def _run(self, search: SearchMethod, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
         """Run a search that may be interrupted."""

@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 from ....models import FloatArray, frozen_array
-from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
-from ...interruption import reason_of
+from ...interruption import one_search, reason_of, reason_to_stop
 from ...program.nlp import Nlp
 from ..boxes.engines import Engine
 from ..boxes.incumbent import Incumbent, IncumbentError
@@ -81,37 +81,38 @@ def certify_program(
         ValueError: ``above`` for a maximisation.
         InputError: the C kernel was not built.
     """
-    effort = Effort(time_limit)
-    if above is not None and nlp.sense is not Sense.MIN:
-        raise ValueError("above is proved by minimising: the program's sense must be min")
-    if nlp.n == 0:
-        return _certify_point(nlp, above, effort.seconds)
-    kernel()  # before any work where it is missing
-    form = standard_form(nlp)
-    incumbent = Incumbent(form)
-    method = _method(form, incumbent, jobs, recorder)
-    search = _Search(form, incumbent, method, gap, above, effort)
-    try:
-        search.incumbent.start(x, claimed)
-    except IncumbentError as error:
-        return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-    search.first_value = incumbent.value
+    with one_search(time_limit):
+        effort = Effort()
+        if nlp.n == 0:
+            return _certify_point(nlp, above, effort.seconds)
+        kernel()  # before any work where it is missing
+        form = standard_form(nlp)
+        incumbent = Incumbent(form)
+        # The method in use takes the place of this one: what it sets up can be stopped.
+        whole = optimum_search(form, partial(Engine, form, jobs), incumbent)
+        search = _Search(form, incumbent, whole, gap, above, effort)
+        try:
+            search.incumbent.start(x, claimed)
+        except IncumbentError as error:
+            return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
 
-    def run() -> str:
-        reason = search.run(progress)
-        while not reason and search.is_short():
+        def run() -> str:
+            reason = reason_to_stop(effort.seconds)
+            while not reason:
+                search.restart(_method(form, incumbent, jobs, recorder))
+                reason = search.run(progress)
+                if reason or not search.is_short():
+                    break
+                search.method.close()
+                if recorder is not None:
+                    recorder.clear()
+            return reason
+
+        try:
+            reason = reason_of(run)
+        finally:
             search.method.close()
-            if recorder is not None:
-                recorder.clear()
-            search.restart(_method(form, incumbent, jobs, recorder))
-            reason = search.run(progress)
-        return reason
-
-    try:
-        reason = reason_of(run)
-    finally:
-        search.method.close()
-    return search.certificate(reason)
+        return search.certificate(reason)
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
@@ -142,7 +143,8 @@ def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder
     if separation is not None and not separation.shared:
         return IndependentSearch(form, separation, incumbent, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
-        return optimum_search(form, Engine(form, jobs, tangents=recorder is None), incumbent, recorder)
+        build = partial(Engine, form, jobs, tangents=recorder is None)
+        return optimum_search(form, build, incumbent, recorder)
     return shared_search(form, separation, incumbent, jobs, recorder)
 
 

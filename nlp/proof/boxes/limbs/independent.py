@@ -104,7 +104,7 @@ class IndependentSearch:
         self._searches = [
             optimum_search(
                 limbs[group[0]].form,
-                Engine(limbs[group[0]].form, jobs, tangents=recorder is None),
+                partial(Engine, limbs[group[0]].form, jobs, tangents=recorder is None),
                 LimbPoint([limbs[each] for each in group], incumbent, parts),
                 None if recorder is None else recorder.limb(partial(self._limb_bound, k)),
             )

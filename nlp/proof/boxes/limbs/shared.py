@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .....models.arrays import first_largest
 from ...enclosure.quadratic_models import ranges
 from ..engines import Engine
 from ..optimum import LEAST_WIDTHS, reason_without_bound
@@ -84,7 +85,7 @@ def shared_search(
     columns = SharedColumns(own, tuple((0.5 * (each.lower + each.upper)).T for each in own))
     root = Boxes(common.lower[None], common.upper[None], np.array([np.inf]), np.array([WHOLE]), columns)
     whole = common.upper - common.lower
-    return Search(rule, root, block=_BLOCK, whole=whole, least=LEAST_WIDTHS, order=Order.LARGEST_CHUNK)
+    return Search(rule, root, whole=whole, least=LEAST_WIDTHS, order=Order.LARGEST_CHUNK)
 
 
 class SharedRule(Rule[SharedColumns]):
@@ -98,6 +99,8 @@ class SharedRule(Rule[SharedColumns]):
         recorder: records the search for a proof, which has no rules for cuts of shared boxes nor for own boxes that are
             dropped because of the other limbs: the search makes none then.
     """
+
+    block = _BLOCK
 
     def __init__(
         self,
@@ -240,12 +243,12 @@ class SharedRule(Rule[SharedColumns]):
         if self._record is not None:
             emptied = sizes == 0
             self._record.close(boxes, sums, emptied, bounded | ~sums.is_possible | emptied.any(axis=0), threshold)
-            self._record.bisect(boxes, np.where(cut, change.argmax(axis=0), -1))
+            self._record.bisect(boxes, np.where(cut, first_largest(change.T), -1))
         # A box that collapsed, or one of whose lists did, has not been examined as what is left of it.
         moved = ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
         for before, each in zip(boxes.own, lists, strict=True):
             moved |= each.own.width < before.width
-        split = np.where(cut, change.argmax(axis=0), np.where(refine | moved, WHOLE, SMALL))
+        split = np.where(cut, first_largest(change.T), np.where(refine | moved, WHOLE, SMALL))
         own = tuple(
             _refined(each, refine & (spread[k] >= _SPREAD * spread.max(axis=0))) for k, each in enumerate(lists)
         )

@@ -16,6 +16,7 @@ import numpy as np
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
+from ....interruption import one_search
 from ...boxes.rows import Boxes, Columns, bisected, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
 from ..robot.pose_box import PoseBox
@@ -99,12 +100,13 @@ def prove_minimum(
         time_limit: seconds after which the search stops with the bound reached.
         recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
     """
-    effort = Effort(time_limit)
+    effort = Effort()
     rule = _OracleRule(oracle, box, Goal(gap, limit, slack), recorder)
     lower, upper = box.lower[None], box.upper[None]
     root = Boxes(lower, upper, np.array([math.inf]), rule.split(lower, upper, oracle.bounds(lower, upper)), ())
-    search = Search(rule, root, block=_BLOCK, whole=box.upper - box.lower, least=(0.0, 0.0), order=Order.LARGEST)
-    reason = effort.run(search, rule.ending(search))
+    search = Search(rule, root, whole=box.upper - box.lower, least=(0.0, 0.0), order=Order.LARGEST)
+    with one_search(time_limit):
+        reason = effort.run(search, rule.ending(search))
     value, y = rule.best
     least = min(-search.bound, value)
     return Minimum(least, value, y, search.boxes, search.left, effort.seconds, reason)
@@ -174,6 +176,8 @@ class SmallestValue(Rule[Columns]):
 
 class _OracleRule(SmallestValue[tuple[()]]):
     """Rule of a function of the pose."""
+
+    block = _BLOCK
 
     def __init__(self, oracle: Oracle, box: PoseBox, goal: Goal, recorder: TreeRecord | None) -> None:
         super().__init__(goal, _good_point(oracle, box))

@@ -17,6 +17,7 @@ from .....models import FloatArray
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....errors import UncoveredError
+from ....interruption import one_search
 from ...boxes.rows import Boxes, joined, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
@@ -32,10 +33,10 @@ from .limit_values import Enclosed, LimitValues
 _BLOCK = 128
 #: Widths of a box, in parts of the whole box, below which it is not bisected.
 _LEAST_WIDTHS = 2.0**-24, 2.0**-24
-#: Smallest size of a number that gaps are parts of.
-_NEAR_ZERO = 1e-6
 #: Derivative, as a part of the largest, that is rounding error and points to no end of a box.
 _FLAT = 1e-9
+#: Smallest size of a number that gaps are parts of.
+_NEAR_ZERO = 1e-6
 
 
 def loop_extremes(
@@ -55,24 +56,25 @@ def loop_extremes(
     """
     if not closed.model.unknowns:
         return []
-    try:
-        problem = build_problem(case, closed.model, box)
-        values = LimitValues(case, closed, problem)
-        if not values.claims:
+    with one_search():
+        effort = Effort()
+        try:
+            problem = build_problem(case, closed.model, box)
+            values = LimitValues(case, closed, problem)
+            if not values.claims:
+                return []
+            rule = _LimitsRule(problem, values, gap)
+        except (NotJudgedError, UncoveredError):
             return []
-        rule = _LimitsRule(problem, values, gap)
-    except (NotJudgedError, UncoveredError):
-        return []
-    search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
+        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
 
-    def ending() -> str | None:
-        if search.state.small:
-            return TOO_SMALL
-        return None if search.is_open or rule.is_one_assembly() else APART
+        def ending() -> str | None:
+            if search.state.small:
+                return TOO_SMALL
+            return None if search.is_open or rule.is_one_assembly() else APART
 
-    effort = Effort()
-    reason = effort.run(search, ending)
-    return rule.extremes(reason, search.boxes, effort.seconds)
+        reason = effort.run(search, ending)
+        return rule.extremes(reason, search.boxes, effort.seconds)
 
 
 class _Best(NamedTuple):
@@ -84,6 +86,8 @@ class _Best(NamedTuple):
 
 class _LimitsRule(LoopRule):
     """Rule of K numbers."""
+
+    block = _BLOCK
 
     def __init__(self, problem: Problem, values: LimitValues, gap: float) -> None:
         examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start))

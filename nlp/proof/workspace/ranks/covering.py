@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .....models.arrays import first_largest
 from ...boxes.rows import Boxes, bisected, joined, some
 from ...boxes.search import Rule
 from ..robot.posed_robot import Problem
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .....models import FloatArray
-from .....models.arrays import first_largest
 
 #: Reason for which nothing is claimed although every box is closed.
 APART = "the assemblies in two neighbouring boxes are not proved to be the same"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .....models import FloatArray, frozen_array
+from ....interruption import one_search
 from ...boxes.rows import Boxes, joined, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ...enclosure.engine import ENGINE
@@ -59,24 +60,29 @@ def prove_rank(
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    rule = _RankRule(
-        problem, matrix, family, recorder, NewtonRefuter(problem, matrix, family) if refuter is None else refuter
-    )
-    search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
+    effort = Effort(most_boxes)
+    with one_search(time_limit):
+        rule = _RankRule(
+            problem,
+            matrix,
+            family,
+            recorder,
+            NewtonRefuter(problem, matrix, family) if refuter is None else refuter,
+        )
+        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
 
-    def ending() -> str | None:
-        if rule.singular is not None:
-            return ""
-        if search.is_open:
-            return None
-        if search.state.small:
-            return TOO_SMALL
-        return "" if rule.is_one_assembly() else APART
+        def ending() -> str | None:
+            if rule.singular is not None:
+                return ""
+            if search.is_open:
+                return None
+            if search.state.small:
+                return TOO_SMALL
+            return "" if rule.is_one_assembly() else APART
 
-    effort = Effort(time_limit, most_boxes)
-    if progress is not None:
-        effort = replace(effort, progress=lambda seconds: progress(seconds, search.boxes, search.left))
-    reason = effort.run(search, ending)
+        if progress is not None:
+            effort = replace(effort, progress=lambda seconds: progress(seconds, search.boxes, search.left))
+        reason = effort.run(search, ending)
     singular, left = rule.singular, search.state.left
     outcome, y, share = Outcome.PROVED, None, 0.0
     if singular is not None:
@@ -116,6 +122,8 @@ class _RankRule(LoopRule):
     Attributes:
         singular: a singular pose; None while none is known.
     """
+
+    block = _BLOCK
 
     def __init__(
         self,

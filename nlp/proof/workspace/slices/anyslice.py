@@ -191,6 +191,8 @@ class _SliceRule(CoverRule[_Columns]):
         done: the boxes that are decided, and indices of regions and limits.
     """
 
+    block = _BLOCK
+
     def __init__(
         self,
         slices: AnySlices,
@@ -217,7 +219,7 @@ class _SliceRule(CoverRule[_Columns]):
             np.zeros(1, dtype=bool),
             Relation(*nothing),
         )
-        self.cover(Boxes(ends[:1], ends[1:], np.zeros(1), np.array([WHOLE]), columns), _BLOCK)
+        self.cover(Boxes(ends[:1], ends[1:], np.zeros(1), np.array([WHOLE]), columns))
 
     def divided(self, boxes: Boxes[_Columns]) -> Boxes[_Columns]:
         """Return the quarters of boxes, with the dependent coordinates that follow where they are known."""

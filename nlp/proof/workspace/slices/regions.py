@@ -74,10 +74,10 @@ class CoverRule(Rule[Columns]):
         low, high = lower[:, self._places], upper[:, self._places]
         return low, high, np.asarray((high - low <= LEAST * (self._upper - self._lower)).all(axis=1))
 
-    def cover(self, root: Boxes[Columns], block: int) -> None:
+    def cover(self, root: Boxes[Columns]) -> None:
         """Divide the slice until all boxes are done."""
         whole = (root.upper - root.lower)[0]
-        search = Search(self, root, block=block, whole=np.nan_to_num(whole), least=(0.0, 0.0), order=Order.NEWEST)
+        search = Search(self, root, whole=np.nan_to_num(whole), least=(0.0, 0.0), order=Order.NEWEST)
         while search.is_open:
             search.step(-math.inf)
 

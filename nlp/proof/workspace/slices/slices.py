@@ -171,6 +171,8 @@ _States = NDArray[np.int8]
 class _LegsRule(CoverRule[_States]):
     """Rule of ranks and limits of six straight legs."""
 
+    block = _BLOCK
+
     def __init__(
         self, examiner: Examiner, limits: LimitCells, first: FirstViolated, whole: PoseBox, chosen: list[int]
     ) -> None:
@@ -180,7 +182,7 @@ class _LegsRule(CoverRule[_States]):
         self._sign = self._ranks(middle, middle).signs[0]
         self._done: list[tuple[FloatArray, FloatArray, NDArray[np.int8], NDArray[np.int16]]] = []
         ends = whole.lower[None], whole.upper[None]
-        self.cover(Boxes(*ends, np.zeros(1), np.array([WHOLE]), limits.unknown.T), _BLOCK)
+        self.cover(Boxes(*ends, np.zeros(1), np.array([WHOLE]), limits.unknown.T))
 
     def _ranks(self, lower: FloatArray, upper: FloatArray) -> Examined:
         """Return the ranks over boxes (B, 6)."""

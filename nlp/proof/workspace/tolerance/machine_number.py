@@ -18,6 +18,8 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
+from ....interruption import one_search
 from ...boxes.rows import Boxes, some
 from ...boxes.search import Effort, Order, Search, Verdicts
 from ...enclosure.forms import Forms
@@ -108,10 +110,11 @@ def smallest_of_machines(
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    effort = Effort(time_limit)
-    rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
-    search = Search(rule, rule.root, block=_BLOCK, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
-    reason = effort.run(search, rule.ending(search))
+    effort = Effort()
+    with one_search(time_limit):
+        rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
+        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
+        reason = effort.run(search, rule.ending(search))
     bound, (value, z) = -search.bound, rule.best
     bound = min(bound, value)
     if math.isfinite(bound) and not rule.is_one_assembly():
@@ -129,6 +132,8 @@ def smallest_of_machines(
 class _MachineRule(LoopRule, SmallestValue[Followed]):
     """Rule of an expression over all machines."""
 
+    block = _BLOCK
+
     def __init__(self, family: Family, expression: SX, goal: Goal) -> None:
         LoopRule.__init__(self, family.problem, Examiner(family.problem, _Bound(expression), family))
         SmallestValue.__init__(self, goal, Value(math.inf, family.start))
@@ -145,7 +150,7 @@ class _MachineRule(LoopRule, SmallestValue[Followed]):
                 self.best = best
         width = self.widths(found)
         score = found.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-        split = np.argmax(np.where(width > 0, score, -1.0), axis=1)
+        split = first_largest(np.where(width > 0, score, -1.0))
         # Nothing is known of a box in which dependent coordinates are not.
         bound = np.where(found.cells.is_known, -found.smallest, np.inf)
         return self.verdicts(self.boxes_of(found, bound, split))

@@ -19,6 +19,7 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
 from ...boxes.rows import WHOLE, Boxes
 from ...boxes.search import Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser
@@ -83,7 +84,7 @@ def _of_centres(family: Family, H: SX, centres: list[int], first: float) -> floa
     rule, whole = _ChangeRule(family, encloser, blocks, len(places)), whole_workspace(problem)
     width = (whole.upper - whole.lower)[0]
     root = Boxes(whole.lower, whole.upper, np.array([math.inf]), np.array([WHOLE]), np.zeros(1))
-    search = Search(rule, root, block=_BLOCK, whole=width, least=(0.0, 0.0), order=Order.LARGEST)
+    search = Search(rule, root, whole=width, least=(0.0, 0.0), order=Order.LARGEST)
     while search.is_open and search.boxes < _MOST:
         worst = search.state.waiting[-1][2]
         k = int(np.argmax(worst.bound))
@@ -95,6 +96,8 @@ def _of_centres(family: Family, H: SX, centres: list[int], first: float) -> floa
 
 class _ChangeRule(Rule[FloatArray]):
     """Rule of the change of second order; boxes carry its value at their middles."""
+
+    block = _BLOCK
 
     def __init__(self, family: Family, encloser: Encloser, blocks: _Blocks, errors: int) -> None:
         self._family, self._encloser, self._blocks, self._errors = family, encloser, blocks, errors
@@ -112,7 +115,7 @@ class _ChangeRule(Rule[FloatArray]):
         with np.errstate(all="ignore"):
             found = factor * self._blocks.sums(np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r)
         middles = np.nan_to_num(factor * self._blocks.sums(np.abs(forms.c)))
-        split = np.argmax((now.upper - now.lower) / self._whole, axis=1)
+        split = first_largest((now.upper - now.lower) / self._whole)
         bound = np.where(np.isfinite(found), found, np.inf)
         return Verdicts(Boxes(now.lower, now.upper, bound, split, middles), -math.inf, len(split))
 
