@@ -2,5 +2,5 @@
 
 The modules import each other in this order: ``intervals``, ``univariate``, ``first_order`` and ``second_order`` (forms
 of an expression), ``quadratic_models``, ``squared_quotients``, ``tangent_bounds``, ``first_pass``, ``bounding`` (the
-examination of boxes) and ``limb_models``.
+examination of boxes), ``limb_models`` and ``rank_rule``.
 """

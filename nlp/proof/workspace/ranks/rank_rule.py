@@ -87,7 +87,7 @@ class RankTest:
     def examine_second(
         self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray | None = None
     ) -> Tested:
-        """Return the verdict on boxes, by the C kernel from forms of second order of the entries.
+        """Return the verdict on boxes from forms of second order of the entries.
 
         Args:
             encloser: of the entries.
@@ -99,9 +99,8 @@ class RankTest:
         regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
         shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        encloser.module.rank(
-            n, encloser.tape.head, self._head, (*ends, regular, shares, smallest, signs), count, change
-        )
+        found = (*ends, regular, shares, smallest, signs)
+        encloser.module.rank(n, encloser.tape.head, self._head, found, count, change)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
 
     def examine(
@@ -125,13 +124,24 @@ class RankTest:
             rest = r + (size @ relation.rho[:, :, None])[:, :, 0]
             terms = np.abs(c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
             rest = rest * (1 + ROUNDING) + ROUNDING * terms
-        count, f = len(c), len(independent)
+        return self._of_entries(middle, slope, rest, len(independent))
+
+    def _of_entries(self, middle: FloatArray, slope: FloatArray, rest: FloatArray, f: int) -> Tested:
+        """Return the verdict on boxes.
+
+        Args:
+            middle: (B, E) of the entries.
+            slope: (B, E, f + e) terms, those of errors last.
+            rest: (B, E).
+            f: number of terms that are not those of errors.
+        """
+        count = len(middle)
         M0 = np.broadcast_to(self._constant, (count, *self._constant.shape)).copy()
         R = np.zeros_like(M0)
         at, scale = self._at, self._scale[self._at[0]]
         M0[:, at[0], at[1]] += middle * scale
         R[:, at[0], at[1]] = rest * scale
-        M = np.zeros((count, f + len(errors), *self._constant.shape))
+        M = np.zeros((count, slope.shape[2], *self._constant.shape))
         M[:, :, at[0], at[1]] = (slope * scale[:, None]).transpose(0, 2, 1)
         known = np.asarray(np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
         known &= np.isfinite(M).all(axis=(1, 2, 3))
