@@ -1,4 +1,4 @@
-"""The rank of matrices without loops over boxes, from forms of second order of their entries, but for the reflection."""
+"""The rank of matrices without loops, from forms of second order of their entries, without the kernel's reflection."""
 
 from __future__ import annotations
 
