@@ -81,6 +81,8 @@ def certify_program(
         ValueError: ``above`` for a maximisation.
         InputError: the C kernel was not built.
     """
+    if above is not None and nlp.sense is not Sense.MIN:
+        raise ValueError("above is proved by minimising: the program's sense must be min")
     with one_search(time_limit):
         effort = Effort()
         if nlp.n == 0:
