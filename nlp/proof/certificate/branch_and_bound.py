@@ -16,6 +16,7 @@ from functools import partial
 from typing import NamedTuple
 
 from ....models import FloatArray, frozen_array
+from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
 from ...interruption import one_search, reason_of, reason_to_stop
