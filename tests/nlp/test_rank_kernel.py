@@ -70,11 +70,34 @@ def test_a_hexapod_takes_as_many_boxes_as_its_exact_expansion(kind: TurnKind, de
     assert found.boxes <= 1.02 * most
 
 
-@pytest.mark.parametrize(("name", "part", "degrees"), [("6-rss", 0.02, 5), ("6-rus", 0.05, 10), ("6-ups", 0.1, 20)])
-def test_forms_of_second_order_take_a_quarter_of_the_boxes_of_the_first(name: str, part: float, degrees: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "part", "degrees", "most"), [("6-rss", 0.02, 5, 103), ("6-rus", 0.05, 10, 87), ("6-ups", 0.1, 20, 39)]
+)
+def test_other_robots_take_few_boxes_too(name: str, part: float, degrees: float, most: int) -> None:
     problem = gallery(name, part, degrees)
-    boxes = [prove_rank(problem, problem.locked, engine=engine, most_boxes=5000).boxes for engine in ("c", "numpy")]
-    assert boxes[0] < 0.25 * boxes[1]
+    found = prove_rank(problem, problem.locked)
+    assert found.outcome is Outcome.PROVED
+    assert found.boxes <= 1.02 * most
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.3])
+def test_numpy_agrees_box_by_box(tolerance: float) -> None:
+    problem, rng = hexapod(TURNS, 45), np.random.default_rng(1)
+    family = family_of(CASE, built_model(CASE.model), problem, tolerance) if tolerance else None
+    meant, z = family or problem, problem.z if family is None else family.coordinates
+    box = problem.box
+    lower = box.random(300, rng)
+    upper = lower + (box.upper - box.lower) * rng.uniform(0, 0.2, (300, 1))
+    cells = Cells(lower, upper, 0.5 * (lower + upper), np.ones(300, dtype=bool))
+    ours, theirs = (
+        Examiner(problem, RankTest(meant.locked, z, meant.start), engine, family).examine(cells)
+        for engine in ("c", "numpy")
+    )
+    # Near singular poses the kernel turns columns, and proves more.
+    assert (ours.is_regular | ~theirs.is_regular).all()
+    assert (ours.is_regular == theirs.is_regular).mean() > 0.98
+    assert (ours.signs == theirs.signs).mean() > 0.98
+    assert 0.1 < theirs.is_regular.mean() < 0.9
 
 
 #: One wrong rule each: the text of the kernel, and what stands in its place.
@@ -83,8 +106,9 @@ FAULTS = {
     "pairs are dropped": ("a < n + n; a++", "a < n; a++"),
     "terms of first order are dropped": ("for (int a = 0, t = 0;", "for (int a = n, t = n;"),
     "the half of a square is its own middle": ("b == a - n ? 0.5 : 1.0", "b == a - n ? 0.0 : 1.0"),
-    "a square moves about 0": ("EACH middle[l] += 0.5 * terms[t][l], size", "EACH size"),
+    "a square moves about 0": ("EACH middle[l] += 0.5 * term[l], size", "EACH size"),
     "|C| times the rest is omitted": ("fabs(by[l]) * (rest[l] + ", "fabs(by[l]) * (0 * rest[l] + "),
+    "columns are not turned": ("x.row[j][l] -= sum[l] * x.turn[j][l];", ""),
     "errors of joint centres change nothing": ("scale * found->change[", "0 * found->change["),
     "the rest has a fifth of its width": ("double half = 0.5 * (v->q[l]", "double half = 0.1 * (v->q[l]"),
     "the spectral radius may be above 1": ("if (most < 1 - PRODUCTS)", "if (most < 3)"),
@@ -102,10 +126,14 @@ class Copy:
         for before, after in ((keep, f"            if (!l) keep_parts(m, parts);\n{keep}"), (old, new)):
             assert not before or text.count(before) == 1, before
             text = text.replace(before, after) if before else text
+        # Boxes near singular poses are few: columns are turned in many more of them.
+        text = text.replace("#define NEAR_SINGULAR 0.01", "#define NEAR_SINGULAR 0.4")
         start = "static void rank_all("
         kept = (
-            "double kept_C[4096], kept_B[4096];\nstatic void keep_parts(const Matrix *m, RankParts x)\n{\n"
+            "double kept_C[4096], kept_B[4096], kept_t[4096];\n"
+            "static void keep_parts(const Matrix *m, RankParts x)\n{\n"
             "    memcpy(kept_C, x.inverse, (size_t)(m->columns * m->rows) * sizeof(double));\n"
+            "    memcpy(kept_t, x.t, (size_t)m->columns * sizeof(double));\n"
             "    memcpy(kept_B, x.B, (size_t)(m->columns * m->columns) * sizeof(double));\n}\n\n"
         )
         header.write_text(text.replace(start, kept + start), encoding="utf-8")
@@ -119,12 +147,13 @@ class Copy:
         self.module: ModuleType = importlib.util.module_from_spec(spec)
         loader.exec_module(self.module)
         library = ctypes.CDLL(str(target))
-        self._kept = [(ctypes.c_double * 4096).in_dll(library, name) for name in ("kept_C", "kept_B")]
+        self._kept = [(ctypes.c_double * 4096).in_dll(library, name) for name in ("kept_C", "kept_B", "kept_t")]
 
-    def kept(self, columns: int) -> tuple[FloatArray, FloatArray]:
-        """C and B, (c, c) each."""
-        first, second = (np.array(each)[: columns**2].reshape(columns, columns) for each in self._kept)
-        return first, second
+    def kept(self, columns: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """C, B and V, (c, c) each."""
+        first, second = (np.array(each)[: columns**2].reshape(columns, columns) for each in self._kept[:2])
+        t = np.array(self._kept[2])[:columns]
+        return first, second, np.eye(columns) - np.outer(t, t)
 
 
 def is_found(copy: Copy, problem: Problem, family: Family | None = None) -> bool:
@@ -145,7 +174,7 @@ def is_found(copy: Copy, problem: Problem, family: Family | None = None) -> bool
         centre = problem.start + 0.5 * problem.size * rng.uniform(-1, 1, n)
         lower, upper = (centre - half)[None], (centre + half)[None]
         found = examiner.examine(Cells(lower, upper, centre[None], np.ones(1, dtype=bool)))
-        C, B = copy.kept(columns)
+        C, B, V = copy.kept(columns)
         if found.is_regular[0] and np.abs(np.linalg.eigvals(B)).max() >= 1:
             return True
         if not np.isfinite(found.smallest[0]) or not found.smallest[0] or not np.isfinite(B).all():
@@ -154,7 +183,7 @@ def is_found(copy: Copy, problem: Problem, family: Family | None = None) -> bool
         for y in np.vstack([ends, centre[None], rng.uniform(lower, upper, (4, n))]):
             machine = y if family is None else family.within(np.append(y, rng.normal(size=family.errors.numel())))
             values = scale[:, None] * M(machine).full()
-            if (np.abs(np.eye(columns) - C @ values) > B + 1e-11).any():
+            if (np.abs(np.eye(columns) - C @ values @ V) > B + 1e-11).any():
                 return True
     return False
 

@@ -31,7 +31,6 @@ from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extre
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examined, Examiner
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
-from screwsynth.nlp.proof.workspace.regular import rows
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, built_model, family_of
@@ -104,8 +103,7 @@ class Machines:
         points = box.random(count, rng)
         ends = np.where(rng.uniform(size=points.shape) < 0.5, box.upper, box.lower)
         points[::2] = box.clipped(np.where(rng.uniform(size=points.shape) < 0.9, ends, points)[::2])
-        form = rows.turn_form(box, points[:, 3:], np.zeros((count, 3))).terms[:, 0]
-        self.turn = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+        self.turn = box.rotations(points)
         self.position = points[:, :3]
         span = self.position[:, None] + np.einsum("kij,lj->kli", self.turn, robot.platform) - robot.base
         unit = span / np.linalg.norm(span, axis=2, keepdims=True)
@@ -357,8 +355,7 @@ def test_strokes_are_those_of_one_machine_at_two_poses(case: Case) -> None:
     strokes = [each for each in judged.extremes if each.key == "actuator.stroke_max"]
     rng = np.random.default_rng(3)
     corners = box.clipped(np.where(rng.uniform(size=(200, 6)) < 0.5, box.upper, box.lower))
-    form = rows.turn_form(box, corners[:, 3:], np.zeros((200, 3))).terms[:, 0]
-    turn = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    turn = box.rotations(corners)
     errors = rng.normal(size=(2, 300, 6, 3))
     errors *= TOLERANCE / np.linalg.norm(errors, axis=3, keepdims=True)
     arms = np.einsum("kij,mlj->kmli", turn, robot.platform + errors[0])

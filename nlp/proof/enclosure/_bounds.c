@@ -101,6 +101,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     for (int k = 0; good && k < form.tangents; k++)
         fits = fits && form.squared[k] >= 0 && form.squared[k] < form.functions;
     fits = fits && (values == Py_None || form.values.outputs == R + rows_of_tangents(&form));
+    fits = fits && (values == Py_None || n <= MOST_VARIABLES);
     if (good && !(fits && (objective == Py_None || form.objective.outputs == form.functions * (n + 1)))) {
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
         good = 0;
@@ -108,7 +109,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     size_t count = finish > begin ? (size_t)(finish - begin) : 1;
     Kept kept = {NULL, NULL};
     if (good) {
-        memory = malloc(memory_needed(&form) * sizeof(double));
+        memory = calloc(memory_needed(&form), sizeof(double));
         kept.open = malloc(count * sizeof(Py_ssize_t));
         kept.scores = malloc((form.objective.length ? count * (size_t)n : 1) * sizeof(double));
     }
@@ -134,21 +135,21 @@ static PyObject *enclose(PyObject *module, PyObject *args)
 {
     PyObject *tuple, *arrays[7];
     Tape tape = {0};
-    Enclosed found = {0};
+    Enclosed found = {.order = 1};
     int n;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "iO!(OOOOOOO)n", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
-                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &found.B))
+    if (!PyArg_ParseTuple(args, "iO!(OOOOOOO)n|i", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
+                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &found.B, &found.order))
         return NULL;
-    int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
+    int good = n > 0 && (found.order == 1 || n <= MOST_VARIABLES) && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
     Py_ssize_t R = tape.outputs, B = found.B, D = sizeof(double);
     good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
     good = good && (found.c = borrow(&all, arrays[2], R * B, D, 1)) && (found.p = borrow(&all, arrays[3], R * B, D, 1));
     good = good && (found.q = borrow(&all, arrays[4], R * B, D, 1)) && (found.s = borrow(&all, arrays[5], R * B, D, 1));
-    good = good && (found.a = borrow(&all, arrays[6], R * n * B, D, 1));
+    good = good && (found.a = borrow(&all, arrays[6], R * (Py_ssize_t)terms_to_enclose(n, found.order) * B, D, 1));
     double *memory = NULL;
-    if (good && !(memory = malloc(memory_to_enclose(&tape, n) * sizeof(double))))
+    if (good && !(memory = calloc(memory_to_enclose(&tape, n, found.order), sizeof(double))))
         PyErr_NoMemory();
     if (memory) {
         Py_BEGIN_ALLOW_THREADS
@@ -221,7 +222,7 @@ static PyObject *rank(PyObject *module, PyObject *args)
         return NULL;
     int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
     Py_ssize_t B = found.B, D = sizeof(double), E = matrix.entries = tape.outputs;
-    good = good && matrix.columns > 0 && matrix.columns <= 64 && matrix.nullity >= 0 && matrix.nullity < matrix.columns &&
+    good = good && n <= MOST_VARIABLES && matrix.columns > 0 && matrix.columns <= 64 && matrix.nullity >= 0 && matrix.nullity < matrix.columns &&
            matrix.rows + matrix.nullity >= matrix.columns;
     good = good && (matrix.at = borrow(&all, at, 2 * E, sizeof(int), 0)) && (matrix.scale = borrow(&all, scale, E, D, 0));
     good = good && (matrix.constant = borrow(&all, constant, (Py_ssize_t)matrix.rows * matrix.columns, D, 0));
@@ -234,7 +235,7 @@ static PyObject *rank(PyObject *module, PyObject *args)
         good = matrix.at[2 * e] >= 0 && matrix.at[2 * e] < matrix.rows && matrix.at[2 * e + 1] >= 0 &&
                matrix.at[2 * e + 1] < matrix.columns;
     double *memory = NULL;
-    if (good && !(memory = malloc(memory_for_ranks(&tape, &matrix, n) * sizeof(double))))
+    if (good && !(memory = calloc(memory_for_ranks(&tape, &matrix, n), sizeof(double))))
         PyErr_NoMemory();
     if (memory) {
         Py_BEGIN_ALLOW_THREADS
@@ -261,8 +262,9 @@ static PyMethodDef methods[] = {
      "models(n, (...), B, level, low, high)\n\n"
      "Write upper bounds (B,) of B quadratic models, or the ends (n, B) of points that can reach levels (B,)."},
     {"enclose", enclose, METH_VARARGS,
-     "enclose(n, tape, (lower, upper, c, p, q, s, a), B)\n\n"
-     "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a."},
+     "enclose(n, tape, (lower, upper, c, p, q, s, a), B, order=1)\n\n"
+     "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a; with order 2\n"
+     "a has the coefficients of pairs of variables too."},
     {"examine", examine, METH_VARARGS,
      "examine((n, functions, equation, depends, low, high, whose, tape, values, objective, squared), arrays, B,\n"
      "        begin, finish, threshold, shared=0, models=None, least=None)\n\n"

@@ -17,6 +17,7 @@ from ....models import FloatArray
 from .engine import chosen_kernel, kernel
 from .first_order import enclose
 from .instructions import compile_tape
+from .second_order import enclose_second
 from .tape import Tape
 
 if TYPE_CHECKING:
@@ -42,6 +43,22 @@ class Forms(NamedTuple):
     def part(self, which: slice) -> Forms:
         """Return the forms of some of the expressions."""
         return Forms(self.c[:, which], self.a[:, which], self.r[:, which])
+
+
+class SecondForms(NamedTuple):
+    """R expressions over B boxes, with ``Q_ij e_i e_j`` for each pair i <= j, row by row.
+
+    Attributes:
+        c: (B, R) values at the centres, and middles of the terms of higher order.
+        a: (B, R, n) linear parts.
+        Q: (B, R, n (n + 1) / 2) terms of second order.
+        r: (B, R) bounds of the rest; infinite where a value may be undefined.
+    """
+
+    c: FloatArray
+    a: FloatArray
+    Q: FloatArray
+    r: FloatArray
 
 
 class Encloser:
@@ -84,6 +101,27 @@ class Encloser:
             a = np.empty((tape.outputs, n, count))
             ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
             self.module.enclose(n, self.head, (*ends, c, p, q, s, a), count)
-        middle, half = 0.5 * (p + q), 0.5 * (q - p)
-        rest = half + s + 4 * _ULP * (half + np.abs(c) + np.abs(middle))
-        return Forms((c + middle).T, a.transpose(2, 0, 1), rest.T)
+        middle, rest = _centred(c, p, q, s)
+        return Forms(middle, a.transpose(2, 0, 1), rest)
+
+    def second(self, lower: FloatArray, upper: FloatArray) -> SecondForms:
+        """Return the forms of second order over boxes with ends (n, B)."""
+        tape, (n, count) = self.tape, lower.shape
+        if self.module is None:
+            found = enclose_second(tape, lower, upper)
+            c, p, q, s = found.c, found.p, found.q, found.s
+            terms = np.concatenate([found.a, found.Q], axis=1)
+        else:
+            c, p, q, s = (np.empty((tape.outputs, count)) for _ in range(4))
+            terms = np.empty((tape.outputs, n * (n + 3) // 2, count))
+            ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+            self.module.enclose(n, self.head, (*ends, c, p, q, s, terms), count, 2)
+        middle, rest = _centred(c, p, q, s)
+        terms = terms.transpose(2, 0, 1)
+        return SecondForms(middle, terms[:, :, :n], terms[:, :, n:], rest)
+
+
+def _centred(c: FloatArray, p: FloatArray, q: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return middles (B, R) of expressions in ``c + [p, q] +- s``, and bounds of the rest."""
+    middle, half = 0.5 * (p + q), 0.5 * (q - p)
+    return (c + middle).T, (half + s + 4 * _ULP * (half + np.abs(c) + np.abs(middle))).T

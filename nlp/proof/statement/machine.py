@@ -32,11 +32,6 @@ class Legs(NamedTuple):
     platform: FloatArray
     tolerance: float = 0.0
 
-    @property
-    def length(self) -> float:
-        """Length of the order of the robot's, by which positions are comparable to rotations."""
-        return float(max(np.abs(self.base).max(), np.abs(self.platform).max())) or 1.0
-
 
 class JointErrors(NamedTuple):
     """Errors of the joint centres of one machine, (6, 3) each: base in the world frame, platform in its own, length."""

@@ -8,6 +8,8 @@
 #define PRODUCTS 1e-13
 #define RANK_POWERS 12
 #define NORM_POWERS 6
+/* Smallest singular value, in parts of the largest, below which the direction that it belongs to becomes a column. */
+#define NEAR_SINGULAR 0.01
 
 typedef struct {
     int rows, columns, nullity, entries;
@@ -24,10 +26,12 @@ typedef struct {
     Py_ssize_t B;
 } Ranks;
 
-/* Parts of LANES boxes, and of one of them: A has the middle and, below it, a basis of its null space. */
+/* Parts of LANES boxes, and of one of them: A has the middle and, below it, a basis of its null space. Near a singular
+ * matrix it is that of A V, V = I - t t', whose columns have the direction in which A is nearly singular as one: the
+ * bounds of |I - C A V| are then near the change of the smallest singular value. */
 typedef struct {
-    Lane *C, *bound, *linear, *row, *middle, *rest, *size;
-    double *A, *inverse, *work, *B, *v, *w;
+    Lane *C, *bound, *linear, *row, *middle, *rest, *size, *turn;
+    double *A, *inverse, *work, *B, *v, *w, *t;
 } RankParts;
 
 /* Turns column k of a matrix (rows, columns), from row k on, to its first entry by a reflection, and the later columns
@@ -187,7 +191,7 @@ static int is_contracting(const double *B, int c, double *v, double *w)
 static size_t memory_of_rank(const Matrix *m, int n)
 {
     size_t rows = (size_t)(m->rows + m->nullity), c = (size_t)m->columns;
-    return LANES * (rows * c + (1 + (size_t)n) * c * c + c + 3 * (size_t)m->entries) + 3 * rows * c + c * c + 6 * (rows + c);
+    return LANES * (rows * c + (1 + (size_t)n) * c * c + 2 * c + 3 * (size_t)m->entries) + 3 * rows * c + c * c + 7 * (rows + c);
 }
 
 static RankParts carve_rank(const Matrix *m, int n, double *memory)
@@ -197,10 +201,11 @@ static RankParts carve_rank(const Matrix *m, int n, double *memory)
     RankParts x;
     x.C = (Lane *)carve(&rest, rows * c * LANES), x.bound = (Lane *)carve(&rest, c * c * LANES);
     x.linear = (Lane *)carve(&rest, (size_t)n * c * c * LANES), x.row = (Lane *)carve(&rest, c * LANES);
+    x.turn = (Lane *)carve(&rest, c * LANES);
     x.middle = (Lane *)carve(&rest, E * LANES), x.rest = (Lane *)carve(&rest, E * LANES);
     x.size = (Lane *)carve(&rest, E * LANES);
     x.A = carve(&rest, rows * c), x.inverse = carve(&rest, rows * c), x.work = carve(&rest, rows * c + 2 * (rows + c));
-    x.B = carve(&rest, c * c), x.v = carve(&rest, rows + c), x.w = carve(&rest, rows + c);
+    x.B = carve(&rest, c * c), x.v = carve(&rest, rows + c), x.w = carve(&rest, rows + c), x.t = carve(&rest, c);
     return x;
 }
 
@@ -214,13 +219,17 @@ static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py
         double scale = m->scale[e];
         double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
         EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        for (int i = 0, t = n; i < n; i++) {
+        EACH_OF(i, 0, v->terms.linear)
+        {
             EACH size[l] += fabs(terms[i][l]);
-            for (int j = i; j < n; j++, t++)
+            EACH_OF(j, i, v->terms.pairs[i])
+            {
+                const double *term = terms[n + row_of(n, i) + j];
                 if (i == j)
-                    EACH middle[l] += 0.5 * terms[t][l], size[l] += 0.5 * fabs(terms[t][l]);
+                    EACH middle[l] += 0.5 * term[l], size[l] += 0.5 * fabs(term[l]);
                 else
-                    EACH size[l] += fabs(terms[t][l]);
+                    EACH size[l] += fabs(term[l]);
+            }
         }
         /* The middle is a sum of n + 2 terms, the half width of two. */
         EACH
@@ -234,9 +243,44 @@ static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py
     }
 }
 
+/* A row times V, or sizes times |V|. */
+static void turn_row(int c, const double *t, double *row, int sizes)
+{
+    double sum = 0;
+    for (int j = 0; j < c; j++)
+        sum += row[j] * (sizes ? fabs(t[j]) : -t[j]);
+    for (int j = 0; j < c; j++)
+        row[j] += sum * (sizes ? fabs(t[j]) : t[j]);
+}
+
+/* Writes t, and the inverse of A V in the place of that of A. V is a reflection of the direction w of the largest
+ * singular value of the inverse to the axis that is nearest to it; I where this is not meant. */
+static void turn_columns(int rows, int c, RankParts x, int is_meant)
+{
+    double size = 0;
+    int axis = 0;
+    for (int i = 0; i < c; i++) {
+        x.t[i] = is_meant ? x.w[i] : 0.0, size += x.t[i] * x.t[i];
+        axis = fabs(x.t[i]) > fabs(x.t[axis]) * (1 + TIE) ? i : axis;
+    }
+    if (!(size > 0))
+        return;
+    x.t[axis] += x.t[axis] > 0 ? sqrt(size) : -sqrt(size);
+    double scale = 1 / sqrt(size + sqrt(size) * (fabs(x.t[axis]) - sqrt(size)));
+    for (int i = 0; i < c; i++)
+        x.t[i] *= scale;
+    for (int r = 0; r < rows; r++) {
+        double sum = 0;
+        for (int i = 0; i < c; i++)
+            sum += x.t[i] * x.inverse[i * rows + r];
+        for (int i = 0; i < c; i++)
+            x.inverse[i * rows + r] -= sum * x.t[i];
+    }
+}
+
 /* Whether the middle of lane l has a left inverse, which goes into C: the sign of left_inverse, or 0; how
  * singular it is. */
-static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
+static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest, double near)
 {
     int rows = m->rows + m->nullity, c = m->columns, known = 1;
     memcpy(x.A, m->constant, (size_t)(m->rows * c) * sizeof(double));
@@ -248,19 +292,27 @@ static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
     if (known && m->nullity)
         null_space(x.A, m->rows, c, m->nullity, x.A + m->rows * c, x.work);
     int good = known ? left_inverse(x.A, rows, c, x.inverse, x.work) : 0;
+    if (good) {
+        double largest = norm_of(x.A, rows, c, x.v, x.w), far = norm_of(x.inverse, c, rows, x.v, x.w);
+        *smallest = 1 / (far * largest);
+        turn_columns(rows, c, x, *smallest < near);
+    }
     for (int k = 0; k < rows * c; k++)
         x.C[k][l] = good ? x.inverse[k] : 0.0;
+    for (int k = 0; k < c; k++)
+        x.turn[k][l] = good ? x.t[k] : 0.0;
     if (!good)
         return 0;
-    *smallest = 1 / (norm_of(x.inverse, c, rows, x.v, x.w) * norm_of(x.A, rows, c, x.v, x.w));
     for (int i = 0; i < c; i++) {
         const double *Ci = x.inverse + i * rows;
-        for (int j = 0; j < c; j++) {
-            double sum = 0, size = 0;
-            for (int r = 0; r < rows; r++)
-                sum += Ci[r] * x.A[r * c + j], size += fabs(Ci[r] * x.A[r * c + j]);
-            x.bound[i * c + j][l] = fabs(sum - (i == j)) + PRODUCTS * (size + (i == j));
-        }
+        for (int j = 0; j < c; j++)
+            x.v[j] = x.w[j] = 0;
+        for (int r = 0; r < rows; r++)
+            for (int j = 0; j < c; j++)
+                x.v[j] += Ci[r] * x.A[r * c + j], x.w[j] += fabs(Ci[r] * x.A[r * c + j]);
+        turn_row(c, x.t, x.v, 0), turn_row(c, x.t, x.w, 1);
+        for (int j = 0; j < c; j++)
+            x.bound[i * c + j][l] = fabs(x.v[j] - (i == j)) + PRODUCTS * (x.w[j] + (i == j));
     }
     return good;
 }
@@ -272,23 +324,40 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
     for (int i = 0; i < c; i++) {
         Lane *bound = x.bound + i * c;
         const Lane *C = (const Lane *)(x.C + i * rows);
+        Lane sum;
+        memset(x.row, 0, (size_t)c * sizeof(Lane));
         for (int e = 0; e < m->entries; e++) {
-            double *to = bound[m->at[2 * e + 1]], *rest = x.rest[e], *size = x.size[e];
+            double *to = x.row[m->at[2 * e + 1]], *rest = x.rest[e], *size = x.size[e];
             const double *by = C[m->at[2 * e]];
             EACH to[l] += fabs(by[l]) * (rest[l] + PRODUCTS * size[l]);
         }
+        EACH sum[l] = 0.0;
+        for (int j = 0; j < c; j++)
+            EACH sum[l] += x.row[j][l] * fabs(x.turn[j][l]);
+        for (int j = 0; j < c; j++)
+            EACH bound[j][l] += x.row[j][l] + sum[l] * fabs(x.turn[j][l]);
         for (int a = 0, t = 0; a < n + n; a++)
             for (int b = a < n ? n - 1 : a - n; b < n; b++, t++) {
                 /* First the terms of first order, then the pairs, row by row; the scales of a column are one number. */
                 double part = a >= n && b == a - n ? 0.5 : 1.0;
                 memset(x.row, 0, (size_t)c * sizeof(Lane));
                 for (int e = 0; e < m->entries; e++) {
-                    const double *term = terms_of_form2(form2_of(out, e))[t], *by = C[m->at[2 * e]];
+                    Form2 *v = form2_of(out, e);
+                    if (!((a < n ? v->terms.linear >> a : v->terms.pairs[a - n] >> b) & 1))
+                        continue;
+                    const double *term = terms_of_form2(v)[t], *by = C[m->at[2 * e]];
                     double *to = x.row[m->at[2 * e + 1]], scale = part * m->scale[e];
                     EACH to[l] += by[l] * (term[l] * scale);
                 }
+                EACH sum[l] = 0.0;
                 for (int j = 0; j < c; j++)
-                    EACH bound[j][l] += fabs(x.row[j][l]);
+                    EACH sum[l] += x.row[j][l] * x.turn[j][l];
+                for (int j = 0; j < c; j++)
+                    EACH
+                    {
+                        x.row[j][l] -= sum[l] * x.turn[j][l];
+                        bound[j][l] += fabs(x.row[j][l]);
+                    }
                 if (a < n)
                     for (int j = 0; j < c; j++)
                         EACH x.linear[(t * c + i) * c + j][l] = fabs(x.row[j][l]);
@@ -334,12 +403,14 @@ static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, dou
     for (int i = 0; i < 4; i++)
         lanes[i] = (Lane *)carve(&rest, (size_t)n * LANES);
     RankParts parts = carve_rank(m, n, rest);
+    /* V makes what does not become small with the box larger. */
+    double near = found->change ? 0 : NEAR_SINGULAR;
     for (Py_ssize_t start = 0; start < found->B; start += LANES) {
         load(&form, &report, NULL, start, found->B, lanes[0], lanes[1], lanes[2], lanes[3]);
         run2(tape, n, work, out, lanes[0], lanes[1], lanes[2], lanes[3], terms);
         middles_of(m, n, out, found, start, parts);
         int ready[LANES] = {0};
-        EACH if (start + l < found->B) ready[l] = invert_lane(m, l, parts, found->smallest + start + l);
+        EACH if (start + l < found->B) ready[l] = invert_lane(m, l, parts, found->smallest + start + l, near);
         add_moving(m, n, out, parts);
         for (int l = 0; l < LANES && start + l < found->B; l++) {
             double shares[64] = {0};

@@ -4,11 +4,23 @@
 
 #include "enclosure.h"
 
-/* c + a e + Q(e) + [p, q] +- s, with Q's range [sl, sh] and the sum of |a|. The n coefficients a follow in memory, then
- * those of e_i e_j, i <= j, row by row. */
+/* Most variables of a form: bits of an unsigned number. */
+#define MOST_VARIABLES 15
+
+/* Which coefficients of a form may differ from 0, as bits: a, and the rows of Q, which is symmetric. */
 typedef struct {
+    unsigned linear, pairs[MOST_VARIABLES];
+} Terms;
+
+/* c + a e + Q(e) + [p, q] +- s, with Q's range [sl, sh] and the sum of |a|. The n coefficients a follow in memory, then
+ * those of e_i e_j, i <= j, row by row. Memory is all 0 at first, and coefficients that are no terms stay so. */
+typedef struct {
+    Terms terms;
     Lane c, p, q, s, lo, hi, rad, sl, sh;
 } Form2;
+
+/* The variables i = from, ..., n - 1 of a set of bits. */
+#define EACH_OF(i, from, set) for (int i = from; i < n; i++) if ((set) >> i & 1)
 
 static size_t pairs_of(int n) { return (size_t)n * ((size_t)n + 1) / 2; }
 static size_t stride_of_form2(int n) { return sizeof(Form2) / sizeof(double) + ((size_t)n + pairs_of(n)) * LANES; }
@@ -18,54 +30,106 @@ static inline Lane *terms_of_form2(Form2 *v) { return (Lane *)(v + 1); }
 /* Place of the coefficient of e_i e_j, i <= j, less j. */
 static inline int row_of(int n, int i) { return i * n - i * (i + 1) / 2; }
 
+/* The terms of a sum, with product those of a product, and with dense those of any function, of two forms. */
+static Terms structure_of(int n, Terms x, Terms y, int product, int dense)
+{
+    Terms found = {.linear = x.linear | y.linear};
+    for (int i = 0; i < n; i++) {
+        found.pairs[i] = x.pairs[i] | y.pairs[i];
+        if (product)
+            found.pairs[i] |= (x.linear >> i & 1 ? y.linear : 0) | (y.linear >> i & 1 ? x.linear : 0);
+        if (dense)
+            found.pairs[i] |= found.linear >> i & 1 ? found.linear : 0;
+    }
+    return found;
+}
+
+/* The variables k for which e_i e_j e_k may be a term of the product of a linear and a quadratic part. */
+INLINE unsigned cubic_terms(Terms a, Terms Q, int i, int j)
+{
+    return (a.linear >> i & 1 ? Q.pairs[j] : 0) | (a.linear >> j & 1 ? Q.pairs[i] : 0) | (Q.pairs[i] >> j & 1 ? a.linear : 0);
+}
+
 /* Sums of the sizes of the coefficients of a (other's Q) + (other's a) Q, monomial by monomial; with one = other, of
  * 2 a Q. */
-INLINE void cubic_sizes(int n, int first, int last, const Lane *a, const Lane *Q, const Lane *b, const Lane *P, int own,
+INLINE void cubic_sizes(int n, Terms x, Terms y, const Lane *a, const Lane *Q, const Lane *b, const Lane *P, int own,
                         double *restrict out)
 {
     EACH out[l] = 0.0;
-    for (int i = first; i < last; i++) {
+    EACH_OF(i, 0, x.linear | y.linear)
+    {
         const Lane *Qi = Q + row_of(n, i), *Pi = P + row_of(n, i);
-        if (own)
-            EACH out[l] += fabs(2 * (a[i][l] * Q[row_of(n, i) + i][l]));
-        else
-            EACH out[l] += fabs(a[i][l] * Pi[i][l] + b[i][l] * Qi[i][l]);
-        for (int j = i + 1; j < last; j++) {
-            const Lane *Qj = Q + row_of(n, j), *Pj = P + row_of(n, j);
+        if ((cubic_terms(x, y, i, i) | cubic_terms(y, x, i, i)) >> i & 1) {
             if (own)
-                EACH out[l] += fabs(2 * (a[i][l] * Qi[j][l] + a[j][l] * Qi[i][l])) +
-                               fabs(2 * (a[i][l] * Qj[j][l] + a[j][l] * Qi[j][l]));
+                EACH out[l] += fabs(2 * (a[i][l] * Q[row_of(n, i) + i][l]));
             else
-                EACH out[l] += fabs((a[i][l] * Pi[j][l] + a[j][l] * Pi[i][l]) + (b[i][l] * Qi[j][l] + b[j][l] * Qi[i][l])) +
-                               fabs((a[i][l] * Pj[j][l] + a[j][l] * Pi[j][l]) + (b[i][l] * Qj[j][l] + b[j][l] * Qi[j][l]));
-            for (int k = j + 1; k < last; k++)
+                EACH out[l] += fabs(a[i][l] * Pi[i][l] + b[i][l] * Qi[i][l]);
+        }
+        EACH_OF(j, i + 1, x.linear | y.linear)
+        {
+            const Lane *Qj = Q + row_of(n, j), *Pj = P + row_of(n, j);
+            unsigned third = cubic_terms(x, y, i, j) | cubic_terms(y, x, i, j);
+            if (third >> i & 1 || third >> j & 1) {
+                if (own)
+                    EACH out[l] += fabs(2 * (a[i][l] * Qi[j][l] + a[j][l] * Qi[i][l])) +
+                                   fabs(2 * (a[i][l] * Qj[j][l] + a[j][l] * Qi[j][l]));
+                else
+                    EACH out[l] += fabs((a[i][l] * Pi[j][l] + a[j][l] * Pi[i][l]) + (b[i][l] * Qi[j][l] + b[j][l] * Qi[i][l])) +
+                                   fabs((a[i][l] * Pj[j][l] + a[j][l] * Pi[j][l]) + (b[i][l] * Qj[j][l] + b[j][l] * Qi[j][l]));
+            }
+            EACH_OF(k, j + 1, third)
+            {
                 if (own)
                     EACH out[l] += fabs(2 * (a[i][l] * Qj[k][l] + a[j][l] * Qi[k][l] + a[k][l] * Qi[j][l]));
                 else
                     EACH out[l] += fabs((a[i][l] * Pj[k][l] + a[j][l] * Pi[k][l] + a[k][l] * Pi[j][l]) +
                                         (b[i][l] * Qj[k][l] + b[j][l] * Qi[k][l] + b[k][l] * Qi[j][l]));
+            }
         }
     }
 }
 
+/* Makes the coefficients of a form those of t, which has these terms. */
+INLINE void write_terms(Form2 *v, int n, Terms terms, const Lane *t)
+{
+    Lane *to = terms_of_form2(v);
+    EACH_OF(i, 0, terms.linear | v->terms.linear)
+    {
+        int at = n + row_of(n, i);
+        if (terms.linear >> i & 1)
+            memcpy(to + i, t + i, sizeof(Lane));
+        else
+            memset(to + i, 0, sizeof(Lane));
+        EACH_OF(j, i, terms.pairs[i] | v->terms.pairs[i])
+        {
+            if (terms.pairs[i] >> j & 1)
+                memcpy(to + at + j, t + at + j, sizeof(Lane));
+            else
+                memset(to + at + j, 0, sizeof(Lane));
+        }
+    }
+    v->terms = terms;
+}
+
 /* Writes a value: ranges of its parts, poison without a finite form, and the interval with the form's range. */
-INLINE void settle2(Form2 *restrict v, int n, int first, int last, double slack, const Result *restrict from,
-                    Lane *restrict t)
+INLINE void settle2(Form2 *restrict v, int n, Terms which, double slack, const Result *restrict from, Lane *restrict t)
 {
     Lane *terms = terms_of_form2(v), rad, low, high;
     double grown = 1 + slack;
     size_t pairs = pairs_of(n);
     int all = 1;
     EACH rad[l] = low[l] = high[l] = 0.0;
-    for (int i = first; i < last; i++) {
+    EACH_OF(i, 0, which.linear)
+    {
         const Lane *row = t + n + row_of(n, i);
-        EACH
-        {
-            double own = row[i][l];
-            rad[l] += fabs(t[i][l]);
-            low[l] += smaller(own, 0.0), high[l] += larger(own, 0.0);
-        }
-        for (int j = i + 1; j < last; j++)
+        EACH rad[l] += fabs(t[i][l]);
+        if (which.pairs[i] >> i & 1)
+            EACH
+            {
+                double own = row[i][l];
+                low[l] += smaller(own, 0.0), high[l] += larger(own, 0.0);
+            }
+        EACH_OF(j, i + 1, which.pairs[i])
             EACH
             {
                 double size = fabs(row[j][l]);
@@ -87,16 +151,7 @@ INLINE void settle2(Form2 *restrict v, int n, int first, int last, double slack,
         v->p[l] = good ? p : 0.0, v->q[l] = good ? q : 0.0, v->s[l] = good ? s : INFINITY;
         v->lo[l] = good ? lo : -INFINITY, v->hi[l] = good ? hi : INFINITY;
     }
-    if (first == 0 && last == n)
-        memcpy(terms, t, ((size_t)n + pairs) * sizeof(Lane));
-    else {
-        memset(terms, 0, ((size_t)n + pairs) * sizeof(Lane));
-        memcpy(terms + first, t + first, (size_t)(last - first) * sizeof(Lane));
-        for (int i = first; i < last; i++) {
-            int at = n + row_of(n, i);
-            memcpy(terms + at + i, t + at + i, (size_t)(last - i) * sizeof(Lane));
-        }
-    }
+    write_terms(v, n, which, t);
     if (!all)
         for (size_t i = 0; i < (size_t)n + pairs; i++)
             EACH terms[i][l] = v->s[l] < INFINITY ? terms[i][l] : 0.0;
@@ -122,31 +177,41 @@ static double curve_of(int op, Rule rule, double c)
     }
 }
 
-/* Writes the span's linear coefficients t[i] and those of its pairs t[at]. */
-#define EACH_TERM(linear, pair)                                                                                        \
-    for (int i = first; i < last; i++) {                                                                               \
-        EACH t[i][l] = linear;                                                                                         \
-        for (int j = i, at = n + row_of(n, i) + i; j < last; j++, at++)                                                \
+/* Writes the linear coefficients t[i] and those of pairs t[at] that are terms. */
+#define EACH_TERM(first, pair)                                                                                        \
+    EACH_OF(i, 0, which.linear)                                                                                        \
+    {                                                                                                                  \
+        EACH t[i][l] = first;                                                                                          \
+        EACH_OF(j, i, which.pairs[i])                                                                                  \
+        {                                                                                                              \
+            int at = n + row_of(n, i) + j;                                                                             \
             EACH t[at][l] = pair;                                                                                      \
+        }                                                                                                              \
     }
 
 WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *centre, Lane *radius, Lane *lower,
                       Lane *upper, Lane *restrict t)
 {
-    size_t pairs = pairs_of(n), whole = sizeof(Form2) + ((size_t)n + pairs) * sizeof(Lane);
+    const Terms none = {0};
     /* An operation makes fewer roundings of each of its terms than there are monomials of third order. */
     double slack = ((double)(n * (n + 1) * (n + 2) / 6) + 16) * ULP;
     for (int index = 0; index < tape->length; index++) {
         const int *code = tape->code + 6 * index;
-        int op = code[0], first = code[4], last = code[5];
+        int op = code[0];
         double k = tape->k[index];
         Form2 *v = form2_of(op == OUTPUT ? out : work, code[1]);
         if (op == OUTPUT) {
-            memcpy(v, form2_of(work, code[2]), whole);
+            const Form2 *from = form2_of(work, code[2]);
+            memcpy(v->c, from->c, sizeof(Form2) - offsetof(Form2, c));
+            write_terms(v, n, from->terms, terms_of_form2((Form2 *)from));
             continue;
         }
+        if (op == INPUT || op == CONSTANT) {
+            write_terms(v, n, none, t);
+            memset(v->c, 0, sizeof(Form2) - offsetof(Form2, c));
+        }
         if (op == INPUT) {
-            memset(v, 0, whole);
+            v->terms.linear = 1u << code[2];
             memcpy(v->c, centre[code[2]], sizeof(Lane));
             memcpy(v->lo, lower[code[2]], sizeof(Lane));
             memcpy(v->hi, upper[code[2]], sizeof(Lane));
@@ -155,12 +220,14 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             continue;
         }
         if (op == CONSTANT) {
-            memset(v, 0, whole);
             EACH v->c[l] = v->lo[l] = v->hi[l] = k;
             continue;
         }
         const Form2 *x = form2_of(work, code[2]), *y = form2_of(work, code[3]);
         const Lane *ax = (const Lane *)(x + 1), *ay = (const Lane *)(y + 1), *Qx = ax + n, *Qy = ay + n;
+        int is_binary = op == ADD || op == SUB || op == MUL || op == DIV, is_sum = op == ADD || op == SUB || op == SHIFT || op == SCALE;
+        Terms X = x->terms, Y = is_binary ? y->terms : op == SQUARE ? X : none;
+        const Terms which = structure_of(n, X, Y, op == MUL || op == SQUARE, !is_sum && op != MUL && op != SQUARE);
         Lane cubic;
         Result r;
         switch (op) {
@@ -210,16 +277,16 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             break;
         }
         case MUL:
-            for (int i = first; i < last; i++) {
+            EACH_OF(i, 0, which.linear)
+            {
                 EACH t[i][l] = x->c[l] * ay[i][l] + y->c[l] * ax[i][l];
-                int at = n + row_of(n, i) + i;
-                EACH t[at][l] = (x->c[l] * ay[at][l] + y->c[l] * ax[at][l]) + ax[i][l] * ay[i][l];
-                for (int j = i + 1; j < last; j++) {
-                    at++;
-                    EACH t[at][l] = (x->c[l] * ay[at][l] + y->c[l] * ax[at][l]) + (ax[i][l] * ay[j][l] + ax[j][l] * ay[i][l]);
-                }
+                int at = n + row_of(n, i);
+                if (which.pairs[i] >> i & 1)
+                    EACH t[at + i][l] = (x->c[l] * ay[at + i][l] + y->c[l] * ax[at + i][l]) + ax[i][l] * ay[i][l];
+                EACH_OF(j, i + 1, which.pairs[i])
+                    EACH t[at + j][l] = (x->c[l] * ay[at + j][l] + y->c[l] * ax[at + j][l]) + (ax[i][l] * ay[j][l] + ax[j][l] * ay[i][l]);
             }
-            cubic_sizes(n, first, last, ax, Qx, ay, Qy, 0, cubic);
+            cubic_sizes(n, X, Y, ax, Qx, ay, Qy, 0, cubic);
             EACH
             {
                 double cx = x->c[l], cy = y->c[l], rx = x->rad[l], ry = y->rad[l], px = x->p[l], qx = x->q[l];
@@ -235,16 +302,15 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             interval_product(x->lo, x->hi, y->lo, y->hi, &r);
             break;
         case SQUARE:
-            for (int i = first; i < last; i++) {
+            EACH_OF(i, 0, which.linear)
+            {
                 EACH t[i][l] = 2 * x->c[l] * ax[i][l];
-                int at = n + row_of(n, i) + i;
-                EACH t[at][l] = 2 * x->c[l] * ax[at][l] + ax[i][l] * ax[i][l];
-                for (int j = i + 1; j < last; j++) {
-                    at++;
-                    EACH t[at][l] = 2 * x->c[l] * ax[at][l] + 2 * (ax[i][l] * ax[j][l]);
-                }
+                int at = n + row_of(n, i);
+                EACH t[at + i][l] = 2 * x->c[l] * ax[at + i][l] + ax[i][l] * ax[i][l];
+                EACH_OF(j, i + 1, which.pairs[i])
+                    EACH t[at + j][l] = 2 * x->c[l] * ax[at + j][l] + 2 * (ax[i][l] * ax[j][l]);
             }
-            cubic_sizes(n, first, last, ax, Qx, ax, Qx, 1, cubic);
+            cubic_sizes(n, X, X, ax, Qx, ax, Qx, 1, cubic);
             EACH
             {
                 double c = x->c[l], rad = x->rad[l], p = x->p[l], q = x->q[l], s = x->s[l], m = larger(-p, q);
@@ -275,21 +341,24 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
                 low[l] = least - (fabs(least) * ULP + TINY), high[l] = most + (fabs(most) * ULP + TINY);
                 rad[l] = size[l] = 0.0;
             }
-            for (int i = first; i < last; i++)
+            EACH_OF(i, 0, which.linear)
                 EACH
                 {
                     t[i][l] = (ax[i][l] - ratio[l] * ay[i][l]) * inverse[l];
                     rad[l] += fabs(t[i][l]);
                 }
-            for (int i = first; i < last; i++)
-                for (int j = i, at = n + row_of(n, i) + i; j < last; j++, at++)
+            EACH_OF(i, 0, which.linear)
+                EACH_OF(j, i, which.pairs[i])
+                {
+                    int at = n + row_of(n, i) + j;
                     EACH
                     {
                         double crossed = t[i][l] * ay[j][l] + (i == j ? 0.0 : t[j][l] * ay[i][l]);
                         t[at][l] = ((ax[at][l] - ratio[l] * ay[at][l]) - crossed) * inverse[l];
                         size[l] += fabs(t[at][l]);
                     }
-            cubic_sizes(n, first, last, t, t + n, ay, Qy, 0, cubic);
+                }
+            cubic_sizes(n, which, Y, t, t + n, ay, Qy, 0, cubic);
             EACH
             {
                 int positive = y->lo[l] > 0;
@@ -307,7 +376,7 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
         }
         default: {
             Lane slopes, curves;
-            cubic_sizes(n, first, last, ax, Qx, ax, Qx, 1, cubic);
+            cubic_sizes(n, X, X, ax, Qx, ax, Qx, 1, cubic);
             EACH
             {
                 Rule rule = rule_of(op, x->c[l], x->lo[l], x->hi[l]);
@@ -331,18 +400,17 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
                 double lost = TINY * (1 + fabs(curve) + fabs(rule.least) + fabs(rule.most));
                 r.s[l] = steep * s + (rule.error + lost) * (1 + moved + moved * moved) + slack * size + unknown;
             }
-            for (int i = first; i < last; i++) {
-                int at = n + row_of(n, i) + i;
-                EACH t[at][l] = slopes[l] * ax[at][l] + curves[l] * (ax[i][l] * ax[i][l]);
-                for (int j = i + 1; j < last; j++) {
-                    at++;
-                    EACH t[at][l] = slopes[l] * ax[at][l] + 2 * curves[l] * (ax[i][l] * ax[j][l]);
-                }
+            EACH_OF(i, 0, which.linear)
+            {
+                int at = n + row_of(n, i);
+                EACH t[at + i][l] = slopes[l] * ax[at + i][l] + curves[l] * (ax[i][l] * ax[i][l]);
+                EACH_OF(j, i + 1, which.pairs[i])
+                    EACH t[at + j][l] = slopes[l] * ax[at + j][l] + 2 * curves[l] * (ax[i][l] * ax[j][l]);
                 EACH t[i][l] = slopes[l] * ax[i][l];
             }
         }
         }
-        settle2(v, n, first, last, slack, &r, t);
+        settle2(v, n, which, slack, &r, t);
     }
 }
 

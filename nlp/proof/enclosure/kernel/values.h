@@ -3,6 +3,7 @@
 #define VALUES_H
 
 #include <math.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 

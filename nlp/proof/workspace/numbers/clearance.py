@@ -11,17 +11,22 @@ twice the tolerance: that of two legs that are moved towards each other.
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
+from casadi import SX
 
 from .....models import FloatArray
+from ...enclosure.forms import Encloser, SecondForms
 from ...statement.machine import LEGS, JointErrors, Legs
-from ..regular.rows import FIRST, SECOND, TurnForm, turn_form
 from ..robot.pose_box import PoseBox
+from ..robot.posed_model import polynomial_rotation
 from ..tolerance.legs.worst import along
 from .bound_search import Bounds
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
 _ROUNDING = 1e-13
+#: Places of the squares of the three coordinates of a rotation, after these and among their pairs.
+_SQUARES = [3, 6, 8]
 #: Part of the squared lengths below which lines count as parallel; the distance found is then too large by little.
 _PARALLEL = 1e-12
 
@@ -40,6 +45,9 @@ class Clearance:
         self._base = legs.base[[one, other]]
         self._platform = legs.platform[[one, other]]
         self._legs, self._pair, self._nearer = legs, (one, other), 2 * legs.tolerance
+        turn = SX.sym("turn", 3)
+        turned, scale = polynomial_rotation(box, turn)
+        self._turns = Encloser(turn, ca.vertcat(ca.vec(turned.T), scale))
 
     def values(self, points: FloatArray) -> FloatArray:
         """Return the distances (K,) at points (K, 6)."""
@@ -60,7 +68,7 @@ class Clearance:
         size = np.linalg.norm(between, axis=1, keepdims=True)
         with np.errstate(all="ignore"):
             n = np.where(size > 0, between / (size * (1 + 1e-15)), 0.0)
-        form = turn_form(self._box, centre[:, 3:], half[:, 3:])
+        form = self._turns.second(lower[:, 3:].T, upper[:, 3:].T)
         a, b = self._platform, self._base
         # Ends of the first leg less ends of the second: base and base, platform and base, base and platform, both.
         moved = (n * centre[:, :3]).sum(axis=1), (np.abs(n) * half[:, :3]).sum(axis=1)
@@ -73,35 +81,32 @@ class Clearance:
         )
         found = np.full(len(centre), np.inf)
         for turned, by, fixed in choices:
-            least = n @ fixed + by * moved[0] - abs(by) * moved[1] + self._least_turned(n, form, turned, half)
+            least = n @ fixed + by * moved[0] - abs(by) * moved[1] + self._least_turned(n, form, turned)
             found = np.minimum(found, least)
         # How far each coordinate moves an end of a leg.
         arms = np.array([1.0, 1.0, 1.0, *[2 * np.linalg.norm(a, axis=1).max()] * 3])
-        found -= _ROUNDING * form.most * far
+        most = 2 * (
+            np.abs(form.c[:, 9]) + np.abs(form.a[:, 9]).sum(axis=1) + np.abs(form.Q[:, 9]).sum(axis=1) + form.r[:, 9]
+        )
+        found -= _ROUNDING * most * far
         return Bounds(np.maximum(found - self._nearer if self._nearer else found, 0.0), arms * half)
 
-    def _least_turned(self, n: FloatArray, form: TurnForm, a: FloatArray, half: FloatArray) -> FloatArray:
+    def _least_turned(self, n: FloatArray, form: SecondForms, a: FloatArray) -> FloatArray:
         """Return the least of ``n.R a`` over each box, (B,)."""
-        wide, count = half[:, 3:], len(n)
-        dots = np.einsum("bi,btij,j->bt", n, form.terms[:, :, :9].reshape(count, -1, 3, 3), a)
-        scale = form.terms[:, :, 9]
-        at = dots[:, 0] / scale[:, 0]
+        c, terms, r = form.c, np.concatenate([form.a, form.Q], axis=2), form.r
+        middle, moved, rest = (each[:, :9].reshape(len(n), 3, 3, *each.shape[2:]) for each in (c, terms, r))
+        at = np.einsum("bi,bij,j->b", n, middle, a) / c[:, 9]
         # n.u - at s is 0 at the centre; s is at least 1.
-        change = dots[:, 1:] - at[:, None] * scale[:, 1:]
-        factor = np.concatenate([wide, wide[:, FIRST] * wide[:, SECOND]], axis=1)
-        falls = np.abs(change) * factor
-        squares = 3 + np.flatnonzero(FIRST == SECOND)
-        falls[:, squares] = np.maximum(-change[:, squares], 0.0) * factor[:, squares]
-        rest = np.einsum("bi,bij,j->b", np.abs(n), form.rest[:, :9].reshape(count, 3, 3), np.abs(a))
-        rest += np.abs(at) * form.rest[:, 9]
-        least_scale = np.maximum(1.0, scale[:, 0] - (np.abs(scale[:, 1:]) * factor).sum(axis=1) - form.rest[:, 9])
-        return np.asarray(at - (falls.sum(axis=1) + rest) / (least_scale * (1 - 1e-14)))
+        change = np.einsum("bi,bijt,j->bt", n, moved, a) - at[:, None] * terms[:, 9]
+        falls = np.abs(change)
+        falls[:, _SQUARES] = np.maximum(-change[:, _SQUARES], 0.0)
+        left = np.einsum("bi,bij,j->b", np.abs(n), rest, np.abs(a)) + np.abs(at) * r[:, 9]
+        least_scale = np.maximum(1.0, c[:, 9] - np.abs(terms[:, 9]).sum(axis=1) - r[:, 9])
+        return np.asarray(at - (falls.sum(axis=1) + left) / (least_scale * (1 - 1e-14)))
 
     def _between(self, points: FloatArray) -> FloatArray:
         """Return the vectors (K, 3) from the nearest point of the second leg to that of the first."""
-        form = turn_form(self._box, points[:, 3:], np.zeros((len(points), 3))).terms[:, 0]
-        rotation = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
-        ends = points[:, None, :3] + np.einsum("bij,lj->bli", rotation, self._platform)
+        ends = points[:, None, :3] + np.einsum("bij,lj->bli", self._box.rotations(points), self._platform)
         d, e = ends[:, 0] - self._base[0], ends[:, 1] - self._base[1]
         r = np.broadcast_to(self._base[0] - self._base[1], d.shape)
         a, b, c = (d * d).sum(axis=1), (d * e).sum(axis=1), (e * e).sum(axis=1)

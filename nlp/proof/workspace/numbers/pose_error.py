@@ -27,7 +27,7 @@ from .....models import FloatArray
 from ...statement.machine import Legs
 from ..ranks.krawczyk import inverses
 from ..regular.inverse import CORNERS, inverse_over
-from ..regular.rows import expand
+from ..regular.rows import LegRows, rows_at
 from ..robot.pose_box import PoseBox
 from .bound_search import Bounds
 
@@ -51,7 +51,7 @@ class WorstError:
     """
 
     def __init__(self, legs: Legs, box: PoseBox, *, is_rotation: bool) -> None:
-        self._legs, self._box = legs, box
+        self._legs, self._box, self._rows = legs, box, LegRows(legs, box)
         self._part = slice(3, 6) if is_rotation else slice(0, 3)
 
     def values(self, points: FloatArray) -> FloatArray:
@@ -65,14 +65,14 @@ class WorstError:
 
     def responses(self, points: FloatArray) -> FloatArray:
         """Return the rows (K, 3, 6) of the inverses of J with unit rows."""
-        rows = expand(self._legs, self._box, points, np.zeros_like(points)).terms[:, :, 0]
+        rows = rows_at(self._legs, self._box, points)
         lengths = np.linalg.norm(rows[:, :, :3], axis=2)
         with np.errstate(all="ignore"):
             return np.asarray(inverses(rows)[:, self._part] * lengths[:, None, :])
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""
-        inverse = inverse_over(self._legs, self._box, lower, upper)
+        inverse = inverse_over(self._rows, lower, upper)
         with np.errstate(all="ignore"):
             corners = inverse.at_corners(self._part)
             worst = np.linalg.norm(corners @ _ERRORS, axis=2).max(axis=(1, 2))

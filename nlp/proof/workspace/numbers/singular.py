@@ -20,7 +20,7 @@ import numpy as np
 from .....models import FloatArray
 from ...statement.machine import JointErrors, Legs
 from ..regular.inverse import CORNERS, Inverse, inverse_over
-from ..regular.rows import FIRST, SECOND, expand
+from ..regular.rows import LegRows, rows_at
 from ..robot.pose_box import PoseBox
 from ..tolerance.legs.singular_values import change_of_rows, worst_rows
 from .bound_search import Bounds
@@ -61,6 +61,7 @@ class SingularValues:
     def __init__(self, legs: Legs, box: PoseBox, length: float, *, is_condition: bool, shortest: float = 0.0) -> None:
         self._box, self._length, self._is_condition = box, length, is_condition
         self._built, self._legs = legs, legs._replace(tolerance=0.0)
+        self._rows = LegRows(legs, box)
         self._change = change_of_rows(legs, length, shortest)
 
     def values(self, points: FloatArray) -> FloatArray:
@@ -68,7 +69,7 @@ class SingularValues:
         with np.errstate(all="ignore"):
             if self._change:
                 return self._of(worst_rows(self._built, self._box, points, self._length, self._is_condition).rows)
-            return self._of(expand(self._legs, self._box, points, np.zeros_like(points)).terms[:, :, 0])
+            return self._of(rows_at(self._legs, self._box, points))
 
     def errors(self, y: FloatArray) -> JointErrors:
         """Return the errors of the machine that is worst at a point (6,) to first order."""
@@ -85,7 +86,7 @@ class SingularValues:
         """Return lower bounds over boxes (B, 6)."""
         with np.errstate(all="ignore"):
             J = self._unit_rows(lower, upper)
-            inverse = inverse_over(self._legs, self._box, lower, upper)
+            inverse = inverse_over(self._rows, lower, upper)
             norm = _norm_of_inverse(inverse, self._length)
             if self._change:
                 # The largest singular value may be larger, and the smallest one smaller, by the change of J.
@@ -98,16 +99,7 @@ class SingularValues:
 
     def _unit_rows(self, lower: FloatArray, upper: FloatArray) -> _Affine:
         """Return J, (B, 6, 6)."""
-        centre = 0.5 * lower + 0.5 * upper
-        half = np.maximum(upper - centre, centre - lower) * (1 + 2.0**-51)
-        terms, rest = expand(self._legs, self._box, centre, half)
-        # Of second order: in two coordinates of the rotation, and in one of the rotation and one of the position.
-        factor = np.concatenate([half[:, 3 + FIRST] * half[:, 3 + SECOND], _mixed(half)], axis=1)
-        rows = _Affine(
-            terms[:, :, 0],
-            terms[:, :, 1:7].transpose(0, 1, 3, 2) * half[:, None, None, :],
-            rest + np.einsum("bt,blti->bli", factor, np.abs(terms[:, :, 7:])),
-        )
+        rows = _Affine(*self._rows.over(lower, upper))
         force = _Affine(rows.c[:, :, :3], rows.a[:, :, :3], rows.r[:, :, :3])
         square = (force.c**2).sum(axis=2)
         slope = 2 * (force.c[..., None] * force.a).sum(axis=2)
@@ -125,11 +117,6 @@ class SingularValues:
         unit = _product(rows, _Affine(factor_of.c[..., None], factor_of.a[..., None, :], factor_of.r[..., None]))
         scale = np.array([1.0, 1.0, 1.0, *[1 / self._length] * 3])
         return _Affine(unit.c * scale, unit.a * scale[:, None], unit.r * scale)
-
-
-def _mixed(half: FloatArray) -> FloatArray:
-    """Return the products (B, 9) of half widths of a rotation's coordinate and of one of the position."""
-    return (half[:, 3:, None] * half[:, None, :3]).reshape(-1, 9)
 
 
 def _product(one: _Affine, other: _Affine) -> _Affine:

@@ -148,13 +148,12 @@ class Examiner:
         return Encloser(coordinates, ca.vertcat(equations, own, self._test.entries, z[0]), engine)
 
     def _use_second_order(self, test: RankTest, family: Family | None, engine: str | None) -> None:
-        """Examine by forms of second order where the kernel has them; with errors, of polynomials alone."""
+        """Examine by forms of second order; with errors, of polynomials alone."""
         if family is not None and not is_polynomial(test.entries, family):
             return
         change = None if family is None else EntryChange(family, test.entries, engine)
         second = Encloser(self.problem.z, test.entries if change is None else change.exact, engine)
-        if second.module is not None:
-            self.second, self._rank, self._change, self.engine = second, test, change, second.name
+        self.second, self._rank, self._change, self.engine = second, test, change, second.name
 
     def examine(self, cells: Cells) -> Examined:
         """Examine boxes."""

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
+#: Numbers of the terms of matrices that NumPy handles at once.
+_NUMBERS = 10**6
+
+
 class Tested(NamedTuple):
     """Results for B boxes.
 
@@ -87,22 +91,40 @@ class RankTest:
     def examine_second(
         self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray | None = None
     ) -> Tested:
-        """Return the verdict on boxes, by the C kernel from forms of second order of the entries.
+        """Return the verdict on boxes from forms of second order of the entries.
 
         Args:
-            encloser: of the entries, by the kernel.
+            encloser: of the entries.
             lower: (n, B) lower ends of the coordinates.
             upper: (n, B) upper ends.
             change: (E, B) by how much the entries may be off in other machines; None for the design alone.
         """
         n, count = lower.shape
+        if encloser.module is None:
+            size = max(1, _NUMBERS // (self._constant.size * (n * (n + 3) // 2)))
+            change = np.zeros((len(self._at[0]), count)) if change is None else change
+            parts = [slice(k, k + size) for k in range(0, count, size)]
+            tested = [self._by_numpy(encloser, lower[:, k], upper[:, k], change[:, k]) for k in parts]
+            regular, shares, smallest, signs = zip(*tested, strict=True)
+            return Tested(*map(np.concatenate, (regular, shares, smallest, signs)))
         regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
         shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        if encloser.module is None:
-            raise TypeError("forms of second order of a matrix are those of the C kernel")
         encloser.module.rank(n, encloser.head, self._head, (*ends, regular, shares, smallest, signs), count, change)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
+
+    def _by_numpy(self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray) -> Tested:
+        """Return the verdict on a few boxes, as :meth:`examine_second`."""
+        n = len(lower)
+        c, a, Q, r = encloser.second(lower, upper)
+        # The square of a coordinate is a half, plus or minus as much.
+        squares = [n * i - i * (i - 1) // 2 for i in range(n)]
+        Q = Q.copy()
+        Q[:, :, squares] *= 0.5
+        terms, middle = np.concatenate([a, Q], axis=2), c + Q[:, :, squares].sum(axis=2)
+        rest = (r + change.T) * (1 + ROUNDING) + ROUNDING * (np.abs(c) + np.abs(terms).sum(axis=2))
+        found = self._of_entries(middle, terms, rest, terms.shape[2])
+        return found._replace(shares=found.shares[:, :n])
 
     def examine(
         self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
@@ -125,13 +147,24 @@ class RankTest:
             rest = r + (size @ relation.rho[:, :, None])[:, :, 0]
             terms = np.abs(c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
             rest = rest * (1 + ROUNDING) + ROUNDING * terms
-        count, f = len(c), len(independent)
+        return self._of_entries(middle, slope, rest, len(independent))
+
+    def _of_entries(self, middle: FloatArray, slope: FloatArray, rest: FloatArray, f: int) -> Tested:
+        """Return the verdict on boxes.
+
+        Args:
+            middle: (B, E) of the entries.
+            slope: (B, E, f + e) terms, those of errors last.
+            rest: (B, E).
+            f: number of terms that are not those of errors.
+        """
+        count = len(middle)
         M0 = np.broadcast_to(self._constant, (count, *self._constant.shape)).copy()
         R = np.zeros_like(M0)
         at, scale = self._at, self._scale[self._at[0]]
         M0[:, at[0], at[1]] += middle * scale
         R[:, at[0], at[1]] = rest * scale
-        M = np.zeros((count, f + len(errors), *self._constant.shape))
+        M = np.zeros((count, slope.shape[2], *self._constant.shape))
         M[:, :, at[0], at[1]] = (slope * scale[:, None]).transpose(0, 2, 1)
         known = np.asarray(np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
         known &= np.isfinite(M).all(axis=(1, 2, 3))

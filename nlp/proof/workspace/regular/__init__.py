@@ -1,6 +1,5 @@
-"""Regular poses of six straight legs.
+"""Six straight legs over a box of poses, beside what all robots have.
 
-The modules import each other in this order: ``rows`` and ``regularity`` (the examination of boxes in NumPy),
-``engines`` (the same in C), ``exact`` (signs of determinants without rounding), ``inverse`` (of the rows over boxes),
-``search``.
+The modules import each other in this order: ``rows`` (forms of the rows), ``inverse`` (of the rows over boxes),
+``exact`` (signs of determinants without rounding), ``signs`` (singular poses by these signs).
 """

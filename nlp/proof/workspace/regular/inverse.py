@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .....models import FloatArray
-from ...statement.machine import LEGS, Legs
+from ...statement.machine import LEGS
 from ..ranks.krawczyk import inverses
-from ..robot.pose_box import PoseBox
-from .rows import FIRST, SECOND, expand
+from .rows import LegRows
 
 #: Part of its size by which a computed number may be off: rounding of products and of LAPACK.
 _ROUNDING = 1e-10
@@ -46,20 +45,17 @@ class Inverse:
         return np.asarray(self.fixed[:, None, part] + change)
 
 
-def inverse_over(legs: Legs, box: PoseBox, lower: FloatArray, upper: FloatArray) -> Inverse:
+def inverse_over(rows: LegRows, lower: FloatArray, upper: FloatArray) -> Inverse:
     """Return the inverses of J over boxes (B, 6)."""
-    centre = 0.5 * lower + 0.5 * upper
-    half = np.maximum(upper - centre, centre - lower) * (1 + 2.0**-51)
-    terms, rest = expand(legs, box, centre, half)
-    mixed = (half[:, 3:, None] * half[:, None, :3]).reshape(-1, 9)
-    factor = np.concatenate([half[:, 3 + FIRST] * half[:, 3 + SECOND], mixed], axis=1)
+    middle, linear, rest = rows.over(lower, upper)
+    moved = linear.transpose(0, 3, 1, 2)
     with np.errstate(all="ignore"):
-        C = inverses(terms[:, :, 0])
+        C = inverses(middle)
         size_of_C = np.abs(C)
-        slopes = np.einsum("bij,bjkl->bkil", C, terms[:, :, 1:7]) * half[:, :, None, None]
-        second = size_of_C @ (rest + np.einsum("bt,blti->bli", factor, np.abs(terms[:, :, 7:])))
+        slopes = C[:, None] @ moved
+        second = size_of_C @ rest
         # How far C is from an inverse is computed: LAPACK bounds the other residual, of the rows times C.
-        second += np.abs(C @ terms[:, :, 0] - np.eye(LEGS)) + _ROUNDING * (size_of_C @ np.abs(terms[:, :, 0]))
+        second += np.abs(C @ middle - np.eye(LEGS)) + _ROUNDING * (size_of_C @ np.abs(middle))
         first = np.abs(slopes).sum(axis=1)
         B = first + second
         # |(I + C (J - J0))^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.
@@ -69,15 +65,14 @@ def inverse_over(legs: Legs, box: PoseBox, lower: FloatArray, upper: FloatArray)
         is_bound = known & (X >= 0).all(axis=(1, 2)) & (size_of_C <= X - B @ X).all(axis=(1, 2))
         further = (second + B @ B) @ X
         # The rows are divided by their lengths: |f + g| <= |f| + f.g / |f| + |g|^2 / 2|f|.
-        force = terms[:, :, 0, :3]
+        force = middle[:, :, :3]
         size = np.linalg.norm(force, axis=2)
-        moved = terms[:, :, 1:7, :3] * half[:, None, :, None]
-        left = (rest[:, :, :3] + np.einsum("bt,blti->bli", factor, np.abs(terms[:, :, 7:, :3]))).sum(axis=2)
-        far = np.linalg.norm(np.abs(moved).sum(axis=2), axis=2) + left
-        slope = np.einsum("bli,blki->bkl", force / size[:, :, None], moved)
+        left = rest[:, :, :3].sum(axis=2)
+        far = np.linalg.norm(np.abs(linear[:, :, :3]).sum(axis=3), axis=2) + left
+        slope = np.einsum("bli,blik->bkl", force / size[:, :, None], linear[:, :, :3])
         off = left + far**2 / (2 * size) + _ROUNDING * size
-        linear = C[:, None] * slope[:, :, None, :]
-        linear -= np.einsum("bkij,bjl->bkil", slopes, C) * size[:, None, None, :]
+        change = C[:, None] * slope[:, :, None, :]
+        change -= np.einsum("bkij,bjl->bkil", slopes, C) * size[:, None, None, :]
         most = size_of_C * off[:, None] + further * (size + far)[:, None] + first @ size_of_C * far[:, None]
     most = np.where(is_bound[:, None, None] & np.isfinite(most), most, np.inf)
-    return Inverse(C * size[:, None], linear, most, np.nan_to_num((slopes**2).sum(axis=(2, 3))))
+    return Inverse(C * size[:, None], change, most, np.nan_to_num((slopes**2).sum(axis=(2, 3))))

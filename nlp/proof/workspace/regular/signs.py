@@ -29,6 +29,9 @@ from .rows import rows_at
 _WORTH, _POSES = 0.5, 4
 #: Number of poses of each sign that are computed without rounding in one call.
 _TRIED = 4
+#: Before the search: number of random poses, of those from which others are looked for, of steps, and the distance of
+#: poses from which derivatives are taken, in parts of the workspace.
+_SAMPLES, _KEPT, _STEPS, _APART, _SEED = 256, 8, 6, 1e-4, 0
 #: Halvings between two machines: more than a double has digits.
 _HALVINGS = 60
 
@@ -44,20 +47,59 @@ class SignRefuter:
     def __init__(self, legs: Legs, problem: Problem) -> None:
         self._legs, self._problem, self._box = legs, problem, problem.box
         self._points: dict[int, FloatArray] = {}
+        self._is_sampled = False
 
     def look(self, found: Examined, boxes: int) -> Singular | None:  # noqa: ARG002 - every block is looked at
-        """Return a singular pose from this block of boxes and earlier ones."""
+        """Return a singular pose from random ones, from this block of boxes and from earlier ones."""
         box, y = self._box, self._problem.pose_of(found.cells.centre)
-        inside = (y[:, 3:] ** 2).sum(axis=1) <= box.ball
-        for sign in {-1, 1} - self._points.keys():
-            for k in np.flatnonzero((found.signs == sign) & inside)[:_TRIED]:
-                if box.holds(y[k]) and determinant_sign(self._legs, box, y[k]) == sign:
-                    self._points[sign] = y[k]
-                    break
+        if not self._is_sampled:
+            self._is_sampled = True
+            points = self._near_singular()
+            self._confirm(points, np.sign(self._determinants(points)))
+        self._confirm(y, np.where((y[:, 3:] ** 2).sum(axis=1) <= box.ball, found.signs, 0))
         if len(self._points) == 2:
             sides = frozen_array([self._points[1], self._points[-1]], (2, 6))
             return Singular(frozen_array(singular_between(self._legs, box, *sides), (6,)), sides=sides)
         return singular_machine(self._legs, box, y[~found.is_regular]) if self._legs.tolerance else None
+
+    def _confirm(self, points: FloatArray, signs: FloatArray) -> None:
+        """Keep a pose of each sign, without rounding, among points (K, 6) with computed signs (K,)."""
+        for sign in {-1, 1} - self._points.keys():
+            for k in np.flatnonzero(signs == sign)[:_TRIED]:
+                if self._box.holds(points[k]) and determinant_sign(self._legs, self._box, points[k]) == sign:
+                    self._points[sign] = points[k]
+                    break
+
+    def _near_singular(self) -> FloatArray:
+        """Return poses (K, 6) with the smallest and the largest determinants that a few steps from random ones find.
+
+        The determinant changes little but linearly over a box: each step tries corners that its derivatives point to.
+        """
+        box = self._box
+        width, parts = box.upper - box.lower, np.array([1.0, 0.5, 0.25])[:, None, None]
+        every = box.random(_SAMPLES, np.random.default_rng(_SEED))
+        values = self._determinants(every)
+        found = []
+        for sign in (-1.0, 1.0):
+            y = every[np.argsort(sign * values)[:_KEPT]]
+            for _ in range(_STEPS):
+                moved = y[None] + _APART * width * np.eye(6)[:, None]
+                slopes = sign * (self._determinants(moved.reshape(-1, 6)).reshape(6, -1) - self._determinants(y)).T
+                end = np.where(slopes > 0, box.lower, box.upper)
+                if box.ball < np.inf:
+                    size = np.linalg.norm(slopes[:, 3:], axis=1, keepdims=True)
+                    end[:, 3:] = -slopes[:, 3:] / np.maximum(size, np.finfo(float).tiny) * np.sqrt(box.ball)
+                tried = np.concatenate([y[None], y + parts * (end - y)])
+                tried = box.clipped(tried.reshape(-1, 6)).reshape(tried.shape)
+                best = np.argmin(sign * self._determinants(tried.reshape(-1, 6)).reshape(4, -1), axis=0)
+                y = tried[best, np.arange(len(y))]
+            found.append(y)
+        return np.concatenate(found)
+
+    def _determinants(self, points: FloatArray) -> FloatArray:
+        """Return the determinants (K,) of unit rows at points (K, 6): computed numbers."""
+        rows = rows_at(self._legs, self._box, points)
+        return np.asarray(np.linalg.det(rows) / np.linalg.norm(rows[:, :, :3], axis=2).prod(axis=1))
 
 
 def singular_machine(legs: Legs, box: PoseBox, points: FloatArray) -> Singular | None:

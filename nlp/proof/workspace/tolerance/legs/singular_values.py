@@ -17,7 +17,6 @@ import numpy as np
 
 from ......models import FloatArray
 from ....statement.machine import INSIDE, JointErrors, Legs
-from ...regular.rows import turn_form
 from ...robot.pose_box import PoseBox
 
 #: Part of itself by which the bound moves outwards: its own rounding.
@@ -72,8 +71,7 @@ def worst_rows(legs: Legs, box: PoseBox, points: FloatArray, length: float, is_c
         length: by which moments are divided.
         is_condition: whether the condition number is meant, or the smallest singular value.
     """
-    form = turn_form(box, points[:, 3:], np.zeros((len(points), 3))).terms[:, 0]
-    turn = (form[:, :9] / form[:, 9:]).reshape(-1, 3, 3)
+    turn = box.rotations(points)
     arm = np.einsum("kij,lj->kli", turn, legs.platform)
     d = points[:, None, :3] + arm - legs.base
     l = np.linalg.norm(d, axis=2, keepdims=True)  # noqa: E741 - the symbol in the formulas above
