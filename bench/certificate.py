@@ -1,4 +1,4 @@
-"""Boxes and CPU seconds of certificates: by case and engine, by number of free variables, and by gap; and of checks.
+"""Boxes and CPU seconds of certificates: by case, by number of free variables, and by gap; and of checks.
 
     python -P bench/certificate.py
     python -P bench/certificate.py proofs
@@ -8,7 +8,6 @@ CPU time of this process on one thread, best of three where it is short, because
 
 import sys
 import time
-from collections.abc import Iterable
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, load_case, solve
@@ -16,37 +15,36 @@ from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import Certificate
 from screwsynth.nlp.proof.checker.premises import program_of
 from screwsynth.nlp.proof.checker.proofcheck import check_proof
-from screwsynth.nlp.proof.enclosure.engine import kernel
 from screwsynth.nlp.solver.certified import certify, proof_of
 
 LIMIT = 60.0
 
 
-def measure(solution: Solution, gap: float, engine: str) -> tuple[Certificate, float]:
+def measure(solution: Solution, gap: float) -> tuple[Certificate, float]:
     """Return the certificate of a solution, and the CPU seconds of the fastest of up to three runs."""
     best = float("inf")
     for _ in range(3):
         began = time.process_time()
-        found = certify_program(solution.nlp, solution.x, gap=gap, engine=engine, jobs=1, time_limit=LIMIT)
+        found = certify_program(solution.nlp, solution.x, gap=gap, jobs=1, time_limit=LIMIT)
         best = min(best, time.process_time() - began)
         if best > 3:
             break
     return found, best
 
 
-def row(name: str, solution: Solution, gap: float, engine: str) -> None:
+def row(name: str, solution: Solution, gap: float) -> None:
     """Print one row of the table."""
-    found, seconds = measure(solution, gap, engine)
+    found, seconds = measure(solution, gap)
     relative = "" if found.relative_gap is None else f"{found.relative_gap:.1e}"
     print(
-        f"{name:34} {engine:6} {gap:7.0e} {found.status.value:10} {found.boxes:>9,} {seconds:9.3f} {relative}",
+        f"{name:34} {gap:7.0e} {found.status.value:10} {found.boxes:>9,} {seconds:9.3f} {relative}",
         flush=True,
     )
 
 
 def proof_row(name: str, solution: Solution) -> None:
     """Print the size of a proof for a gap of 1e-4, and the CPU seconds of its search and of its check."""
-    _, seconds = measure(solution, 1e-4, "c" if kernel() is not None else "numpy")
+    _, seconds = measure(solution, 1e-4)
     certified = certify(solution, gap=1e-4, jobs=1, time_limit=LIMIT, with_proof=True)
     if certified.tree is None:
         print(f"{name:34} not proved", flush=True)
@@ -86,19 +84,17 @@ def case_with(free: int) -> Case:
     return Case(stewart_gough(), parameters, p, [task], rotation=rotation)
 
 
-def main(engines: Iterable[str]) -> None:
-    """Print the table: cases by engine, then gaps, then numbers of free variables."""
-    print(f"{'case':34} {'engine':6} {'asked':>7} {'status':10} {'boxes':>9} {'CPU s':>9} gap")
+def main() -> None:
+    """Print the table: cases, then gaps, then numbers of free variables."""
+    print(f"{'case':34} {'asked':>7} {'status':10} {'boxes':>9} {'CPU s':>9} gap")
     for name in ("paper-4.1-helical", "paper-4.1-rotation", "paper-4.2-rotation", "paper-4.2-translation", "paper-4.3"):
-        solution = solve(load_case(name), starts=8)
-        for engine in engines:
-            row(name, solution, 1e-4, engine)
+        row(name, solve(load_case(name), starts=8), 1e-4)
     for gap in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
-        row("paper-4.1-helical", solve(load_case("paper-4.1-helical"), starts=8), gap, next(iter(engines)))
+        row("paper-4.1-helical", solve(load_case("paper-4.1-helical"), starts=8), gap)
     for free in range(2, 10):
         solution = solve(case_with(free), starts=16)
-        row(f"{solution.nlp.n} free variables", solution, 1e-4, next(iter(engines)))
+        row(f"{solution.nlp.n} free variables", solution, 1e-4)
 
 
 if __name__ == "__main__":
-    proofs() if sys.argv[1:] == ["proofs"] else main(["numpy"] if kernel() is None else ["c", "numpy"])
+    proofs() if sys.argv[1:] == ["proofs"] else main()

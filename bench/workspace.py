@@ -1,4 +1,4 @@
-"""Boxes and CPU time of workspaces: by angle and engine, and by the number of free coordinates of the pose.
+"""Boxes and CPU time of workspaces: by angle, and by the number of free coordinates of the pose.
 
     python -P bench/workspace.py
 
@@ -13,7 +13,6 @@ from tempfile import TemporaryDirectory
 
 from screwsynth.nlp import Case, Free, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.proof.enclosure.engine import kernel
 from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
@@ -49,17 +48,12 @@ def by_angle(case: Case) -> None:
         for degrees in (20, 25, 30, 35, 40):
             angle = Free(-math.radians(degrees), math.radians(degrees))
             workspace = Workspace(POSITION, Turns(kind, (angle,) * (1 if kind is TurnKind.ANY_AXIS else 3)))
-            cells = []
-            for engine in ("c", "numpy") if kernel() is not None else ("numpy",):
-                best = math.inf
-                for _ in range(5):
-                    began = time.process_time()
-                    found = judge_workspace(
-                        replace(case, workspace=workspace), engine=engine, with_limits=False
-                    ).regularity
-                    best = min(best, time.process_time() - began)
-                cells.append(f"{engine} {found.outcome.value} {found.boxes:,} boxes {1e3 * best:.1f} ms")
-            print(f"{kind.value}, {degrees} deg: {'; '.join(cells)}")
+            best = math.inf
+            for _ in range(5):
+                began = time.process_time()
+                found = judge_workspace(replace(case, workspace=workspace), with_limits=False).regularity
+                best = min(best, time.process_time() - began)
+            print(f"{kind.value}, {degrees} deg: {found.outcome.value} {found.boxes:,} boxes {1e3 * best:.1f} ms")
 
 
 def by_dimension(case: Case) -> None:

@@ -15,6 +15,7 @@ from ..case.task import Sense
 from ..errors import CaseError, EvaluationError, InputError, ScrewsynthError, UncoveredError, check_seconds, listing
 from ..evidence.singularities import clause_of
 from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, within
+from ..proof.enclosure.engine import kernel
 from ..proof.workspace.judge import judge_workspace
 from ..proof.workspace.verdict import Outcome
 from ..solver.certified import certify
@@ -114,6 +115,8 @@ def compare(
     contenders = read_robots(robots, case)
     check_seconds(time_limit)
     _check_numbers(size, part, scale=scale)
+    if certified:
+        kernel()  # before any solve where it is missing
     common = (size or _own_size(case)) if scale else None
     length = case.characteristic_length if case.model.has_couples else (common or _own_size(case)) / 2
     entries = []

@@ -27,6 +27,7 @@ from ..errors import EvaluationError, InputError
 from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, why_stopped, within
 from ..proof.certificate.branch_and_bound import certify_program
 from ..proof.certificate.certificate import Certificate
+from ..proof.enclosure.engine import kernel
 from ..solver.multistart import ProgramSolution, solve_program
 from .boxes import GoalBox, Region
 from .goals import Goal
@@ -101,6 +102,8 @@ def find_front(
         progress: called after each solve.
     """
     began = time.perf_counter()
+    if certify:
+        kernel()  # before any solve where it is missing
     loosest = loosest_numbers(case, goals)
     builder = _Builder(case, goals, search, jobs)
     nothing = (None,) * len(goals)

@@ -74,7 +74,7 @@ class RegularData(JsonObject):
         open: number of boxes left.
         share: part of the box of poses in boxes that are left.
         seconds: wall time.
-        engine: ``c`` or ``numpy``.
+        engine: ``c``, or ``none`` where no search was made.
         reason: for stopping early, or how a singular pose was found that is not between two; absent without one.
         machine: that is singular at the pose; absent where the claim is not refuted, or the exact machine is.
     """

@@ -21,6 +21,7 @@ from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.fingerprint import fingerprint
 from ..proof.checker.premises import check_minimum, has_both_senses, has_modes, program_of
 from ..proof.checker.proof_file import Proof, Statement
+from ..proof.enclosure.engine import kernel
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
 from .answer import Answer
 from .compromise import solution_of_one_task
@@ -127,6 +128,7 @@ def certify(
     Raises:
         OptionError: an option is outside of its range, or has no meaning for the case.
         UncoveredError: the case's expressions hold an operation without a rule.
+        InputError: the C kernel was not built.
     """
     options = CertifyOptions(gap, above, time_limit, jobs)
     with within(time_limit):
@@ -158,7 +160,8 @@ def _certify(
     nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:
-        # An operation without a rule is refused before a solve.
+        # A missing kernel, or an operation without a rule, is refused before a solve.
+        kernel()
         form = standard_form(replace(nlps[0], in_home_mode=with_mode))
         reason_of(lambda: "" if search_tape(form, is_short=False).op.size else "empty")
     search = case.search.but(starts, seed)

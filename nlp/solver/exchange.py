@@ -33,6 +33,7 @@ from ..errors import CaseError
 from ..interruption import is_requested, one_call
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
+from ..proof.enclosure.engine import kernel
 from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.judge import Judgement, judge_workspace
 from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box
@@ -99,8 +100,10 @@ def solve_over_workspace(case: Case, solve_one: SolveOne, *, progress: ExchangeP
     Raises:
         CaseError: the case has several tasks or poses, or a tolerance on joint centres of a robot that is not six
             straight legs.
+        InputError: the C kernel was not built.
     """
     _check(case)
+    kernel()  # before any solve where it is missing
     bare = formulate(case)
     nlp, binding, history = bare, list[BindingPose](), list[tuple[float, int]]()
     others = None if has_straight_legs(case.model) else OtherClaims(bare, case)

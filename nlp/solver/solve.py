@@ -51,7 +51,8 @@ def solve(
 
     Raises:
         CaseError: the case contradicts itself, or has several tasks and nothing free.
-        InputError: the objective is to be compiled, and there is no C compiler or it fails.
+        InputError: the objective is to be compiled, and there is no C compiler or it fails; or limits hold over a
+            workspace, which needs a proof, and the C kernel was not built.
     """
     began = time.perf_counter()
     search = case.search.but(starts, seed, compiled=compiled)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import CaseError, InputError
 from ..interruption import within
+from ..proof.enclosure.engine import kernel
 from .compiled import CompiledEngine
 from .interpreted import solve_point
 from .places import NotPlacedError
@@ -64,13 +65,14 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
 
     Raises:
         CaseError: the case has no number of a name, or does not allow a value.
-        InputError: the compiled engine is asked for and cannot be had.
+        InputError: the compiled engine is asked for and cannot be had, or something is to be proved and cannot be.
     """
     if job.certified and wanted is EngineKind.COMPILED:
         raise InputError("--engine compiled: has no certificates; leave it out, or leave out --certify")
     if wanted is EngineKind.IPOPT or job.certified:
-        for values in job.chosen:
-            job.source.case_at(dict(zip(job.names, values, strict=True)))
+        cases = [job.source.case_at(dict(zip(job.names, values, strict=True))) for values in job.chosen]
+        if job.certified or any(each.workspace and each.workspace.has_limits for each in cases):
+            kernel()  # before any solve where it is missing
         return Choice(EngineKind.IPOPT, "" if wanted else "a certificate is of one solve by Ipopt")
     try:
         compiled_engine(job, threads)

@@ -3,7 +3,7 @@
 import flint
 import numpy as np
 
-from screwsynth.nlp.proof.enclosure.first_order import Enclosures
+from screwsynth.nlp.proof.enclosure.forms import Enclosures
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
 BINARY = (Op.ADD, Op.SUB, Op.MUL, Op.DIV)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from numpy_engine.bounding import NumpyEngine
 
 from screwsynth.models import Dimension, Model, hexapod, robot_function
 from screwsynth.models.catalog import gallery_names
@@ -13,7 +14,7 @@ from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations, linearise
 from screwsynth.nlp.evidence.state import loops_are_closed
-from screwsynth.nlp.proof.boxes.engines import engine_for
+from screwsynth.nlp.proof.boxes.engines import Engine
 from screwsynth.nlp.proof.boxes.examination import Verdict
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
@@ -147,19 +148,12 @@ def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
     bad = points[np.argsort(-h[:, k])[:4]].T
     half = np.array([[0.3], [0.3], [0.3], [0.015], [0.015], [0.015]])
     alone = [each for each in form.conditions if each.name != limit.key]
-    excluded, by_numpy = (
-        verdicts(replace(form, conditions=tuple(alone)), engine, bad - half, bad + half) for engine in (None, "numpy")
+    excluded, by_reference = (
+        engine(replace(form, conditions=tuple(alone)), 1).examine(bad - half, bad + half, -np.inf).verdict
+        for engine in (Engine, NumpyEngine)
     )
     assert (excluded == Verdict.INFEASIBLE).all()
-    np.testing.assert_array_equal(by_numpy, excluded)
+    np.testing.assert_array_equal(by_reference, excluded)
     estimate = tuple(each for each in form.conditions if not each.follows)
-    by_estimate = verdicts(replace(form, conditions=estimate), None, bad - half, bad + half)
+    by_estimate = Engine(replace(form, conditions=estimate), 1).examine(bad - half, bad + half, -np.inf).verdict
     assert not (by_estimate == Verdict.INFEASIBLE).any()
-
-
-def verdicts(form: StandardForm, engine: str | None, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """What an engine finds of boxes."""
-    examiner = engine_for(form, engine, 1)
-    found = examiner.examine(lower, upper, -np.inf)
-    examiner.close()
-    return found.verdict

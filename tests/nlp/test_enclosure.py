@@ -1,20 +1,22 @@
 """Enclosures against 200-bit ball arithmetic: on random graphs over every operation, and on the models."""
 
+from collections.abc import Callable
+
 import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy_engine import first_order, intervals, univariate
 from random_graphs import N, random_boxes, random_function
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.boxes.tapes import search_tape
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
-from screwsynth.nlp.proof.enclosure import first_order as enclosure
-from screwsynth.nlp.proof.enclosure import intervals, univariate
-from screwsynth.nlp.proof.enclosure.first_order import enclose, midpoints
+from screwsynth.nlp.proof.enclosure.forms import Enclosures, enclose
 from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.intervals import midpoints
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
 from screwsynth.nlp.proof.statement.standard_form import standard_form
@@ -22,11 +24,14 @@ from screwsynth.nlp.proof.statement.standard_form import standard_form
 balls = pytest.importorskip("balls")
 
 
+Enclose = Callable[[Tape, np.ndarray, np.ndarray], Enclosures]
+
+
 def count_violations(
-    tape: Tape, lower_ends: np.ndarray, upper_ends: np.ndarray, points: int, seed: int
+    tape: Tape, lower_ends: np.ndarray, upper_ends: np.ndarray, points: int, seed: int, by: Enclose = enclose
 ) -> tuple[int, int]:
     rng = np.random.default_rng(seed)
-    forms = enclose(tape, lower_ends, upper_ends)
+    forms = by(tape, lower_ends, upper_ends)
     centre, radius = midpoints(lower_ends, upper_ends)
     bad = checks = 0
     for box in range(lower_ends.shape[1]):
@@ -39,11 +44,12 @@ def count_violations(
     return bad, checks
 
 
-@given(seed=st.integers(0, 2**31))
+@given(seed=st.integers(0, 2**31), by=st.sampled_from([enclose, first_order.enclose]))
 @settings(max_examples=60, deadline=None)
-def test_random_graphs_stay_inside_their_enclosures(seed: int) -> None:
+def test_random_graphs_stay_inside_their_enclosures(seed: int, by: Enclose) -> None:
+    """Those of the kernel, and those of the reference."""
     tape = compile_tape(random_function(seed, 24))
-    bad, checks = count_violations(tape, *random_boxes(seed + 1, 14), points=2, seed=seed)
+    bad, checks = count_violations(tape, *random_boxes(seed + 1, 14), points=2, seed=seed, by=by)
     assert bad == 0
     assert checks == 14 * 2 * 2 * 24
 
@@ -51,7 +57,7 @@ def test_random_graphs_stay_inside_their_enclosures(seed: int) -> None:
 MODELS = ("paper-4.1-helical", "paper-4.1-helical-axis-z", "paper-4.2-rotation", "paper-4.3", "paper-4.4-max")
 
 
-def count_on_models(boxes: int, widths: tuple[float, float]) -> tuple[int, int]:
+def count_on_models(boxes: int, widths: tuple[float, float], by: Enclose = enclose) -> tuple[int, int]:
     bad = checks = 0
     for name in MODELS:
         form = standard_form(formulate(load_case(name)))
@@ -59,9 +65,8 @@ def count_on_models(boxes: int, widths: tuple[float, float]) -> tuple[int, int]:
         room = (form.upper - form.lower)[:, None]
         width = 10.0 ** rng.uniform(*widths, size=(form.n, boxes))
         low = form.lower[:, None] + room * rng.random((form.n, boxes)) * (1 - width)
-        more, made = count_violations(
-            search_tape(form), low, np.minimum(low + room * width, form.upper[:, None]), 2, 11
-        )
+        high = np.minimum(low + room * width, form.upper[:, None])
+        more, made = count_violations(search_tape(form), low, high, 2, 11, by)
         bad, checks = bad + more, checks + made
     return bad, checks
 
@@ -74,11 +79,11 @@ def test_models_stay_inside_their_enclosures_and_the_checks_are_many() -> None:
 
 
 def test_without_the_rounding_terms_violations_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (intervals, univariate, enclosure):
+    for module in (intervals, univariate, first_order):
         monkeypatch.setattr(module, "ULP", 0.0)
         monkeypatch.setattr(module, "TINY", 0.0)
     monkeypatch.setattr(univariate, "_LIBRARY_ERROR", 0.0)
-    bad, checks = count_on_models(6, (-14, -9))
+    bad, checks = count_on_models(6, (-14, -9), first_order.enclose)
     assert bad > checks / 50
 
 

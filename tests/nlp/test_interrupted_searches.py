@@ -127,17 +127,15 @@ def six_legs_problem() -> Problem:
     return build_problem(Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])]), model, box)
 
 
-def regular(
-    *, engine: str | None = None, most_boxes: int | None = None, progress: Callable[..., None] | None = None
-) -> Regularity:
+def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> Regularity:
     """The verdict on the rank of the rows of these legs."""
     problem = six_legs_problem()
     refuter = SignRefuter(legs_and_box()[0], problem)
-    return prove_rank(problem, problem.locked, refuter=refuter, engine=engine, most_boxes=most_boxes, progress=progress)
+    return prove_rank(problem, problem.locked, refuter=refuter, most_boxes=most_boxes, progress=progress)
 
 
 def six_legs() -> Claim:
-    return from_regularity(regular(engine="numpy", most_boxes=300))
+    return from_regularity(regular(most_boxes=300))
 
 
 @cache
@@ -149,7 +147,7 @@ def any_robot() -> Problem:
 
 def any_rank() -> Claim:
     problem = any_robot()
-    return from_regularity(prove_rank(problem, problem.locked, engine="numpy", most_boxes=130))
+    return from_regularity(prove_rank(problem, problem.locked, most_boxes=130))
 
 
 def workspace_case(name: str, limits: str, width: float, turn: float, tolerance: float | None = None) -> Case:
@@ -241,7 +239,7 @@ def program(name: str) -> tuple[Nlp, float]:
 def certified(name: str) -> Claim:
     """The claim of a certificate; its bound may be sharper before the end than then, but never beyond the optimum."""
     nlp, best = program(name)
-    found = certify_program(nlp, gap=0.2, engine="numpy", jobs=1)
+    found = certify_program(nlp, gap=0.2, jobs=1)
     assert nlp.sign * found.bound <= nlp.sign * best
     if found.x is not None:
         assert pytest.approx(found.incumbent, rel=1e-12) == nlp.evaluate(found.x).F
@@ -443,7 +441,7 @@ for k in range(12):
     timer = threading.Timer(0.004 * (k + 1), os.kill, (os.getpid(), signal.SIGINT))
     try:
         timer.start()
-        found = own.prove_rank(problem, problem.locked, engine="numpy")
+        found = own.prove_rank(problem, problem.locked)
         print("claim", found.outcome.value, found.reason, found.share)
     except KeyboardInterrupt:
         print("raised")

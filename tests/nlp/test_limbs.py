@@ -7,14 +7,16 @@ import casadi as ca
 import numpy as np
 import pytest
 from limb_cases import machine, poses, separated
+from numpy_engine.bounding import NumpyEngine
+from numpy_engine.limb_models import NumpyLimbEngine
 
 from screwsynth.nlp import Case, formulate, load_case, solve
-from screwsynth.nlp.proof.boxes.engines import limb_engine_for
+from screwsynth.nlp.proof.boxes.engines import Engine
 from screwsynth.nlp.proof.boxes.incumbent import Incumbent
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
 from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
 from screwsynth.nlp.proof.boxes.limbs.cuts import LeftOwn
-from screwsynth.nlp.proof.boxes.limbs.models import LimbEngine, LimbModels
+from screwsynth.nlp.proof.boxes.limbs.models import LimbModels
 from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb
 from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
 from screwsynth.nlp.proof.certificate import branch_and_bound
@@ -23,11 +25,9 @@ from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.fingerprint import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 from screwsynth.nlp.proof.checker.proofcheck import check_proof
-from screwsynth.nlp.proof.enclosure.engine import kernel
+from screwsynth.nlp.proof.enclosure.quadratic_models import QuadraticModel
 from screwsynth.nlp.proof.statement.limb_separation import separate
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
-
-needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,6 @@ def test_a_form_whose_terms_share_every_variable_has_no_limbs(name: str) -> None
     assert separate(standard_form(formulate(load_case(name)))) is None
 
 
-@needs_kernel
 def test_independent_limbs_are_proved_by_themselves() -> None:
     solution = solve(machine(2.0), starts=2)
     found = certify_program(solution.nlp, solution.x, gap=1e-4)
@@ -97,20 +96,20 @@ def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
 
 def test_an_independent_search_that_stops_has_a_bound() -> None:
     solution = solve(machine(5.0), starts=2)
-    found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.05, engine="numpy")
+    found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.05)
     assert found.status is CertificateStatus.INCOMPLETE
     assert found.bound >= solution.F
 
 
-@needs_kernel
-def test_the_engines_have_the_same_models_of_limbs() -> None:
+def test_models_of_limbs_are_those_of_the_reference() -> None:
     for case in (machine(2.0, pose_is_free=True), poses(6)):
         form, found = separated(case)
         m, limb = len(found.shared), found.limbs[1].form
         rng = np.random.default_rng(1)
         size = (limb.upper - limb.lower)[:, None] * rng.uniform(0, 0.3, (limb.n, 200))
         low = limb.lower[:, None] + rng.random((limb.n, 200)) * ((limb.upper - limb.lower)[:, None] - size)
-        one, other = (limb_engine_for(limb, m, name, 1).limb_models(low, low + size) for name in ("c", "numpy"))
+        one = Engine(limb, 1, m).limb_models(low, low + size)
+        other = NumpyLimbEngine(NumpyEngine(limb, apart=True), m).limb_models(low, low + size)
         for name in ("is_possible", "defined", "holds", "stops_up", "stops_down"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
         for name in ("lower", "upper", "slope_lo", "slope_hi", "high", "value"):
@@ -123,12 +122,12 @@ def test_the_engines_have_the_same_models_of_limbs() -> None:
         with np.errstate(all="ignore"):
             level = np.where(np.arange(200) % 2, L.bound() - 0.1 * (L.bound() - L.middle), -np.inf)
         L.slope_lo[0, :3], L.H[0, 0, 3:6], L.middle[6:9] = np.nan, np.inf, np.nan
-        kernel_engine = limb_engine_for(limb, m, "c", 1)
+        by_kernel = QuadraticModel(**vars(L))
         with np.errstate(all="ignore"):
             bound, ends = L.bound(), L.ends_reaching(level)
-        np.testing.assert_allclose(kernel_engine.bound(L)[3:], bound[3:], rtol=1e-12)
-        assert (kernel_engine.bound(L)[:3] >= bound[:3] * (1 - 1e-12)).all()
-        for mine, reference in zip(kernel_engine.ends_reaching(L, level), ends, strict=True):
+        np.testing.assert_allclose(by_kernel.bound()[3:], bound[3:], rtol=1e-12)
+        assert (by_kernel.bound()[:3] >= bound[:3] * (1 - 1e-12)).all()
+        for mine, reference in zip(by_kernel.ends_reaching(level), ends, strict=True):
             np.testing.assert_allclose(mine, reference, rtol=1e-9, atol=1e-9)
         assert 0 < np.count_nonzero(ends.low > -1) < ends.low.size
 
@@ -137,7 +136,7 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     """phi_k - t_k at random points of random boxes, for random tilts' boxes; and the value reached is a lower bound."""
     _, found = separated(machine(2.0, pose_is_free=True))
     m, limb = len(found.shared), found.limbs[2].form
-    engine = limb_engine_for(limb, m)
+    engine = Engine(limb, shared=m)
     rng = np.random.default_rng(2)
     B, each, points = 30, 5, 40
     room = (limb.upper - limb.lower)[:, None]
@@ -152,9 +151,9 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
         np.concatenate([low[:m, of], own.lower]), np.concatenate([(low + size)[:m, of], own.upper])
     )
     at_good = engine.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good]))
-    opposite = limb_engine_for(replace(limb, functions=(-limb.functions[0],)), m)
+    opposite = Engine(replace(limb, functions=(-limb.functions[0],)), shared=m)
     fall = opposite.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good])).L
-    part = bound_limb(engine, models, at_good, fall, own, m)
+    part = bound_limb(models, at_good, fall, own, m)
     assert (part.reached > -np.inf).all()
     value = ca.Function("f", [limb.x], [limb.functions[0]])
     e = rng.uniform(-1, 1, (m, B, points))
@@ -199,7 +198,6 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
     whole = sharedsearch.cut_own
 
     def careless(
-        engine: LimbEngine,
         good: np.ndarray,
         found: LimbModels,
         part: LimbBound,
@@ -208,7 +206,7 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
         threshold: float,
     ) -> LeftOwn:
         del sums
-        return whole(engine, good, found, part, own, part.best, threshold)
+        return whole(good, found, part, own, part.best, threshold)
 
     monkeypatch.setattr(branch_and_bound, "_WHOLE_BOX", 0)
     monkeypatch.setattr(sharedsearch, "cut_own", careless)
@@ -221,7 +219,6 @@ def test_a_fault_in_dropping_own_boxes_is_caught(monkeypatch: pytest.MonkeyPatch
     assert wrong >= 1
 
 
-@needs_kernel
 def test_limbs_that_share_the_pose_are_bounded_soon() -> None:
     """42 free numbers, proved to 1e-3 in seconds: here to a half, and the bound holds at random corners of the box."""
     nlp = formulate(machine(2.0, pose_is_free=True))
@@ -241,7 +238,7 @@ def test_limbs_that_share_the_pose_are_bounded_soon() -> None:
 def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
     """Trap: the bound that a box has from its parent is no sum of limbs, so nothing of a limb follows from it."""
     form, found = separated(poses(0))
-    search = sharedsearch.shared_search(form, found, Incumbent(form), None, 1)
+    search = sharedsearch.shared_search(form, found, Incumbent(form), 1)
     for _ in found.limbs:
         search.step(-np.inf)  # prepares a limb
     rule = search.rule
@@ -251,7 +248,7 @@ def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
             sums = rule._examine(replace(boxes, bound=np.array([bound])))
             lists = [
                 sharedsearch.cut_own(*each, sums.sums, 0.9 * sums.sums[0])
-                for each in zip(rule._engines, boxes.good, sums.models, sums.parts, boxes.own, strict=True)
+                for each in zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)
             ]
         assert sums.bound[0] == min(bound, sums.sums[0])
         assert all(each.own.of.size for each in lists)
@@ -260,13 +257,12 @@ def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
 def test_the_time_limit_ends_the_preparation_of_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Engines of long limbs take seconds: a search whose time is up builds no further one."""
     built: list[object] = []
-    engine_for = sharedsearch.limb_engine_for
 
-    def counted(form: StandardForm, shared: int, engine: str | None, jobs: int) -> LimbEngine:
+    def counted(form: StandardForm, jobs: int, shared: int) -> Engine:
         built.append(form)
-        return engine_for(form, shared, engine, jobs)
+        return Engine(form, jobs, shared)
 
-    monkeypatch.setattr(sharedsearch, "limb_engine_for", counted)
+    monkeypatch.setattr(sharedsearch, "Engine", counted)
     nlp = formulate(machine(2.0, pose_is_free=True))
     found = certify_program(nlp, time_limit=1e-9)
     assert (found.status, found.open, built) == (CertificateStatus.INCOMPLETE, 1, [])

@@ -6,15 +6,15 @@ import casadi as ca
 import numpy as np
 import pytest
 from limb_cases import machine, poses, separated
+from numpy_engine import squared_quotients as quotients
+from numpy_engine.bounding import NumpyEngine
+from numpy_engine.limb_models import NumpyLimbEngine
+from numpy_engine.quadratic_models import GradientModel
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
-from screwsynth.nlp.proof.boxes.engines import limb_engine_for
+from screwsynth.nlp.proof.boxes.engines import Engine
 from screwsynth.nlp.proof.boxes.tapes import search_tape
-from screwsynth.nlp.proof.enclosure import squared_quotients as quotients
-from screwsynth.nlp.proof.enclosure.engine import kernel
-from screwsynth.nlp.proof.enclosure.first_order import midpoints
-from screwsynth.nlp.proof.enclosure.quadratic_models import GradientModel
+from screwsynth.nlp.proof.enclosure.intervals import midpoints
 from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows
 from screwsynth.nlp.proof.statement.limb_separation import terms_of
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
@@ -22,7 +22,10 @@ from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_
 flint = pytest.importorskip("flint")
 balls = pytest.importorskip("balls")
 
-ENGINES = ["numpy", pytest.param("c", marks=pytest.mark.skipif(kernel() is None, reason="no C kernel here"))]
+ENGINES = {
+    "c": lambda form: Engine(form, 1, 0),
+    "numpy": lambda form: NumpyLimbEngine(NumpyEngine(form, apart=True), 0),
+}
 
 
 def free_of_limits(form: StandardForm, sign: int = 1) -> StandardForm:
@@ -62,7 +65,7 @@ def violations(form: StandardForm, engine: str, seed: int = 0, widths: tuple[flo
     """Points of random boxes above the bound, centres below their value, and gradients outside of their ends."""
     low, high = random_boxes(form, 60, seed, widths)
     points = points_of(low, high, 30, seed + 1)
-    found = limb_engine_for(form, 0, engine, 1).limb_models(low, high)
+    found = ENGINES[engine](form).limb_models(low, high)
     with np.errstate(all="ignore"):
         bound = np.where(found.defined, np.fmin(found.L.bound(), found.high), np.inf)
     flat = points.reshape(form.n, -1)
@@ -126,7 +129,7 @@ def test_tiny_boxes_hold_their_exact_values(engine: str) -> None:
         low, high = random_boxes(form, 25, 3, (-15, -9))
         points = points_of(low, high, 2, 4)
         with np.errstate(all="ignore"):
-            bound = limb_engine_for(form, 0, engine, 1).limb_models(low, high).L.bound()
+            bound = ENGINES[engine](form).limb_models(low, high).L.bound()
         rows = search_rows(form, apart=True)
         tape = search_tape(form, rows)
         for box in range(low.shape[1]):

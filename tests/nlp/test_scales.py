@@ -1,4 +1,4 @@
-"""Enclosures of numbers from 1e-300 to 1e300 against 200-bit balls: of both engines, and of the checkers."""
+"""Enclosures of numbers from 1e-300 to 1e300 against 200-bit balls: of kernel, reference, and checkers."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -7,28 +7,28 @@ import casadi as ca
 import numpy as np
 import pytest
 from casadi import SX
+from numpy_engine.bounding import NumpyEngine
+from numpy_engine.limb_models import NumpyLimbEngine
+from numpy_engine.second_order import enclose_second, monomials
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
-from screwsynth.nlp.proof.boxes.engines import Engine, KernelEngine, limb_engine_for
+from screwsynth.nlp.proof.boxes.engines import Engine
 from screwsynth.nlp.proof.boxes.examination import Verdict
 from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
 from screwsynth.nlp.proof.checker.limbs.tilts import tilts_over
 from screwsynth.nlp.proof.checker.polynomialrules import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.polynomials import middles, places
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
-from screwsynth.nlp.proof.enclosure.engine import kernel
-from screwsynth.nlp.proof.enclosure.first_order import enclose, midpoints
-from screwsynth.nlp.proof.enclosure.forms import Encloser
+from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of
 from screwsynth.nlp.proof.enclosure.instructions import compile_tape
-from screwsynth.nlp.proof.enclosure.second_order import enclose_second, monomials
+from screwsynth.nlp.proof.enclosure.intervals import midpoints
 from screwsynth.nlp.proof.enclosure.tape import Tape
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 flint = pytest.importorskip("flint")
 balls = pytest.importorskip("balls")
 
-ENGINES = ("numpy", *["c"] * (kernel() is not None))
+ENGINES = ("numpy", "c")
 N = 3
 #: Products, quotients, roots and others of numbers that may be very small or very large.
 GRAPHS = {
@@ -104,8 +104,8 @@ def form_of(function: ca.Function, sign: float) -> StandardForm:
     return StandardForm(nlp, x, -ends, ends, (sign * function(x),), (), (), 1.0, has_epigraph=False)
 
 
-def engine_of(form: StandardForm, engine: str) -> Engine:
-    return NumpyEngine(form) if engine == "numpy" else KernelEngine(form, kernel(), 1)
+def engine_of(form: StandardForm, engine: str) -> Engine | NumpyEngine:
+    return NumpyEngine(form) if engine == "numpy" else Engine(form, 1)
 
 
 def bounds(function: ca.Function, low: np.ndarray, high: np.ndarray, engine: str) -> np.ndarray:
@@ -121,10 +121,11 @@ Ends = Callable[[int, np.ndarray], tuple[object, object] | None]
 
 
 def of_search(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[str, Ends]:
-    """Enclosures of the search: forms of first and second order, and bounds of both engines."""
-    tape, x, at = compile_tape(function), SX.sym("x", N), monomials(N)
+    """Enclosures of the search: forms of first and second order, and bounds of kernel and reference."""
+    tape, at = compile_tape(function), monomials(N)
     centre, radius = midpoints(low, high)
-    one, two, c = enclose(tape, low, high), enclose_second(tape, low, high), Encloser(x, function(x))(low, high)
+    one, two = enclose(tape, low, high), enclose_second(tape, low, high)
+    c = forms_of(one)
     numbers = {engine: bounds(function, low, high, engine) for engine in ENGINES}
 
     def first(k: int, point: np.ndarray) -> tuple[object, object] | None:
@@ -252,7 +253,8 @@ def test_models_of_squared_quotients_hold_at_every_scale(name: str, engine: str)
     held = 0
     for sign in (-1.0, 1.0):
         form = form_of(function, sign)
-        found = limb_engine_for(form, 0, engine, 1).limb_models(low, high)
+        limbs = Engine(form, 1, 0) if engine == "c" else NumpyLimbEngine(NumpyEngine(form, apart=True), 0)
+        found = limbs.limb_models(low, high)
         with np.errstate(all="ignore"):
             bound = np.where(found.defined, np.fmin(found.L.bound(), found.high), np.inf)
             checker = TiltedForm(form)

@@ -1,21 +1,20 @@
-"""Forms of second order against 200-bit ball arithmetic, and the first pass in both engines."""
+"""Forms of second order of the reference against 200-bit ball arithmetic, and the kernel's first pass against it."""
 
 import casadi as ca
 import numpy as np
 import pytest
 import random_graphs
+from numpy_engine import second_order
+from numpy_engine.bounding import NumpyEngine
+from numpy_engine.second_order import Forms, enclose_second, monomials
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.errors import UncoveredError
-from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
-from screwsynth.nlp.proof.boxes.engines import KernelEngine
+from screwsynth.nlp.proof.boxes.engines import Engine
 from screwsynth.nlp.proof.boxes.examination import Examination, Verdict
-from screwsynth.nlp.proof.boxes.first_pass import value_tape
-from screwsynth.nlp.proof.enclosure import second_order
-from screwsynth.nlp.proof.enclosure.engine import kernel
-from screwsynth.nlp.proof.enclosure.first_order import midpoints
+from screwsynth.nlp.proof.boxes.tapes import value_tape
 from screwsynth.nlp.proof.enclosure.instructions import compile_tape
-from screwsynth.nlp.proof.enclosure.second_order import Forms, enclose_second, monomials
+from screwsynth.nlp.proof.enclosure.intervals import midpoints
 from screwsynth.nlp.proof.enclosure.tape import Tape
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
@@ -124,15 +123,12 @@ def random_form(seed: int) -> StandardForm:
     return StandardForm(nlp, x, -ends, ends, (values[-3],), conditions, (), 1.0, has_epigraph=False)
 
 
-@pytest.mark.skipif(kernel() is None, reason="the kernel was not built")
-def test_the_first_pass_is_the_same_in_both_engines_on_random_graphs() -> None:
+def test_the_first_pass_is_that_of_the_reference_on_random_graphs() -> None:
     """Trap: comparisons in C lose a NaN that NumPy keeps, and a root below 0 would count as defined."""
     verdicts = np.zeros(5, dtype=int)
     infinite = agree = 0
     for seed in range(16):
         form = random_form(seed)
-        module = kernel()
-        assert module is not None
         if not any(any(row) for row in form.dependence[1:]) or ca.jacobian(form.expressions, form.x).is_constant():
             continue
         lower, upper = random_graphs.random_boxes(seed + 1, 40)
@@ -141,7 +137,7 @@ def test_the_first_pass_is_the_same_in_both_engines_on_random_graphs() -> None:
         except UncoveredError:  # a graph whose value jumps
             continue
         assert value_tape(form) is not None
-        one, other = reference.examine(lower, upper, 0.3), KernelEngine(form, module, 1).examine(lower, upper, 0.3)
+        one, other = reference.examine(lower, upper, 0.3), Engine(form, 1).examine(lower, upper, 0.3)
         same = one.verdict == other.verdict
         agree += int(same.sum())
         assert np.array_equal(np.isfinite(one.bound), np.isfinite(other.bound)), seed
@@ -183,23 +179,21 @@ def assert_engines_agree(form: StandardForm, lower: np.ndarray, upper: np.ndarra
     assert (one.split == other.split)[opened].mean() > 0.95
 
 
-@pytest.mark.skipif(kernel() is None, reason="the kernel was not built")
 @pytest.mark.parametrize("name", ["paper-4.1-helical", "hexapod-machining"])
 def test_no_point_above_the_threshold_is_cut_off(name: str) -> None:
     """Bounds, contraction and closed boxes against points; and any number of threads gives the same, bit for bit."""
-    form, module = standard_form(formulate(load_case(name))), kernel()
-    assert module is not None
+    form = standard_form(formulate(load_case(name)))
     point = np.array(MACHINING) if form.n == 10 else 0.5 * (form.lower + form.upper)
     lower, upper = boxes_near(form, point, 240)
     function = ca.Function("values", [form.x], [form.expressions])
     threshold = 430.0 if form.n == 10 else 0.9 * form.value_at(point)
-    found = KernelEngine(form, module, 1).examine(lower, upper, threshold)
+    found = Engine(form, 1).examine(lower, upper, threshold)
     if form.n == 10:  # where the gradients of conditions wait
         few = slice(0, 24)
         part = Examination(**{name: values[..., few] for name, values in vars(found).items()})
         assert_engines_agree(form, lower[:, few], upper[:, few], part)
     for jobs in (2, 3) if form.n == 6 else (2,):
-        again = KernelEngine(form, module, jobs)
+        again = Engine(form, jobs)
         for one, other in zip(vars(found).values(), vars(again.examine(lower, upper, threshold)).values(), strict=True):
             assert one.tobytes() == other.tobytes()
         again.close()

@@ -166,7 +166,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
 
     def careless(*given: object) -> LimbBound:
         found = bound_limb(*given)  # type: ignore[arg-type]
-        own = given[4]
+        own = given[3]
         assert isinstance(own, OwnBoxes)
         reached = found.reached + part * np.abs(found.reached)
         bounds = np.where(found.bounds < reached[own.of], -np.inf, found.bounds)

@@ -114,6 +114,6 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     target, name = (search._RankRule, "divided") if place == "branch" else (Examiner, "examine")
     monkeypatch.setattr(target, name, interrupt)
     problem = build_problem(case, model, box)
-    found = search.prove_rank(problem, problem.locked, engine="numpy", refuter=SignRefuter(legs, problem))
+    found = search.prove_rank(problem, problem.locked, refuter=SignRefuter(legs, problem))
     assert found.outcome is Outcome.OPEN
     assert found.reason == "interrupted"

@@ -384,7 +384,7 @@ def test_a_certificate_that_proves_only_the_obvious_says_so() -> None:
     rotation = Rotation(axis=None, angle=Free(-0.5, 0.5))
     case = replace(load_case("paper-4.1-helical"), rotation=rotation)
     nlp = replace(formulate(case), sense=type(case.tasks[0].sense)("min"))
-    early = certify_program(nlp, nlp.start, time_limit=1e-6, engine="numpy")
+    early = certify_program(nlp, nlp.start, time_limit=1e-6)
     assert early.status is CertificateStatus.INCOMPLETE
     assert early.incumbent > 0
     assert early.statement.startswith("nothing is proved: stopped after")

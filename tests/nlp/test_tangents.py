@@ -6,27 +6,26 @@ import casadi as ca
 import numpy as np
 import pytest
 from limb_cases import poses
+from numpy_engine import tangent_bounds
+from numpy_engine.bounding import NumpyEngine
+from numpy_engine.second_order import Forms, enclose_second, monomials
+from numpy_engine.tangent_bounds import tangent_forms
 
 from screwsynth.nlp import Search, Sense, formulate, load_case, solve_program
-from screwsynth.nlp.proof.boxes.bounding import NumpyEngine
-from screwsynth.nlp.proof.boxes.engines import KernelEngine
+from screwsynth.nlp.proof.boxes.engines import Engine
 from screwsynth.nlp.proof.boxes.examination import Verdict
-from screwsynth.nlp.proof.boxes.first_pass import value_tape
+from screwsynth.nlp.proof.boxes.tapes import value_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure import tangent_bounds
-from screwsynth.nlp.proof.enclosure.engine import kernel
-from screwsynth.nlp.proof.enclosure.first_order import midpoints
 from screwsynth.nlp.proof.enclosure.instructions import compile_tape
-from screwsynth.nlp.proof.enclosure.second_order import Forms, enclose_second, monomials
-from screwsynth.nlp.proof.enclosure.tangent_bounds import tangent_forms, tangent_rows
+from screwsynth.nlp.proof.enclosure.intervals import midpoints
+from screwsynth.nlp.proof.enclosure.squared_quotients import tangent_rows
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
 flint = pytest.importorskip("flint")
 
 
 balls = pytest.importorskip("balls")
-needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 NAMES = ("paper-4.3", "drilling-spindle", "two poses")
 
 
@@ -99,15 +98,13 @@ def test_a_tangent_that_is_a_secant_is_caught(monkeypatch: pytest.MonkeyPatch) -
     assert violations(minimum("paper-4.3"), 60)[0] > 0
 
 
-@needs_kernel
 @pytest.mark.parametrize("name", [*NAMES, "two functions"])
-def test_both_engines_have_the_same_tangents(name: str) -> None:
-    form, module = minimum(name), kernel()
-    assert module is not None
+def test_tangents_are_those_of_the_reference(name: str) -> None:
+    form = minimum(name)
     lower, upper = boxes_of(form, 100)
-    every = KernelEngine(form, module, 1).examine(lower, upper, -np.inf).bound
+    every = Engine(form, 1).examine(lower, upper, -np.inf).bound
     threshold = float(np.quantile(every[np.isfinite(every)], 0.9))
-    one, other = (each.examine(lower, upper, threshold) for each in (NumpyEngine(form), KernelEngine(form, module, 1)))
+    one, other = (each.examine(lower, upper, threshold) for each in (NumpyEngine(form), Engine(form, 1)))
     assert (one.verdict == other.verdict).mean() > 0.98
     same = one.verdict == other.verdict
     np.testing.assert_allclose(other.bound[same], one.bound[same], rtol=1e-9)
@@ -149,7 +146,6 @@ def test_a_maximum_has_no_tangents_and_a_quotient_that_may_be_undefined_none_eit
     assert usable.tolist() == [False, True]
 
 
-@needs_kernel
 def test_a_minimum_takes_fewer_boxes_than_without_and_has_the_same_bound() -> None:
     nlp = replace(formulate(load_case("paper-4.3")), sense=Sense.MIN)
     x = solve_program(nlp, Search(starts=2), jobs=1).x

@@ -8,9 +8,6 @@ from screwsynth.nlp import Case, formulate, load_case
 from screwsynth.nlp.proof.boxes.threads import Threads, pieces
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
-from screwsynth.nlp.proof.enclosure.engine import kernel
-
-needs_kernel = pytest.mark.skipif(kernel() is None, reason="the C kernel was not built here")
 
 
 def test_pieces_cover_every_box_once_and_the_last_ones_are_small() -> None:
@@ -36,7 +33,6 @@ def test_results_keep_the_order_of_the_items_and_faults_are_passed_on() -> None:
         threads.close()
 
 
-@needs_kernel
 @pytest.mark.parametrize(
     ("case", "gap", "whole", "least"),
     [

@@ -18,7 +18,6 @@ from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, Task, json
 from screwsynth.nlp.case.reader import case_from_tables, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.proof.enclosure.engine import kernel
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle, prove_minimum
@@ -37,8 +36,6 @@ from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
-
-needs_kernel = pytest.mark.skipif(kernel() is None, reason="no C compiler when the package was installed")
 
 #: The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
 TEXT = """
@@ -119,7 +116,6 @@ def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
     return np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2))
 
 
-@pytest.mark.parametrize("engine", [pytest.param("c", marks=needs_kernel), "numpy"])
 @pytest.mark.parametrize(
     ("kind", "degrees", "outcome", "most"),
     [
@@ -131,11 +127,11 @@ def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
     ],
 )
 def test_the_machine_is_regular_up_to_an_angle(
-    case: Case, kind: TurnKind, degrees: float, outcome: Outcome, most: int, engine: str
+    case: Case, kind: TurnKind, degrees: float, outcome: Outcome, most: int
 ) -> None:
     box = pose_box(turned(kind, degrees))
-    found = judge_workspace(case, workspace=turned(kind, degrees), engine=engine, with_limits=False).regularity
-    assert (found.outcome, found.engine) == (outcome, engine)
+    found = judge_workspace(case, workspace=turned(kind, degrees), with_limits=False).regularity
+    assert (found.outcome, found.engine) == (outcome, "c")
     assert found.boxes <= most
     if outcome is Outcome.REFUTED:
         assert found.sides is not None

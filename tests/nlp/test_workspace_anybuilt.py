@@ -311,7 +311,7 @@ def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:
     family = machines(replace(case_of(name), joint_centre_tolerance=tolerance)).family
     problem, rng = family.problem, np.random.default_rng(0)
     test = rank.RankTest(family.locked, family.coordinates, family.start)
-    examiner = Examiner(problem, test, None, family)
+    examiner = Examiner(problem, test, family)
     own, n, count = list(problem.independent), len(problem.start), 64
     middle = problem.box.random(count, rng)[:, list(problem.free)][:, own]
     lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)

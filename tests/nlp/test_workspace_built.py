@@ -263,7 +263,7 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
             else (family.locked, family.coordinates, family.start)
         )
         cells = Cells(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
-        return Examiner(exact, RankTest(matrix, z, start), None, family).examine(cells)
+        return Examiner(exact, RankTest(matrix, z, start), family).examine(cells)
 
     found, changed = examined(family), 0
     for k in np.flatnonzero(examined(None).is_regular):

@@ -1,74 +1,53 @@
-"""Engines that examine boxes: the C kernel where it was built, and NumPy, which is always there."""
+"""Examination of boxes by the C kernel: bounds, impossible conditions, monotonicity, contraction, next bisection."""
 
 from __future__ import annotations
 
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..enclosure.engine import chosen_kernel, kernel
-from ..enclosure.quadratic_models import Ends, QuadraticModel
-from ..enclosure.squared_quotients import search_rows
-from ..enclosure.tangent_bounds import tangent_rows
-from ..enclosure.tape import Tape
+from ..enclosure.engine import kernel
+from ..enclosure.squared_quotients import search_rows, tangent_rows
 from ..statement.standard_form import StandardForm
-from .bounding import NumpyEngine
 from .examination import Examination, Verdict
-from .first_pass import value_tape
-from .limbs.models import LimbEngine, LimbModels, NumpyLimbEngine, models_from_rows, rows_of_models
-from .tapes import objective_tape, search_tape
+from .limbs.models import LimbModels, models_from_rows, rows_of_models
+from .tapes import objective_tape, search_tape, value_tape
 from .threads import Threads, pieces
 
 if TYPE_CHECKING:
     from ....models import FloatArray
 
 
-class Engine(Protocol):
-    """Examination of boxes, block by block."""
-
-    @property
-    def name(self) -> str:
-        """``c`` or ``numpy``."""
-
-    @property
-    def block(self) -> int:
-        """Number of boxes that it examines at once."""
-
-    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
-        """Examine boxes: see :meth:`screwsynth.nlp.proof.boxes.bounding.NumpyEngine.examine`."""
-
-    def close(self) -> None:
-        """Stop its threads."""
-
-
 #: Half of the kernel's block: large enough that Python's work between blocks takes no noticeable part of the time.
 _BOXES_PER_JOB = 2048
 
 
-class KernelEngine:
+class Engine:
     """The C kernel on several threads. The results do not depend on their number.
 
     Args:
         form: the form whose box is searched.
-        module: the kernel.
         jobs: threads; one for each processor when left out.
         shared: number of the first variables that the form, a limb's, shares with others; None for a whole form.
         tangents: whether the first pass has tangents to the squares of a minimum.
-    """
 
-    name = "c"
+    Attributes:
+        block: number of boxes to examine at once.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+        InputError: the kernel was not built.
+    """
 
     def __init__(
         self,
         form: StandardForm,
-        module: ModuleType,
         jobs: int | None = None,
         shared: int | None = None,
         *,
         tangents: bool = True,
     ) -> None:
-        self._module, self._shared = module, shared or 0
+        self._module, self._shared = kernel(), shared or 0
         self._threads = Threads(jobs)
         # The size of a block decides the order of the search, so it must not depend on the number of threads.
         self.block = 2 * _BOXES_PER_JOB
@@ -87,18 +66,30 @@ class KernelEngine:
             form.lower,
             form.upper,
             np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32).ravel(),
-            _kernel_tape(tape),
-            None if values is None else _kernel_tape(values),
-            None if values is None or objective is None else _kernel_tape(objective),
+            tape.head,
+            None if values is None else values.head,
+            None if values is None or objective is None else objective.head,
             np.array(() if squares is None else squares.functions, dtype=np.int32),
         )
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
-        """Examine boxes: see :meth:`screwsynth.nlp.proof.boxes.bounding.NumpyEngine.examine`."""
+        """Examine boxes, and close those whose bounds do not exceed a threshold.
+
+        Args:
+            lower: (n, B) lower ends.
+            upper: (n, B) upper ends.
+            threshold: boxes whose bound is at most this are closed.
+        """
         return self._examine(lower, upper, threshold, ())
 
     def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
-        """Return upper models: see :class:`screwsynth.nlp.proof.boxes.limbs.models.LimbEngine`."""
+        """Return upper models of a limb over boxes with ends (n, B).
+
+        Args:
+            lower: lower ends; those of shared variables come first.
+            upper: upper ends.
+            least: (B,) points whose values are less do not matter; None where all do.
+        """
         n, m = lower.shape[0], self._shared
         rows = np.empty((rows_of_models(n, m), lower.shape[1]))
         matters = () if least is None else (np.ascontiguousarray(least),)
@@ -121,18 +112,6 @@ class KernelEngine:
             value=found.value,
         )
 
-    def bound(self, L: QuadraticModel) -> FloatArray:
-        """Return upper bounds (B,): see :class:`~..enclosure.quadratic_models.QuadraticModel`."""
-        bound = np.empty(L.middle.size)
-        self._module.models(len(L.b), _kernel_models(L), bound.size, bound)
-        return bound
-
-    def ends_reaching(self, L: QuadraticModel, level: FloatArray) -> Ends:
-        """Return ends for levels (B,): see ``ends_reaching`` of :class:`.quadratic.QuadraticModel`."""
-        low, high = np.empty(L.b.shape), np.empty(L.b.shape)
-        self._module.models(len(L.b), _kernel_models(L), level.size, np.ascontiguousarray(level), low, high)
-        return Ends(low, high)
-
     def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float, models: tuple[Any, ...]) -> Examination:
         """Examine boxes on all threads; with ``models`` the number of shared variables and an array for the models."""
         n, count = lower.shape
@@ -152,49 +131,3 @@ class KernelEngine:
     def close(self) -> None:
         """Stop the threads."""
         self._threads.close()
-
-
-def _kernel_tape(tape: Tape) -> tuple[Any, ...]:
-    """Return a tape as the kernel reads it: code, constants, and the numbers of instructions, registers and results."""
-    code = np.stack([tape.op, tape.to, tape.a, tape.b, tape.first, tape.last], axis=1).astype(np.int32)
-    return np.ascontiguousarray(code), tape.k, len(tape), tape.registers, tape.outputs
-
-
-def _kernel_models(L: QuadraticModel) -> tuple[FloatArray, ...]:
-    """Return models as the kernel reads them."""
-    arrays = (L.middle, L.b, L.H, L.w, L.slope_lo, L.slope_hi, L.rounding)
-    return tuple(np.ascontiguousarray(each) for each in arrays)
-
-
-def engine_for(
-    form: StandardForm, name: str | None = None, jobs: int | None = None, *, tangents: bool = True
-) -> Engine:
-    """Return an engine for a form.
-
-    Args:
-        form: the form whose box is searched.
-        name: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
-        jobs: threads of the C kernel.
-        tangents: whether the first pass has tangents to the squares of a minimum.
-
-    Raises:
-        UncoveredError: an expression holds an operation without a rule.
-        ValueError: there is no engine of that name here.
-    """
-    module = chosen_kernel(name, kernel)
-    if module is None:
-        return NumpyEngine(form, tangents=tangents)
-    return KernelEngine(form, module, jobs, tangents=tangents)
-
-
-def limb_engine_for(form: StandardForm, shared: int, name: str | None = None, jobs: int | None = None) -> LimbEngine:
-    """Return an engine for the form of a limb, of whose variables the first ``shared`` are shared with others.
-
-    Raises:
-        UncoveredError: an expression holds an operation without a rule.
-        ValueError: there is no engine of that name here.
-    """
-    module = chosen_kernel(name, kernel)
-    if module is None:
-        return NumpyLimbEngine(NumpyEngine(form, apart=True), shared)
-    return KernelEngine(form, module, jobs, shared)

@@ -6,9 +6,8 @@ import enum
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
     from ....models import FloatArray
@@ -52,29 +51,3 @@ class Examination:
     split: NDArray[np.int32]
     value: FloatArray
     centre: FloatArray
-
-
-@dataclass(eq=False)
-class Remainder:
-    """Parts of B boxes that are left, with the reasons for their ends and for closing a box; written to in place.
-
-    The attributes are those of :class:`Examination`.
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    cut_lower: NDArray[np.int32]
-    cut_upper: NDArray[np.int32]
-    verdict: NDArray[np.int32]
-    reason: NDArray[np.int32]
-
-    @classmethod
-    def whole(cls, lower: FloatArray, upper: FloatArray) -> Remainder:
-        """Return whole boxes, all open."""
-        cuts = np.full(lower.shape, UNMOVED, dtype=np.int32)
-        open_boxes = np.zeros(lower.shape[1], dtype=np.int32)
-        return cls(lower.copy(), upper.copy(), cuts, cuts.copy(), open_boxes, open_boxes.copy())
-
-    def close(self, which: NDArray[np.bool_], verdict: Verdict, reason: int | NDArray[np.intp]) -> None:
-        """Close some boxes for a reason."""
-        self.verdict[which], self.reason[which] = verdict, reason

@@ -1,19 +1,22 @@
-"""A form as lists of operations: what an engine evaluates on every box."""
+"""A form as lists of operations, which the kernel evaluates on every box."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import casadi as ca
 
 from ...errors import UncoveredError
 from ..enclosure.instructions import compile_tape
-from ..enclosure.squared_quotients import SearchRows, search_rows
+from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows
 from ..enclosure.tape import Tape
 from ..statement.piecewise_derivatives import refuse_jumps
 from ..statement.standard_form import StandardForm
-from .first_pass import MOST_VARIABLES, without_conditions
 
 #: How many times longer than that of the functions a tape must be for the gradients of conditions to wait.
 _MANY_CONDITIONS = 4
+#: Largest number of variables for which the first pass is made: a value has half its square as coefficients.
+MOST_VARIABLES = 12
 
 
 def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short: bool = True) -> Tape:
@@ -31,6 +34,22 @@ def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short:
         return compile_tape(ca.Function("search", [form.x], ca.cse(results) if is_short else results))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
+
+
+def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | None:
+    """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
+
+    None is returned for a form with too many variables for a first pass.
+    """
+    if form.n > MOST_VARIABLES:
+        return None
+    every = form.expressions if rows is None else ca.densify(ca.vertcat(form.expressions, rows.expressions))
+    return compile_tape(ca.Function("values", [form.x], [ca.cse(every)]))
+
+
+def without_conditions(form: StandardForm) -> StandardForm:
+    """Return the form of the functions alone."""
+    return replace(form, conditions=(), signs=())
 
 
 def objective_tape(form: StandardForm, length: int) -> Tape | None:

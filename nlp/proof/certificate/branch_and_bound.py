@@ -1,9 +1,8 @@
 """A proven bound of the global optimum, by branch and bound over the whole box.
 
-Boxes are examined in blocks by :mod:`screwsynth.nlp.proof.boxes.bounding`, or by the C kernel with the same
-formulas. A box is closed when its bound does not exceed the incumbent by more than the gap, when a condition cannot
-hold in it, or when no maximum can lie in it; otherwise it is bisected. A search that stops early has a bound too,
-from the boxes that are open: it is wider, and as certain as that at the end.
+Boxes are examined in blocks by the C kernel. A box is closed when its bound does not exceed the incumbent by more than
+the gap, when a condition cannot hold in it, or when no maximum can lie in it; otherwise it is bisected. A search that
+stops early has a bound too, from the boxes that are open: it is wider, and as certain as that at the end.
 
 No solver is trusted: the value of an incumbent is that of the program's own functions at the point.
 """
@@ -21,7 +20,7 @@ from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
 from ...interruption import one_search, reason_of, reason_to_stop
 from ...program.nlp import Nlp
-from ..boxes.engines import engine_for
+from ..boxes.engines import Engine
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search
@@ -29,7 +28,7 @@ from ..boxes.optimum import optimum_search
 from ..boxes.proof_writer import ProofWriter
 from ..boxes.search import TOO_SMALL, Effort, SearchMethod
 from ..boxes.symmetry import halved
-from ..enclosure.engine import engine_name
+from ..enclosure.engine import ENGINE, kernel
 from ..statement.limb_separation import separate
 from ..statement.standard_form import StandardForm, is_in_home_mode, standard_form
 from .certificate import Certificate, CertificateStatus
@@ -61,7 +60,6 @@ def certify_program(
     above: float | None = None,
     time_limit: float | None = None,
     jobs: int | None = None,
-    engine: str | None = None,
     progress: CertifyProgress | None = None,
     recorder: ProofWriter | None = None,
 ) -> Certificate:
@@ -74,24 +72,25 @@ def certify_program(
         gap: largest difference of bound and incumbent, as a part of the incumbent; near 0, of the objective's scale.
         above: prove, instead, that F is above this value on the whole box. The program must be a minimisation.
         time_limit: seconds after which the search stops with the bound reached.
-        jobs: threads of the C kernel; the result does not depend on it. Left out, one for each processor.
-        engine: ``"c"`` or ``"numpy"``; left out, the C kernel where it was built.
+        jobs: threads; the result does not depend on it. Left out, one for each processor.
         progress: called about ten times a second.
         recorder: records the search's tree for a proof.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
-        ValueError: ``above`` for a maximisation, or an engine that does not exist here.
+        ValueError: ``above`` for a maximisation.
+        InputError: the C kernel was not built.
     """
     with one_search(time_limit):
         effort = Effort()
         if nlp.n == 0:
             return _certify_point(nlp, above, effort.seconds)
+        kernel()  # before any work where it is missing
         form = standard_form(nlp)
         incumbent = Incumbent(form)
         # The method in use takes the place of this one: what it sets up can be stopped.
-        whole = optimum_search(form, partial(engine_for, form, engine, jobs), incumbent)
-        search = _Search(form, incumbent, whole, engine_name(engine), gap, above, effort)
+        whole = optimum_search(form, partial(Engine, form, jobs), incumbent)
+        search = _Search(form, incumbent, whole, gap, above, effort)
         try:
             search.incumbent.start(x, claimed)
         except IncumbentError as error:
@@ -100,7 +99,7 @@ def certify_program(
         def run() -> str:
             reason = reason_to_stop(effort.seconds)
             while not reason:
-                search.restart(_method(form, incumbent, engine, jobs, recorder))
+                search.restart(_method(form, incumbent, jobs, recorder))
                 reason = search.run(progress)
                 if reason or not search.is_short():
                     break
@@ -133,9 +132,7 @@ def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate
     )
 
 
-def _method(
-    form: StandardForm, incumbent: Incumbent, engine: str | None, jobs: int | None, recorder: ProofWriter | None
-) -> SearchMethod:
+def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder: ProofWriter | None) -> SearchMethod:
     """Return the search for a form: by limbs where it separates, else of the whole box.
 
     A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to
@@ -144,11 +141,11 @@ def _method(
     form = halved(form) if recorder is None else form
     separation = separate(form)
     if separation is not None and not separation.shared:
-        return IndependentSearch(form, separation, incumbent, engine, jobs, recorder)
+        return IndependentSearch(form, separation, incumbent, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
-        build = partial(engine_for, form, engine, jobs, tangents=recorder is None)
+        build = partial(Engine, form, jobs, tangents=recorder is None)
         return optimum_search(form, build, incumbent, recorder)
-    return shared_search(form, separation, incumbent, engine, jobs, recorder)
+    return shared_search(form, separation, incumbent, jobs, recorder)
 
 
 class _Gap(NamedTuple):
@@ -177,7 +174,6 @@ class _Search:
     form: StandardForm
     incumbent: Incumbent
     method: SearchMethod
-    engine: str
     gap: float
     above: float | None
     effort: Effort
@@ -293,7 +289,7 @@ class _Search:
             is_relative=is_relative,
             above=self.above,
             was_beaten=self.incumbent.was_beaten,
-            engine=self.engine,
+            engine=ENGINE,
             boxes=self.boxes_before + self.method.boxes,
             open=left,
             seconds=seconds,

@@ -44,7 +44,7 @@ class Certificate(Whole, Shown):
         is_relative: whether that gap is a part of the incumbent; near 0 it is a part of the objective's scale.
         above: the value that F is claimed to be above; None without such a claim.
         was_beaten: whether the search found a better point than the one given.
-        engine: ``c`` or ``numpy``.
+        engine: ``c``, or ``none`` for a program without variables.
         boxes: number of boxes examined.
         open: number of boxes that are still open.
         seconds: wall time.

@@ -1,14 +1,14 @@
-/* Kernel of the search of a whole box: the examination of boxes, as in first_order.py, univariate.py, quadratic_models.py and
- * bounding.py.
+/* Kernel of every proof: forms of expressions over boxes, and the inner loops of the rules that use them.
  *
  * The tape is interpreted over LANES boxes at once, so that an instruction is fetched once for all of them and its
- * loops become vector instructions; the boxes are then examined one by one. Every formula is that of the Python
- * modules, in the same order; their docstrings and docs/certificate.md explain them. The headers of kernel/ have an idea
- * each and belong to this one translation unit, so that the compiler sees all of it: values, univariate, enclosure,
- * quadratic, quotients, contraction, examination, secondorder, firstpass, tangents, blocks, enclosed, models.
+ * loops become vector instructions; the boxes are then examined one by one. docs/certificate.md explains the formulas.
+ * tests/reference has them in NumPy, in the same order, in the modules that the headers name. The headers of kernel/ have
+ * an idea each and belong to this one translation unit, so that the compiler sees all of it: values, univariate,
+ * enclosure, quadratic, quotients, contraction, examination, secondorder, firstpass, tangents, blocks, enclosed, models,
+ * rank.
  *
  * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
- * nor with contraction to fused operations, which would make the two engines differ.
+ * nor with contraction to fused operations, which would make it differ from the reference.
  */
 #define Py_LIMITED_API 0x030B0000
 #define PY_SSIZE_T_CLEAN
@@ -133,21 +133,23 @@ static PyObject *examine(PyObject *module, PyObject *args)
 
 static PyObject *enclose(PyObject *module, PyObject *args)
 {
-    PyObject *tuple, *arrays[7];
+    PyObject *tuple, *arrays[9];
     Tape tape = {0};
     Enclosed found = {.order = 1};
     int n;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "iO!(OOOOOOO)n|i", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
-                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &found.B, &found.order))
+    if (!PyArg_ParseTuple(args, "iO!(OOOOOOOOO)n|i", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
+                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &found.B,
+                          &found.order))
         return NULL;
     int good = n > 0 && (found.order == 1 || n <= MOST_VARIABLES) && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
     Py_ssize_t R = tape.outputs, B = found.B, D = sizeof(double);
     good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
     good = good && (found.c = borrow(&all, arrays[2], R * B, D, 1)) && (found.p = borrow(&all, arrays[3], R * B, D, 1));
     good = good && (found.q = borrow(&all, arrays[4], R * B, D, 1)) && (found.s = borrow(&all, arrays[5], R * B, D, 1));
-    good = good && (found.a = borrow(&all, arrays[6], R * (Py_ssize_t)terms_to_enclose(n, found.order) * B, D, 1));
+    good = good && (found.lo = borrow(&all, arrays[6], R * B, D, 1)) && (found.hi = borrow(&all, arrays[7], R * B, D, 1));
+    good = good && (found.a = borrow(&all, arrays[8], R * (Py_ssize_t)terms_to_enclose(n, found.order) * B, D, 1));
     double *memory = NULL;
     if (good && !(memory = calloc(memory_to_enclose(&tape, n, found.order), sizeof(double))))
         PyErr_NoMemory();
@@ -262,8 +264,8 @@ static PyMethodDef methods[] = {
      "models(n, (...), B, level, low, high)\n\n"
      "Write upper bounds (B,) of B quadratic models, or the ends (n, B) of points that can reach levels (B,)."},
     {"enclose", enclose, METH_VARARGS,
-     "enclose(n, tape, (lower, upper, c, p, q, s, a), B, order=1)\n\n"
-     "Write the forms of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a; with order 2\n"
+     "enclose(n, tape, (lower, upper, c, p, q, s, lo, hi, a), B, order=1)\n\n"
+     "Write forms and ranges of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a; with order 2\n"
      "a has the coefficients of pairs of variables too."},
     {"examine", examine, METH_VARARGS,
      "examine((n, functions, equation, depends, low, high, whose, tape, values, objective, squared), arrays, B,\n"

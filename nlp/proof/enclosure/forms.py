@@ -1,11 +1,23 @@
-"""Forms of expressions over many boxes, by the enclosures of the certificate's search: in C or in NumPy.
+"""Forms of expressions over many boxes, by the C kernel: Taylor forms and intervals with rigorous rounding terms.
 
-On a box ``z_i = c_i + r_i e_i`` with ``|e_i| <= 1`` an expression lies in ``c + a.e + [-r, r]``: its value at the
-centre and the middle of its terms of second order, its scaled gradient, and the rest of these terms with rounding.
+On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, each value ``v`` has two enclosures: for ``0 <= t <= 1``
+
+    v(t e) in c + t sum_i a_i e_i + t^2 [p, q] +- s        and        lo <= v <= hi,
+
+where ``c`` is its value at the centre, ``a`` its scaled gradient there, ``[p, q]`` holds 0 and all terms of second
+order, and ``s`` bounds the rounding errors. The terms of second order shrink with ``t^2``, so that the integral of a
+gradient's form along a ray has a third of their width. These are Taylor models of first order (M. Berz and K. Makino,
+*Verified integration of ODEs and flows using differential algebraic methods on high-order Taylor models*, Reliable
+Computing 4 (1998)) with the products bounded as in affine arithmetic (J. Stolfi and L. H. de Figueiredo, 1997; F.
+Messine, *Extensions of affine arithmetic*, 2002). See ``docs/certificate.md``.
+
+A value that may be undefined somewhere in the box, or that overflows, is *poisoned*: its ``s`` and its ends are
+infinite, and so are those of every value computed from it.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,26 +26,62 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
-from .engine import chosen_kernel, kernel
-from .first_order import enclose
+from .engine import kernel
 from .instructions import compile_tape
-from .second_order import enclose_second
-from .tape import Tape
+from .intervals import ULP
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from .tape import Tape
 
-#: Part of its parts by which a sum of two doubles may be off, several times.
-_ULP = 2.0**-51
+
+@dataclass(eq=False)
+class Enclosures:
+    """Enclosures of R values over B boxes.
+
+    Attributes:
+        c: (R, B) values at the centres.
+        a: (R, n, B) scaled gradients there.
+        p, q: (R, B) least and largest sum of the terms of second order, ``p <= 0 <= q``.
+        s: (R, B) bounds of the rounding errors; infinite where a value is poisoned.
+        lo, hi: (R, B) intervals.
+    """
+
+    c: FloatArray
+    a: FloatArray
+    p: FloatArray
+    q: FloatArray
+    s: FloatArray
+    lo: FloatArray
+    hi: FloatArray
+
+
+def enclose(
+    tape: Tape, lower: FloatArray, upper: FloatArray, module: ModuleType | None = None, order: int = 1
+) -> Enclosures:
+    """Return enclosures of a tape's results over boxes.
+
+    Args:
+        tape: the instructions.
+        lower: (n, B) lower ends of the boxes.
+        upper: (n, B) upper ends of the boxes.
+        module: the C kernel, where it is known already.
+        order: of the forms; with 2, ``a`` has coefficients of pairs of variables too, and ``[p, q]`` what is left.
+    """
+    n, count = lower.shape
+    c, p, q, s, lo, hi = (np.empty((tape.outputs, count)) for _ in range(6))
+    a = np.empty((tape.outputs, n if order == 1 else n * (n + 3) // 2, count))
+    ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+    (module or kernel()).enclose(n, tape.head, (*ends, c, p, q, s, lo, hi, a), count, order)
+    return Enclosures(c, a, p, q, s, lo, hi)
 
 
 class Forms(NamedTuple):
-    """R expressions over B boxes.
+    """R expressions over B boxes, each in ``c + a.e + [-r, r]``.
 
     Attributes:
-        c: (B, R) middles.
+        c: (B, R) values at the centres, and the middles of the terms of second order.
         a: (B, R, n) linear parts, scaled by the half widths of the boxes.
-        r: (B, R) bounds of the rest; infinite where a value may be undefined.
+        r: (B, R) bounds of the rest, with rounding; infinite where a value may be undefined.
     """
 
     c: FloatArray
@@ -67,61 +115,29 @@ class Encloser:
     Args:
         z: (n, 1) symbols of the coordinates.
         expressions: (R, 1) of them.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
-        ValueError: there is no engine of that name here.
+        InputError: the C kernel was not built.
     """
 
-    def __init__(self, z: SX, expressions: SX, engine: str | None = None) -> None:
+    def __init__(self, z: SX, expressions: SX) -> None:
+        self.module = kernel()
         self.tape: Tape = compile_tape(ca.Function("entries", [z], [ca.densify(expressions)]))
-        self.module: ModuleType | None = chosen_kernel(engine, kernel)
-        code = [getattr(self.tape, name) for name in ("op", "to", "a", "b", "first", "last")]
-        self._code = np.ascontiguousarray(np.stack(code, axis=1).astype(np.int32))
-
-    @property
-    def name(self) -> str:
-        """``c`` or ``numpy``."""
-        return "numpy" if self.module is None else "c"
-
-    @property
-    def head(self) -> tuple[NDArray[np.int32], FloatArray, int, int, int]:
-        """The tape as the C kernel reads it."""
-        return self._code, self.tape.k, len(self.tape), self.tape.registers, self.tape.outputs
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms over boxes with ends (n, B)."""
-        tape, (n, count) = self.tape, lower.shape
-        if self.module is None:
-            found = enclose(tape, lower, upper)
-            c, a, p, q, s = found.c, found.a, found.p, found.q, found.s
-        else:
-            c, p, q, s = (np.empty((tape.outputs, count)) for _ in range(4))
-            a = np.empty((tape.outputs, n, count))
-            ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-            self.module.enclose(n, self.head, (*ends, c, p, q, s, a), count)
-        middle, rest = _centred(c, p, q, s)
-        return Forms(middle, a.transpose(2, 0, 1), rest)
+        return forms_of(enclose(self.tape, lower, upper, self.module))
 
     def second(self, lower: FloatArray, upper: FloatArray) -> SecondForms:
         """Return the forms of second order over boxes with ends (n, B)."""
-        tape, (n, count) = self.tape, lower.shape
-        if self.module is None:
-            found = enclose_second(tape, lower, upper)
-            c, p, q, s = found.c, found.p, found.q, found.s
-            terms = np.concatenate([found.a, found.Q], axis=1)
-        else:
-            c, p, q, s = (np.empty((tape.outputs, count)) for _ in range(4))
-            terms = np.empty((tape.outputs, n * (n + 3) // 2, count))
-            ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-            self.module.enclose(n, self.head, (*ends, c, p, q, s, terms), count, 2)
-        middle, rest = _centred(c, p, q, s)
-        terms = terms.transpose(2, 0, 1)
-        return SecondForms(middle, terms[:, :, :n], terms[:, :, n:], rest)
+        n = len(lower)
+        c, terms, r = forms_of(enclose(self.tape, lower, upper, self.module, 2))
+        return SecondForms(c, terms[:, :, :n], terms[:, :, n:], r)
 
 
-def _centred(c: FloatArray, p: FloatArray, q: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return middles (B, R) of expressions in ``c + [p, q] +- s``, and bounds of the rest."""
-    middle, half = 0.5 * (p + q), 0.5 * (q - p)
-    return (c + middle).T, (half + s + 4 * _ULP * (half + np.abs(c) + np.abs(middle))).T
+def forms_of(found: Enclosures) -> Forms:
+    """Return enclosures as forms with one remainder."""
+    middle, half = 0.5 * (found.p + found.q), 0.5 * (found.q - found.p)
+    rest = half + found.s + 4 * ULP * (half + np.abs(found.c) + np.abs(middle))
+    return Forms((found.c + middle).T, found.a.transpose(2, 0, 1), rest.T)

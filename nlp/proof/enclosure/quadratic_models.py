@@ -1,32 +1,35 @@
 """Quadratic upper models of expressions over boxes, from the Taylor forms of their gradients; sums and contraction.
 
-See :mod:`screwsynth.nlp.proof.boxes.bounding` for the formula, and ``docs/certificate.md`` for its derivation.
+With ``h = r e``, ``|e_i| <= 1``, the forms of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the
+ray from the centre, give
+
+    L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
+    b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
+
+a quadratic model with a remainder of third order, without second derivatives. With ``mu`` on the simplex and
+``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
+conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
+``docs/certificate.md`` has the derivation; the kernel bounds the models.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .first_order import Enclosures
+from .engine import kernel
 from .intervals import TINY, ULP
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....models import FloatArray
-    from .squared_quotients import SquareSums
+    from .forms import Enclosures
 
 #: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
 _MULTIPLIER_ROUNDS = 8
-#: Rounds of the coordinate-wise search for a tangent point: any result of it gives a bound.
-_TANGENT_ROUNDS = 3
-#: Part of its terms by which a quadratic's level is lowered before its roots: far more than their rounding.
-_ROOT_SLACK = 1e-12
-#: Least size of the terms of a quadratic whose roots are taken; its inverse is the largest.
-_LEAST_SIZE = 1e-140
 #: Largest weight of a condition: what underflow takes from its model, times the weight, is still less than ``TINY``.
 _LARGEST_WEIGHT = 1e20
 
@@ -36,6 +39,43 @@ class Ends(NamedTuple):
 
     low: FloatArray
     high: FloatArray
+
+
+class Total(NamedTuple):
+    """The form of the gradient of a function over B boxes, times their radii ``r_i``.
+
+    Attributes:
+        middle: (B,) upper bound of the value at the centre.
+        b: (n, B) gradient at the centre.
+        A: (n, n, B) linear part of the gradient.
+        p, q: (n, B) least and largest terms of second order of the gradient.
+        s: (n, B) rounding errors of the gradient.
+        low, high: (n, B) ends of the gradient from another enclosure, for an intersection.
+        largest: (B,) size of the terms of the value at the centre.
+    """
+
+    middle: FloatArray
+    b: FloatArray
+    A: FloatArray
+    p: FloatArray
+    q: FloatArray
+    s: FloatArray
+    low: FloatArray
+    high: FloatArray
+    largest: FloatArray
+
+    def integral(self) -> QuadraticModel:
+        """Return the upper model of the function, by the integral of its gradient along rays from the centre.
+
+        The terms of second order grow along a ray with ``t^2``, whose integral is 1/3.
+        """
+        middle, b, A, p, q, s, low, high, largest = self
+        across = np.abs(A).sum(axis=1)
+        rounding = 64 * ULP * (largest + (np.abs(b) + 2 * across + q - p + s).sum(axis=0)) + TINY
+        margin = 64 * ULP * (np.abs(b) + across + q - p + s) + TINY
+        symmetric, remainder = 0.5 * (A + np.swapaxes(A, 0, 1)), (q - p) / 6 + s
+        low, high = np.fmax(low, b - across + p - s), np.fmin(high, b + across + q + s)
+        return QuadraticModel(middle, b + (p + q) / 6, symmetric, remainder, low - margin, high + margin, rounding)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +92,6 @@ class GradientModel:
         s: (R, n, B) rounding errors of the gradients times ``r_i``.
         slope_lo, slope_hi: (R, n, B) interval gradients times ``r_i``.
         gradient_lo, gradient_hi: (R, n, B) interval gradients.
-        squares: upper models of the functions' quotients, whose ``b`` is in that of the functions; None without them.
     """
 
     value: Enclosures
@@ -65,24 +104,19 @@ class GradientModel:
     slope_hi: FloatArray
     gradient_lo: FloatArray
     gradient_hi: FloatArray
-    squares: SquareSums | None = None
 
     def expression_model(self, r: int, sign: float) -> QuadraticModel:
         """Return the upper model of ``sign`` times one expression."""
-        low, high, p, q = self.slope_lo[r], self.slope_hi[r], self.p[r], self.q[r]
-        if sign < 0:
-            low, high, p, q = -high, -low, -q, -p
-        middle, size = sign * self.value.c[r] + self.value.s[r], np.abs(self.value.c[r])
-        H, w = self._squares_of(r)
-        return _integrate(middle, sign * self.b[r], sign * self.A[r], p, q, self.s[r], low, high, size, H, w)
-
-    def _squares_of(self, r: int) -> tuple[FloatArray | None, FloatArray | None]:
-        """Return matrix and remainder of the quotients of an expression."""
-        has_squares = self.squares is not None and r < len(self.squares.H)
-        return (self.squares.H[r], self.squares.w[r]) if self.squares is not None and has_squares else (None, None)
+        weights = np.zeros(self.value.c.shape)
+        weights[r] = sign
+        return self.sum_model(weights)
 
     def sum_model(self, weights: FloatArray) -> QuadraticModel:
         """Return the upper model of a sum of all expressions with weights (R, B)."""
+        return self.total(weights).integral()
+
+    def total(self, weights: FloatArray) -> Total:
+        """Return the form of the gradient of a sum of all expressions with weights (R, B)."""
         size = np.abs(weights)
         used = size > 0
         keep = used[:, None]
@@ -102,11 +136,7 @@ class GradientModel:
 
         largest = total(np.where(used, np.abs(self.value.c), 0.0), size)
         p, q = ends(self.p, self.q)
-        if self.squares is None:
-            return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest)
-        J = len(self.squares.H)
-        H, w = total(self.squares.H, weights[:J]), total(self.squares.w, weights[:J])
-        return _integrate(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest, H, w)
+        return Total(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,40 +162,21 @@ class QuadraticModel:
 
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
-        mean = self.middle + np.maximum(np.abs(self.slope_lo), np.abs(self.slope_hi)).sum(axis=0)
-        # Where the slope has a sign, the largest value is on that face.
-        s = np.where(self.slope_lo >= 0, 1.0, np.where(self.slope_hi <= 0, -1.0, 0.0))
-        free = s == 0
-        Hs = np.einsum("ijb,jb->ib", self.H, s)
-        fixed = self.middle + (self.b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0) + (self.w * np.abs(s)).sum(axis=0)
-        b = np.where(free, self.b + Hs, 0.0)
-        w = np.where(free, self.w, 0.0)
-        H = np.where(free[:, None] & free[None], self.H, 0.0)
-        diagonal = np.einsum("iib->ib", H).copy()
-        others = np.abs(H).sum(axis=1) - np.abs(diagonal)
-        separate = fixed + (largest_on_unit_interval(np.abs(b) + w, diagonal) + 0.5 * others).sum(axis=0)
-        shift = np.maximum(diagonal + others, 0.0)
-        tangent = fixed + _tangent(b, H, diagonal - shift) + (0.5 * shift + w).sum(axis=0)
-        best = np.fmin(mean, np.fmin(separate, tangent))
-        return np.asarray(best + self.rounding)
+        bound = np.empty(self.middle.size)
+        kernel().models(len(self.b), self._arrays(), bound.size, bound)
+        return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
-        diagonal = np.einsum("iib->ib", self.H)
-        others = np.abs(self.H).sum(axis=(0, 1)) - np.abs(diagonal).sum(axis=0)
-        most = largest_on_unit_interval(np.abs(self.b) + self.w, diagonal)
-        total = self.middle + self.rounding + 0.5 * others + most.sum(axis=0)
-        need = level - (total - most)
-        size = np.abs(need) + np.abs(self.b) + self.w + np.abs(diagonal) + np.abs(total) + np.abs(level)
-        need = need - (_ROOT_SLACK * size + TINY)
-        right_first, right_last = _ends_of_solutions(self.b + self.w, diagonal, need)
-        left_first, left_last = _ends_of_solutions(-self.b + self.w, diagonal, need)
-        # A side without a solution has last < first: then the other side's first solution is the end.
-        low = np.where(left_last >= left_first, -left_last, right_first)
-        high = np.where(right_last >= right_first, right_last, -left_first)
-        # Numbers that are not finite, or whose squares may underflow or overflow, exclude nothing.
-        known = (size > _LEAST_SIZE) & (size < 1 / _LEAST_SIZE)
-        return Ends(np.where(known, low, -1.0), np.where(known, high, 1.0))
+        low, high, levels = np.empty(self.b.shape), np.empty(self.b.shape), np.empty(self.middle.size)
+        levels[:] = level
+        kernel().models(len(self.b), self._arrays(), levels.size, levels, low, high)
+        return Ends(low, high)
+
+    def _arrays(self) -> tuple[FloatArray, ...]:
+        """Return the model as the kernel reads it."""
+        arrays = (self.middle, self.b, self.H, self.w, self.slope_lo, self.slope_hi, self.rounding)
+        return tuple(np.ascontiguousarray(each) for each in arrays)
 
 
 def affine_ends_reaching(value: Enclosures, r: int, sign: float, level: float) -> Ends:
@@ -184,96 +195,32 @@ def affine_ends_reaching(value: Enclosures, r: int, sign: float, level: float) -
     return Ends(low, high)
 
 
-def largest_on_unit_interval(linear: FloatArray, quadratic: FloatArray) -> FloatArray:
-    """Return the largest ``linear t + 1/2 quadratic t^2`` for t in [0, 1], linear not negative."""
-    inside = (quadratic < 0) & (linear < -quadratic)
-    # In this order: the square of a small number may underflow.
-    peak = np.where(inside, linear * (linear / np.where(inside, -2 * quadratic, 1.0)), 0.0)
-    return np.where(inside, peak, linear + 0.5 * quadratic)
-
-
-def _tangent(b: FloatArray, H: FloatArray, diagonal: FloatArray) -> FloatArray:
-    """Return the largest value over the box of a tangent plane to the concave ``b e + 1/2 e' C e``.
-
-    ``C`` is ``H`` with another diagonal. A tangent plane of a concave function is nowhere below it; this one
-    touches it near its maximum.
-    """
-    n = len(b)
-    t = np.zeros_like(b)
-    gradient = b.copy()
-    for _ in range(_TANGENT_ROUNDS):
-        for i in range(n):
-            curvature = diagonal[i]
-            new = np.where(curvature < 0, t[i] - gradient[i] / curvature, np.sign(gradient[i]))
-            new = np.clip(np.where(np.isfinite(new), new, 0.0), -1.0, 1.0)
-            change = new - t[i]
-            t[i] = new
-            gradient += change * H[i]
-            gradient[i] += change * (curvature - H[i, i])
-    # The plane at t: b t + 1/2 t'Ct + gradient (e - t), where gradient = b + C t.
-    Ct = np.einsum("ijb,jb->ib", H, t) + (diagonal - np.einsum("iib->ib", H)) * t
-    gradient = b + Ct
-    return np.asarray(-0.5 * (t * Ct).sum(axis=0) + np.abs(gradient).sum(axis=0))
-
-
-def _integrate(
-    middle: FloatArray,
-    b: FloatArray,
-    A: FloatArray,
-    p: FloatArray,
-    q: FloatArray,
-    s: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    largest: FloatArray,
-    H: FloatArray | None = None,
-    w: FloatArray | None = None,
-) -> QuadraticModel:
-    """Return the model whose gradient has a Taylor form, by its integral along rays from the centre.
-
-    The terms of second order grow along a ray with ``t^2``, whose integral is 1/3.
+def gradient_model(box: Enclosures, radius: FloatArray) -> GradientModel:
+    """Return the enclosures of E rows and of their gradients, from those of the rows and then their derivatives.
 
     Args:
-        middle: (B,) upper bound of the value at the centre.
-        b: (n, B) gradient at the centre times ``r_i``.
-        A: (n, n, B) linear part of the gradient times ``r_i``.
-        p: (n, B) least terms of second order of the gradient times ``r_i``.
-        q: (n, B) largest terms of second order of the gradient times ``r_i``.
-        s: (n, B) rounding errors of the gradient times ``r_i``.
-        low: (n, B) lower ends of the gradient times ``r_i`` from another enclosure, for an intersection.
-        high: (n, B) upper ends likewise.
-        largest: (B,) size of the terms of the value at the centre.
-        H: (n, n, B) matrix of an upper model whose linear part is in b and whose slopes are in the other enclosure.
-        w: (n, B) its remainder.
+        box: of E (1 + n) values over B boxes; the derivatives are row by row.
+        radius: (n, B) half widths of the boxes.
     """
-    across = np.abs(A).sum(axis=1)
-    rounding = 64 * ULP * (largest + (np.abs(b) + 2 * across + q - p + s).sum(axis=0)) + TINY
-    margin = 64 * ULP * (np.abs(b) + across + q - p + s) + TINY
-    symmetric, remainder = 0.5 * (A + np.swapaxes(A, 0, 1)), (q - p) / 6 + s
-    if H is None or w is None:
-        low, high = np.fmax(low, b - across + p - s), np.fmin(high, b + across + q + s)
-    else:
-        symmetric, remainder = symmetric + H, remainder + w
-        rounding = rounding + 64 * ULP * (np.abs(H).sum(axis=(0, 1)) + w.sum(axis=0))
-    return QuadraticModel(middle, b + (p + q) / 6, symmetric, remainder, low - margin, high + margin, rounding)
+    n, count = radius.shape
+    E = len(box.c) // (n + 1)
+    shape, r = (E, n, count), radius[None]
 
+    def scaled(values: FloatArray) -> FloatArray:
+        return np.where(r > 0, values[E:].reshape(shape) * r, 0.0)
 
-def _ends_of_solutions(linear: FloatArray, quadratic: FloatArray, need: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return first and last t in [0, 1] with ``linear t + 1/2 quadratic t^2 >= need``; last < first without one."""
-    at_end = linear + 0.5 * quadratic >= need
-    at_start = need <= 0
-    root = np.sqrt(np.maximum(linear * linear + 2 * quadratic * need, 0.0))
-    # The roots of 1/2 q t^2 + l t - need, each in the form without cancellation.
-    small = np.where(linear >= 0, 2 * need / (linear + root), (root - linear) / quadratic)
-    large = np.where(linear >= 0, -(linear + root) / quadratic, 2 * need / (linear - root))
-    peak = (quadratic < 0) & (linear > 0) & (linear < -quadratic) & (linear * linear >= -2 * quadratic * need)
-    # Up to a peak and down again: both roots. From a start where it holds, down: the first root where it fails.
-    down = np.where(quadratic < 0, large, np.where(linear < 0, large, 1.0))
-    last = np.where(
-        at_end, 1.0, np.where(at_start, np.clip(down, 0.0, 1.0), np.where(peak, np.clip(large, 0.0, 1.0), -1.0))
+    return GradientModel(
+        value=replace(box, **{name: values[:E] for name, values in vars(box).items()}),
+        b=scaled(box.c),
+        A=box.a[E:].reshape(E, n, n, count) * radius[None, :, None],
+        p=scaled(box.p),
+        q=scaled(box.q),
+        s=scaled(box.s),
+        slope_lo=scaled(box.lo),
+        slope_hi=scaled(box.hi),
+        gradient_lo=box.lo[E:].reshape(shape),
+        gradient_hi=box.hi[E:].reshape(shape),
     )
-    first = np.where(at_start, 0.0, np.where(at_end | peak, np.clip(small, 0.0, 1.0), 2.0))
-    return first, last
 
 
 def multipliers(

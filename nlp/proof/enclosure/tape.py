@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from ....models import FloatArray
@@ -67,3 +69,9 @@ class Tape:
 
     def __len__(self) -> int:
         return len(self.op)
+
+    @cached_property
+    def head(self) -> tuple[NDArray[np.int32], FloatArray, int, int, int]:
+        """The tape as the C kernel reads it: code, constants, and numbers of instructions, registers and results."""
+        code = np.stack([self.op, self.to, self.a, self.b, self.first, self.last], axis=1).astype(np.int32)
+        return np.ascontiguousarray(code), self.k, len(self), self.registers, self.outputs

@@ -13,6 +13,7 @@ from ...case.case import Case
 from ...case.workspace import Workspace
 from ...interruption import one_call, within
 from ...program.layout import Layout
+from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
 from ..statement.closed_layout import closed_layout, reach_claims
 from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
@@ -91,7 +92,6 @@ def judge_workspace(
     gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
     jobs: int | None = None,
-    engine: str | None = None,
     with_limits: bool = True,
     with_objective: bool = True,
     until_fault: bool = False,
@@ -110,7 +110,6 @@ def judge_workspace(
         time_limit: seconds for all searches together, which then stop with the bounds reached; None for no limit. A
             search takes at most half of what is left.
         jobs: threads.
-        engine: ``"c"`` or ``"numpy"`` for the search of singular poses; left out, the C kernel where it was built.
         with_limits: whether numbers are bounded at all, and not regularity alone.
         with_objective: whether F of each task is bounded.
         leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
@@ -122,10 +121,11 @@ def judge_workspace(
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no measure of a name, or the error of legs is negative, or for a robot that is not six
-            straight legs.
+        InputError: the robot has no measure of a name, the error of legs is negative, or for a robot that is not six
+            straight legs, or the C kernel was not built.
     """
     own = workspace_of_case(case)
+    kernel()  # before any work where it is missing
     check_leg_error(case, leg_error)
     workspace = own if workspace is None else workspace
     with within(time_limit, _PART):
@@ -136,7 +136,7 @@ def judge_workspace(
         ranks = (
             Ranks(not_judged(box, unknown), None)
             if unknown
-            else prove_ranks(closed.model, homes, legs=legs, engine=engine, progress=rank_progress, paper=paper)
+            else prove_ranks(closed.model, homes, legs=legs, progress=rank_progress, paper=paper)
         )
         judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
         if not with_limits or (until_fault and not judged.is_regular):

@@ -29,7 +29,7 @@ class Regularity:
             where it is open; None where it is proved.
         sides: (2, 6) two poses of the workspace at which the determinant of the rows has opposite signs, without
             rounding, where the claim is refuted so.
-        engine: ``c`` or ``numpy``.
+        engine: ``c``, or ``none`` where no search was made.
         boxes: number of boxes examined.
         open: number of boxes left.
         share: part of the box's volume, that of its coordinates, in boxes that are left.

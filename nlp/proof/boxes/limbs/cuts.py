@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models.arrays import first_largest
-from ...enclosure.first_order import midpoints
-from ...enclosure.intervals import ULP
+from ...enclosure.intervals import ULP, midpoints
 from ...enclosure.quadratic_models import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .boxes import OwnBoxes, SharedBoxes
-from .models import LimbEngine, LimbModels
+from .models import LimbModels
 from .sums import LimbBound, first_largest_of_lists
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from .....models import FloatArray
     from ...statement.standard_form import StandardForm
 
-#: Weight of a model's linear part beside its curved part in the choice of a variable, as in ``bounding``.
+#: Weight of a model's linear part beside its curved part in the choice of a variable, as in the kernel.
 LINEAR = 0.3
 #: Own boxes are bisected where their bound is within this part of the limb's spread of the best.
 _NEAR = 0.5
@@ -146,7 +145,6 @@ def collapse_monotone(form: StandardForm, boxes: SharedBoxes, sums: SharedSums, 
 
 
 def cut_own(
-    engine: LimbEngine,
     good: FloatArray,
     found: LimbModels,
     part: LimbBound,
@@ -157,7 +155,6 @@ def cut_own(
     """Return a limb's own boxes that can exceed a threshold together with the best of everything else.
 
     Args:
-        engine: finds the ends of models.
         good: (d, B) the best point known of the own variables.
         found: models of the limb.
         part: its bounds.
@@ -172,7 +169,7 @@ def cut_own(
     level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(part.best))
     level = np.fmax(np.where(np.isfinite(level), level, -np.inf), part.reached)
     keep = (part.bounds > -np.inf) & ~(part.bounds < level[own.of])
-    ends = engine.ends_reaching(part.L, level[own.of])
+    ends = part.L.ends_reaching(level[own.of])
     centre, radius = midpoints(own.lower, own.upper)
     own_ends = [Ends(ends.low[m:], ends.high[m:])]
     moved = _moved(found.lower[m:], found.upper[m:], centre, radius, own_ends, found.defined)

@@ -15,7 +15,7 @@ import numpy as np
 from .....models import FloatArray
 from ...statement.limb_separation import Limb, Separation
 from ...statement.standard_form import StandardForm
-from ..engines import engine_for
+from ..engines import Engine
 from ..incumbent import Incumbent
 from ..optimum import optimum_search
 from ..proof_writer import ProofWriter
@@ -84,8 +84,7 @@ class IndependentSearch:
         form: the whole form.
         separation: its limbs.
         incumbent: the best point known, which the search improves.
-        engine: name of the engine.
-        jobs: threads of the engine.
+        jobs: threads.
         recorder: records the limbs' trees for a proof.
     """
 
@@ -94,7 +93,6 @@ class IndependentSearch:
         form: StandardForm,
         separation: Separation,
         incumbent: Incumbent,
-        engine: str | None,
         jobs: int | None,
         recorder: ProofWriter | None = None,
     ) -> None:
@@ -106,7 +104,7 @@ class IndependentSearch:
         self._searches = [
             optimum_search(
                 limbs[group[0]].form,
-                partial(engine_for, limbs[group[0]].form, engine, jobs, tangents=recorder is None),
+                partial(Engine, limbs[group[0]].form, jobs, tangents=recorder is None),
                 LimbPoint([limbs[each] for each in group], incumbent, parts),
                 None if recorder is None else recorder.limb(partial(self._limb_bound, k)),
             )

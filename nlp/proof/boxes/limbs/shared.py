@@ -16,17 +16,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models.arrays import first_largest
-from ...enclosure.first_order import midpoints
-from ...enclosure.quadratic_models import GradientModel, ranges
-from ..bounding import NumpyEngine
-from ..engines import limb_engine_for
+from ...enclosure.quadratic_models import ranges
+from ..engines import Engine
 from ..optimum import LEAST_WIDTHS, reason_without_bound
 from ..rows import SMALL, WHOLE, Boxes, some
 from ..search import Order, Rule, Search, Verdicts
 from ..threads import Threads
 from .boxes import OwnBoxes, SharedBoxes
+from .common import CommonPart
 from .cuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
-from .models import LimbEngine, LimbModels
+from .models import LimbModels
 from .record import SharedRecord
 from .sums import LimbBound, bound_limb, first_largest_of_lists, with_tilts
 
@@ -73,12 +72,11 @@ def shared_search(
     form: StandardForm,
     separation: Separation,
     incumbent: Incumbent,
-    engine: str | None,
     jobs: int | None,
     recorder: ProofWriter | None = None,
 ) -> Search[SharedRule]:
     """Return the search of limbs with shared variables: see :class:`SharedRule`."""
-    rule = SharedRule(form, separation, incumbent, engine, jobs, recorder)
+    rule = SharedRule(form, separation, incumbent, jobs, recorder)
     common, m = rule.common_form, len(separation.shared)
     own = tuple(
         OwnBoxes(limb.form.lower[m:, None], limb.form.upper[m:, None], np.zeros(1, dtype=np.int64), 1)
@@ -97,7 +95,6 @@ class SharedRule(Rule[SharedColumns]):
         form: the whole form.
         separation: its limbs.
         incumbent: the best point known, which the search improves.
-        engine: name of the engine.
         jobs: threads, which share the limbs.
         recorder: records the search for a proof, which has no rules for cuts of shared boxes nor for own boxes that are
             dropped because of the other limbs: the search makes none then.
@@ -110,7 +107,6 @@ class SharedRule(Rule[SharedColumns]):
         form: StandardForm,
         separation: Separation,
         incumbent: Incumbent,
-        engine: str | None,
         jobs: int | None,
         recorder: ProofWriter | None = None,
     ) -> None:
@@ -118,12 +114,12 @@ class SharedRule(Rule[SharedColumns]):
             raise ValueError("the limbs share no variable")
         self._form, self._separation, self._incumbent = form, separation, incumbent
         self.common_form = separation.common
-        self._common = NumpyEngine(separation.common)
+        self._common = CommonPart(separation.common)
         self._m, self._turn = len(separation.shared), 0
         # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
         self._threads = Threads(jobs)
         # Engines of long limbs take seconds, so that each is a step of its own, between which a search can end.
-        self._engine, self._engines, self._opposites = engine, list[LimbEngine](), list[LimbEngine]()
+        self._engines, self._opposites = list[Engine](), list[Engine]()
         self._record: SharedRecord | None = None
         if recorder is not None:
             self._record = SharedRecord(self.common_form.lower, self.common_form.upper)
@@ -142,10 +138,8 @@ class SharedRule(Rule[SharedColumns]):
         if len(self._engines) < len(self._separation.limbs):
             form = self._separation.limbs[len(self._engines)].form
             # Minus a limb's function, for lower models.
-            self._opposites.append(
-                limb_engine_for(replace(form, functions=(-form.functions[0],)), self._m, self._engine, 1)
-            )
-            self._engines.append(limb_engine_for(form, self._m, self._engine, 1))
+            self._opposites.append(Engine(replace(form, functions=(-form.functions[0],)), 1, self._m))
+            self._engines.append(Engine(form, 1, self._m))
             return Verdicts(boxes, -math.inf, 0)
         current, before = view(boxes), self._incumbent.value
         self._turn += 1
@@ -161,15 +155,13 @@ class SharedRule(Rule[SharedColumns]):
         """Return bounds of shared boxes."""
         found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
         models, parts = [each.models for each in found], [each.bound for each in found]
-        radius = midpoints(boxes.lower, boxes.upper).radius
-        common = self._common.model(boxes.lower, boxes.upper, radius)
+        common = self._common.model(boxes.lower, boxes.upper)
         low, high = ranges(common)
         impossible, binding = self._common.states(low, high)
         tilted = common.b.copy()
         for part in parts:
             tilted[0] += part.tilt.g
-        weights = self._common.multipliers(GradientModel(**{**vars(common), "b": tilted}), high)
-        M = with_tilts(common.sum_model(weights), parts)
+        M = with_tilts(common.sum_model(self._common.multipliers(tilted, high)), parts)
         bound = M.bound()
         known = np.isfinite(common.value.s[0]) & np.all([np.isfinite(part.best) for part in parts], axis=0)
         sums = np.where(known & ~np.isnan(bound), bound, np.inf)
@@ -186,17 +178,17 @@ class SharedRule(Rule[SharedColumns]):
             at_good, fall = engine.limb_models(*place), opposite.limb_models(*place).L
             # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
             known = at_good.holds & at_good.defined
-            least = np.where(known, -engine.bound(fall), -np.inf)
+            least = np.where(known, -fall.bound(), -np.inf)
             lower = np.concatenate([boxes.lower[:, own.of], own.lower])
             upper = np.concatenate([boxes.upper[:, own.of], own.upper])
             models = engine.limb_models(lower, upper, least[own.of])
-            return _ExaminedLimb(models, bound_limb(engine, models, at_good, fall, own, self._m))
+            return _ExaminedLimb(models, bound_limb(models, at_good, fall, own, self._m))
 
     def _cut_limb(self, k: int, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> LeftOwn:
         """Return a limb's own boxes that are left."""
         with np.errstate(all="ignore"):
             parts = boxes.good[k], sums.models[k], sums.parts[k], boxes.own[k]
-            return cut_own(self._engines[k], *parts, sums.sums, threshold)
+            return cut_own(*parts, sums.sums, threshold)
 
     def _improve(self, boxes: SharedBoxes, sums: SharedSums) -> None:
         """Improve the incumbent from the best centre, and now and then from the box with the largest bound."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...enclosure.intervals import TINY, ULP
 from ...enclosure.quadratic_models import QuadraticModel
-from .models import LimbEngine, LimbModels
+from .models import LimbModels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,15 +73,12 @@ def first_largest_of_lists(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp
     return np.asarray(np.minimum.reduceat(places, starts))
 
 
-def bound_limb(
-    engine: LimbEngine, models: LimbModels, good: LimbModels, fall: QuadraticModel, own: OwnBoxes, m: int
-) -> LimbBound:
+def bound_limb(models: LimbModels, good: LimbModels, fall: QuadraticModel, own: OwnBoxes, m: int) -> LimbBound:
     """Return bounds of a limb whose first m variables are shared, with a tilt for each shared box.
 
     An own box in which the limb is nowhere as good as at the good point is dropped: no optimum lies in it.
 
     Args:
-        engine: bounds models.
         models: of the N own boxes.
         good: of a good point of the limb in each of the B shared boxes.
         fall: upper models of minus the limb's function there.
@@ -97,10 +94,10 @@ def bound_limb(
         Q = np.where(is_known, good.L.H[:m, :m], L.H[:m, :m, chosen])
         finite = np.isfinite(g).all(axis=0) & np.isfinite(Q).all(axis=(0, 1)) & (is_known | usable[chosen])
         tilt = Tilt(np.where(finite, g, 0.0), np.where(finite, Q, 0.0))
-        reached = np.where(is_known, -engine.bound(_add(fall, tilt)), -np.inf)
+        reached = np.where(is_known, -_add(fall, tilt).bound(), -np.inf)
         reached = np.where(np.isnan(reached), -np.inf, reached)
         rest = without_tilt(L, Tilt(tilt.g[:, own.of], tilt.Q[:, :, own.of]))
-        bounds = np.where(models.defined, engine.bound(rest), np.inf)
+        bounds = np.where(models.defined, rest.bound(), np.inf)
         # The bound of the limb itself, and that of minus its tilt.
         apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
         # The two may cancel: their rounding is in parts of their sizes.

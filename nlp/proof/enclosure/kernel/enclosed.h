@@ -6,7 +6,7 @@
 
 typedef struct {
     const double *lower, *upper;  /* (n, B) */
-    double *c, *p, *q, *s, *a;    /* (R, B), a: (R, n, B), or (R, n + n (n + 1) / 2, B) for forms of second order */
+    double *c, *p, *q, *s, *lo, *hi, *a; /* (R, B), a: (R, n, B), or (R, n + n (n + 1) / 2, B) for forms of second order */
     Py_ssize_t B;
     int order;
 } Enclosed;
@@ -45,13 +45,14 @@ static void enclose_all(const Tape *tape, int n, Enclosed *found, double *memory
         for (int k = 0; k < tape->outputs; k++) {
             Value *v = value_of(out, k);
             Form2 *w = form2_of(out, k);
-            const double *c = v->c, *p = v->p, *q = v->q, *s = v->s;
+            const double *c = v->c, *p = v->p, *q = v->q, *s = v->s, *lo = v->lo, *hi = v->hi;
             const Lane *a = terms_of(v);
             if (found->order > 1)
-                c = w->c, p = w->p, q = w->q, s = w->s, a = terms_of_form2(w);
+                c = w->c, p = w->p, q = w->q, s = w->s, lo = w->lo, hi = w->hi, a = terms_of_form2(w);
             size_t at = (size_t)(k * B + start), bytes = (size_t)lanes_used * sizeof(double);
             memcpy(found->c + at, c, bytes), memcpy(found->p + at, p, bytes);
             memcpy(found->q + at, q, bytes), memcpy(found->s + at, s, bytes);
+            memcpy(found->lo + at, lo, bytes), memcpy(found->hi + at, hi, bytes);
             for (size_t i = 0; i < terms; i++)
                 memcpy(found->a + ((size_t)k * terms + i) * (size_t)B + start, a[i], bytes);
         }

@@ -90,7 +90,7 @@ class _LimitsRule(LoopRule):
     block = _BLOCK
 
     def __init__(self, problem: Problem, values: LimitValues, gap: float) -> None:
-        examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None, None)
+        examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start))
         super().__init__(problem, examiner)
         self._values, self._gap, self._dependent = values, gap, list(problem.dependent)
         count, n = len(values.claims), len(problem.start)

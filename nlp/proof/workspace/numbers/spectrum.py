@@ -35,7 +35,6 @@ class Spectrum:
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
         family: all machines that are meant, whose errors count entry by entry; values are those of the design.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
@@ -48,7 +47,6 @@ class Spectrum:
         *,
         is_condition: bool,
         family: Family | None = None,
-        engine: str | None = None,
     ) -> None:
         self._problem, self._is_condition = problem, is_condition
         scale = ca.diag(ca.vertcat(SX.ones(3), problem.length / length * SX.ones(3)))
@@ -56,7 +54,7 @@ class Spectrum:
         self._rows = J.shape[0]
         self._function = ca.Function("J", [problem.z], [ca.vec(J)])
         own, coordinates = (J, problem.z) if family is None else (family.jacobian @ scale, family.coordinates)
-        self._encloser = Encloser(coordinates, ca.vec(ca.densify(own)), engine)
+        self._encloser = Encloser(coordinates, ca.vec(ca.densify(own)))
         self._errors = np.full(
             int(coordinates.numel() - problem.z.numel()), 0.0 if family is None else family.tolerance
         )

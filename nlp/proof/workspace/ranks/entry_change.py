@@ -51,7 +51,6 @@ class EntryChange:
     Args:
         family: the machines; none of their coordinates follows from others.
         entries: (E, 1) polynomials in their coordinates.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Attributes:
         exact: (E, 1) the entries of the design, in the coordinates of the pose alone.
@@ -60,7 +59,7 @@ class EntryChange:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, family: Family, entries: SX, engine: str | None) -> None:
+    def __init__(self, family: Family, entries: SX) -> None:
         problem, errors, t = family.problem, family.errors, family.tolerance
         self.exact: SX = _at_zero(entries, errors)
         self._tolerance, self._count = t, int(entries.numel())
@@ -68,13 +67,13 @@ class EntryChange:
         # One sum for each entry and centre.
         self._sums, self._of_sum = np.unique(of_entry * len(family.names) + of_error // 3, return_inverse=True)
         self._sums //= len(family.names)
-        self._slopes = Encloser(problem.z, _at_zero(first, errors), engine)
+        self._slopes = Encloser(problem.z, _at_zero(first, errors))
         second, of_slope, _ = _slopes(first, errors)
         box, free = problem.box, list(problem.free)
         lower, upper = (
             np.append(end[free], np.full(errors.numel(), size)) for end, size in ((box.lower, -t), (box.upper, t))
         )
-        sizes = _sizes(Encloser(family.coordinates, second, engine)(lower[:, None], upper[:, None]))
+        sizes = _sizes(Encloser(family.coordinates, second)(lower[:, None], upper[:, None]))
         self._bend = 0.5 * t * t * np.bincount(of_entry[of_slope], sizes[0], self._count)
 
     def over(self, lower: FloatArray, upper: FloatArray) -> FloatArray:

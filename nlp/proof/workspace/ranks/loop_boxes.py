@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from .....models import FloatArray
-from ...boxes.first_pass import MOST_VARIABLES
+from ...boxes.tapes import MOST_VARIABLES
 from ...enclosure.forms import Encloser, Forms
 from ..robot.closed_loops import Loops
 from ..robot.posed_robot import Problem
@@ -107,19 +107,13 @@ class Examiner:
     Args:
         problem: the robot.
         test: its entries are in the coordinates of the problem, or of all machines.
-        engine: ``"c"``, ``"numpy"``, or None.
         family: all machines that are meant; None for the design alone.
-
-    Attributes:
-        engine: ``c`` or ``numpy``.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    engine: str
-
-    def __init__(self, problem: Problem, test: Test, engine: str | None, family: Family | None = None) -> None:
+    def __init__(self, problem: Problem, test: Test, family: Family | None = None) -> None:
         self.problem, self._test = problem, test
         self._rank: RankTest | None = None
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
@@ -128,32 +122,31 @@ class Examiner:
         coordinates = problem.z if family is None else family.coordinates
         n, whole = int(problem.z.numel()), int(coordinates.numel())
         self._errors, self._tolerance = list(range(n, whole)), 0.0 if family is None else family.tolerance
-        self._forms_of = equations, coordinates, engine
+        self._forms_of = equations, coordinates
         self.second: Encloser | None = None
         self._change: EntryChange | None = None
         if isinstance(test, RankTest) and not self.count and n <= MOST_VARIABLES:
-            self._use_second_order(test, family, engine)
+            self._use_second_order(test, family)
         if self.second is None:
-            self.engine = self._encloser.name
+            _ = self._encloser  # refuses an operation without a rule at once
         self._machines = None if family is None else family.loops
         self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
 
     @cached_property
     def _encloser(self) -> Encloser:
         """Forms of first order of the equations, their derivatives by dependent coordinates, and the entries."""
-        (equations, coordinates, engine), z = self._forms_of, self.problem.z
+        (equations, coordinates), z = self._forms_of, self.problem.z
         slopes = [ca.jacobian(equations, z)[:, k] for k in self._dependent]
         own = ca.densify(ca.vertcat(ca.SX(0, 1), *slopes))
         # A last entry that is not used, for a matrix that is constant.
-        return Encloser(coordinates, ca.vertcat(equations, own, self._test.entries, z[0]), engine)
+        return Encloser(coordinates, ca.vertcat(equations, own, self._test.entries, z[0]))
 
-    def _use_second_order(self, test: RankTest, family: Family | None, engine: str | None) -> None:
+    def _use_second_order(self, test: RankTest, family: Family | None) -> None:
         """Examine by forms of second order; with errors, of polynomials alone."""
         if family is not None and not is_polynomial(test.entries, family):
             return
-        change = None if family is None else EntryChange(family, test.entries, engine)
-        second = Encloser(self.problem.z, test.entries if change is None else change.exact, engine)
-        self.second, self._rank, self._change, self.engine = second, test, change, second.name
+        self._rank, self._change = test, None if family is None else EntryChange(family, test.entries)
+        self.second = Encloser(self.problem.z, test.entries if self._change is None else self._change.exact)
 
     def examine(self, cells: Cells) -> Examined:
         """Examine boxes."""

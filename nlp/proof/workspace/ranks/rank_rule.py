@@ -29,10 +29,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-#: Numbers of the terms of matrices that NumPy handles at once.
-_NUMBERS = 10**6
-
-
 class Tested(NamedTuple):
     """Results for B boxes.
 
@@ -100,31 +96,12 @@ class RankTest:
             change: (E, B) by how much the entries may be off in other machines; None for the design alone.
         """
         n, count = lower.shape
-        if encloser.module is None:
-            size = max(1, _NUMBERS // (self._constant.size * (n * (n + 3) // 2)))
-            change = np.zeros((len(self._at[0]), count)) if change is None else change
-            parts = [slice(k, k + size) for k in range(0, count, size)]
-            tested = [self._by_numpy(encloser, lower[:, k], upper[:, k], change[:, k]) for k in parts]
-            regular, shares, smallest, signs = zip(*tested, strict=True)
-            return Tested(*map(np.concatenate, (regular, shares, smallest, signs)))
         regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
         shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        encloser.module.rank(n, encloser.head, self._head, (*ends, regular, shares, smallest, signs), count, change)
+        found = (*ends, regular, shares, smallest, signs)
+        encloser.module.rank(n, encloser.tape.head, self._head, found, count, change)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
-
-    def _by_numpy(self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray) -> Tested:
-        """Return the verdict on a few boxes, as :meth:`examine_second`."""
-        n = len(lower)
-        c, a, Q, r = encloser.second(lower, upper)
-        # The square of a coordinate is a half, plus or minus as much.
-        squares = [n * i - i * (i - 1) // 2 for i in range(n)]
-        Q = Q.copy()
-        Q[:, :, squares] *= 0.5
-        terms, middle = np.concatenate([a, Q], axis=2), c + Q[:, :, squares].sum(axis=2)
-        rest = (r + change.T) * (1 + ROUNDING) + ROUNDING * (np.abs(c) + np.abs(terms).sum(axis=2))
-        found = self._of_entries(middle, terms, rest, terms.shape[2])
-        return found._replace(shares=found.shares[:, :n])
 
     def examine(
         self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]

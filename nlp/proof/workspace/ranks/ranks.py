@@ -45,7 +45,6 @@ def prove_ranks(
     homes: Homes,
     *,
     legs: Legs | None = None,
-    engine: str | None = None,
     progress: RankProgress | None = None,
     paper: PaperRecord | None = None,
 ) -> Ranks:
@@ -55,7 +54,6 @@ def prove_ranks(
         model: the robot, without unknowns that follow in closed form.
         homes: the case, its poses and the machines that are meant.
         legs: joint centres of six straight legs; None for another robot.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         progress: called during them.
         paper: records the searches for a proof.
     """
@@ -63,7 +61,7 @@ def prove_ranks(
     try:
         family = _family(model, homes, legs)
         problem = build_problem(homes.case, model, box) if family is None else family.problem
-        prove = partial(prove_rank, problem, family=family, engine=engine, progress=progress)
+        prove = partial(prove_rank, problem, family=family, progress=progress)
         shown = partial(_is_shown, problem, family, homes)
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
@@ -126,4 +124,4 @@ def _after_newton(
 
 def not_judged(box: PoseBox, reason: str) -> Regularity:
     """Return the verdict on a robot that no search covers."""
-    return Regularity(Outcome.OPEN, box, None, None, "numpy", 0, 1, 1.0, 0.0, reason)
+    return Regularity(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)

@@ -12,6 +12,7 @@ from .....models import FloatArray, frozen_array
 from ....interruption import one_search
 from ...boxes.rows import Boxes, joined, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
+from ...enclosure.engine import ENGINE
 from ..robot.motion_matrix import RankMatrix
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
@@ -38,7 +39,6 @@ def prove_rank(
     matrix: RankMatrix,
     *,
     family: Family | None = None,
-    engine: str | None = None,
     time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
@@ -51,7 +51,6 @@ def prove_rank(
         problem: the robot.
         matrix: one of its two matrices.
         family: all machines that are meant; None for the design alone.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
@@ -67,7 +66,6 @@ def prove_rank(
             problem,
             matrix,
             family,
-            engine,
             recorder,
             NewtonRefuter(problem, matrix, family) if refuter is None else refuter,
         )
@@ -104,7 +102,7 @@ def prove_rank(
         box=problem.box,
         y=None if y is None else frozen_array(y, (6,)),
         sides=None if singular is None else singular.sides,
-        engine=rule.engine,
+        engine=ENGINE,
         boxes=search.boxes,
         open=search.left,
         share=share,
@@ -119,10 +117,9 @@ class _RankRule(LoopRule):
     """Rule of the rank of a matrix.
 
     Args:
-        problem, matrix, family, engine, recorder, refuter: as in :func:`prove_rank`.
+        problem, matrix, family, recorder, refuter: as in :func:`prove_rank`.
 
     Attributes:
-        engine: ``c`` or ``numpy``.
         singular: a singular pose; None while none is known.
     """
 
@@ -133,16 +130,13 @@ class _RankRule(LoopRule):
         problem: Problem,
         matrix: RankMatrix,
         family: Family | None,
-        engine: str | None,
         recorder: TreeRecord | None,
         refuter: Refuter,
     ) -> None:
         test = RankTest(matrix, problem.z, problem.start)
         if family is not None:
             test = RankTest(family.matrix(matrix), family.coordinates, family.start)
-        examiner = Examiner(problem, test, engine, family)
-        super().__init__(problem, examiner)
-        self.engine: str = examiner.engine
+        super().__init__(problem, Examiner(problem, test, family))
         self.singular: Singular | None = None
         self._recorder, self._refuter, self._examined = recorder, refuter, 0
 

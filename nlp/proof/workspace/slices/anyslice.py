@@ -78,7 +78,7 @@ class AnySlices:
             self.limits = AnyLimits(case, closed, problem)
             matrices = [problem.locked, *([] if problem.unactuated is None else [problem.unactuated])]
             tests = [RankTest(each, problem.z, problem.start) for each in matrices]
-            self.examiners = [Examiner(problem, each, None, None) for each in tests]
+            self.examiners = [Examiner(problem, each) for each in tests]
         except (NotJudgedError, UncoveredError) as error:
             raise CaseError("workspace", f"has no slices: {error}", source=case.source) from None
         self._dependent = list(problem.dependent)

@@ -25,7 +25,7 @@ from ....case.limits.singular_values import ConditionNumber, SmallestSingularVal
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....program.layout import Layout
-from ...enclosure.first_order import enclose
+from ...enclosure.forms import enclose
 from ...enclosure.instructions import compile_tape
 from ...statement.claims import Claim, claims_of
 from ...statement.machine import Legs

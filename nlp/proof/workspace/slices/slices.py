@@ -117,7 +117,7 @@ def _of_legs(case: Case, legs: Legs, wide: PoseBox, chosen: list[int]) -> Covere
 
     first = FirstViolated(violated, len(limits.limits), lower[chosen], upper[chosen])
     problem = build_problem(case, case.model, wide)
-    examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start), None)
+    examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start))
     cover = _LegsRule(examiner, limits, first, whole, chosen).result
     return Covered(cover, limits.limits, limits.uncovered)
 

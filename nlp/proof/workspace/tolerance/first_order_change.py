@@ -39,7 +39,7 @@ class Place(NamedTuple):
     z: SX
 
 
-def worst_number(place: Place, number: SX, reading: Reading, sign: float, engine: str | None = None) -> Worst | None:
+def worst_number(place: Place, number: SX, reading: Reading, sign: float) -> Worst | None:
     """Return the largest (sign 1) or smallest (sign -1) value of a number over all machines; None without a bound.
 
     Args:
@@ -47,7 +47,6 @@ def worst_number(place: Place, number: SX, reading: Reading, sign: float, engine
         number: (1, 1) in their coordinates, smooth.
         reading: how it reads.
         sign: which end is meant.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
@@ -56,7 +55,7 @@ def worst_number(place: Place, number: SX, reading: Reading, sign: float, engine
     machine = _Machine(family, number, reading, sign)
     poses = family.problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(family.problem.free)]
     first = max((machine.first_order_change(z) for z in poses), default=0.0)
-    rest = second_order_change(family, number, first, engine)
+    rest = second_order_change(family, number, first)
     if not math.isfinite(rest):
         return None
     gradient = ca.gradient(number, e)

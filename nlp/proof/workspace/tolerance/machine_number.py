@@ -96,7 +96,6 @@ def smallest_of_machines(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-    engine: str | None = None,
 ) -> MachineMinimum:
     """Prove the smallest value of an expression over all machines and poses.
 
@@ -107,14 +106,13 @@ def smallest_of_machines(
         limit: the search ends once the bound is at least this, or a smaller value is known.
         slack: how far a value may be below the limit and still count as on it.
         time_limit: seconds after which the search stops with the bound reached.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
     effort = Effort()
     with one_search(time_limit):
-        rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True), engine)
+        rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
         search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
         reason = effort.run(search, rule.ending(search))
     bound, (value, z) = -search.bound, rule.best
@@ -136,8 +134,8 @@ class _MachineRule(LoopRule, SmallestValue[Followed]):
 
     block = _BLOCK
 
-    def __init__(self, family: Family, expression: SX, goal: Goal, engine: str | None) -> None:
-        LoopRule.__init__(self, family.problem, Examiner(family.problem, _Bound(expression), engine, family))
+    def __init__(self, family: Family, expression: SX, goal: Goal) -> None:
+        LoopRule.__init__(self, family.problem, Examiner(family.problem, _Bound(expression), family))
         SmallestValue.__init__(self, goal, Value(math.inf, family.start))
         self._points = MachinePoints(family, expression)
 

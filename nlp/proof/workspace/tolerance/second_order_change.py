@@ -46,21 +46,20 @@ def is_smooth(family: Family, expression: SX) -> bool:
     return not any(function.instruction_id(k) in _KINKS for k in range(function.n_instructions()))
 
 
-def second_order_change(family: Family, expression: SX, first: float, engine: str | None = None) -> float:
+def second_order_change(family: Family, expression: SX, first: float) -> float:
     """Return a bound of the change of an expression beyond first order; infinite where none is found.
 
     Args:
         family: the machines; no coordinate of theirs follows from others.
         expression: (1, 1) in their coordinates, smooth.
         first: size of the first-order change at some pose, beside which a small bound is good enough.
-        engine: ``"c"``, ``"numpy"``, or None for the C kernel where it was built.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
     H = ca.hessian(expression, family.errors)[0]
     groups = _groups(H, len(family.names))
-    return sum((_of_centres(family, H, each, first / len(groups), engine) for each in groups), 0.0)
+    return sum((_of_centres(family, H, each, first / len(groups)) for each in groups), 0.0)
 
 
 def _groups(H: SX, count: int) -> list[list[int]]:
@@ -73,14 +72,14 @@ def _groups(H: SX, count: int) -> list[list[int]]:
     return [np.flatnonzero(group == each).tolist() for each in sorted(own)]
 
 
-def _of_centres(family: Family, H: SX, centres: list[int], first: float, engine: str | None) -> float:
+def _of_centres(family: Family, H: SX, centres: list[int], first: float) -> float:
     """Return the bound for errors of some centres, whose second derivatives depend on no other errors."""
     problem = family.problem
     places = [3 * j + k for j in centres for k in range(3)]
     own = ca.tril(H[places, places])
     blocks = _Blocks(own, len(centres))
     encloser = Encloser(
-        ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*[own.nz[k] for k in range(own.nnz())]), engine
+        ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*[own.nz[k] for k in range(own.nnz())])
     )
     rule, whole = _ChangeRule(family, encloser, blocks, len(places)), whole_workspace(problem)
     width = (whole.upper - whole.lower)[0]

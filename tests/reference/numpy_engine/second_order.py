@@ -6,10 +6,10 @@ On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, each value ``v`` of the tape
 
 where ``[p, q]`` holds 0 and all terms of third and higher order, and ``s`` bounds the rounding errors. The terms of
 second order of a sum cancel as they do in the function, so that what ``[p, q]`` holds is an order smaller than in
-:mod:`.enclosure`, for ``n (n + 1) / 2`` more coefficients of each value. Taylor models of second order: see the sources
-there. Terms of third order of a product are bounded monomial by monomial.
+:mod:`.first_order`, for ``n (n + 1) / 2`` more coefficients of each value. Terms of third order of a product are
+bounded monomial by monomial.
 
-Rounding and poison are as in :mod:`.enclosure`. This module is the reference; the C kernel has the same formulas.
+Rounding and poison are as in :mod:`.first_order`.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .first_order import midpoints
+from screwsynth.nlp.proof.enclosure.intervals import midpoints
+from screwsynth.nlp.proof.enclosure.tape import Op, Tape
+
 from .intervals import LARGEST, TINY, ULP, Interval, interval_product, widen
-from .tape import Op, Tape
 from .univariate import RULES, Rule
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ....models import FloatArray
+    from screwsynth.models import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

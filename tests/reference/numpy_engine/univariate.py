@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from screwsynth.nlp.proof.enclosure.tape import Op
+
 from .intervals import LIBRARY, TINY, ULP, widen
-from .tape import Op
 
 if TYPE_CHECKING:
-    from ....models import FloatArray
+    from screwsynth.models import FloatArray
 
 #: Error of a library's function, in parts of its size.
 _LIBRARY_ERROR = LIBRARY * ULP

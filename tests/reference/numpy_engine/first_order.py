@@ -1,78 +1,31 @@
 """Enclosures of a tape's results over many boxes at once: Taylor forms and intervals with rigorous rounding terms.
 
-On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, each value ``v`` of the tape has two enclosures: for ``0 <= t <= 1``
-
-    v(t e) in c + t sum_i a_i e_i + t^2 [p, q] +- s        and        lo <= v <= hi,
-
-where ``c`` is its value at the centre, ``a`` its scaled gradient there, ``[p, q]`` holds 0 and all terms of second
-order, and ``s`` bounds the rounding errors. The terms of second order shrink with ``t^2``, so that the integral of a
-gradient's form along a ray has a third of their width. The interval is intersected with the form's range at every
-operation. These are Taylor models of first order (M. Berz and K. Makino, *Verified integration of ODEs and flows using
-differential algebraic methods on high-order Taylor models*, Reliable Computing 4 (1998)) with the products bounded as
-in affine arithmetic (J. Stolfi and L. H. de Figueiredo, 1997; F. Messine, *Extensions of affine arithmetic*, 2002).
-
-All arithmetic is in round to nearest; each operation adds more to ``s``, and to both ends, than its roundings can cost
-(see ``docs/certificate.md``). A value that may be undefined somewhere in the box, or that overflows, is *poisoned*: its
-``s`` and its ends are infinite, and so are those of every value computed from it.
-
-This module is the reference; the C kernel (``kernel/``) has the same formulas.
+:mod:`screwsynth.nlp.proof.enclosure.forms` states both. The interval is intersected with the form's range at every
+operation. All arithmetic is in round to nearest; each operation adds more to ``s``, and to both ends, than its
+roundings can cost (see ``docs/certificate.md``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from screwsynth.nlp.proof.enclosure.forms import Enclosures
+from screwsynth.nlp.proof.enclosure.intervals import midpoints
+from screwsynth.nlp.proof.enclosure.tape import Op, Tape
+
 from .intervals import LARGEST, TINY, ULP, interval_product, widen
-from .tape import Op, Tape
 from .univariate import RULES
 
 if TYPE_CHECKING:
-    from ....models import FloatArray
+    from screwsynth.models import FloatArray
 
 
-@dataclass(eq=False)
-class Enclosures:
-    """Enclosures of R values over B boxes.
-
-    Attributes:
-        c: (R, B) values at the centres.
-        a: (R, n, B) scaled gradients there.
-        p, q: (R, B) least and largest sum of the terms of second order, ``p <= 0 <= q``.
-        s: (R, B) bounds of the rounding errors; infinite where a value is poisoned.
-        lo, hi: (R, B) intervals.
-    """
-
-    c: FloatArray
-    a: FloatArray
-    p: FloatArray
-    q: FloatArray
-    s: FloatArray
-    lo: FloatArray
-    hi: FloatArray
-
-    @classmethod
-    def zeros(cls, values: int, symbols: int, boxes: int) -> Enclosures:
-        """Return enclosures of zero, to be written to."""
-        c, p, q, s, lo, hi = (np.zeros((values, boxes)) for _ in range(6))
-        return cls(c, np.zeros((values, symbols, boxes)), p, q, s, lo, hi)
-
-
-class Midpoints(NamedTuple):
-    """Centres and radii of boxes, (n, B) each; ``centre +- radius`` holds the box in spite of rounding."""
-
-    centre: FloatArray
-    radius: FloatArray
-
-
-def midpoints(lower: FloatArray, upper: FloatArray) -> Midpoints:
-    """Return the centres and radii of boxes with ends (n, B)."""
-    centre = np.clip(0.5 * lower + 0.5 * upper, lower, upper)
-    radius = np.maximum(upper - centre, centre - lower)
-    radius = np.where(radius > 0, radius * (1 + ULP) + TINY, 0.0)
-    return Midpoints(centre, np.where(np.maximum(-lower, upper) < LARGEST, radius, np.inf))
+def zeros(values: int, symbols: int, boxes: int) -> Enclosures:
+    """Return enclosures of zero, to be written to."""
+    c, p, q, s, lo, hi = (np.zeros((values, boxes)) for _ in range(6))
+    return Enclosures(c, np.zeros((values, symbols, boxes)), p, q, s, lo, hi)
 
 
 def enclose(tape: Tape, lower: FloatArray, upper: FloatArray) -> Enclosures:
@@ -156,9 +109,9 @@ class _Interpreter:
 
     def __init__(self, tape: Tape, boxes: int) -> None:
         self.tape = tape
-        self.work = Enclosures.zeros(tape.registers, tape.inputs, boxes)
+        self.work = zeros(tape.registers, tape.inputs, boxes)
         self.rad = np.zeros((tape.registers, boxes))
-        self.out = Enclosures.zeros(tape.outputs, tape.inputs, boxes)
+        self.out = zeros(tape.outputs, tape.inputs, boxes)
         # An operation makes about n + 4 roundings of each of its terms.
         self.slack = (tape.inputs + 8) * ULP
 

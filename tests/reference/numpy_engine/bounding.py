@@ -1,42 +1,59 @@
 """Examination of boxes with NumPy: bounds, impossible conditions, monotonicity, contraction, the next bisection.
 
-Each box gets an upper bound of the maximised value over its feasible part. With ``h = r e``, ``|e_i| <= 1``, the forms
-of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the ray from the centre, give
-
-    L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
-    b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
-
-a quadratic model with a remainder of third order, without second derivatives. With ``mu`` on the simplex and
-``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
-conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
-
-This module is the reference; the C kernel (``kernel/``) has the same formulas. ``docs/certificate.md`` explains them.
+Each box gets an upper bound of the maximised value over its feasible part, by the models of
+:mod:`screwsynth.nlp.proof.enclosure.quadratic_models`. ``docs/certificate.md`` explains the formulas.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ....models.arrays import first_largest
-from ..enclosure.first_order import Enclosures, Midpoints, enclose, midpoints
-from ..enclosure.intervals import ULP
-from ..enclosure.quadratic_models import GradientModel, QuadraticModel, affine_ends_reaching, multipliers, ranges
-from ..enclosure.squared_quotients import search_rows, with_quotients
-from ..enclosure.tangent_bounds import tangent_rows
-from ..statement.standard_form import StandardForm
-from .examination import COLLAPSED, UNMOVED, Examination, Remainder, Verdict
-from .first_pass import LINEAR, Cuts, FirstPass, first_pass, value_tape, without_conditions
-from .tapes import objective_tape, search_tape
+from screwsynth.models import FloatArray
+from screwsynth.models.arrays import first_largest
+from screwsynth.nlp.proof.boxes.examination import COLLAPSED, UNMOVED, Examination, Verdict
+from screwsynth.nlp.proof.boxes.tapes import objective_tape, search_tape, value_tape, without_conditions
+from screwsynth.nlp.proof.enclosure.intervals import Midpoints, midpoints
+from screwsynth.nlp.proof.enclosure.quadratic_models import affine_ends_reaching, gradient_model, multipliers, ranges
+from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows, tangent_rows
+from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from ....models import FloatArray
+from .first_order import enclose
+from .first_pass import LINEAR, Cuts, FirstPass, first_pass
+from .intervals import ULP
+from .quadratic_models import GradientModel, QuadraticModel
+from .squared_quotients import with_quotients
 
 #: Part of a side below which a contraction is not worth its leaf in a proof.
 _WORTH = 0.1
+
+
+@dataclass(eq=False)
+class Remainder:
+    """Parts of B boxes that are left, with the reasons for their ends and for closing a box; written to in place.
+
+    The attributes are those of :class:`Examination`.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    cut_lower: NDArray[np.int32]
+    cut_upper: NDArray[np.int32]
+    verdict: NDArray[np.int32]
+    reason: NDArray[np.int32]
+
+    @classmethod
+    def whole(cls, lower: FloatArray, upper: FloatArray) -> Remainder:
+        """Return whole boxes, all open."""
+        cuts = np.full(lower.shape, UNMOVED, dtype=np.int32)
+        open_boxes = np.zeros(lower.shape[1], dtype=np.int32)
+        return cls(lower.copy(), upper.copy(), cuts, cuts.copy(), open_boxes, open_boxes.copy())
+
+    def close(self, which: NDArray[np.bool_], verdict: Verdict, reason: int | NDArray[np.intp]) -> None:
+        """Close some boxes for a reason."""
+        self.verdict[which], self.reason[which] = verdict, reason
 
 
 class NumpyEngine:
@@ -44,16 +61,19 @@ class NumpyEngine:
 
     Args:
         form: the form whose box is searched.
+        jobs: threads, which it has not.
         apart: whether N and D of the functions' squared quotients are enclosed, and not the quotients. The first pass
             over a box does without.
         tangents: whether the first pass has tangents to the squares of a minimum.
     """
 
-    name = "numpy"
     #: Boxes that fit the processor's cache with all their registers.
     block = 1024
 
-    def __init__(self, form: StandardForm, *, apart: bool = False, tangents: bool = True) -> None:
+    def __init__(
+        self, form: StandardForm, jobs: int | None = None, *, apart: bool = False, tangents: bool = True
+    ) -> None:
+        del jobs
         self.form = form
         rows = search_rows(form, apart=apart)
         self._tape, self._quotients = search_tape(form, rows), rows.quotients
@@ -176,31 +196,11 @@ class NumpyEngine:
 
         The ends of gradients that are not scaled are for points whose values are at least ``least`` (B,).
         """
-        n, R = self.form.n, len(self.equation)
-        E = R + 2 * len(self._quotients)
-        box = enclose(self._tape, lower, upper)
-        shape = (E, n, lower.shape[1])
-        r = radius[None]
-
-        def scaled(values: FloatArray) -> FloatArray:
-            return np.where(r > 0, values[E:].reshape(shape) * r, 0.0)
-
-        rows = GradientModel(
-            value=Enclosures(*(each[:E] for each in vars(box).values())),
-            b=scaled(box.c),
-            A=box.a[E:].reshape(E, n, n, lower.shape[1]) * radius[None, :, None],
-            p=scaled(box.p),
-            q=scaled(box.q),
-            s=scaled(box.s),
-            slope_lo=scaled(box.lo),
-            slope_hi=scaled(box.hi),
-            gradient_lo=box.lo[E:].reshape(shape),
-            gradient_hi=box.hi[E:].reshape(shape),
-        )
-        return with_quotients(rows, self._quotients, R, radius, least)
+        rows = gradient_model(enclose(self._tape, lower, upper), radius)
+        return with_quotients(GradientModel(**vars(rows)), self._quotients, len(self.equation), radius, least)
 
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
-        """Return weights (R, B) of the Lagrangian: see :func:`.quadratic.multipliers`."""
+        """Return weights (R, B) of the Lagrangian: see :func:`.quadratic_models.multipliers`."""
         weighed = np.where(self._follows[:, None], -np.inf, high)
         return multipliers(model.b, weighed, self.equation, self.functions, first)
 

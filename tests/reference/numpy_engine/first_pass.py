@@ -3,52 +3,27 @@
 It closes a box by its bound or by a condition that cannot hold, and contracts the others. Only these go on to the forms
 of the gradients in :mod:`.bounding`, which cost as much again and find variables along which a box is monotone. For any
 weights the forms add up to a quadratic model of the Lagrangian with a constant remainder, the terms of third order.
-
-This module is the reference; the C kernel has the same formulas.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
-from ..enclosure.instructions import compile_tape
-from ..enclosure.intervals import TINY, ULP
-from ..enclosure.quadratic_models import Ends, QuadraticModel, multipliers
-from ..enclosure.second_order import Forms, enclose_second, monomials
-from ..enclosure.tangent_bounds import TangentRows, tangent_forms
-from .examination import UNMOVED, Verdict
+from screwsynth.models import FloatArray
+from screwsynth.nlp.proof.boxes.examination import UNMOVED, Verdict
+from screwsynth.nlp.proof.enclosure.quadratic_models import Ends, multipliers
+from screwsynth.nlp.proof.enclosure.tape import Tape
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from .intervals import TINY, ULP
+from .quadratic_models import QuadraticModel
+from .second_order import Forms, enclose_second, monomials
+from .tangent_bounds import tangent_forms
 
-    from ....models import FloatArray
-    from ..enclosure.tape import Tape
-    from ..statement.standard_form import StandardForm
-
-#: Largest number of variables for which the first pass is made: a value has half its square as coefficients.
-MOST_VARIABLES = 12
 #: Weight of the Lagrangian's linear part beside its curved part in the choice of the variable to bisect.
 LINEAR = 0.3
-
-
-def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | None:
-    """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
-
-    None is returned for a form with too many variables for a first pass.
-    """
-    if form.n > MOST_VARIABLES:
-        return None
-    every = form.expressions if rows is None else ca.densify(ca.vertcat(form.expressions, rows.expressions))
-    return compile_tape(ca.Function("values", [form.x], [ca.cse(every)]))
-
-
-def without_conditions(form: StandardForm) -> StandardForm:
-    """Return the form of the functions alone."""
-    return replace(form, conditions=(), signs=())
 
 
 class Cuts(NamedTuple):

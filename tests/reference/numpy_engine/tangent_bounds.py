@@ -12,55 +12,18 @@ function. Any other point gives a bound that holds too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
-from casadi import SX
+from numpy.typing import NDArray
 
-from ..statement.limb_separation import terms_of
+from screwsynth.models import FloatArray
+
 from .intervals import LARGEST, TINY, ULP
 from .second_order import Forms, monomials
-from .squared_quotients import as_quotient
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from ....models import FloatArray
-    from ..statement.standard_form import StandardForm
 
 #: Sweeps over the variables in the search for a point where the sum of squares is small.
 _SWEEPS = 8
-
-
-class TangentRows(NamedTuple):
-    """Rows behind the expressions of a form.
-
-    Attributes:
-        expressions: (J + 2 K, 1) functions without their K terms ``-N^2 / D``, then N and D of each.
-        functions: (K,) number of the function of each.
-    """
-
-    expressions: SX
-    functions: tuple[int, ...]
-
-
-def tangent_rows(form: StandardForm) -> TangentRows | None:
-    """Return the rows of a form for tangents; None where no function has squares with a minus sign."""
-    rests: list[SX] = []
-    parts: list[SX] = []
-    functions: list[int] = []
-    for j, function in enumerate(form.functions):
-        rest = SX(0)
-        for term in terms_of(function):
-            quotient = as_quotient(term, j)
-            if quotient is None or quotient.sign > 0:
-                rest = rest + term
-            else:
-                parts += [quotient.N, quotient.D]
-                functions.append(j)
-        rests.append(rest)
-    return TangentRows(ca.vertcat(*rests, *parts), tuple(functions)) if functions else None
 
 
 class TangentForms(NamedTuple):
