@@ -16,6 +16,7 @@ from functools import partial
 from typing import NamedTuple
 
 from ....models import FloatArray, frozen_array
+from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
 from ...interruption import one_search, reason_of, reason_to_stop
@@ -81,6 +82,8 @@ def certify_program(
         ValueError: ``above`` for a maximisation.
         InputError: the C kernel was not built.
     """
+    if above is not None and nlp.sense is not Sense.MIN:
+        raise ValueError("above is proved by minimising: the program's sense must be min")
     with one_search(time_limit):
         effort = Effort()
         if nlp.n == 0:
