@@ -113,6 +113,8 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
 
     target, name = (search._RankRule, "divided") if place == "branch" else (Examiner, "examine")
     monkeypatch.setattr(target, name, interrupt)
+    # The poses of opposite signs that are known before a box is bisected would refute the claim, as they should.
+    monkeypatch.setattr(SignRefuter, "look", lambda *_: None)
     problem = build_problem(case, model, box)
     found = search.prove_rank(problem, problem.locked, refuter=SignRefuter(legs, problem))
     assert found.outcome is Outcome.OPEN

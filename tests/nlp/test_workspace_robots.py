@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Solution, load_case, pareto, solve
 from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.front.data import front_result
@@ -274,6 +275,18 @@ def test_slices_and_limits_of_a_robot_with_loops_hold_at_every_point() -> None:
     assert {each.outcome for each in refuted if each.limit == -0.08} == {Outcome.REFUTED}
     worst = tripod(case, roll, pitch, np.full(10_000, 1.1))[0].min()
     assert min(each.reached for each in refuted) <= worst
+
+
+def test_a_slice_is_drawn_where_no_loops_close_at_its_ends() -> None:
+    """The legs reach no further than the sum of their lengths, and the slice is wider than the workspace."""
+    lengths = {item.name: item.typical[0] for item in build_model("planar-3-rrr").parameters}
+    text = "[robot]\nmodel = 'planar-3-rrr'\n[robot.parameters]\n"
+    text += "".join(f"{name} = {value}\n" for name, value in lengths.items())
+    text += "[pose]\nposition = [0, 0, 0]\n[[task]]\nsense = 'max'\naxis = [0, 0, 1]\npoint = [0, 0, 0]\npitch = 0.1\n"
+    half = sum(lengths.values())
+    text += f"[workspace]\nposition = [{{min = -{half}, max = {half}}}, {{min = -{half}, max = {half}}}, 0]\n"
+    (found,) = slices_of(case_from_tables(tomllib.loads(text), name="mine", source="mine"))
+    assert {Region.UNKNOWN} <= set(found.regions)
 
 
 def test_slices_need_two_numbers_that_the_robot_can_choose() -> None:

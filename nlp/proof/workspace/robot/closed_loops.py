@@ -73,6 +73,8 @@ class Loops:
         A point that does not close is NaN.
         """
         z = z.copy()
+        if not z.size:
+            return z
         with np.errstate(all="ignore"):
             for _ in range(_STEPS):
                 residual, slopes = self.values(z), self.slopes(z)[:, :, moving] * self.size[moving]
