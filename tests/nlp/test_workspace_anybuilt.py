@@ -226,7 +226,7 @@ SAMPLED: dict[str, Callable[[], Sampled]] = {"3-rps": ThreeRps, "6-rus": SixRus,
 
 def wanted(found: Machines, names: tuple[str, ...], gap: float) -> list[Extreme]:
     """Return the smallest and largest value of each of these numbers."""
-    effort = Effort(gap, 60.0, 1, lambda: False)
+    effort = Effort(gap, 1)
     quantities = [each.name for each in found.built.model.quantities]
     every = machine_extremes(found, quantities, effort, with_objective=True, only=names)
     return [each for each in every if each.name in names]
