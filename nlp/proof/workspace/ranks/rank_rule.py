@@ -105,8 +105,12 @@ class RankTest:
             change = np.zeros((len(self._at[0]), count)) if change is None else change
             parts = [slice(k, k + size) for k in range(0, count, size)]
             tested = [self._by_numpy(encloser, lower[:, k], upper[:, k], change[:, k]) for k in parts]
-            regular, shares, smallest, signs = zip(*tested, strict=True)
-            return Tested(*map(np.concatenate, (regular, shares, smallest, signs)))
+            return Tested(
+                np.concatenate([each.is_regular for each in tested]),
+                np.concatenate([each.shares for each in tested]),
+                np.concatenate([each.smallest for each in tested]),
+                np.concatenate([each.signs for each in tested]),
+            )
         regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
         shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
