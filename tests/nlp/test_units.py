@@ -16,9 +16,11 @@ import pytest
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED, gallery_names
 from screwsynth.nlp import Case, case_from_tables, certify, json_data, result_of, solve
+from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.first_order import enclose
@@ -33,6 +35,11 @@ from screwsynth.nlp.results.summary import case_summary, evaluation_summary
 from screwsynth.nlp.results.text import Line, TextTable
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacewording import workspace_summary
+from screwsynth.nlp.sweeps.columns import columns_of
+from screwsynth.nlp.sweeps.points import Points
+from screwsynth.nlp.sweeps.rows import Row
+from screwsynth.nlp.sweeps.source import CaseSource
+from screwsynth.nlp.sweeps.sweep import Sweep
 
 Tables = dict[str, Any]
 Make = Callable[[Case], tuple[object, Iterable[Line | TextTable]]]
@@ -281,3 +288,11 @@ def test_residuals_that_are_rounding_have_no_digits() -> None:
 def test_rounding_decides_on_no_order() -> None:
     assert ordered(0.8339443) == ordered(0.8339443 * (1 + 1e-12))
     assert ordered(0.8339443) < ordered(0.83395)
+
+
+def test_a_page_of_a_sweep_shows_rounding_as_zero() -> None:
+    points = Points(("x4",), np.array([[5.0]]))
+    sweep = Sweep.of(CaseSource.from_file(read_case("paper-4.1-helical")), points)
+    found = columns_of(sweep, [Row(0, "optimal", 1.0, x=tuple(1.234e-17 for _ in sweep.variables))])
+    page = sweep_page(sweep.source.case_at(points.settings(0)), points, found)
+    assert "1.234e-17" not in page
