@@ -15,11 +15,13 @@ import pytest
 
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED, gallery_names
-from screwsynth.nlp import Case, case_from_tables, certify, json_data, result_of, solve
+from screwsynth.nlp import Case, case_from_tables, certify, json_data, pareto, result_of, solve
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.front.goals import read_goals
+from screwsynth.nlp.front.programs import program_of
 from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
@@ -296,3 +298,31 @@ def test_a_page_of_a_sweep_shows_rounding_as_zero() -> None:
     found = columns_of(sweep, [Row(0, "optimal", 1.0, x=tuple(1.234e-17 for _ in sweep.variables))])
     page = sweep_page(sweep.source.case_at(points.settings(0)), points, found)
     assert "1.234e-17" not in page
+
+
+def with_other_task(model: Model, unit: str) -> Case:
+    tables = tables_of(model, unit)
+    task = tables["task"][0] | {"name": "task"}
+    tables["task"] = [task, task | {"name": "other", "axis": [1, 0, 0]}]
+    return case_from_tables(tables, name=model.name, source=model.name)
+
+
+def test_a_bound_of_F_on_a_front_is_of_the_same_size_in_every_unit() -> None:  # noqa: N802 - the objective's name
+    sizes = []
+    for unit, f in UNITS.items():
+        case = with_other_task(robot_function("hexapod")(), unit)
+        nlp = program_of(case, read_goals(["max F:task", "min F:other"], case), 0, (None, 178 * f**2)).nlp
+        assert nlp.program.constraints[-1].reading.from_value(nlp.g_upper[-1]) == pytest.approx(178 * f**2)
+        sizes.append(nlp.row_sizes[-1])
+    assert sizes == pytest.approx([sizes[0]] * len(UNITS))
+    assert 0.1 < sizes[0] < 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hexapod", "orthoglide", "five-bar"])
+def test_a_front_is_the_same_in_every_unit(name: str) -> None:
+    fronts = []
+    for unit, f in UNITS.items():
+        found = pareto(with_other_task(robot_function(name)(), unit), ["max F:task", "min F:other"], points=4, starts=4)
+        fronts.append([point.values / f**2 for point in found.points])
+    assert all(np.allclose(fronts[0], front, rtol=1e-6) for front in fronts)
