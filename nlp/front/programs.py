@@ -16,7 +16,7 @@ from casadi import SX
 
 from ...models import Dimension, FloatArray
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
+from ..case.limits.constraint import BoundedConstraint, Constraint, Reading, in_parts
 from ..case.pose import Free, OverPoses
 from ..case.task import Sense
 from ..errors import InputError, listing
@@ -96,9 +96,11 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
     added: list[BoundedConstraint] = []
     for goal, bound in zip(goals, bounds, strict=True):
         if bound is not None and goal.task is not None:
-            F = _total(layout, tasks.index(goal.task))
-            sides = (bound, math.inf) if goal.sense is Sense.MAX else (-math.inf, bound)
-            added.append(BoundedConstraint(Constraint(f"F of {goal.label[2:]}", F, Reading(Dimension.NUMBER)), *sides))
+            # Of order 1, as the solver takes what is no limit of the case.
+            part = 1 / formulate(case, goal.task).objective_scale
+            F = part * _total(layout, tasks.index(goal.task))
+            sides = (part * bound, math.inf) if goal.sense is Sense.MAX else (-math.inf, part * bound)
+            added.append(BoundedConstraint(Constraint(f"F of {goal.label[2:]}", F, in_parts(part)), *sides))
         if bound is not None and goal.task is None:
             layout = replace(layout, constraints=tuple(_moved(item, goal, bound) for item in layout.constraints))
     raw, readings = zip(*[_raw(layout, goal, tasks) for goal in goals], strict=True)

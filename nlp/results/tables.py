@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from ..case.case import Case
     from ..case.settings import Search
+    from ..program.nlp import Nlp
     from ..solver.multistart import ProgramSolution
     from .data import SolveResult
     from .evaluation import PrincipalMotionsData
@@ -172,6 +173,12 @@ def _violated(result: SolveResult | CombinedData) -> Collection[str]:
     return () if result.reached is None else [side.name for side in result.reached.violated]
 
 
+def sizes_of_variables(nlp: Nlp) -> list[float]:
+    """Return the size of each variable's range in the case's units, beside which its values have rounding error."""
+    pairs = zip(nlp.scale, nlp.program.variables, strict=True)
+    return [nlp.case.units.shown(float(size), variable.dimension) for size, variable in pairs]
+
+
 def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> TextTable:
     """Return the best of the distinct optima that a solve found: F, and every variable.
 
@@ -181,10 +188,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
     """
     units, variables = solution.nlp.case.units, solution.nlp.program.variables
     labels = [(variable.name, units.label(variable.dimension)) for variable in variables]
-    widths = [
-        units.shown(float(size), variable.dimension)
-        for size, variable in zip(solution.nlp.scale, variables, strict=True)
-    ]
+    widths = sizes_of_variables(solution.nlp)
     rows = []
     for found in solution.optima[:MOST_OPTIMA]:
         spread = f", a set over {100 * found.spread:.0f} % of the ranges" if found.spread > SET else ""

@@ -6,6 +6,8 @@ import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from operator import mul
 from typing import TypeAlias, TypeVar
 
 from casadi import SX
@@ -71,6 +73,17 @@ def _slope_of_square(value: float) -> float:
 
 def _square(number: SX) -> SX:
     return number * number
+
+
+def in_parts(part: float) -> Reading:
+    """Return the reading of a part of a plain number as the number itself."""
+    return Reading(
+        Dimension.NUMBER, from_value=partial(mul, 1 / part), slope=partial(_slope, part), to_value=partial(mul, part)
+    )
+
+
+def _slope(part: float, value: float) -> float:  # noqa: ARG001 - a slope is a function of the bound
+    return part
 
 
 LENGTH, NUMBER = Reading(Dimension.LENGTH), Reading(Dimension.NUMBER)

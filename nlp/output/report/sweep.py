@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...case.case import Case
+from ...program.formulation import formulate
 from ...results.rounding import number
+from ...results.tables import sizes_of_variables
 from ...results.text import TextTable
 from ...results.tradeoffwording import unit_of_objective
 from ...sweeps.columns import SweepColumns, stated_pose_note
@@ -59,14 +61,16 @@ def _table(case: Case, found: SweepColumns) -> TextTable:
     headers = ["point", *found.numbers, "status", f"F\n{unit}" if unit else "F"]
     headers += ["certificate", "gap"] if is_proved else []
     headers += [*found.design, "active"]
-    rows = []
+    nlp, rows = formulate(case), []
+    names = [each.name for each in nlp.program.variables]
+    sizes = dict(zip(names, sizes_of_variables(nlp), strict=True))
     for k in range(min(len(found), _ROWS)):
         row = [str(k), *(number(values[k]) for values in found.numbers.values()), found.status[k], _text(found.F[k])]
         row += [found.certificate[k], _text(found.gap[k])] if is_proved else []
-        row += [_text(values[k]) for values in found.design.values()]
+        row += [_text(values[k], sizes.get(name, 0.0)) for name, values in found.design.items()]
         rows.append((*row, ", ".join(found.active[k]) or found.note[k]))
     return TextTable(tuple(headers), tuple(rows))
 
 
-def _text(value: float) -> str:
-    return number(value) if np.isfinite(value) else ""
+def _text(value: float, size: float = 0.0) -> str:
+    return number(value, size) if np.isfinite(value) else ""

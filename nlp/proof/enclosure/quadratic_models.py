@@ -224,14 +224,21 @@ def gradient_model(box: Enclosures, radius: FloatArray) -> GradientModel:
 
 
 def multipliers(
-    gradients: FloatArray, high: FloatArray, equation: NDArray[np.bool_], functions: int, first: int = 0
+    gradients: FloatArray,
+    rounding: FloatArray,
+    high: FloatArray,
+    equation: NDArray[np.bool_],
+    functions: int,
+    first: int = 0,
 ) -> FloatArray:
     """Return weights (R, B) of the Lagrangian, ``mu`` of functions and ``-lambda`` of conditions.
 
     They make its gradient small in the variables from number ``first`` on, by coordinate descent on the sum of squares.
+    A condition whose gradient is within its rounding has none: that would add more to a bound than it can take away.
 
     Args:
         gradients: (R, n, B) of the expressions at the centres, scaled.
+        rounding: (R, m, B) rounding errors of the gradients from variable ``first`` on, or of the values, m = 1.
         high: (R, B) upper ends of the expressions.
         equation: (R,) whether each must be 0.
         functions: number J of the first expressions, which are functions.
@@ -244,7 +251,8 @@ def multipliers(
     directions = gradients[:, first:].copy()
     directions[:J] -= gradients[0, first:]
     sizes = np.einsum("rib,rib->rb", directions, directions)
-    usable = (sizes > 0) & (sizes < np.inf) & (high >= 0)
+    lost = np.einsum("rib,rib->rb", rounding, rounding)
+    usable = (sizes > lost) & (sizes < np.inf) & (high >= 0)
     usable[:J] = (sizes[:J] > 0) & (sizes[:J] < np.inf)
     for _ in range(_MULTIPLIER_ROUNDS if R > 1 else 0):
         for r in range(1, R):

@@ -202,7 +202,7 @@ class NumpyEngine:
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
         """Return weights (R, B) of the Lagrangian: see :func:`.quadratic_models.multipliers`."""
         weighed = np.where(self._follows[:, None], -np.inf, high)
-        return multipliers(model.b, weighed, self.equation, self.functions, first)
+        return multipliers(model.b, model.s[:, first:], weighed, self.equation, self.functions, first)
 
     def states(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return whether expressions (R, B) are conditions that cannot hold, and whether they may bind."""

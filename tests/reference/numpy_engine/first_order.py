@@ -250,7 +250,8 @@ class _Interpreter:
         w = self.work
         c = w.c[x]
         # The rounded centre may lie outside of a narrow interval.
-        value, slope, least, most, error, lo, hi = RULES[Op(op)](c, np.minimum(w.lo[x], c), np.maximum(w.hi[x], c))
+        rule = RULES[Op(op)](c, np.minimum(w.lo[x], c), np.maximum(w.hi[x], c))
+        value, slope, least, most, error, slope_error, lo, hi = rule
         moved = self.rad[x] + np.maximum(-w.p[x], w.q[x])
         square = moved * moved
         p = np.minimum(slope * w.p[x], slope * w.q[x]) + np.minimum(least * square, 0.0)
@@ -258,7 +259,8 @@ class _Interpreter:
         bent = np.maximum(np.abs(least), np.abs(most))
         steep = np.abs(slope) + 2 * bent * (moved + w.s[x])
         size = np.abs(slope) * moved + np.abs(value)
-        s = steep * w.s[x] + (error + TINY * (1 + bent)) * (1 + moved) + self.slack * size
+        error = error + slope_error * moved + TINY * (1 + bent) * (1 + moved)
+        s = steep * w.s[x] + error + self.slack * size
         return _Result(value, slope * w.a[x, span], p, q, s, lo, hi)
 
     def _write(self, to: int, result: _Result, span: slice) -> None:

@@ -132,7 +132,7 @@ def _pass(
     size = size + np.abs(forms.a).sum(axis=1) + np.abs(matrices).sum(axis=(1, 2))
     defined = np.asarray((forms.s[:J] < np.inf).all(axis=0))
     weighed = np.where(follows[:, None], -np.inf, forms.hi)
-    L = _sum_model(forms, matrices, size, multipliers(forms.a, weighed, equation, J))
+    L = _sum_model(forms, matrices, size, multipliers(forms.a, forms.s[:, None], weighed, equation, J))
     bound = np.where(defined, np.fmin(forms.hi[:J].min(axis=0), L.bound()), np.inf)
     impossible = (forms.lo > 0) | (equation[:, None] & (forms.hi < 0))
     impossible[:J] = False

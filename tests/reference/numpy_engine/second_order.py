@@ -273,7 +273,9 @@ class _Interpreter:
         # A rule without a value poisons the result.
         unknown = 0 * (least + most)
         lost = TINY * (1 + np.abs(curve) + np.abs(rule.least) + np.abs(rule.most))
-        error = steep * s + (rule.error + lost) * (1 + moved + moved * moved) + self.slack * size + unknown
+        further = moved + moved * moved
+        error = rule.error + rule.slope_error * further + lost * (1 + further)
+        error = steep * s + error + self.slack * size + unknown
         products = x.a[at.first] * x.a[at.second]
         Q = slope * x.Q + np.where(at.is_square[:, None], curve, 2 * curve) * products
         return Forms(rule.value, slope * x.a, Q, low, high, error, rule.lo, rule.hi)

@@ -25,7 +25,9 @@ class Rule(NamedTuple):
         value: ``f(c)``.
         slope: ``f'(c)``.
         least, most: half of the least and largest second derivative on the interval.
-        error: rounding error of the value, and per unit of ``Y`` of the slope.
+        error: rounding error of the value.
+        slope_error: that of the slope, and of half the curvature. It is 0 where a few roundings in parts of themselves
+            are all, which each operation covers, as for the root of a square of lengths.
         lo, hi: range of the function on the interval.
     """
 
@@ -34,6 +36,7 @@ class Rule(NamedTuple):
     least: FloatArray
     most: FloatArray
     error: FloatArray
+    slope_error: FloatArray
     lo: FloatArray
     hi: FloatArray
 
@@ -46,8 +49,7 @@ def _sqrt(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
     root, low, high = np.sqrt(c), np.sqrt(lo), np.sqrt(hi)
     slope = 0.5 / root
     least, most = -slope / ((low + root) * (low + root)), -slope / ((high + root) * (high + root))
-    # The slope's own rounding is in parts of slope * |Y|, which the general term covers.
-    return Rule(root, slope, least, most, _LIBRARY_ERROR * root, *widen(low, high))
+    return Rule(root, slope, least, most, _LIBRARY_ERROR * root, np.zeros_like(c), *widen(low, high))
 
 
 def _wave(c: FloatArray, lo: FloatArray, hi: FloatArray, shifted: bool) -> Rule:
@@ -65,14 +67,16 @@ def _wave(c: FloatArray, lo: FloatArray, hi: FloatArray, shifted: bool) -> Rule:
     sine, cosine = np.sin(c), np.cos(c)
     value, slope = (cosine, -sine) if shifted else (sine, cosine)
     # The second derivative is minus the function; errors are of order 1, not of the value's own size.
-    return Rule(value, slope, -0.5 * most, -0.5 * least, np.full_like(c, 4 * _LIBRARY_ERROR), least, most)
+    error = np.full_like(c, 4 * _LIBRARY_ERROR)
+    return Rule(value, slope, -0.5 * most, -0.5 * least, error, error, least, most)
 
 
 def _exp(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
     value, low, high = np.exp(c), np.exp(lo), np.exp(hi)
     least = np.maximum(low * (1 - _LIBRARY_ERROR) - TINY, 0.0)
     most = high * (1 + _LIBRARY_ERROR) + TINY
-    return Rule(value, value, 0.5 * least, 0.5 * most, 2 * _LIBRARY_ERROR * value, least, most)
+    error = 2 * _LIBRARY_ERROR * value
+    return Rule(value, value, 0.5 * least, 0.5 * most, error, error, least, most)
 
 
 def _log(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
@@ -81,8 +85,8 @@ def _log(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
     low, high, value, slope = np.log(lo), np.log(hi), np.log(c), 1 / c
     grown = 1 + _LIBRARY_ERROR
     ends = low - (np.abs(low) * _LIBRARY_ERROR + TINY), high + (np.abs(high) * _LIBRARY_ERROR + TINY)
-    error = 2 * _LIBRARY_ERROR * (np.abs(value) + slope)
-    return Rule(value, slope, -0.5 * grown / (lo * lo), -0.5 / (grown * hi * hi), error, *ends)
+    least, most = -0.5 * grown / (lo * lo), -0.5 / (grown * hi * hi)
+    return Rule(value, slope, least, most, 2 * _LIBRARY_ERROR * np.abs(value), np.zeros_like(c), *ends)
 
 
 def _atan(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
@@ -94,7 +98,8 @@ def _atan(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
     most = np.where(lo >= 0, 0.0, np.minimum(0.325, -lo * (1 + ULP)))
     least = np.where(hi <= 0, 0.0, np.maximum(-0.325, -hi * (1 + ULP)))
     ends = low - (np.abs(low) * _LIBRARY_ERROR + TINY), high + (np.abs(high) * _LIBRARY_ERROR + TINY)
-    return Rule(value, 1 / (1 + c * c), least, most, 2 * _LIBRARY_ERROR * (np.abs(value) + 1), *ends)
+    error = 2 * _LIBRARY_ERROR * (np.abs(value) + 1)
+    return Rule(value, 1 / (1 + c * c), least, most, error, error, *ends)
 
 
 def _ramp(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
@@ -103,14 +108,14 @@ def _ramp(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
     half = np.where((lo < 0) & (hi > 0), -0.5 * slope * lo, 0.0)
     error = half + np.where((lo < 0) & (hi > 0), 8 * ULP * (hi - lo) + TINY, 0.0)
     nothing = np.zeros_like(c)
-    return Rule(slope * c + half, slope, nothing, nothing, error, np.maximum(lo, 0.0), np.maximum(hi, 0.0))
+    return Rule(slope * c + half, slope, nothing, nothing, error, nothing, np.maximum(lo, 0.0), np.maximum(hi, 0.0))
 
 
 def _step(c: FloatArray, lo: FloatArray, hi: FloatArray) -> Rule:
     """Return the rule of the step, which is 1 from 0 on; over an interval with 0 in it, anything between."""
     least, most = np.where(lo > 0, 1.0, 0.0), np.where(hi < 0, 0.0, 1.0)
     nothing = np.zeros_like(c)
-    return Rule(0.5 * (least + most), nothing, nothing, nothing, 0.5 * (most - least), least, most)
+    return Rule(0.5 * (least + most), nothing, nothing, nothing, 0.5 * (most - least), nothing, least, most)
 
 
 #: The rule of each operation of one variable, from its centre and the ends of its interval.

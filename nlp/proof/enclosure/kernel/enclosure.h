@@ -258,7 +258,8 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
                 double size = fabs(slope) * moved + fabs(rule.value);
                 /* larger() and smaller() lose a NaN: one in the rule must poison the value. */
                 double unknown = 0 * (rule.least + rule.most);
-                r.s[l] = steep * x->s[l] + (rule.error + TINY * (1 + bent)) * (1 + moved) + slack * size + unknown;
+                double error = rule.error + rule.slope_error * moved + TINY * (1 + bent) * (1 + moved);
+                r.s[l] = steep * x->s[l] + error + slack * size + unknown;
             }
             for (int i = first; i < last; i++)
                 EACH t[i][l] = slopes[l] * ax[i][l];

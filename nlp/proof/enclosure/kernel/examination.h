@@ -90,7 +90,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         if (rises || falls)
             return 1;
     }
-    choose_multipliers(x, form->equation, report->shared);
+    choose_multipliers(x, form->equation, report->shared, x->gs, n);
     combine(x);
     if (report->models)
         write_model(form, x, report, at, defined);

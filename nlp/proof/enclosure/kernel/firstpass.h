@@ -55,7 +55,7 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
                 value = -INFINITY;
         }
     }
-    choose_multipliers(x, form->equation, 0);
+    choose_multipliers(x, form->equation, 0, x->s, 1);
     for (int r = 0; r < R; r++) {
         x->size[r] = fabs(x->c[r]) + (x->q[r] - x->p[r]) + x->s[r];
         for (int i = 0; i < n; i++)

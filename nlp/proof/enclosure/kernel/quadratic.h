@@ -26,8 +26,9 @@ typedef struct {
     double *aE, *HN, *HD, *bN, *bD, *wN, *wD; /* (n), HN and HD: (n, n) */
 } Box;
 
-/* The gradient is made small in the variables from number first on. */
-static void choose_multipliers(Box *x, const int *equation, int first)
+/* The gradient is made small in the variables from number first on; rounding errors, m for each expression, are those
+ * of these gradients, or of the values: quadratic_models.py's multipliers. */
+static void choose_multipliers(Box *x, const int *equation, int first, const double *rounding, int m)
 {
     int n = x->n, J = x->J, R = x->R;
     for (int r = 0; r < R; r++) {
@@ -37,6 +38,11 @@ static void choose_multipliers(Box *x, const int *equation, int first)
             double along = x->gb[r * n + i] - (r < J ? x->gb[i] : 0.0);
             x->size[r] += along * along;
         }
+        double lost = 0.0;
+        for (int i = first; i < m; i++)
+            lost += rounding[r * m + i] * rounding[r * m + i];
+        if (r >= J && !(x->size[r] > lost))
+            x->size[r] = 0.0;
     }
     memcpy(x->left, x->gb, (size_t)n * sizeof(double));
     for (int round = 0; round < (R > 1 ? MULTIPLIER_ROUNDS : 0); round++)

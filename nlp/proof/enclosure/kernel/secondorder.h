@@ -398,7 +398,9 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
                 /* larger() and smaller() lose a NaN: one in the rule must poison the value. */
                 double unknown = 0 * (least + most);
                 double lost = TINY * (1 + fabs(curve) + fabs(rule.least) + fabs(rule.most));
-                r.s[l] = steep * s + (rule.error + lost) * (1 + moved + moved * moved) + slack * size + unknown;
+                double further = moved + moved * moved;
+                double error = rule.error + rule.slope_error * further + lost * (1 + further);
+                r.s[l] = steep * s + error + slack * size + unknown;
             }
             EACH_OF(i, 0, which.linear)
             {

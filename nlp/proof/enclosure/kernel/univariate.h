@@ -5,7 +5,7 @@
 #include "values.h"
 
 typedef struct {
-    double value, slope, least, most, error, lo, hi;
+    double value, slope, least, most, error, slope_error, lo, hi;
 } Rule;
 
 #define LIBRARY 8.0
@@ -19,13 +19,13 @@ static Rule wave(double c, double lo, double hi, int shifted)
     spread = spread + 2 * OFF * (1 + spread);
     double least = larger(centred - spread, -1.0), most = smaller(centred + spread, 1.0);
     double sine = sin(c), cosine = cos(c);
-    Rule r = {shifted ? cosine : sine, shifted ? -sine : cosine, -0.5 * most, -0.5 * least, 4 * OFF, least, most};
+    Rule r = {shifted ? cosine : sine, shifted ? -sine : cosine, -0.5 * most, -0.5 * least, 4 * OFF, 4 * OFF, least, most};
     return r;
 }
 
 static Rule rule_of(int op, double c, double lo, double hi)
 {
-    Rule r = {NAN, NAN, NAN, NAN, NAN, NAN, NAN};
+    Rule r = {NAN, NAN, NAN, NAN, NAN, 0.0, NAN, NAN};
     lo = smaller(lo, c), hi = larger(hi, c);
     if (op == SQRT && lo >= 0) { /* below 0 it stays NaN: smaller and larger would lose a NaN of least alone */
         double root = sqrt(c), low = sqrt(lo), high = sqrt(hi), slope = 0.5 / root;
@@ -35,12 +35,12 @@ static Rule rule_of(int op, double c, double lo, double hi)
     } else if (op == SIN || op == COS) {
         r = wave(c, lo, hi, op == COS);
     } else if (op == EXP) {
-        r.value = r.slope = exp(c), r.error = 2 * OFF * r.value;
+        r.value = r.slope = exp(c), r.error = r.slope_error = 2 * OFF * r.value;
         r.lo = larger(exp(lo) * (1 - OFF) - TINY, 0.0), r.hi = exp(hi) * (1 + OFF) + TINY;
         r.least = 0.5 * r.lo, r.most = 0.5 * r.hi;
     } else if (op == LOG && lo > 0) {
         double low = log(lo), high = log(hi), grown = 1 + OFF;
-        r.value = log(c), r.slope = 1 / c, r.error = 2 * OFF * (fabs(r.value) + r.slope);
+        r.value = log(c), r.slope = 1 / c, r.error = 2 * OFF * fabs(r.value);
         r.least = -0.5 * grown / (lo * lo), r.most = -0.5 / (grown * hi * hi);
         r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);
     } else if (op == RAMP) {
@@ -54,7 +54,7 @@ static Rule rule_of(int op, double c, double lo, double hi)
         r.value = 0.5 * (r.lo + r.hi), r.error = 0.5 * (r.hi - r.lo), r.slope = r.least = r.most = 0.0;
     } else if (op == ATAN) {
         double low = atan(lo), high = atan(hi);
-        r.value = atan(c), r.slope = 1 / (1 + c * c), r.error = 2 * OFF * (fabs(r.value) + 1);
+        r.value = atan(c), r.slope = 1 / (1 + c * c), r.error = r.slope_error = 2 * OFF * (fabs(r.value) + 1);
         r.most = lo >= 0 ? 0.0 : smaller(0.325, -lo * (1 + ULP));
         r.least = hi <= 0 ? 0.0 : larger(-0.325, -hi * (1 + ULP));
         r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);
