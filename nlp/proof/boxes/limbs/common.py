@@ -33,10 +33,10 @@ class CommonPart:
         """Return the enclosures of the expressions and of their gradients over boxes, (n, B) each."""
         return gradient_model(enclose(self._tape, lower, upper), midpoints(lower, upper).radius)
 
-    def multipliers(self, gradients: FloatArray, high: FloatArray) -> FloatArray:
-        """Return weights (R, B) of the Lagrangian for gradients (R, n, B)."""
+    def multipliers(self, gradients: FloatArray, rounding: FloatArray, high: FloatArray) -> FloatArray:
+        """Return weights (R, B) of the Lagrangian for gradients (R, n, B) with these rounding errors."""
         weighed = np.where(self._follows[:, None], -np.inf, high)
-        return multipliers(gradients, weighed, self._equation, self._functions)
+        return multipliers(gradients, rounding, weighed, self._equation, self._functions)
 
     def states(self, low: FloatArray, high: FloatArray) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return whether expressions (R, B) are conditions that cannot hold, and whether they may bind."""

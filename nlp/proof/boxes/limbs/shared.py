@@ -161,7 +161,7 @@ class SharedRule(Rule[SharedColumns]):
         tilted = common.b.copy()
         for part in parts:
             tilted[0] += part.tilt.g
-        M = with_tilts(common.sum_model(self._common.multipliers(tilted, high)), parts)
+        M = with_tilts(common.sum_model(self._common.multipliers(tilted, common.s, high)), parts)
         bound = M.bound()
         known = np.isfinite(common.value.s[0]) & np.all([np.isfinite(part.best) for part in parts], axis=0)
         sums = np.where(known & ~np.isnan(bound), bound, np.inf)
