@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -25,7 +26,6 @@ from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
 from screwsynth.nlp.proof.workspace.ranks import search
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner
-from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -112,8 +112,7 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     target, name = (search._RankRule, "divided") if place == "branch" else (Examiner, "examine")
     monkeypatch.setattr(target, name, interrupt)
     # The poses of opposite signs that are known before a box is bisected would refute the claim, as they should.
-    monkeypatch.setattr(SignRefuter, "look", lambda *_: None)
     problem = build_problem(case, model, box)
-    found = search.prove_rank(problem, problem.locked, refuter=SignRefuter(legs, problem))
+    found = search.prove_rank(problem, problem.locked, refuter=SimpleNamespace(look=lambda *_: None))
     assert found.outcome is Outcome.OPEN
     assert found.reason == "interrupted"
