@@ -38,6 +38,7 @@ from .measured import header_texts
 from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words
+from .turns import turning_joints
 from .unitdata import UnitData
 from .worstcase import worst_case_texts
 
@@ -198,6 +199,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nposes": str(poses),
         "nlegs": str(len(program.robot.legs)),
         "level": str(level),
+        "nturns": str(len(turning_joints(nlp))),
         "nsigns": str(staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0),
         "ninputs": str(inputs),
         "pose_parameter": "int pose, " if poses > 1 else "",
@@ -243,6 +245,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     case, program = nlp.case, nlp.program
     units = UnitData(nlp)
     lower, upper = (np.nan_to_num(bound, neginf=-1e300, posinf=1e300) for bound in (nlp.g_lower, nlp.g_upper))
+    turning = turning_joints(nlp)
     kinds = [list(Dimension).index(each.dimension) for each in program.variables]
     bounds = bounds_in_c(nlp)
     if program.places.epigraph is not None:
@@ -254,6 +257,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         string_table(f"{prefix}_variable_units", N, units.variables),
         integer_table(f"{prefix}_variable_kinds", N, kinds),
         integer_table(f"{prefix}_variable_is_joint", N, [int(i in program.places.inner) for i in range(nlp.n)]),
+        integer_table(f"{prefix}_variable_turns", N, [int(i in turning) for i in range(nlp.n)]),
         number_table(f"{prefix}_variable_lower", N, bounds.lower),
         number_table(f"{prefix}_variable_upper", N, bounds.upper),
         number_table(f"{prefix}_variable_starts", N, nlp.start),
