@@ -175,7 +175,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     level = -1 if program.places.epigraph is None else program.places.epigraph.level
     if level >= 0:
         seeds[:, level] = 0.0
-    n, c = nlp.n, len(program.constraints)
+    n, signs = nlp.n, staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0
+    c = len(program.constraints) + signs
     rows = len(program.model.frame_rows)
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
@@ -193,14 +194,14 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "n": str(n),
         "np": str(len(program.arguments)),
         "m": str(rows),
-        "nc": str(c),
+        "nc": str(c - signs),
         "ntasks": str(len(case.tasks)),
         "nweights": str(len(program.places.weights)),
         "nposes": str(poses),
         "nlegs": str(len(program.robot.legs)),
         "level": str(level),
         "nturns": str(len(turning_joints(nlp))),
-        "nsigns": str(staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0),
+        "nsigns": str(signs),
         "ninputs": str(inputs),
         "pose_parameter": "int pose, " if poses > 1 else "",
         "pose_or_first": "pose" if poses > 1 else "0",
@@ -215,7 +216,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        **worst_case_texts(n, c, _SEEDS + 1, level >= 0),
+        **worst_case_texts(n, c, _SEEDS + 1, level >= 0, 1 + (signs > 0)),
         **header_texts(),
         "solver_work": str(solver_work),
         "solver_iwork": str(solver_iwork),

@@ -21,7 +21,7 @@ _CURVATURES = 3
 _DERIVATIVES = 4
 
 
-def worst_case_texts(n: int, c: int, searches: int, has_level: bool) -> dict[str, str]:
+def worst_case_texts(n: int, c: int, searches: int, has_level: bool, phases: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
     A search counts its first derivatives, and may have a few for each point that it has judged beside those of one line
@@ -34,9 +34,12 @@ def worst_case_texts(n: int, c: int, searches: int, has_level: bool) -> dict[str
         c: number of constraints.
         searches: largest number of searches of a solve.
         has_level: whether a level is optimised.
+        phases: number of times that a search begins: again within home's assembly where it has left that one.
     """
-    parts = _ROUNDS + _RESTORES
-    by_iteration, by_search = _DERIVATIVES, 1 + _RESTORES * has_level + _TRIALS + _DERIVATIVES * parts
+    parts = phases * (_ROUNDS + _RESTORES)
+    by_iteration, levels = _DERIVATIVES, (phases * (1 + _RESTORES) - 1) * has_level
+    by_search = 1 + levels + _TRIALS + _DERIVATIVES * parts
+    magnitudes = 1 + phases + parts
     programs = len(_PARTS) + 1
     passes = 20 * (2 * (n + c) + 5)
     iterations = searches * _ITERATIONS
@@ -51,11 +54,11 @@ def worst_case_texts(n: int, c: int, searches: int, has_level: bool) -> dict[str
         "derivatives_by_iteration": str(by_iteration),
         "derivatives_by_search": str(by_search),
         "curvatures_by_iteration": str(_CURVATURES),
-        "magnitudes_by_search": str(2 + parts),
+        "magnitudes_by_search": str(magnitudes),
         "programs_by_iteration": str(programs),
         "passes": str(passes),
         "most_derivatives": str(by_iteration * iterations + by_search * searches),
         "most_curvatures": str(_CURVATURES * iterations),
-        "most_magnitudes": str((2 + parts) * searches),
+        "most_magnitudes": str(magnitudes * searches),
         "most_programs": str(programs * iterations),
     }
