@@ -99,6 +99,8 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     names |= held_texts(held, limits)
     names |= limit_texts(limits, prefix, units.of_case.label, units.limit_multipliers(limits.limits))
     parts = dict(_PARTS)
+    if "signs" in staged.functions:
+        parts["-home.c"] = "home.c"
     if staged.loops:
         parts["-loops.c"] = "loops.c"
     if staged.loops.spectra:

@@ -123,7 +123,10 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
     if signs.numel():
         outputs["signs"] = [signs]
         inputs["home_curvature"] = [carried := SX.sym("carried", signs.numel())]
-        outputs |= {"home": [signs, ca.jacobian(signs, x).T], "home_curvature": [ca.hessian(ca.dot(carried, signs), x)[0]]}
+        outputs |= {
+            "home": [signs, ca.jacobian(signs, x).T],
+            "home_curvature": [ca.hessian(ca.dot(carried, signs), x)[0]],
+        }
     if held.items:
         outputs["held"] = [held.values, ca.jacobian(held.values[: held.equations], x).T]
     if loops:

@@ -21,7 +21,11 @@ def turning_joints(nlp: Nlp) -> frozenset[int]:
     if not turning:
         return frozenset()
     program = nlp.program
-    outputs = [program.objective, *(each.expression for each in program.constraints), *(r.signs for r in program.robots)]
+    outputs = [
+        program.objective,
+        *(each.expression for each in program.constraints),
+        *(r.signs for r in program.robots),
+    ]
     function = ca.Function("all", [program.x, program.p], [ca.veccat(*outputs)])
     held: dict[int, int] = {}
     for k in range(function.n_instructions()):
