@@ -145,7 +145,9 @@ def starter(name: str) -> Case:
     return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
 
 
-@pytest.mark.parametrize(("name", "trials"), [("paper-4.1-helical", 1000), ("camera-mount", 240), ("planar-3-rrr", 240)])
+@pytest.mark.parametrize(
+    ("name", "trials"), [("paper-4.1-helical", 1000), ("camera-mount", 240), ("planar-3-rrr", 240)]
+)
 def test_no_solve_needs_more_than_the_header_says(
     name: str,
     trials: int,
