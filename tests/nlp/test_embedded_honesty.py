@@ -26,11 +26,27 @@ OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT, BUDGET, OTHER_ASSEMBLY, RANGE_END = ra
 Compiled = Callable[[str], CompiledCase]
 
 
+#: Makes a case of one task a worst case of two.
+TWO_TASKS = """[combine]
+method = "worst-case"
+
+[[task]]
+name = "other"
+sense = "max"
+axis = [0, 0, 1]
+point = [0.2, 0, 0]
+pitch = 0.5
+"""
+
+
 def case_of(name: str) -> Case:
-    """A shipped case, or the starter of a robot."""
+    """A shipped case, or the starter of a robot, after "worst of two, " with a second task."""
     if name in shipped_cases():
         return load_case(name)
-    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
+    robot = name.removeprefix("worst of two, ")
+    starter = tomllib.loads(starter_case(robot_function(robot)()))
+    other = tomllib.loads(TWO_TASKS) if robot != name else {"task": []}
+    return case_from_tables(starter | other | {"task": other["task"] + starter["task"]}, name=robot, source=robot)
 
 
 @pytest.fixture(scope="module")
@@ -220,8 +236,9 @@ def test_loops_of_a_feasible_pose_are_closed_at_home(compiled: Compiled, ticks: 
         lower[:, held[0]], upper[:, held[0]] = (each[held[0]] for each in ranges(own))
 
 
-def test_the_end_of_homes_assembly_is_an_optimum(compiled: Compiled, ticks: ModuleType) -> None:
-    own = compiled("planar-3-rrr")
+@pytest.mark.parametrize("name", ["planar-3-rrr", "worst of two, planar-3-rrr"])
+def test_the_end_of_homes_assembly_is_an_optimum(name: str, compiled: Compiled, ticks: ModuleType) -> None:
+    own = compiled(name)
     robot, p = ticks.Robot(own, 1.0), tasks(own, 20, 0)
     found = own.solve(p=p)
     assert set(found.status.tolist()) == {OK, RANGE_END}
