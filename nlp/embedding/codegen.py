@@ -47,6 +47,7 @@ from .measured import NOT_MEASURED
 from .runtimelimits import limit_texts, run_time_limits
 from .stages import StagedFunctions, stage_functions
 from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words
+from .turns import turning_joints
 from .unitdata import UnitData
 from .worstcase import worst_case_texts
 
@@ -106,7 +107,8 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     names, units = _substitutions(subject, staged), UnitData(nlp)
     names |= held_texts(held, limits)
     names |= limit_texts(limits, prefix, units.of_case.label, units.limit_multipliers(limits.limits))
-    parts = _PARTS | ({"-loops.c": "loops.c"} if staged.loops else {})
+    parts = _PARTS | ({"-home.c": "home.c"} if "signs" in staged.functions else {})
+    parts |= {"-loops.c": "loops.c"} if staged.loops else {}
     parts |= {"-spectrum.c": "spectrum.c"} if staged.loops.spectra else {}
     own = [f"{prefix}{ending}" for ending in (*parts, *_CORE, "-casadi.c", "-casadi.h")]
     sources = [name for name in own if name.endswith(".c")]
@@ -184,7 +186,8 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     level = -1 if program.places.epigraph is None else program.places.epigraph.level
     if level >= 0:
         seeds[:, level] = 0.0
-    n, c = nlp.n, len(program.constraints)
+    n, signs = nlp.n, staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0
+    c = len(program.constraints) + signs
     rows = len(program.model.frame_rows)
     poses, inputs = case.pose_count, program.robot.inputs.numel()
     work = casadi_work(staged) + max(loop_work(staged, rows, n), poses * inputs if poses > 1 else 0)
@@ -202,13 +205,14 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "n": str(n),
         "np": str(len(program.arguments)),
         "m": str(rows),
-        "nc": str(c),
+        "nc": str(c - signs),
         "ntasks": str(len(case.tasks)),
         "nweights": str(len(program.places.weights)),
         "nposes": str(poses),
         "nlegs": str(len(program.robot.legs)),
         "level": str(level),
-        "nsigns": str(staged.functions["signs"].numel_out(0) if "signs" in staged.functions else 0),
+        "nturns": str(len(turning_joints(nlp))),
+        "nsigns": str(signs),
         "ninputs": str(inputs),
         "pose_parameter": "int pose, " if poses > 1 else "",
         "pose_or_first": "pose" if poses > 1 else "0",
@@ -223,7 +227,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "nk": str(staged.prepare.numel_out(0)),
         "maximise": str(int(nlp.sense is Sense.MAX)),
         "nseeds": str(_SEEDS),
-        **worst_case_texts(n, c, _SEEDS + 1),
+        **worst_case_texts(n, c, _SEEDS + 1, 1 + (signs > 0)),
         "measured_macros": f"/* {NOT_MEASURED} */",
         "measured_rows": NOT_MEASURED,
         "solver_work": str(solver_work),
@@ -253,6 +257,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
     units = UnitData(nlp)
+    turning = turning_joints(nlp)
     kinds = [list(Dimension).index(each.dimension) for each in program.variables]
     bounds = bounds_in_c(nlp)
     if program.places.epigraph is not None:
@@ -264,6 +269,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
         string_table(f"{prefix}_variable_units", N, units.variables),
         integer_table(f"{prefix}_variable_kinds", N, kinds),
         integer_table(f"{prefix}_variable_is_joint", N, [int(i in program.places.inner) for i in range(nlp.n)]),
+        integer_table(f"{prefix}_variable_turns", N, [int(i in turning) for i in range(nlp.n)]),
         number_table(f"{prefix}_variable_lower", N, bounds.lower),
         number_table(f"{prefix}_variable_upper", N, bounds.upper),
         number_table(f"{prefix}_variable_starts", N, nlp.start),

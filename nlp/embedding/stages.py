@@ -80,6 +80,7 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
     * ``curvature``: Hessian of ``weight * F + multipliers . g``, for a weight and multipliers as further inputs;
     * ``magnitude``: size of the objective without cancellation;
     * ``signs``: numbers that are positive in home's assembly of the joints at every pose; absent without any.
+    * ``home``: ``signs`` with their gradients; ``home_curvature``: Hessian of ``multipliers . signs``;
     * ``held``: what the case's fixed numbers make hold, and the gradients of its equations; absent without any.
 
     Where there are loops, the constraints here are the plain ones alone, ``derivatives`` returns the entries too, with
@@ -117,6 +118,11 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
     signs = ca.vertcat(SX(0, 1), *[robot.signs for robot in program.robots])
     if signs.numel():
         outputs["signs"] = [signs]
+        inputs["home_curvature"] = [carried := SX.sym("carried", signs.numel())]
+        outputs |= {
+            "home": [signs, ca.jacobian(signs, x).T],
+            "home_curvature": [ca.hessian(ca.dot(carried, signs), x)[0]],
+        }
     if held.items:
         outputs["held"] = [held.values, ca.jacobian(held.values[: held.equations], x).T]
     if loops:

@@ -21,7 +21,7 @@ _CURVATURES = 3
 _DERIVATIVES = 4
 
 
-def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
+def worst_case_texts(n: int, c: int, searches: int, phases: int) -> dict[str, str]:
     """Return the texts of the placeholders for the solver's constants and for its worst case.
 
     A search counts its first derivatives, and may have a few for each point that it has judged beside those of one line
@@ -32,9 +32,10 @@ def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
         n: number of variables.
         c: number of constraints.
         searches: largest number of searches of a solve.
+        phases: number of times that a search begins: again within home's assembly where it has left that one.
     """
-    parts = _ROUNDS + _RESTORES
-    by_iteration, by_search = _DERIVATIVES, _TRIALS + _DERIVATIVES * parts
+    parts = phases * (_ROUNDS + _RESTORES)
+    by_iteration, by_search, magnitudes = _DERIVATIVES, _TRIALS + _DERIVATIVES * parts, 1 + phases + parts
     programs = len(_PARTS) + 1
     passes = 20 * (2 * (n + c) + 5)
     iterations = searches * _ITERATIONS
@@ -49,11 +50,11 @@ def worst_case_texts(n: int, c: int, searches: int) -> dict[str, str]:
         "derivatives_by_iteration": str(by_iteration),
         "derivatives_by_search": str(by_search),
         "curvatures_by_iteration": str(_CURVATURES),
-        "magnitudes_by_search": str(2 + parts),
+        "magnitudes_by_search": str(magnitudes),
         "programs_by_iteration": str(programs),
         "passes": str(passes),
         "most_derivatives": str(by_iteration * iterations + by_search * searches),
         "most_curvatures": str(_CURVATURES * iterations),
-        "most_magnitudes": str((2 + parts) * searches),
+        "most_magnitudes": str(magnitudes * searches),
         "most_programs": str(programs * iterations),
     }

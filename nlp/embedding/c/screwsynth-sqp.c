@@ -132,7 +132,8 @@ static void guess_sides(search *of) {
     for (j = 0; j < c; ++j) {
         of->u[2 * n + j] = fabs(at->g[j] - p->g_lower[j]) <= near ? 1.0 : 0.0;
         of->u[2 * n + c + j] = fabs(at->g[j] - p->g_upper[j]) <= near ? 1.0 : 0.0;
-        of->carried[j] = of->weights[j] = 0.0;
+        of->carried[j] = p->carried ? p->carried[j] : 0.0;
+        of->weights[j] = 0.0;
     }
 }
 

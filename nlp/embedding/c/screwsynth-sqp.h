@@ -29,6 +29,7 @@ typedef struct {
     int n, c;
     const double *lower, *upper;     /* n bounds of the variables; equal ones fix a variable */
     const double *g_lower, *g_upper; /* c bounds of the constraints, scaled as g; infinite where there is none */
+    const double *carried;           /* c multipliers of the constraints for the first Hessian; 0: none */
     double extent;                   /* largest half range of the variables, at most of order 1 */
     int max_iterations;
     /* f, its gradient, c constraints and their gradients, row after row. Returns 1 where a number is not finite. */
