@@ -20,6 +20,7 @@ from ...case.task import Sense
 from ...errors import EvaluationError
 from ...evidence.closing import closed_in_place
 from ...evidence.mobility import mobility_of
+from ...evidence.singularities import is_passive_singular
 from ...evidence.state import evaluate
 from ...program.layout import Layout
 from ..statement.claims import REACH, Claim, claims_of
@@ -67,6 +68,9 @@ class _HomePoses:
         x = self.closed(given)
         if x is None:
             return False
+        # Where nested loops lose their rank, the rows of J are those near by, or have no value.
+        if not constraints and self._nlp.program.model.nested and is_passive_singular(self._nlp, x):
+            return True
         try:
             state = evaluate(self._nlp, x)
         except EvaluationError:

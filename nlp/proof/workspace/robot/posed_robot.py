@@ -53,7 +53,8 @@ class Problem:
         jacobian: (rows, 6) J, moments about the platform's origin divided by ``length``.
         length: of the order of the robot's, length.
         needed: indices of the equations among those of the model.
-        columns: indices of the screws of each member that are kept.
+        columns: indices of the screws that are kept of each member without nested loops.
+        is_nested: whether a member has nested loops.
     """
 
     box: PoseBox
@@ -70,6 +71,7 @@ class Problem:
     length: float
     needed: tuple[int, ...]
     columns: tuple[tuple[int, ...], ...]
+    is_nested: bool
 
     def pose_of(self, z: FloatArray) -> FloatArray:
         """Return the six coordinates of the pose (..., 6) at points (..., n)."""
@@ -106,7 +108,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     moved = counted.all_closed(middle[:, None], list(dependent))[:, 0]
     start = moved if counted.is_closed(moved) else start
     length = _length(posed, start, case, model)
-    columns = tuple(_independent_screws(each, posed, start, length) for each in posed.limbs.members)
+    columns = tuple(_independent_screws(each, posed, start, length) for each in posed.limbs.simple)
     limbs = posed.limbs.reduced(columns, length)
     return Problem(
         box=box,
@@ -117,14 +119,18 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         independent=independent,
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=RankMatrix(
-            polynomial_rows(locked_matrix(limbs), locked_matrix(posed.turned.reduced(columns, length)), posed), 0
+        locked=_of_nullity(
+            polynomial_rows(locked_matrix(limbs), locked_matrix(posed.turned.reduced(columns, length)), posed),
+            limbs.idle,
+            posed.z,
+            start,
         ),
         unactuated=_unactuated(model, limbs, posed.z, start),
         jacobian=about_platform(posed.jacobian, limbs.position, length),
         length=length,
         needed=tuple(needed),
         columns=columns,
+        is_nested=bool(limbs.nested),
     )
 
 
@@ -222,9 +228,19 @@ def _unactuated(model: Model, limbs: Limbs, z: SX, start: FloatArray) -> RankMat
     matrix = free_matrix(limbs)
     if not matrix.numel():
         return None
-    values = np.linalg.svd(ca.Function("free", [z], [ca.densify(matrix)])(start).full(), compute_uv=False)
-    rank = int(np.count_nonzero(values > _ZERO * values[0]))
-    freedoms, idle = matrix.shape[1] - rank, 0
-    if model.generic is not None:
-        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
-    return RankMatrix(matrix, freedoms + idle) if 0 < freedoms < 6 else None
+    if model.generic is None:
+        found = _of_nullity(matrix, matrix.shape[1], z, start)
+        return found if 0 < found.nullity < 6 else None
+    freedoms, idle = 6 - model.generic.constraints, model.generic.idle + limbs.idle
+    return _of_nullity(matrix, freedoms + idle, z, start) if 0 < freedoms < 6 else None
+
+
+def _of_nullity(matrix: SX, generic: int, z: SX, start: FloatArray) -> RankMatrix:
+    """Return a matrix with the dimension of its null space at almost all poses, or at a closed point where it is less.
+
+    That of almost all poses is a measured number. With one too large, a singular pose would count as regular.
+    """
+    if not generic:
+        return RankMatrix(matrix, 0)
+    values = np.linalg.svd(ca.Function("M", [z], [ca.densify(matrix)])(start).full(), compute_uv=False)
+    return RankMatrix(matrix, min(generic, matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0]))))

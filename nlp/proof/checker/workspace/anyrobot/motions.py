@@ -8,10 +8,14 @@ of joints. Each row of the matrix is a condition that it keeps:
   velocity of its centre alone.
 
 With the actuators free, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member stands for x in its
-conditions, and relations ``B u = 0`` that loops demand of the actuators alone are conditions too. With locked actuators
-the matrix has full column rank where J has full rank, and the passive screws of each member are independent. With free
-ones its null space has as many dimensions as the robot has freedoms and rates ``u`` without a motion, and more only
-where the constraint wrenches lose their rank, or passive screws theirs.
+conditions. With locked actuators the matrix has full column rank where J has full rank, and the passive screws of each
+member are independent. With free ones its null space has as many dimensions as the robot has freedoms and rates ``u``
+without a motion, and more only where the constraint wrenches lose their rank, or passive screws theirs.
+
+Nested loops of a member are conditions as they are, ``sum_j w_j L_j + sum_k u_k L_k = 0``, beside ``x = sum_j w_j S_j +
+sum_k u_k S_k`` with the motions S that joints give the platform along a tree of links. Screws with the loops solved
+would not tell where a loop loses its rank. Both null spaces have the rates of passive joints in addition that close the
+loops and do not move the platform.
 """
 
 from __future__ import annotations
@@ -23,7 +27,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ......models import Actuator, FloatArray, Member, Model, Wrench, WrenchKind, rate_relations
+from ......models import Actuator, FloatArray, Member, Model, Wrench, WrenchKind
 from ......models.member import scaled_twists
 from ......models.rows import independent_rows
 from ...proof_file import ProofError
@@ -39,7 +43,7 @@ class Motions:
 
     Attributes:
         matrix: (m, c) sparse, m not below c less the freedoms; its first six columns are those of the platform.
-        freedoms: dimensions of its null space that are claimed to be all: the robot's freedoms and idle rates.
+        freedoms: dimensions of its null space that are claimed to be all: of the robot's freedoms and idle rates.
     """
 
     matrix: SX
@@ -56,7 +60,11 @@ def locked_motions(robot: PosedRobot, start: FloatArray) -> Motions:
     Raises:
         ProofError: the screws of a member are singular there.
     """
-    return Motions(_matrix(robot, robot.rows, _with_chosen_screws(robot, start), ()), 0)
+    matrix = _matrix(robot, robot.rows, _with_chosen_screws(robot, start), ())
+    idle = sum(each.idle for each in robot.nested)
+    if idle and idle > _freedoms(robot, matrix, start):
+        raise ProofError("passive joints have fewer motions without the platform than at almost all poses")
+    return Motions(matrix, idle)
 
 
 def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
@@ -75,14 +83,22 @@ def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
     else:
         couples = [row for row in robot.rows if row.kind is WrenchKind.COUPLE]
         matrix = _matrix(robot, couples, (), ())
+    at_start = _freedoms(robot, matrix, start)
+    freedoms, idle = at_start, 0
     if model.generic is not None:
-        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
-    else:
-        values = np.linalg.svd(ca.Function("free", [robot.z], [ca.densify(matrix)])(start).full(), compute_uv=False)
-        freedoms, idle = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0])), 0
+        freedoms = 6 - model.generic.constraints
+        idle = model.generic.idle + sum(each.idle for each in robot.nested)
     if not 0 < freedoms < 6:
         raise ProofError("the robot has no constraint wrenches of which the rank could be claimed")
+    if freedoms + idle > at_start:
+        raise ProofError("the robot has fewer freedoms in the middle of the workspace than at almost all poses")
     return Motions(matrix, freedoms + idle)
+
+
+def _freedoms(robot: PosedRobot, matrix: SX, start: FloatArray) -> int:
+    """Return the dimensions of the null space at closed loops (n,)."""
+    values = np.linalg.svd(ca.Function("at", [robot.z], [ca.densify(matrix)])(start).full(), compute_uv=False)
+    return int(matrix.shape[1]) - int(np.count_nonzero(values > _ZERO * values[0]))
 
 
 def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
@@ -107,7 +123,7 @@ def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
 
 def _matrix(robot: PosedRobot, rows: Sequence[Wrench], members: Sequence[Member], actuators: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), with columns of the platform, of passive joints and of actuators."""
-    passive = sum(each.screws.shape[1] for each in members)
+    passive = sum(each.screws.shape[1] for each in members) + sum(len(each.passive) for each in robot.nested)
     blocks, at = [], 6
 
     def driven(member: str, seen: SX) -> list[SX]:
@@ -128,8 +144,17 @@ def _matrix(robot: PosedRobot, rows: Sequence[Wrench], members: Sequence[Member]
         before, after = SX(each.size, at - 6), SX(each.size, 6 + passive - at - count)
         blocks.append(ca.horzcat(seen, before, *own, after, *driven(each.label, seen)))
         at += count
-    relations = rate_relations(actuators)
-    blocks.append(ca.horzcat(SX(relations.shape[0], 6 + passive), relations))
+    for path in robot.nested:
+        motions = [-_motion(robot, path.all[:, j]) for j in range(path.all.shape[1])]
+        conditions = ca.vertcat(ca.horzcat(SX(6, 0), *motions), path.loops)
+        count, height = len(path.passive), conditions.shape[0]
+        turned = {(path.limb, path.actuator(j)): conditions[:, j] for j in path.driven}
+        before, after = SX(height, at - 6), SX(height, 6 + passive - at - count)
+        platform = ca.vertcat(SX.eye(6), SX(height - 6, 6))
+        turns = [turned.get((each.limb, each.name), SX(height, 1)) for each in actuators]
+        whole = ca.sparsify(ca.horzcat(platform, before, conditions[:, path.passive], after, *turns))
+        blocks += [row for row in ca.vertsplit(whole) if row.nnz()]
+        at += count
     return ca.sparsify(ca.vertcat(SX(0, 6 + passive + len(actuators)), *blocks))
 
 
