@@ -134,7 +134,7 @@ def with_loops(
     relations[:, [k for k, (limb, _) in enumerate(names) if limb in nested]] = 0.0
     found = [relations]
     for each, screws, loops in paths:
-        own = [names.index((each.limb, each.actuator(k))) for k in each.driven]
+        own = [names.index((each.limb, each.joints[k].removeprefix(f"{each.limb}:"))) for k in each.driven]
         rows = [k for k, row in enumerate(model.frame_rows) if row.member == each.member]
         passive = each.passive
         left, values, right = np.linalg.svd(loops[:, passive])

@@ -228,8 +228,7 @@ class JointScrews:
         passive_rank, all_rank: ranks of the motions by passive joints, and by all, at almost all dimensions and poses.
         member: name of the member of nested loops; empty for a path of joints.
         loops: (m, k) ``L`` of nested loops, without a unit for rates of order 1.
-        idle: dimension of the rates of passive joints that close the loops and do not move the platform, at almost all
-            dimensions and poses, as the spin of a rod between two ball joints is.
+        loop_rank: of the columns of passive joints in ``L``, at almost all dimensions and poses.
     """
 
     limb: str
@@ -240,7 +239,7 @@ class JointScrews:
     all_rank: int
     member: str = ""
     loops: SX = field(default_factory=lambda: SX(0, 0))
-    idle: int = 0
+    loop_rank: int = 0
 
     @property
     def is_nested(self) -> bool:
@@ -251,10 +250,6 @@ class JointScrews:
     def passive(self) -> list[int]:
         """Indices of the columns of passive joints."""
         return [k for k in range(self.all.shape[1]) if k not in self.driven]
-
-    def actuator(self, k: int) -> str:
-        """Return the name of the actuator of a column of nested loops."""
-        return self.joints[k].removeprefix(f"{self.limb}:")
 
 
 @dataclass(frozen=True)

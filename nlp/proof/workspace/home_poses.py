@@ -68,9 +68,9 @@ class _HomePoses:
         x = self.closed(given)
         if x is None:
             return False
-        # Where nested loops lose their rank, the rows of J are those near by, or have no value.
-        if not constraints and self._nlp.program.model.nested and is_passive_singular(self._nlp, x):
-            return True
+        # Where nested loops lose their rank, the actuators' motions have no value, and say nothing of constraints.
+        if constraints and self._nlp.program.model.nested and is_passive_singular(self._nlp, x):
+            return False
         try:
             state = evaluate(self._nlp, x)
         except EvaluationError:

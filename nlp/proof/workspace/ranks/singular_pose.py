@@ -55,22 +55,18 @@ class SingularPose:
         self._equations = ca.Function(
             "singular", [z, v], [meant.equations, product, ca.jacobian(meant.equations, z), ca.jacobian(product, z)]
         )
-        # J has no value where nested loops lose their rank: there M alone is looked at.
-        is_told = matrix.nullity == 0 and not problem.is_nested
-        self._jacobian = ca.Function("J", [z], [ca.densify(meant.jacobian)]) if is_told else None
+        self._jacobian = ca.Function("J", [z], [ca.densify(meant.jacobian)])
 
     def smallest(self, z: FloatArray) -> float:
         """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""
         M = self._values(z).full()
+        J = self._jacobian(z).full()
         rank = M.shape[1] - self._matrix.nullity
-        if not np.isfinite(M).all() or rank < 1 or len(M) < rank:
+        if not (np.isfinite(M).all() and np.isfinite(J).all()) or rank < 1 or len(M) < rank:
             return float("inf")
         values, right = np.linalg.svd(M)[1:]
         found = float(values[rank - 1] / values[0])
-        if self._jacobian is not None:
-            J = self._jacobian(z).full()
-            if not np.isfinite(J).all():
-                return float("inf")
+        if not self._matrix.nullity:
             values = np.linalg.svd(J, compute_uv=False)
             found = float(values[5] / values[0]) if len(values) > 5 else 0.0
         return found if float(np.abs(right[rank - 1, :6]).max()) > _MOVES else float("inf")

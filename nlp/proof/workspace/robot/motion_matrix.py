@@ -6,14 +6,13 @@ are ``M (x, w) = 0`` with entries that are rows and screws themselves, neither n
 full rank, and the passive screws of every member are independent, exactly where M has full column rank.
 
 With free actuators of rates ``u``, each row and member sees ``x - A u`` in the place of x, with the screws ``A`` of
-those actuators that move its member. The null space of this matrix N has as many dimensions as the robot has freedoms
-and rates of actuators without a motion, more only where the constraint wrenches lose their rank, or passive screws
-theirs.
+those actuators that move its member; and the relations of rates that loops demand are rows of their own. The null space
+of this matrix N has as many dimensions as the robot has freedoms and rates of actuators without a motion, more only
+where the constraint wrenches lose their rank, or passive screws theirs.
 
-A member with nested loops has the motions ``S_p w + S_a u`` of all its joints along a tree of links as columns, and its
-loops as rows ``L_p w + L_a u = 0``: screws of the platform that follow from the loops have the rank of almost all
-configurations, also where the loops lose theirs. Rates w with which nothing but the member itself moves, such as the
-spin of a rod between two ball joints, are further dimensions of both null spaces.
+The screws of members with nested loops follow from ``L q = 0`` with the rank that L has at almost all poses. They would
+not tell a pose at which L loses it, and the member resists less. So both matrices have, as blocks of their own, as many
+rows of L as its rank, transposed: full column rank means that L keeps its rank too.
 
 Twists are ``(v, length omega)`` with the velocity v of the platform's origin.
 """
@@ -26,7 +25,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 from casadi import SX
 
-from .....models import Actuator, JointScrews, Member, Wrench, WrenchKind
+from .....models import Actuator, Member, Wrench, WrenchKind, rate_relations
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class RankMatrix:
 
     Attributes:
         matrix: (m, c) sparse: the first six columns are the platform's twist.
-        nullity: dimension of its null space at almost all poses: of the robot's freedoms and idle rates.
+        nullity: dimension of its null space at almost all poses: 0, or the robot's freedoms and idle rates.
     """
 
     matrix: SX
@@ -49,42 +48,33 @@ class Limbs:
     Attributes:
         wrenches: rows.
         members: members; those columns of each that are independent.
-        nested: members with nested loops.
         actuators: actuated joints.
+        loops: (m, k) each, the equations of nested loops in the rates of a member's passive joints.
         position: (3, 1) the platform's origin, length.
         length: by which rotations are multiplied, length.
     """
 
     wrenches: Sequence[Wrench]
     members: Sequence[Member]
-    nested: Sequence[JointScrews]
     actuators: Sequence[Actuator]
+    loops: Sequence[SX]
     position: SX
     length: float
 
-    @property
-    def idle(self) -> int:
-        """Dimension of the rates of passive joints without a motion of the platform, at almost all poses."""
-        return sum(each.idle for each in self.nested)
-
-    @property
-    def simple(self) -> list[Member]:
-        """Members without nested loops."""
-        names = {each.member for each in self.nested}
-        return [each for each in self.members if each.label not in names]
-
-    def reduced(self, columns: Sequence[Sequence[int]], length: float) -> Limbs:
-        """Return the limbs with some of the screws of each member without nested loops, and another length.
+    def reduced(self, columns: Sequence[Sequence[int]], rows: Sequence[Sequence[int]], length: float) -> Limbs:
+        """Return the limbs with some of the screws and loop equations of each member, and another length.
 
         Args:
             columns: indices of the screws that are kept.
+            rows: indices of the equations that are kept.
             length: by which rotations are multiplied.
         """
         members = [
             replace(each, screws=each.screws[:, list(kept)], groups=())
-            for each, kept in zip(self.simple, columns, strict=True)
+            for each, kept in zip(self.members, columns, strict=True)
         ]
-        return replace(self, members=members, length=length)
+        loops = [each[list(kept), :] for each, kept in zip(self.loops, rows, strict=True)]
+        return replace(self, members=members, loops=loops, length=length)
 
 
 def locked_matrix(limbs: Limbs) -> SX:
@@ -103,7 +93,7 @@ def free_matrix(limbs: Limbs) -> SX:
 def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), sparse, with one column for each driven joint at its end."""
     p, length = limbs.position, limbs.length
-    rates = sum(each.screws.shape[1] for each in limbs.members) + sum(len(each.passive) for each in limbs.nested)
+    rates = sum(member.screws.shape[1] for member in limbs.members)
     columns, blocks, at = 6 + rates + len(driven), [], 6
     for row in limbs.wrenches:
         moment = row.moment - ca.cross(p, row.force)
@@ -132,18 +122,9 @@ def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
                 block[:, 6 + rates + k] = -seen @ _twist(screw, p, length)
         blocks.append(block)
         at += count
-    places = {(each.limb, each.name): 6 + rates + k for k, each in enumerate(driven)}
-    for path in limbs.nested:
-        own = {j: at + k for k, j in enumerate(path.passive)}
-        at += len(own)
-        own |= {j: places[path.limb, path.actuator(j)] for j in path.driven if driven}
-        block, loops = SX(6, columns), SX(path.loops.shape[0], columns)
-        block[:, :6] = SX.eye(6)
-        for j, column in own.items():
-            block[:, column] = -_twist(path.all[:, j], p, length)
-            loops[:, column] = path.loops[:, j]
-        blocks += [block, *[row for row in ca.vertsplit(ca.sparsify(loops)) if row.nnz()]]
-    return ca.sparsify(ca.vertcat(SX(0, columns), *blocks))
+    relations = rate_relations(driven)
+    blocks.append(ca.horzcat(SX(relations.shape[0], columns - len(driven)), relations))
+    return ca.sparsify(ca.diagcat(ca.vertcat(*blocks), *[each.T for each in limbs.loops if each.shape[0]]))
 
 
 def _twist(screw: SX, position: SX, length: float) -> SX:

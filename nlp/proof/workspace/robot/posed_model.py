@@ -117,8 +117,8 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
         *[part for member in model.members for part in (member.centre, member.screws)],
-        *[each.screws for each in model.actuators],
-        *[part for each in model.nested for part in (each.all, each.loops)],
+        *[part for each in model.actuators for part in (each.screws, each.relations)],
+        *[each.loops[:, each.passive] for each in model.nested],
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
@@ -131,9 +131,9 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
             for row in model.wrenches
         ]
         members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-        driven = [replace(each, screws=next(following)) for each in model.actuators]
-        nested = [replace(each, all=next(following), loops=next(following)) for each in model.nested]
-        return Limbs(rows, members, nested, driven, position, 1.0)
+        driven = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
+        loops = [next(following) for _ in model.nested]
+        return Limbs(rows, members, driven, loops, position, 1.0)
 
     following = iter(function.call(given.all))
     limbs = limbs_of(following)

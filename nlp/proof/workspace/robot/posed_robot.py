@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Member, Model, frozen_array
+from .....models import FloatArray, JointScrews, Member, Model, frozen_array
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
@@ -53,8 +53,8 @@ class Problem:
         jacobian: (rows, 6) J, moments about the platform's origin divided by ``length``.
         length: of the order of the robot's, length.
         needed: indices of the equations among those of the model.
-        columns: indices of the screws that are kept of each member without nested loops.
-        is_nested: whether a member has nested loops.
+        columns: indices of the screws of each member that are kept.
+        rows: indices of the equations of each member's nested loops that are kept.
     """
 
     box: PoseBox
@@ -71,7 +71,7 @@ class Problem:
     length: float
     needed: tuple[int, ...]
     columns: tuple[tuple[int, ...], ...]
-    is_nested: bool
+    rows: tuple[tuple[int, ...], ...]
 
     def pose_of(self, z: FloatArray) -> FloatArray:
         """Return the six coordinates of the pose (..., 6) at points (..., n)."""
@@ -108,8 +108,10 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     moved = counted.all_closed(middle[:, None], list(dependent))[:, 0]
     start = moved if counted.is_closed(moved) else start
     length = _length(posed, start, case, model)
-    columns = tuple(_independent_screws(each, posed, start, length) for each in posed.limbs.simple)
-    limbs = posed.limbs.reduced(columns, length)
+    columns = tuple(_independent_screws(each, posed, start, length) for each in posed.limbs.members)
+    nested = zip(posed.limbs.loops, model.nested, strict=True)
+    rows = tuple(_independent_loops(each, path, posed.z, start) for each, path in nested)
+    limbs = posed.limbs.reduced(columns, rows, length)
     return Problem(
         box=box,
         z=posed.z,
@@ -119,18 +121,15 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         independent=independent,
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=_of_nullity(
-            polynomial_rows(locked_matrix(limbs), locked_matrix(posed.turned.reduced(columns, length)), posed),
-            limbs.idle,
-            posed.z,
-            start,
+        locked=RankMatrix(
+            polynomial_rows(locked_matrix(limbs), locked_matrix(posed.turned.reduced(columns, rows, length)), posed), 0
         ),
         unactuated=_unactuated(model, limbs, posed.z, start),
         jacobian=about_platform(posed.jacobian, limbs.position, length),
         length=length,
         needed=tuple(needed),
         columns=columns,
-        is_nested=bool(limbs.nested),
+        rows=rows,
     )
 
 
@@ -204,9 +203,22 @@ def _independent_screws(member: Member, posed: PosedModel, start: FloatArray, le
         return tuple(range(member.rank))
     columns = scaled_twists(member.screws, member.centre, SX(length), member.size)
     values = ca.Function("screws", [posed.z], [ca.densify(columns)])(start).full()
-    chosen = independent_rows([values.T])
+    # Screws that loops hold still are rounding alone.
+    chosen = independent_rows([values.T]) if member.rank else ()
     if len(chosen) != member.rank:
         raise NotJudgedError(f"the passive joints of limb {member.label} are singular in the middle of the workspace")
+    return tuple(sorted(chosen))
+
+
+def _independent_loops(loops: SX, path: JointScrews, z: SX, start: FloatArray) -> tuple[int, ...]:
+    """Return the indices of as many equations of a member's nested loops as have their rank.
+
+    Raises:
+        NotJudgedError: they have another rank in the middle of the workspace.
+    """
+    chosen = independent_rows([ca.Function("loops", [z], [ca.densify(loops)])(start).full()]) if path.loop_rank else ()
+    if len(chosen) != path.loop_rank:
+        raise NotJudgedError(f"the nested loops of limb {path.member} are singular in the middle of the workspace")
     return tuple(sorted(chosen))
 
 
@@ -228,19 +240,9 @@ def _unactuated(model: Model, limbs: Limbs, z: SX, start: FloatArray) -> RankMat
     matrix = free_matrix(limbs)
     if not matrix.numel():
         return None
-    if model.generic is None:
-        found = _of_nullity(matrix, matrix.shape[1], z, start)
-        return found if 0 < found.nullity < 6 else None
-    freedoms, idle = 6 - model.generic.constraints, model.generic.idle + limbs.idle
-    return _of_nullity(matrix, freedoms + idle, z, start) if 0 < freedoms < 6 else None
-
-
-def _of_nullity(matrix: SX, generic: int, z: SX, start: FloatArray) -> RankMatrix:
-    """Return a matrix with the dimension of its null space at almost all poses, or at a closed point where it is less.
-
-    That of almost all poses is a measured number. With one too large, a singular pose would count as regular.
-    """
-    if not generic:
-        return RankMatrix(matrix, 0)
-    values = np.linalg.svd(ca.Function("M", [z], [ca.densify(matrix)])(start).full(), compute_uv=False)
-    return RankMatrix(matrix, min(generic, matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0]))))
+    values = np.linalg.svd(ca.Function("free", [z], [ca.densify(matrix)])(start).full(), compute_uv=False)
+    rank = int(np.count_nonzero(values > _ZERO * values[0]))
+    freedoms, idle = matrix.shape[1] - rank, 0
+    if model.generic is not None:
+        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
+    return RankMatrix(matrix, freedoms + idle) if 0 < freedoms < 6 else None

@@ -179,7 +179,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
     """
     errors = ca.vertcat(*[SX.sym(f"e{k}", 3) for k in range(len(built.names))])
     posed = posed_model(case, built.model, problem.box, z=problem.z, errors=errors)
-    limbs = posed.limbs.reduced(problem.columns, problem.length)
+    limbs = posed.limbs.reduced(problem.columns, problem.rows, problem.length)
     unactuated = None
     if problem.unactuated is not None:
         unactuated = RankMatrix(free_matrix(limbs), problem.unactuated.nullity)
@@ -191,7 +191,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
         equations=posed.closure[list(problem.needed)] if problem.needed else SX(0, 1),
         every=posed.every,
         signs=posed.signs,
-        locked=RankMatrix(locked_matrix(limbs), problem.locked.nullity),
+        locked=RankMatrix(locked_matrix(limbs), 0),
         unactuated=unactuated,
         jacobian=about_platform(posed.jacobian, limbs.position, problem.length),
     )
@@ -208,11 +208,11 @@ def _check_freedoms(family: Family, posed: PosedModel) -> None:
     problem, loops = family.problem, family.loops
     columns = [
         scaled_twists(each.screws, each.centre, SX(problem.length), each.size)
-        for each in posed.limbs.simple
+        for each in posed.limbs.members
         if each.rank < each.screws.shape[1]
     ]
     screws = ca.Function("screws", [family.coordinates], [ca.densify(each) for each in columns])
-    ranks = [each.rank for each in posed.limbs.simple if each.rank < each.screws.shape[1]]
+    ranks = [each.rank for each in posed.limbs.members if each.rank < each.screws.shape[1]]
     rng, n = np.random.default_rng(_SEED), len(problem.start)
     every = ca.Function("every", [family.coordinates], [ca.densify(family.every)])
     for _ in range(_TESTS):

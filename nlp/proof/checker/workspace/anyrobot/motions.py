@@ -8,14 +8,13 @@ of joints. Each row of the matrix is a condition that it keeps:
   velocity of its centre alone.
 
 With the actuators free, x minus the motion ``sum_k u_k A_k`` of the actuators that move a member stands for x in its
-conditions. With locked actuators the matrix has full column rank where J has full rank, and the passive screws of each
-member are independent. With free ones its null space has as many dimensions as the robot has freedoms and rates ``u``
-without a motion, and more only where the constraint wrenches lose their rank, or passive screws theirs.
+conditions, and relations ``B u = 0`` that loops demand of the actuators alone are conditions too. With locked actuators
+the matrix has full column rank where J has full rank, and the passive screws of each member are independent. With free
+ones its null space has as many dimensions as the robot has freedoms and rates ``u`` without a motion, and more only
+where the constraint wrenches lose their rank, or passive screws theirs.
 
-Nested loops of a member are conditions as they are, ``sum_j w_j L_j + sum_k u_k L_k = 0``, beside ``x = sum_j w_j S_j +
-sum_k u_k S_k`` with the motions S that joints give the platform along a tree of links. Screws with the loops solved
-would not tell where a loop loses its rank. Both null spaces have the rates of passive joints in addition that close the
-loops and do not move the platform.
+Screws of members with nested loops have these solved, with the rank that they have at almost all poses. That each loop
+keeps its rank is claimed beside: as many of its conditions as its rank are columns of a block of their own.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ......models import Actuator, FloatArray, Member, Model, Wrench, WrenchKind
+from ......models import Actuator, FloatArray, Member, Model, Wrench, WrenchKind, rate_relations
 from ......models.member import scaled_twists
 from ......models.rows import independent_rows
 from ...proof_file import ProofError
@@ -43,28 +42,26 @@ class Motions:
 
     Attributes:
         matrix: (m, c) sparse, m not below c less the freedoms; its first six columns are those of the platform.
-        freedoms: dimensions of its null space that are claimed to be all: of the robot's freedoms and idle rates.
+        freedoms: dimensions of its null space that are claimed to be all: the robot's freedoms and idle rates.
     """
 
     matrix: SX
     freedoms: int
 
 
-def locked_motions(robot: PosedRobot, start: FloatArray) -> Motions:
+def locked_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
     """Return the matrix with locked actuators.
 
     Args:
+        model: the robot's model.
         robot: the robot.
         start: (n,) closed loops, at which those screws of each member are chosen that are independent.
 
     Raises:
-        ProofError: the screws of a member are singular there.
+        ProofError: the screws or loops of a member are singular there.
     """
     matrix = _matrix(robot, robot.rows, _with_chosen_screws(robot, start), ())
-    idle = sum(each.idle for each in robot.nested)
-    if idle and idle > _freedoms(robot, matrix, start):
-        raise ProofError("passive joints have fewer motions without the platform than at almost all poses")
-    return Motions(matrix, idle)
+    return Motions(ca.diagcat(matrix, *_loop_blocks(model, robot, start)), 0)
 
 
 def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
@@ -76,29 +73,22 @@ def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
         start: as for :func:`locked_motions`.
 
     Raises:
-        ProofError: the screws of a member are singular at the start, or as many freedoms as a platform has are left.
+        ProofError: the screws or loops of a member are singular at the start, or as many freedoms as a platform has are left.
     """
     if robot.actuators:
         matrix = _matrix(robot, robot.rows, _with_chosen_screws(robot, start), robot.actuators)
+        matrix = ca.diagcat(matrix, *_loop_blocks(model, robot, start))
     else:
         couples = [row for row in robot.rows if row.kind is WrenchKind.COUPLE]
         matrix = _matrix(robot, couples, (), ())
-    at_start = _freedoms(robot, matrix, start)
-    freedoms, idle = at_start, 0
     if model.generic is not None:
-        freedoms = 6 - model.generic.constraints
-        idle = model.generic.idle + sum(each.idle for each in robot.nested)
+        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
+    else:
+        values = np.linalg.svd(ca.Function("free", [robot.z], [ca.densify(matrix)])(start).full(), compute_uv=False)
+        freedoms, idle = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0])), 0
     if not 0 < freedoms < 6:
         raise ProofError("the robot has no constraint wrenches of which the rank could be claimed")
-    if freedoms + idle > at_start:
-        raise ProofError("the robot has fewer freedoms in the middle of the workspace than at almost all poses")
     return Motions(matrix, freedoms + idle)
-
-
-def _freedoms(robot: PosedRobot, matrix: SX, start: FloatArray) -> int:
-    """Return the dimensions of the null space at closed loops (n,)."""
-    values = np.linalg.svd(ca.Function("at", [robot.z], [ca.densify(matrix)])(start).full(), compute_uv=False)
-    return int(matrix.shape[1]) - int(np.count_nonzero(values > _ZERO * values[0]))
 
 
 def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
@@ -114,16 +104,33 @@ def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
             continue
         columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
         values = ca.Function("screws", [robot.z], [ca.densify(columns)])(start).full()
-        chosen = independent_rows([values.T])
+        # Screws that nested loops hold still are rounding errors.
+        chosen = independent_rows([values.T]) if each.rank else ()
         if len(chosen) != each.rank:
             raise ProofError(f"the passive joints of limb {each.label} are singular in the middle of the workspace")
         members.append(replace(each, screws=each.screws[:, sorted(chosen)], groups=()))
     return members
 
 
+def _loop_blocks(model: Model, robot: PosedRobot, start: FloatArray) -> list[SX]:
+    """Return the conditions (k, r) of nested loops, one in each column, as many as the loops of a member have ranks.
+
+    Raises:
+        ProofError: the loops of a member have another rank at the start.
+    """
+    blocks = []
+    for path, conditions in zip(model.nested, robot.nested, strict=True):
+        values = ca.Function("nested", [robot.z], [ca.densify(conditions)])(start).full()
+        chosen = sorted(independent_rows([values])) if path.loop_rank else []
+        if len(chosen) != path.loop_rank:
+            raise ProofError(f"the nested loops of limb {path.member} are singular in the middle of the workspace")
+        blocks += [conditions[chosen, :].T] if chosen else []
+    return blocks
+
+
 def _matrix(robot: PosedRobot, rows: Sequence[Wrench], members: Sequence[Member], actuators: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), with columns of the platform, of passive joints and of actuators."""
-    passive = sum(each.screws.shape[1] for each in members) + sum(len(each.passive) for each in robot.nested)
+    passive = sum(each.screws.shape[1] for each in members)
     blocks, at = [], 6
 
     def driven(member: str, seen: SX) -> list[SX]:
@@ -144,17 +151,8 @@ def _matrix(robot: PosedRobot, rows: Sequence[Wrench], members: Sequence[Member]
         before, after = SX(each.size, at - 6), SX(each.size, 6 + passive - at - count)
         blocks.append(ca.horzcat(seen, before, *own, after, *driven(each.label, seen)))
         at += count
-    for path in robot.nested:
-        motions = [-_motion(robot, path.all[:, j]) for j in range(path.all.shape[1])]
-        conditions = ca.vertcat(ca.horzcat(SX(6, 0), *motions), path.loops)
-        count, height = len(path.passive), conditions.shape[0]
-        turned = {(path.limb, path.actuator(j)): conditions[:, j] for j in path.driven}
-        before, after = SX(height, at - 6), SX(height, 6 + passive - at - count)
-        platform = ca.vertcat(SX.eye(6), SX(height - 6, 6))
-        turns = [turned.get((each.limb, each.name), SX(height, 1)) for each in actuators]
-        whole = ca.sparsify(ca.horzcat(platform, before, conditions[:, path.passive], after, *turns))
-        blocks += [row for row in ca.vertsplit(whole) if row.nnz()]
-        at += count
+    relations = rate_relations(actuators)
+    blocks.append(ca.horzcat(SX(relations.shape[0], 6 + passive), relations))
     return ca.sparsify(ca.vertcat(SX(0, 6 + passive + len(actuators)), *blocks))
 
 

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ......models import Actuator, FloatArray, JointScrews, Member, Model, Substitution, Wrench
+from ......models import Actuator, FloatArray, Member, Model, Substitution, Wrench
 from .....case.case import Case
 from .....case.pose import Free
 from .....case.workspace import TurnKind
@@ -28,9 +28,9 @@ class PosedRobot:
         loops: (l, 1) further equations of the same loops, which other assemblies of the joints do not fulfil.
         signs: (s, 1) numbers that are positive in home's working mode.
         rows: rows of limbs, one wrench each.
-        members: members of limbs, without those that have nested loops.
-        nested: the joints of these.
+        members: members of limbs.
         actuators: actuated joints.
+        nested: (m, k) each, the conditions of nested loops on rates of a member's passive joints.
         position: (3, 1) the platform's origin, length.
         length: by which rotations are multiplied, length: any positive number.
     """
@@ -44,8 +44,8 @@ class PosedRobot:
     signs: SX
     rows: tuple[Wrench, ...]
     members: tuple[Member, ...]
-    nested: tuple[JointScrews, ...]
     actuators: tuple[Actuator, ...]
+    nested: tuple[SX, ...]
     position: SX
     length: float
 
@@ -75,13 +75,11 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         _rotation(root, y[3:]),
         position,
     )
-    nested = {each.member for each in model.nested}
-    members = [each for each in model.members if each.label not in nested]
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment)],
-        *[part for member in members for part in (member.centre, member.screws)],
-        *[part for each in model.nested for part in (each.all, each.loops)],
-        *[each.screws for each in model.actuators],
+        *[part for member in model.members for part in (member.centre, member.screws)],
+        *[part for each in model.actuators for part in (each.screws, each.relations)],
+        *[each.loops[:, each.passive] for each in model.nested],
         *[each.scaled for each in (*model.closure, *model.loops)],
         *[each.value for each in model.signs],
         *[each.size for each in model.unknowns],
@@ -93,9 +91,11 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         middle=middle,
         size=(0.5 * (root.upper - root.lower))[list(free)],
         rows=tuple(replace(row, force=next(following), moment=next(following)) for row in model.wrenches),
-        members=tuple(replace(each, centre=next(following), screws=next(following), slide=None) for each in members),
-        nested=tuple(replace(each, all=next(following), loops=next(following)) for each in model.nested),
-        actuators=tuple(replace(each, screws=next(following)) for each in model.actuators),
+        members=tuple(
+            replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
+        ),
+        actuators=tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators),
+        nested=tuple(next(following) for _ in model.nested),
         equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
         loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
         signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
