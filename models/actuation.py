@@ -136,7 +136,7 @@ def with_loops(
     for each, screws, loops in paths:
         own = [names.index((each.limb, each.joints[k].removeprefix(f"{each.limb}:"))) for k in each.driven]
         rows = [k for k, row in enumerate(model.frame_rows) if row.member == each.member]
-        passive = [k for k in range(loops.shape[1]) if k not in each.driven]
+        passive = each.passive
         left, values, right = np.linalg.svd(loops[:, passive])
         rank = int(np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0)))
         by_actuators = loops[:, each.driven]

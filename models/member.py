@@ -149,7 +149,10 @@ def resisted_parts(columns: SX, rank: int, vectors: SX, groups: Sequence[ColumnG
     parts = ca.horzcat(vectors, columns)
     for group in groups:
         own = parts[:, [k + j for j in group.columns]]
-        if len(group.columns) == 1:
+        if not group.rank:
+            # The columns are 0, but where loops from which they follow lose their rank: there the parts have no value.
+            parts -= own @ (own.T @ parts)
+        elif len(group.columns) == 1:
             square = ca.sumsqr(own)
             parts = ca.horzcat(*[each - own * (ca.dot(own, each) / square) for each in ca.horzsplit(parts)])
         else:

@@ -134,6 +134,11 @@ class Model(Whole, Shown):
         return (*own, *(RowLabel(each.limb, each.kind, each.label) for each in self.members for _ in range(each.size)))
 
     @property
+    def nested(self) -> tuple[JointScrews, ...]:
+        """Paths of joints with nested loops, of the limbs that resist the platform."""
+        return tuple(each for each in self.joint_screws if each.is_nested and each.limb in self.limbs)
+
+    @property
     def has_couples(self) -> bool:
         """Whether a row has a couple that counts, so that F depends on a characteristic length."""
         return any(row.kind is not WrenchKind.FORCE for row in self.rows)

@@ -228,6 +228,7 @@ class JointScrews:
         passive_rank, all_rank: ranks of the motions by passive joints, and by all, at almost all dimensions and poses.
         member: name of the member of nested loops; empty for a path of joints.
         loops: (m, k) ``L`` of nested loops, without a unit for rates of order 1.
+        loop_rank: of the columns of passive joints in ``L``, at almost all dimensions and poses.
     """
 
     limb: str
@@ -238,11 +239,17 @@ class JointScrews:
     all_rank: int
     member: str = ""
     loops: SX = field(default_factory=lambda: SX(0, 0))
+    loop_rank: int = 0
 
     @property
     def is_nested(self) -> bool:
         """Whether the columns are motions along a tree of links with nested loops."""
         return bool(self.member)
+
+    @property
+    def passive(self) -> list[int]:
+        """Indices of the columns of passive joints."""
+        return [k for k in range(self.all.shape[1]) if k not in self.driven]
 
 
 @dataclass(frozen=True)

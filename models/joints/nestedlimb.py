@@ -133,7 +133,8 @@ def resisting(
         sizes = ca.horzcat(*[rate_sizes.get(k, SX(1)) for k in free.columns])
         motions, loops = (part / ca.repmat(sizes, part.shape[0], 1) for part in (free.platform, free_loops))
         ends = ranks.twists, free_ranks.twists
-        found.screws.append(JointScrews(limb.name, labels, motions, driving, *ends, label or limb.name, loops))
+        names = limb.name, labels, motions, driving, *ends, label or limb.name
+        found.screws.append(JointScrews(*names, loops, sum(ranks.loops)))
         found.structure.append(_structure(limb, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     relations = _relations(ca.vertcat(*open_loops), symbols, points)
     for column, k in enumerate(actuated):

@@ -19,11 +19,6 @@ class PathScrews(NamedTuple):
     screws: FloatArray
     loops: FloatArray
 
-    @property
-    def passive(self) -> list[int]:
-        """Indices of the columns of passive joints."""
-        return [k for k in range(self.screws.shape[1]) if k not in self.path.driven]
-
 
 def paths_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int = 0) -> list[PathScrews]:
     """Return the paths of joints of a robot, of those whose screws are known, at a point.

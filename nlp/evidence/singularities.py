@@ -168,7 +168,7 @@ def _motions_at(nlp: Nlp, x: FloatArray, numbers: RobotNumbers, pose: int) -> li
     """Return the screws of each path of joints at a point."""
     found = []
     for each in paths_at(nlp, x, numbers, pose):
-        screws, passive = each.screws, each.passive
+        screws, passive = each.screws, each.path.passive
         if each.path.is_nested:
             locked = screws[:, passive] @ _null_space(each.loops[:, passive])
             screws = np.hstack([locked, screws @ _null_space(each.loops)])

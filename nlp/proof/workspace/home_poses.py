@@ -20,6 +20,7 @@ from ...case.task import Sense
 from ...errors import EvaluationError
 from ...evidence.closing import closed_in_place
 from ...evidence.mobility import mobility_of
+from ...evidence.singularities import is_passive_singular
 from ...evidence.state import evaluate
 from ...program.layout import Layout
 from ..statement.claims import REACH, Claim, claims_of
@@ -66,6 +67,9 @@ class _HomePoses:
         """Return whether J, or the constraint wrenches alone, lose their rank at given numbers."""
         x = self.closed(given)
         if x is None:
+            return False
+        # Where nested loops lose their rank, the actuators' motions have no value, and say nothing of constraints.
+        if constraints and self._nlp.program.model.nested and is_passive_singular(self._nlp, x):
             return False
         try:
             state = evaluate(self._nlp, x)

@@ -10,6 +10,10 @@ those actuators that move its member; and the relations of rates that loops dema
 of this matrix N has as many dimensions as the robot has freedoms and rates of actuators without a motion, more only
 where the constraint wrenches lose their rank, or passive screws theirs.
 
+The screws of members with nested loops follow from ``L q = 0`` with the rank that L has at almost all poses. They would
+not tell a pose at which L loses it, and the member resists less. So both matrices have, as blocks of their own, as many
+rows of L as its rank, transposed: full column rank means that L keeps its rank too.
+
 Twists are ``(v, length omega)`` with the velocity v of the platform's origin.
 """
 
@@ -45,6 +49,7 @@ class Limbs:
         wrenches: rows.
         members: members; those columns of each that are independent.
         actuators: actuated joints.
+        loops: (m, k) each, the equations of nested loops in the rates of a member's passive joints.
         position: (3, 1) the platform's origin, length.
         length: by which rotations are multiplied, length.
     """
@@ -52,21 +57,24 @@ class Limbs:
     wrenches: Sequence[Wrench]
     members: Sequence[Member]
     actuators: Sequence[Actuator]
+    loops: Sequence[SX]
     position: SX
     length: float
 
-    def reduced(self, columns: Sequence[Sequence[int]], length: float) -> Limbs:
-        """Return the limbs with some of the screws of each member, and another length.
+    def reduced(self, columns: Sequence[Sequence[int]], rows: Sequence[Sequence[int]], length: float) -> Limbs:
+        """Return the limbs with some of the screws and loop equations of each member, and another length.
 
         Args:
             columns: indices of the screws that are kept.
+            rows: indices of the equations that are kept.
             length: by which rotations are multiplied.
         """
         members = [
             replace(each, screws=each.screws[:, list(kept)], groups=())
             for each, kept in zip(self.members, columns, strict=True)
         ]
-        return replace(self, members=members, length=length)
+        loops = [each[list(kept), :] for each, kept in zip(self.loops, rows, strict=True)]
+        return replace(self, members=members, loops=loops, length=length)
 
 
 def locked_matrix(limbs: Limbs) -> SX:
@@ -79,7 +87,7 @@ def free_matrix(limbs: Limbs) -> SX:
     if limbs.actuators:
         return _matrix(limbs, limbs.actuators)
     couples = [row for row in limbs.wrenches if row.kind is WrenchKind.COUPLE]
-    return _matrix(Limbs(couples, (), (), limbs.position, limbs.length), [])
+    return _matrix(Limbs(couples, (), (), (), limbs.position, limbs.length), [])
 
 
 def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
@@ -116,7 +124,7 @@ def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
         at += count
     relations = rate_relations(driven)
     blocks.append(ca.horzcat(SX(relations.shape[0], columns - len(driven)), relations))
-    return ca.sparsify(ca.vertcat(*blocks))
+    return ca.sparsify(ca.diagcat(ca.vertcat(*blocks), *[each.T for each in limbs.loops if each.shape[0]]))
 
 
 def _twist(screw: SX, position: SX, length: float) -> SX:

@@ -118,6 +118,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
         *[part for member in model.members for part in (member.centre, member.screws)],
         *[part for each in model.actuators for part in (each.screws, each.relations)],
+        *[each.loops[:, each.passive] for each in model.nested],
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
@@ -131,7 +132,8 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         ]
         members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
         driven = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
-        return Limbs(rows, members, driven, position, 1.0)
+        loops = [next(following) for _ in model.nested]
+        return Limbs(rows, members, driven, loops, position, 1.0)
 
     following = iter(function.call(given.all))
     limbs = limbs_of(following)

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Member, Model, frozen_array
+from .....models import FloatArray, JointScrews, Member, Model, frozen_array
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
@@ -55,6 +55,7 @@ class Problem:
         length: of the order of the robot's, length.
         needed: indices of the equations among those of the model.
         columns: indices of the screws of each member that are kept.
+        rows: indices of the equations of each member's nested loops that are kept.
     """
 
     box: PoseBox
@@ -71,6 +72,7 @@ class Problem:
     length: float
     needed: tuple[int, ...]
     columns: tuple[tuple[int, ...], ...]
+    rows: tuple[tuple[int, ...], ...]
 
     def pose_of(self, z: FloatArray) -> FloatArray:
         """Return the six coordinates of the pose (..., 6) at points (..., n)."""
@@ -108,7 +110,9 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     start = moved if counted.is_closed(moved) else start
     length = _length(posed, start, case, model)
     columns = tuple(_independent_screws(each, posed, start, length) for each in posed.limbs.members)
-    limbs = posed.limbs.reduced(columns, length)
+    nested = zip(posed.limbs.loops, model.nested, strict=True)
+    rows = tuple(_independent_loops(each, path, posed.z, start) for each, path in nested)
+    limbs = posed.limbs.reduced(columns, rows, length)
     return Problem(
         box=box,
         z=posed.z,
@@ -118,12 +122,13 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         independent=independent,
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=locked_rows(posed, columns, length),
+        locked=locked_rows(posed, columns, rows, length),
         unactuated=_unactuated(model, limbs, posed.z, start),
         jacobian=about_platform(posed.jacobian, limbs.position, length),
         length=length,
         needed=tuple(needed),
         columns=columns,
+        rows=rows,
     )
 
 
@@ -197,21 +202,37 @@ def _independent_screws(member: Member, posed: PosedModel, start: FloatArray, le
         return tuple(range(member.rank))
     columns = scaled_twists(member.screws, member.centre, SX(length), member.size)
     values = ca.Function("screws", [posed.z], [ca.densify(columns)])(start).full()
-    chosen = independent_rows([values.T])
+    # Screws that loops hold still are rounding alone.
+    chosen = independent_rows([values.T]) if member.rank else ()
     if len(chosen) != member.rank:
         raise NotJudgedError(f"the passive joints of limb {member.label} are singular in the middle of the workspace")
     return tuple(sorted(chosen))
 
 
-def locked_rows(posed: PosedModel, columns: Sequence[Sequence[int]], length: float) -> RankMatrix:
+def _independent_loops(loops: SX, path: JointScrews, z: SX, start: FloatArray) -> tuple[int, ...]:
+    """Return the indices of as many equations of a member's nested loops as have their rank.
+
+    Raises:
+        NotJudgedError: they have another rank in the middle of the workspace.
+    """
+    chosen = independent_rows([ca.Function("loops", [z], [ca.densify(loops)])(start).full()]) if path.loop_rank else ()
+    if len(chosen) != path.loop_rank:
+        raise NotJudgedError(f"the nested loops of limb {path.member} are singular in the middle of the workspace")
+    return tuple(sorted(chosen))
+
+
+def locked_rows(
+    posed: PosedModel, columns: Sequence[Sequence[int]], rows: Sequence[Sequence[int]], length: float
+) -> RankMatrix:
     """Return the matrix with locked actuators, rows that are linear in the rotation without a division.
 
     Args:
         posed: the robot.
         columns: indices of the screws of each member that are kept.
+        rows: indices of the equations of the nested loops of each that are kept.
         length: by which rotations are multiplied.
     """
-    plain, turned = (locked_matrix(each.reduced(columns, length)) for each in (posed.limbs, posed.turned))
+    plain, turned = (locked_matrix(each.reduced(columns, rows, length)) for each in (posed.limbs, posed.turned))
     return RankMatrix(polynomial_rows(plain, turned, posed), 0)
 
 

@@ -179,7 +179,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
     """
     errors = ca.vertcat(*[SX.sym(f"e{k}", 3) for k in range(len(built.names))])
     posed = posed_model(case, built.model, problem.box, z=problem.z, errors=errors)
-    limbs = posed.limbs.reduced(problem.columns, problem.length)
+    limbs = posed.limbs.reduced(problem.columns, problem.rows, problem.length)
     unactuated = None
     if problem.unactuated is not None:
         unactuated = RankMatrix(free_matrix(limbs), problem.unactuated.nullity)
@@ -191,7 +191,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
         equations=posed.closure[list(problem.needed)] if problem.needed else SX(0, 1),
         every=posed.every,
         signs=posed.signs,
-        locked=locked_rows(posed, problem.columns, problem.length),
+        locked=locked_rows(posed, problem.columns, problem.rows, problem.length),
         unactuated=unactuated,
         jacobian=about_platform(posed.jacobian, limbs.position, problem.length),
     )

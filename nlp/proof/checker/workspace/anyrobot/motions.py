@@ -12,6 +12,9 @@ conditions, and relations ``B u = 0`` that loops demand of the actuators alone a
 the matrix has full column rank where J has full rank, and the passive screws of each member are independent. With free
 ones its null space has as many dimensions as the robot has freedoms and rates ``u`` without a motion, and more only
 where the constraint wrenches lose their rank, or passive screws theirs.
+
+Screws of members with nested loops have these solved, with the rank that they have at almost all poses. That each loop
+keeps its rank is claimed beside: as many of its conditions as its rank are columns of a block of their own.
 """
 
 from __future__ import annotations
@@ -46,17 +49,19 @@ class Motions:
     freedoms: int
 
 
-def locked_motions(robot: PosedRobot, start: FloatArray) -> Motions:
+def locked_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
     """Return the matrix with locked actuators.
 
     Args:
+        model: the robot's model.
         robot: the robot.
         start: (n,) closed loops, at which those screws of each member are chosen that are independent.
 
     Raises:
-        ProofError: the screws of a member are singular there.
+        ProofError: the screws or loops of a member are singular there.
     """
-    return Motions(_matrix(robot, robot.rows, _with_chosen_screws(robot, start), ()), 0)
+    matrix = _matrix(robot, robot.rows, _with_chosen_screws(robot, start), ())
+    return Motions(ca.diagcat(matrix, *_loop_blocks(model, robot, start)), 0)
 
 
 def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
@@ -68,10 +73,11 @@ def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
         start: as for :func:`locked_motions`.
 
     Raises:
-        ProofError: the screws of a member are singular at the start, or as many freedoms as a platform has are left.
+        ProofError: screws or loops of a member are singular at the start, or all freedoms of a platform are left.
     """
     if robot.actuators:
         matrix = _matrix(robot, robot.rows, _with_chosen_screws(robot, start), robot.actuators)
+        matrix = ca.diagcat(matrix, *_loop_blocks(model, robot, start))
     else:
         couples = [row for row in robot.rows if row.kind is WrenchKind.COUPLE]
         matrix = _matrix(robot, couples, (), ())
@@ -98,11 +104,28 @@ def _with_chosen_screws(robot: PosedRobot, start: FloatArray) -> list[Member]:
             continue
         columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
         values = ca.Function("screws", [robot.z], [ca.densify(columns)])(start).full()
-        chosen = independent_rows([values.T])
+        # Screws that nested loops hold still are rounding errors.
+        chosen = independent_rows([values.T]) if each.rank else ()
         if len(chosen) != each.rank:
             raise ProofError(f"the passive joints of limb {each.label} are singular in the middle of the workspace")
         members.append(replace(each, screws=each.screws[:, sorted(chosen)], groups=()))
     return members
+
+
+def _loop_blocks(model: Model, robot: PosedRobot, start: FloatArray) -> list[SX]:
+    """Return the conditions (k, r) of nested loops, one in each column, as many as the loops of a member have ranks.
+
+    Raises:
+        ProofError: the loops of a member have another rank at the start.
+    """
+    blocks = []
+    for path, conditions in zip(model.nested, robot.nested, strict=True):
+        values = ca.Function("nested", [robot.z], [ca.densify(conditions)])(start).full()
+        chosen = sorted(independent_rows([values])) if path.loop_rank else []
+        if len(chosen) != path.loop_rank:
+            raise ProofError(f"the nested loops of limb {path.member} are singular in the middle of the workspace")
+        blocks += [conditions[chosen, :].T] if chosen else []
+    return blocks
 
 
 def _matrix(robot: PosedRobot, rows: Sequence[Wrench], members: Sequence[Member], actuators: Sequence[Actuator]) -> SX:

@@ -30,6 +30,7 @@ class PosedRobot:
         rows: rows of limbs, one wrench each.
         members: members of limbs.
         actuators: actuated joints.
+        nested: (m, k) each, the conditions of nested loops on rates of a member's passive joints.
         position: (3, 1) the platform's origin, length.
         length: by which rotations are multiplied, length: any positive number.
     """
@@ -44,6 +45,7 @@ class PosedRobot:
     rows: tuple[Wrench, ...]
     members: tuple[Member, ...]
     actuators: tuple[Actuator, ...]
+    nested: tuple[SX, ...]
     position: SX
     length: float
 
@@ -77,6 +79,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         *[part for row in model.wrenches for part in (row.force, row.moment)],
         *[part for member in model.members for part in (member.centre, member.screws)],
         *[part for each in model.actuators for part in (each.screws, each.relations)],
+        *[each.loops[:, each.passive] for each in model.nested],
         *[each.scaled for each in (*model.closure, *model.loops)],
         *[each.value for each in model.signs],
         *[each.size for each in model.unknowns],
@@ -92,6 +95,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
             replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
         ),
         actuators=tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators),
+        nested=tuple(next(following) for _ in model.nested),
         equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
         loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
         signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),

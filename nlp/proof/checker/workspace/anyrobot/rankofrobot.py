@@ -38,7 +38,7 @@ def rank_claim(case: Case, model: Model, root: PoseRoot, name: str) -> MotionCla
     needed = needed_equations(robot, start)
     try:
         assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
-        motions = free_motions(model, robot, start) if name == CONSTRAINTS else locked_motions(robot, start)
+        motions = free_motions(model, robot, start) if name == CONSTRAINTS else locked_motions(model, robot, start)
         return MotionClaim(robot, motions, assembly)
     except UncoveredError as error:
         raise ProofError(f"the check has no rule for {error}") from None
