@@ -153,7 +153,10 @@ class Examiner:
         if self.second is not None and self._rank is not None and len(cells.lower):
             ends = cells.lower.T, cells.upper.T
             change = None if self._change is None else self._change.over(*ends)
-            return self._examined(cells, self._rank.examine_second(self.second, *ends, change))
+            found = self._rank.examine_second(self.second, *ends, change)
+            B, f = found.shares.shape
+            none = Relation(np.zeros((B, 0)), np.zeros((B, 0, f)), np.zeros((B, 0)), np.zeros((B, 0, 0)))
+            return Examined(cells, none, *found)
         f, k = len(self._independent), self.count
         B = len(cells.lower)
         lower, upper = cells.lower.copy(), cells.upper.copy()
@@ -194,12 +197,6 @@ class Examiner:
         finite = np.asarray(np.isfinite(near).all(axis=1))
         near = np.where(finite[:, None], near, cells.near)
         return Examined(Cells(lower, upper, near, known), relation, regular, shares, smallest, signs)
-
-    def _examined(self, cells: Cells, found: Tested) -> Examined:
-        """Return the results of a test of boxes without dependent coordinates."""
-        B, f = found.shares.shape
-        none = Relation(np.zeros((B, 0)), np.zeros((B, 0, f)), np.zeros((B, 0)), np.zeros((B, 0, 0)))
-        return Examined(cells, none, *found)
 
     def _forms(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms of all entries over boxes (B, n), for all machines."""
