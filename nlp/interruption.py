@@ -187,8 +187,9 @@ def reason_of(search: Callable[[], str]) -> str:
     complete. What it claims otherwise must hold in the middle of a step too: a step changes what is claimed by one
     assignment, its last.
     """
-    token = _in_search.set(True)
+    before = _in_search.get()
     try:
+        _in_search.set(True)
         return search()
     except KeyboardInterrupt:
         call = _call.get()
@@ -198,7 +199,7 @@ def reason_of(search: Callable[[], str]) -> str:
     except _StoppedError:
         return why_stopped()
     finally:
-        _in_search.reset(token)
+        _in_search.set(before)
 
 
 def stop_if_requested() -> None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -23,9 +22,11 @@ from screwsynth.nlp.proof.checker.fingerprint import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 from screwsynth.nlp.proof.checker.proofcheck import check_proof
 from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
 from screwsynth.nlp.proof.workspace.ranks import search
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner
+from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -101,7 +102,8 @@ def test_a_value_that_jumps_has_no_rule(jump: Callable[[SX], SX]) -> None:
 @pytest.mark.parametrize("place", ["examine", "branch"])
 def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     rng, model = np.random.default_rng(0), hexapod()
-    given = {f"{plate}_{i}": rng.normal(size=3).tolist() for plate in ("base", "platform") for i in range(1, 7)}
+    legs = Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))
+    given = {f"{plate}_{i + 1}": getattr(legs, plate)[i].tolist() for plate in ("base", "platform") for i in range(6)}
     case = Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])])
     turns = Turns(TurnKind.ANY_AXIS, (Free(0.0, 0.5),))
     box = pose_box(Workspace((Free(-1.0, 1.0), Free(-1.0, 1.0), Free(3.0, 4.0)), turns))
@@ -113,6 +115,10 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     monkeypatch.setattr(target, name, interrupt)
     # The poses of opposite signs that are known before a box is bisected would refute the claim, as they should.
     problem = build_problem(case, model, box)
+<<<<<<< HEAD
     found = search.prove_rank(problem, problem.locked, refuter=SimpleNamespace(look=lambda *_: None))
+=======
+    found = search.prove_rank(problem, problem.locked, refuter=SignRefuter(legs, problem))
+>>>>>>> s6
     assert found.outcome is Outcome.OPEN
     assert found.reason == "interrupted"
