@@ -115,10 +115,6 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     monkeypatch.setattr(target, name, interrupt)
     # The poses of opposite signs that are known before a box is bisected would refute the claim, as they should.
     problem = build_problem(case, model, box)
-<<<<<<< HEAD
     found = search.prove_rank(problem, problem.locked, refuter=SimpleNamespace(look=lambda *_: None))
-=======
-    found = search.prove_rank(problem, problem.locked, refuter=SignRefuter(legs, problem))
->>>>>>> s6
     assert found.outcome is Outcome.OPEN
     assert found.reason == "interrupted"
