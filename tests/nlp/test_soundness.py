@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -26,7 +27,6 @@ from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
 from screwsynth.nlp.proof.workspace.ranks import search
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner
-from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
