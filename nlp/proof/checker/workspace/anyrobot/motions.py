@@ -73,12 +73,7 @@ def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
         start: as for :func:`locked_motions`.
 
     Raises:
-    <<<<<<< HEAD
         ProofError: screws or loops of a member are singular at the start, or all freedoms of a platform are left.
-    =======
-        ProofError: screws or loops of a member are singular at the start, or as many freedoms as a platform has are
-            left.
-    >>>>>>> ne
     """
     if robot.actuators:
         matrix = _matrix(robot, robot.rows, _with_chosen_screws(robot, start), robot.actuators)
