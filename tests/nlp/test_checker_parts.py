@@ -105,7 +105,7 @@ def sign_of(block: np.ndarray) -> int:
 def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -> None:
     """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
     rng, y, nothing, more = np.random.default_rng(1), SX.sym("y"), SX(0, 1), (np.zeros(6), np.ones(1))
-    robot = PosedRobot(y, (0,), *more, nothing, nothing, nothing, (), (), (), SX(3, 1), 1.0)
+    robot = PosedRobot(y, (0,), *more, nothing, nothing, nothing, (), (), (), (), SX(3, 1), 1.0)
     assembly, at = Assembly(robot, nothing, np.zeros(1)), np.zeros((1, 6))
 
     def shown(block: np.ndarray) -> int:

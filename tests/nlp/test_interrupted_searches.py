@@ -6,6 +6,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import copy_context
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -280,8 +281,9 @@ def interrupted(search: Search, error: type[BaseException], watched: tuple[str, 
     answers = 0
     for n in np.random.default_rng(seed).integers(1, instructions + 1, moments).tolist():
         try:
+            # An interrupt may leave context variables as they are: those of a copy.
             with at_instruction(n, error, watched):
-                found = search()
+                found = copy_context().run(search)
         except error:
             continue
         if found == whole:  # the number of instructions depends on the clock by a few

@@ -12,6 +12,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from numpy_engine.first_order import enclose
+from numpy_engine.second_order import enclose_second
 
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED, gallery_names
@@ -25,10 +27,8 @@ from screwsynth.nlp.front.programs import program_of
 from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure.first_order import enclose
 from screwsynth.nlp.proof.enclosure.instructions import compile_tape
 from screwsynth.nlp.proof.enclosure.quadratic_models import multipliers
-from screwsynth.nlp.proof.enclosure.second_order import enclose_second
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.results.evaluation import evaluation_of
