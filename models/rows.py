@@ -94,6 +94,8 @@ def column_groups(matrices: Sequence[FloatArray], rank: int) -> tuple[ColumnGrou
     if sum(each.rank for each in groups) != rank:
         return ()
     zero = tuple(k for k in rest if not any(k in each.columns for each in groups))
+    if any(unit[k][:, zero].any() for k in regular):
+        return ()  # columns in the span of several rotations are in no group with one of them
     groups[0] = ColumnGroup((*groups[0].columns, *zero), groups[0].rank)
     return tuple(groups) if len(groups) > 1 else ()
 

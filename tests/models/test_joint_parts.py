@@ -174,3 +174,8 @@ def test_columns_fall_into_the_smallest_groups_whose_ranks_add_up() -> None:
     assert column_groups(points, 4) == (((0, 2, 6), 1), ((1, 3, 4), 2), ((5,), 1))
     assert column_groups(balls, 5) == (((0,), 1), ((1,), 1), ((2,), 1), ((3, 4, 5), 2))
     assert column_groups(points[:1], 4) == ()
+    # A third axis in the plane of two is no multiple of either: its group is none of theirs.
+    axes = np.array([[1.0, 0, 1, 0], [0, 1, 1, 0], [0, 0, 0, 1]])
+    pencils = [np.vstack([ca.skew(ca.DM(rng.normal(size=3))).full() @ axes, axes]) for _ in range(4)]
+    flat = [np.hstack([each[:, :3], rng.normal(size=(6, 1))]) for each in pencils]
+    assert column_groups(flat, 3) == ()
