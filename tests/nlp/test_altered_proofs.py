@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from hexapods import hexapod_text
 
 from screwsynth.nlp import InputError, case_from_tables
 from screwsynth.nlp.program.formulation import formulate_each
@@ -72,16 +73,9 @@ pitch = inf
 [solve]
 starts = 2
 """
-MACHINE = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 1, x4 = 5 }
-[pose]
-position = [0, 0, 20]
-[[task]]
+MACHINE = (
+    hexapod_text(1, 5, "")
+    + """[[task]]
 name = "push"
 sense = "max"
 axis = [0, 0, 1]
@@ -93,6 +87,7 @@ actuator = { stroke_max = 30 }
 position = [{ min = -0.5, max = 0.5 }, 0.5, 20]
 rotation = { axis = [0, 0, 1], angle = { min = -1, max = 1 } }
 """
+)
 SINGULAR = (
     MACHINE[: MACHINE.index("[limits]")]
     + """[workspace]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hexapods import SMALL
 
 from screwsynth.nlp import InputError, certify, interruption, load_case, solve
 from screwsynth.nlp.interruption import is_requested, one_search, reason_of, seconds_left, stop_if_requested, within
@@ -23,23 +24,6 @@ from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.solver.status import Status
 
 CASE = "paper-4.3"
-HEXAPOD = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 5, x4 = 9 }
-[pose]
-position = [0, 0, 20]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[workspace]
-position = [{ min = -0.2, max = 0.2 }, 0, { min = 19.8, max = 20.2 }]
-[limits]
-"""
 Run = Callable[..., tuple[int, str, str]]
 MEASURES = ("smallest_singular_value", "condition_number")
 #: Seconds from one look of a search at the clock to the next.
@@ -126,7 +110,7 @@ def test_set_up_of_the_whole_box_ends_with_the_time(clock: Clock, monkeypatch: p
 def test_all_searches_of_a_workspace_share_one_time(tmp_path: Path) -> None:
     """The clock counts steps of searches: together they take no more than the whole time, and a few steps."""
     path = tmp_path / "case.toml"
-    path.write_text(HEXAPOD, encoding="utf-8")
+    path.write_text(SMALL, encoding="utf-8")
     case = load_case(str(path))
     found = judge_workspace(case, time_limit=0.4, gap=1e-9, quantities=MEASURES, jobs=1)
     stopped = [each for each in found.extremes if "stopped after" in each.reason or each.reason == "the time is over"]

@@ -11,6 +11,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from hexapods import hexapod_text
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray, hexapod
@@ -38,20 +39,9 @@ from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
 
 #: The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
-TEXT = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 0, x4 = 5 }
-[pose]
-position = [0, 0, 20]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[limits]
+TEXT = (
+    hexapod_text(0, 5)
+    + """[limits]
 leg_length = { min = 17, max = 44 }
 actuator = { stroke_max = 30 }
 platform_joint_angle = { max = 60, about = "home" }
@@ -60,6 +50,7 @@ home = { position = [0, 0, 20] }
 position = [{ min = -5, max = 5 }, { min = -5, max = 5 }, { min = 15, max = 25 }]
 rotation = { angle = { min = -20, max = 20 } }
 """
+)
 POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
 HEXAPOD = hexapod()
 

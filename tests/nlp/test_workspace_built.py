@@ -11,6 +11,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from hexapods import hexapod_text
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
@@ -41,16 +42,9 @@ from screwsynth.nlp.results.workspace import WorkspaceResult
 
 #: The machine of LinuxCNC's hexapod kinematics, joints apart, with every limit that errors of joint centres change. The
 #: limits are wide: the numbers that are proved are compared.
-TEXT = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 4, x4 = 5 }
-[pose]
-position = [0, 0, 20]
-[tolerance]
+TEXT = (
+    hexapod_text(4, 5, "")
+    + """[tolerance]
 joint_centre = 0.02
 [[task]]
 sense = "max"
@@ -76,6 +70,7 @@ custom = ["x1 - 2*x2 >= 0"]
 position = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = 19, max = 21 }]
 rotation = { angle = { min = -6, max = 6 } }
 """
+)
 HOME = np.array([0.0, 0.0, 20.0])
 TOLERANCE = 0.02
 LENGTH = 11.5

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from hexapods import SMALL
 
 from screwsynth.nlp import Case, Free, Rotation, Task
 from screwsynth.nlp.case.reader import read_case
@@ -27,24 +28,6 @@ from screwsynth.nlp.results.workspaceposes import refuted_claims, seeing_lines
 
 Value = TypeVar("Value")
 Run = Callable[..., tuple[int, str, str]]
-
-HEXAPOD = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 5, x4 = 9 }
-[pose]
-position = [0, 0, 20]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[workspace]
-position = [{ min = -0.2, max = 0.2 }, 0, { min = 19.8, max = 20.2 }]
-[limits]
-"""
 
 
 def at_home(name: str, part: float = 0.02, degrees: float = 5.0) -> Case:
@@ -65,7 +48,7 @@ def squares_at(case: Case, position: list[float], rotation: Rotation) -> float:
 
 def judged(text: str, folder: Path, time_limit: float = 20.0, **options: Any) -> Judgement:  # noqa: ANN401
     path = folder / "case.toml"
-    path.write_text(HEXAPOD + text, encoding="utf-8")
+    path.write_text(SMALL + text, encoding="utf-8")
     return judge_workspace(read_case(str(path), {}).case, time_limit=time_limit, jobs=1, **options)
 
 
@@ -127,7 +110,7 @@ def test_the_exit_status_is_that_of_ranks_and_limits(cli: Run, monkeypatch: pyte
     monkeypatch.setattr(judge, "prove_extreme", opened)
     path = tmp_path / "case.toml"
     for text, status in (("leg_length = { min = 15, max = 60 }", 0), ("leg_length = { min = 15, max = 20 }", 1)):
-        path.write_text(HEXAPOD + text, encoding="utf-8")
+        path.write_text(SMALL + text, encoding="utf-8")
         code, out, _ = cli("workspace", str(path))
         assert code == status
         assert ("not everything is proved" in out) == bool(status)

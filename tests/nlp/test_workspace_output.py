@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hexapods import hexapod_text
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
@@ -32,20 +33,9 @@ from screwsynth.nlp.results.workspaceposes import refuted_claims, worst_claim
 Run = Callable[..., tuple[int, str, str]]
 
 #: Limits of every kind that a slice shows, on a design that violates each of them somewhere.
-LIMITED = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 5, x4 = 9 }
-[pose]
-position = [0, 0, 20]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[limits]
+LIMITED = (
+    hexapod_text(5, 9)
+    + """[limits]
 leg_length = { min = 26, max = 34 }
 base_joint_angle = { max = 25, about = "home" }
 home = { position = [0, 0, 20] }
@@ -55,6 +45,7 @@ actuator = { stroke_max = 12 }
 [workspace]
 position = [{ min = -4, max = 4 }, 0, { min = 17, max = 23 }]
 """
+)
 #: Number of random boxes, and of poses in each.
 BOXES, POSES = 120, 4
 

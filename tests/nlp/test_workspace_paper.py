@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hexapods import hexapod_text
 
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Free, Task
@@ -51,20 +52,9 @@ from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
 #: The machine of LinuxCNC's hexapod kinematics, with a limit of every kind.
-TEXT = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 1, x4 = 5 }
-[pose]
-position = [0, 0, 20]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[limits]
+TEXT = (
+    hexapod_text(1, 5)
+    + """[limits]
 leg_length = { min = 17, max = 44 }
 actuator = { stroke_max = 30, dead_length = 0.1 }
 platform_joint_angle = { max = 60, about = "home" }
@@ -76,6 +66,7 @@ home = { position = [0, 0, 20] }
 position = [{ min = -2, max = 2 }, 0.5, { min = 18, max = 21 }]
 rotation = { roll = 3, pitch = { min = -5, max = 9 } }
 """
+)
 LEG_ERROR = 0.008
 POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
 HEXAPOD = hexapod()

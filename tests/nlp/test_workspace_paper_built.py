@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from casadi import SX
+from hexapods import hexapod_text
 
 import screwsynth.cases
 from screwsynth.models import FloatArray
@@ -42,16 +43,9 @@ from screwsynth.nlp.proof.workspace.verdict import Outcome
 Run = Callable[..., tuple[int, str, str]]
 TOLERANCE, LENGTH, LEG_ERROR = 0.02, 11.5, 0.004
 #: A limit of every kind that errors of joint centres change; the triangle inequality does not decide that on strokes.
-TEXT = """
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-parameters = { x1 = 26.5, x2 = 11.543, x3 = 4, x4 = 5 }
-[pose]
-position = [0, 0, 20]
-[tolerance]
+TEXT = (
+    hexapod_text(4, 5, "")
+    + """[tolerance]
 joint_centre = 0.02
 [[task]]
 sense = "max"
@@ -76,6 +70,7 @@ custom = ["x1 - 2*x2 >= 0"]
 position = [0.3, { min = -0.3, max = 0.3 }, 20]
 rotation = { axis = [0.6, 0, 0.8], angle = { min = -2, max = 2 } }
 """.replace("STROKE", "0.93")
+)
 ASKED = ("platform_joint_angle", "smallest_singular_value", "condition_number")
 
 
