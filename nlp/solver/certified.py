@@ -95,7 +95,7 @@ class Certified(Whole, Shown, Answer):
         return all(each.status is CertificateStatus.PROVED for each in every)
 
 
-@one_call()
+@one_call
 def certify(
     found: Case | Solution,
     *,
