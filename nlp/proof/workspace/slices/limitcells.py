@@ -26,7 +26,7 @@ from ....case.task import Sense
 from ....errors import UncoveredError
 from ....program.layout import Layout
 from ...enclosure.forms import enclose
-from ...enclosure.instructions import compile_tape
+from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim, claims_of
 from ...statement.machine import Legs
 from ..numbers.clearance import Clearance
