@@ -79,7 +79,8 @@ class TreeRecord:
         """Return the whole tree.
 
         Args:
-            with_open: whether open boxes are leaves too: the bound of a search that stopped is one for them as well.
+            with_open: whether boxes without a node are leaves: open ones, for which the bound of a search that stopped
+                is one as well, or those that a search of poses has not cut.
 
         Raises:
             ProofError: a box is not closed.
