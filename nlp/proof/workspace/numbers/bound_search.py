@@ -24,7 +24,7 @@ from ..robot.pose_box import PoseBox
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..proof_record import TreeRecord
+    from ...boxes.tree import TreeRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 512

@@ -23,7 +23,7 @@ from .rank_rule import RankTest
 from .refuters import NewtonRefuter, Refuter, Singular
 
 if TYPE_CHECKING:
-    from ..proof_record import TreeRecord
+    from ...boxes.tree import TreeRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024
