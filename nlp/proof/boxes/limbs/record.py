@@ -1,4 +1,4 @@
-"""Record of a search by limbs with shared variables as a proof's tree: see :mod:`...checker.limbs.sharedtree`."""
+"""Record of a search by limbs with shared variables as a proof's tree: see :mod:`...checker.tree`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checker.limbs.sharedtree import leaf_bytes
 from ...checker.proof_file import ProofError
-from ...checker.tree import Node, halves
+from ...checker.tree import Node, halves, leaf_bytes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
