@@ -188,7 +188,7 @@ class Legs:
                 found[f"rate_share limb {name}{words[1]}"] = own / F
                 found[f"actuator_rate actuator {name}{words[1]}"] = abs(rates[:, k])
         for key in ("condition_number", "smallest_singular_value"):
-            for name, size in ((key, self.limits.get(key, {}).get("length", 1.0)), (f"{key} with the characteristic length", self.length)):
+            for name, size in ((key, self.limits.get(key, {}).get("length", self.length)), (f"{key} with the characteristic length", self.length)):
                 scaled = J_platform.copy()
                 scaled[:, :, 3:] /= size
                 s = np.linalg.svd(scaled, compute_uv=False)

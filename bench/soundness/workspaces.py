@@ -145,7 +145,7 @@ def judge_legs(tables: dict[str, Any], result: dict[str, Any], rng: np.random.Ge
     if machines.t == 0:
         errors[:] = 0
     sampled = machines.values(u, errors)
-    regular = result["regular"]
+    regular, reach = result["regular"], float(np.abs(legs.platform).max())
     counts[f"{robot}: regular {regular['outcome']}{' with tolerance' if machines.t else ''}"] += 1
 
     def machine_of(found: dict[str, Any]) -> Array:
@@ -208,7 +208,7 @@ def judge_legs(tables: dict[str, Any], result: dict[str, Any], rng: np.random.Ge
             poses = pose_of(each["pose"], box.unit)
             there = legs.clearance(name, poses, own[:, 0], own[:, 1]) if "clearance" in name else legs.values(poses, own[:, 0], own[:, 1])[value_name(each)]
             off = abs(there[0] - each["reached"] * scale)
-            if off > 1e-6 * (abs(there[0]) + (1e-2 if scale != 1 else 0)) + 1e-11 or not box.has(each["pose"]):
+            if off > 1e-6 * (abs(there[0]) + (1e-2 if scale != 1 else 0)) + 1e-7 * reach or not box.has(each["pose"]):
                 faults.append(f"{name} {each['sense']}: reached {each['reached'] * scale:.12g}, and {there[0]:.12g} there, inside: {box.has(each['pose'])}")
         if each["outcome"] == "refuted" and not sign * (each["reached"] - each["limit"]) > 0:
             faults.append(f"{name} {each['sense']}: refuted by {each['reached']}, with the limit {each['limit']}")
