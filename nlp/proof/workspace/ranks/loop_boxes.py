@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from .....models import FloatArray
-from ...boxes.tapes import MOST_VARIABLES
+from ...boxes.engine import MOST_VARIABLES
 from ...enclosure.forms import Encloser, Forms
 from ..robot.closed_loops import Loops
 from ..robot.posed_robot import Problem
