@@ -20,7 +20,7 @@ from ...enclosure.forms import Encloser, SecondForms
 from ...statement.machine import LEGS, JointErrors, Legs
 from ..robot.pose_box import PoseBox
 from ..robot.posed_model import polynomial_rotation
-from ..tolerance.legs.worst import along
+from ..tolerance.leg_errors import along
 from .bound_search import Bounds
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
@@ -58,7 +58,7 @@ class Clearance:
         """Return the errors of the machine whose legs are nearest at a point (6,)."""
         moved = np.zeros((LEGS, 3))
         moved[list(self._pair)] = np.array([[-1.0], [1.0]]) * self._between(y[None])
-        return along(self._legs, self._box.pose(y), moved, moved)
+        return along(self._legs, self._box.pose(y).rotation, moved, moved)
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""
