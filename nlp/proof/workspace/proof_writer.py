@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 _OUTWARDS = 1e-6
 #: Kinds of claims about ranks.
 _RANKS = ("regular", "constraints")
+#: Kinds of claims that rest on the shortest lengths of legs where machines are meant.
+_OF_ROWS = ("singular value", "condition")
 #: Reason of claims about machines within a tolerance that are not six straight legs.
 _AS_BUILT = "it is about every machine within the tolerance of joint centres, which proofs cover for six straight legs"
 #: Reason of claims of kinds that the checker does not know.
@@ -70,7 +72,8 @@ def paper_of(
         extremes = first if each.kind == "number" else last
         is_rank = each.kind in _RANKS
         found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
-        if each.kind == "error" and not _has_lengths(judged, proved):
+        is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind in _OF_ROWS)
+        if is_of_lengths and not _has_lengths(judged, proved):
             found = _NO_LENGTHS
         if isinstance(found, ProofClaim):
             proved[each.key] = found

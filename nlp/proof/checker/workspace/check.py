@@ -44,7 +44,7 @@ from .tree import read_leaves
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
 #: The tree of one leaf.
-WHOLE = bytes([Node.BOUNDED])
+_WHOLE = bytes([Node.BOUNDED])
 #: Reason that each kind of claim must have.
 _REASONS = {
     "regular": ("regular", "singular", "singular machine"),
@@ -304,19 +304,19 @@ class _Checker:
         reaches = [each for each in self.expected if each.claim is not None and each.claim.key == REACH]
         if claim.key != REACH and any(each.key not in self._bounds for each in reaches):
             raise ProofError("the reach of limbs of every machine has no proof")
-        rest = 0.0
-        if machines.varies(claim):
-            lemma = self._lemmas.get((second_order_name(claim.name), claim.sense.value))
-            if lemma is None or lemma.bound is None or not math.isfinite(lemma.bound):
-                raise ProofError("the terms of second order have no bound")
-            rest = lemma.bound
-            try:
-                self._show(machines.second_order(claim, rest), WHOLE)
-            except UncoveredError as error:
-                raise ProofError(f"the check has no rule for {error}") from None
-            except ProofError as error:
-                raise ProofError(f"{lemma.name}: {error}") from None
-        return self._bound_of(machines.number(claim, rest), claim.sense, given, machines.design)
+        if not machines.varies(claim):
+            return self._bound_of(machines.number(claim, 0.0), claim.sense, given, machines.design)
+        lemma = self._lemmas.get((second_order_name(claim.name), claim.sense.value))
+        if lemma is None or lemma.bound is None or not math.isfinite(lemma.bound):
+            raise ProofError("the terms of second order have no bound")
+        bound = self._bound_of(machines.number(claim, lemma.bound), claim.sense, given, machines.design)
+        try:
+            self._show(machines.second_order(claim, lemma.bound), _WHOLE)
+        except UncoveredError as error:
+            raise ProofError(f"the check has no rule for {error}") from None
+        except ProofError as error:
+            raise ProofError(f"{lemma.name}: {error}") from None
+        return bound
 
     def _length(self, leg: str, sense: str) -> float:
         """Return the proven shortest or longest length of a leg, of all machines that are meant.
