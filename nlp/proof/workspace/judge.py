@@ -16,9 +16,8 @@ from ...interruption import is_requested, one_call, within
 from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.closed_layout import closed_layout, reach_claims
 from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
-from ..statement.posed_layout import posed_layout
+from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
 from .numbers.asked_values import spectral_extremes
@@ -85,7 +84,7 @@ class Judgement:
         return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
 
 
-@one_call()
+@one_call
 def judge_workspace(
     case: Case,
     *,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from ..checker.fingerprint import fingerprint
+from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
 from ..checker.workspace.anyrobot.robotclaims import RobotClaims, robot_claims
 from ..checker.workspace.expected import ERRORS, ExpectedClaim, expected_claims
@@ -154,7 +154,7 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Mo
         return "it was not judged"
     if found.outcome is Outcome.PROVED:
         own = record.own(each.name)
-        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree())
+        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree(with_open=True))
     if found.outcome is Outcome.REFUTED:
         return _refuted(each, found, judged, model)
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
@@ -225,4 +225,4 @@ def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> ProofCla
         bound = sign * max(sign * limit, sign * reached)
         if not math.isfinite(bound) or (each.limit is None and not bound > 0):
             return _NO_BOUND
-    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())
+    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree(with_open=True))

@@ -23,8 +23,8 @@ from ...statement.claims import REACH, Claim
 from ...statement.machine import check_leg_error, legs_of, workspace_of_case
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
+from ..check import check_proof
 from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
-from ..proofcheck import check_proof
 from ..tree import Node
 from .anyrobot.rankofrobot import rank_claim
 from .anyrobot.robotclaims import robot_claims
