@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 from campaign import Row, campaign
-from cases import limited_legs, random_legs, text_of
 from gallery import NAMES, Sampled, random_gallery
 from legs import Legs, Poses
+from randomcases import limited_legs, random_legs, text_of
 
 from screwsynth.nlp import ScrewsynthError, case_from_tables, certify, certify_program, evaluate, solve
 
@@ -38,7 +38,10 @@ def random_certificate(rng: np.random.Generator) -> Tables:
     pose: Tables = {"position": workspace["position"], "rotation": rotation}
     several = rng.random() < 0.3
     if several:
-        tables["pose"] = [pose, {"position": [each["min"] if isinstance(each, dict) else each for each in pose["position"]]}]
+        tables["pose"] = [
+            pose,
+            {"position": [each["min"] if isinstance(each, dict) else each for each in pose["position"]]},
+        ]
         if rng.random() < 0.5 and len(tables["task"]) == 1:
             tables["combine"] = {"over_poses": str(rng.choice(["mean", "worst"]))}
     else:
@@ -47,7 +50,9 @@ def random_certificate(rng: np.random.Generator) -> Tables:
     if len(tables["task"]) > 1:
         tables["combine"] = {"method": str(rng.choice(["weighted-sum", "worst-case"]))}
     parameters = tables["robot"]["parameters"]
-    for name in rng.permutation([key for key, each in parameters.items() if isinstance(each, float)])[: rng.integers(0, 3)].tolist():
+    for name in rng.permutation([key for key, each in parameters.items() if isinstance(each, float)])[
+        : rng.integers(0, 3)
+    ].tolist():
         at = parameters[name]
         parameters[name] = {"min": 0.92 * at, "max": 1.08 * at} if at > 0 else at
     return tables
@@ -57,7 +62,8 @@ def of_legs(seed: int, rng: np.random.Generator) -> Row:
     """Certify a random case of straight legs and attack the bounds."""
     tables, counts, faults = random_certificate(rng), Counter[str](), []
     case = case_from_tables(tomllib.loads(text_of(tables)), name=f"random {seed}", source="random")
-    label = f"{tables['robot']['model']}: {len(tables['task'])} tasks, {'several poses' if isinstance(tables['pose'], list) else 'one pose'}"
+    poses = "several poses" if isinstance(tables["pose"], list) else "one pose"
+    label = f"{tables['robot']['model']}: {len(tables['task'])} tasks, {poses}"
     certified = certify(case, gap=1e-3, time_limit=SECONDS, jobs=1, starts=int(rng.choice([1, 4])), seed=seed)
     other = solve(case, starts=STARTS, seed=seed + 1, jobs=1)
     programs = [(each.own, bound) for each, bound in zip(other.outcomes, certified.tasks, strict=True)]
@@ -104,7 +110,9 @@ def numbered(tables: Tables, state: Any, unit: float = 1.0) -> Tables:  # noqa: 
     given = {}
     for name, each in tables["robot"]["parameters"].items():
         value = state.parameters[name]
-        given[name] = value.tolist() if isinstance(each, list) else float(value[0]) / (unit if name in ("x3", "x4") else 1.0)
+        given[name] = (
+            value.tolist() if isinstance(each, list) else float(value[0]) / (unit if name in ("x3", "x4") else 1.0)
+        )
     return tables["robot"] | {"parameters": given}
 
 

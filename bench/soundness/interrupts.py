@@ -2,8 +2,8 @@
 
     python bench/soundness/interrupts.py COUNT FIRST [JOURNAL]
 
-Each seed interrupts one kind of search once, at a random instruction of the proofs' Python code; the kinds take turns. The
-searches are those of the public names; a case chooses which of them runs.
+Each seed interrupts one kind of search once, at a random instruction of the proofs' Python code; the kinds take turns.
+The searches are those of the public names; a case chooses which of them runs.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ from screwsynth.nlp import case_from_tables, certify_program, formulate, judge_w
 
 WATCHED = tuple(str(Path(screwsynth.nlp.__file__).parent / name) for name in ("proof", "interruption.py"))
 TASK = '[[task]]\nname = "one"\nsense = "max"\naxis = [1, 2, 6]\npoint = [3, 1, 12]\npitch = 0.1\n'
-PLATFORM = '[robot]\nmodel = "stewart-gough"\nlayout = "octahedral"\nparameters = { x1 = 26.5, x2 = 11.5, x3 = 1, x4 = 5 }\n'
+PLATFORM = (
+    '[robot]\nmodel = "stewart-gough"\nlayout = "octahedral"\nparameters = { x1 = 26.5, x2 = 11.5, x3 = 1, x4 = 5 }\n'
+)
 BOX = """[workspace]
 position = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = 19, max = 21 }]
 rotation = { angle = { min = -ANGLE, max = ANGLE } }
@@ -36,7 +38,9 @@ rotation = { angle = { min = -ANGLE, max = ANGLE } }
 
 def platform(limits: str, angle: float = 4, more: str = "") -> str:
     """Return six legs over a workspace."""
-    return f"{PLATFORM}[pose]\nposition = [0, 0, 20]\n{TASK}[limits]\n{limits}\n{more}{BOX.replace('ANGLE', str(angle))}"
+    return (
+        f"{PLATFORM}[pose]\nposition = [0, 0, 20]\n{TASK}[limits]\n{limits}\n{more}{BOX.replace('ANGLE', str(angle))}"
+    )
 
 
 def gallery(name: str, home: str, values: str, limits: str, more: str = "", angle: float = 2) -> str:
@@ -63,16 +67,29 @@ def free_joints() -> str:
     rows = []
     for k in range(6):
         corner = 2 * math.pi * (k // 2) / 3
-        for name, radius, angle in (("base", 26.5, corner), ("platform", 11.5, corner + (k % 2 * 2 - 1) * math.radians(55))):
+        for name, radius, angle in (
+            ("base", 26.5, corner),
+            ("platform", 11.5, corner + (k % 2 * 2 - 1) * math.radians(55)),
+        ):
             place = (radius * math.cos(angle), radius * math.sin(angle), 0.0)
-            rows.append(f"{name}_{k + 1} = [{', '.join(f'{{ min = {each - 1}, max = {each + 1} }}' for each in place)}]")
-    return '[robot]\nmodel = "hexapod"\n[robot.parameters]\n' + "\n".join(rows) + f"\n[pose]\nposition = [0, 0, 20]\n{TASK}"
+            rows.append(
+                f"{name}_{k + 1} = [{', '.join(f'{{ min = {each - 1}, max = {each + 1} }}' for each in place)}]"
+            )
+    return (
+        '[robot]\nmodel = "hexapod"\n[robot.parameters]\n'
+        + "\n".join(rows)
+        + f"\n[pose]\nposition = [0, 0, 20]\n{TASK}"
+    )
 
 
 #: A range of a position.
 SPAN = "{ min = -1, max = 1 }"
 #: A position and rotation that are free by little.
-POSE = "[pose]\nposition = [{ min = -2, max = 2 }, 0, { min = 19, max = 21 }]\nrotation = { angle = { min = -5, max = 5 } }\n"
+POSE = (
+    "[pose]\nposition = [{ min = -2, max = 2 }, 0, { min = 19, max = 21 }]\n"
+    "rotation = { angle = { min = -5, max = 5 } }\n"
+)
+HEIGHTS = (19, 21, 23, 25)
 SPATIAL = "rb = 1, rp = 0.6, h = 1.1"
 CRANKS = "rb = 1, rp = 0.6, base_half = 20, platform_half = 43, crank = 0.35, lift = 35, h = 1.2"
 TOLERANCE = "[tolerance]\njoint_centre = JC\n"
@@ -81,7 +98,7 @@ CASES: dict[str, tuple[str, str]] = {
     "certificate, independent limbs": ("certify", free_joints()),
     "certificate, shared limbs": (
         "certify",
-        free("", "".join(f"[[pose]]\nposition = [{SPAN}, {SPAN}, {{ min = {z}, max = {z + 1} }}]\n" for z in (19, 21, 23, 25))),
+        free("", "".join(f"[[pose]]\nposition = [{SPAN}, {SPAN}, {{ min = {z}, max = {z + 1} }}]\n" for z in HEIGHTS)),
     ),
     "certificate, infeasible": ("certify", free("leg_length = { max = 19 }", POSE)),
     "above": ("above", free("", POSE).replace('"max"', '"min"')),
@@ -94,7 +111,8 @@ CASES: dict[str, tuple[str, str]] = {
     "singular values": ("numbers", platform("smallest_singular_value = { min = 0.3, length = 11.5 }")),
     "machines of legs": ("numbers", platform("leg_length = { max = 43 }", more=TOLERANCE.replace("JC", "0.01"))),
     "machines of loops": (
-        "numbers", gallery("3-rps", "0, 0, 1.1", SPATIAL, "actuator_length = { max = 0.2 }", TOLERANCE.replace("JC", "1e-4")),
+        "numbers",
+        gallery("3-rps", "0, 0, 1.1", SPATIAL, "actuator_length = { max = 0.2 }", TOLERANCE.replace("JC", "1e-4")),
     ),
     "machines of cranks": ("ranks", gallery("6-rus", "0, 0, 1.2", CRANKS, "", TOLERANCE.replace("JC", "1e-4"))),
     "scale": ("scale", platform("leg_length = { max = 34 }")),
@@ -147,7 +165,12 @@ def search(kind: str) -> Callable[[], Claim]:
         def certified() -> Claim:
             found = certify_program(nlp, gap=0.2, jobs=1, **above)
             status = found.status.value
-            return Claim((status in ("proved", "infeasible"),), (status == "refused",), (nlp.sign * found.bound,), (nlp.sign * found.incumbent,))
+            return Claim(
+                (status in ("proved", "infeasible"),),
+                (status == "refused",),
+                (nlp.sign * found.bound,),
+                (nlp.sign * found.incumbent,),
+            )
 
         return certified
     if command == "scale":
@@ -169,7 +192,9 @@ def search(kind: str) -> Callable[[], Claim]:
             tuple((-1 if each.sense.value == "max" else 1) * getattr(each, name) for each in found.extremes)
             for name in ("bound", "reached")
         )
-        return Claim(tuple(each == "proved" for each in every), tuple(each == "refuted" for each in every), bounds, most)
+        return Claim(
+            tuple(each == "proved" for each in every), tuple(each == "refuted" for each in every), bounds, most
+        )
 
     return judged
 

@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 from campaign import Row, campaign, command
-from cases import limited_legs, random_legs, text_of
 from certificates import random_certificate
 from gallery import NAMES, limited, random_gallery
+from randomcases import limited_legs, random_legs, text_of
 
 Place = tuple[str | int, ...]
 ALTERED = 4
@@ -70,7 +70,9 @@ def altered(content: Any, rng: np.random.Generator) -> tuple[str, Any]:  # noqa:
         new: Any = not value
     elif isinstance(value, int | float):
         size = abs(value) or 1.0
-        new = [value * (1 + 1e-9), value - 1e-3 * size, value + 1e-3 * size, -value, 0, 0.5 * value, 2 * value][rng.integers(7)]
+        new = [value * (1 + 1e-9), value - 1e-3 * size, value + 1e-3 * size, -value, 0, 0.5 * value, 2 * value][
+            rng.integers(7)
+        ]
     elif isinstance(value, str):
         new = [value[:-1], value + "x", "", value[::-1]][rng.integers(4)]
     elif isinstance(value, list):
@@ -103,7 +105,11 @@ def reached_values(result: Any) -> dict[tuple[str, str], float]:  # noqa: ANN401
     """Return values that the search reached, by the beginning of the line about them and the side of the bound."""
     side = {"max": "most", "min": "least"}
     if "extremes" in result:
-        return {(each["name"], side[each["sense"]]): each["reached"] for each in result["extremes"] if each["reached"] is not None}
+        return {
+            (each["name"], side[each["sense"]]): each["reached"]
+            for each in result["extremes"]
+            if each["reached"] is not None
+        }
     value = (result.get("certificate") or {}).get("incumbent")
     return {} if value is None else {("holds", each): value for each in side.values()}
 
@@ -118,7 +124,9 @@ def examine(seed: int) -> Row:
         tables = random_certificate(rng) if kind == "certify" else limited_legs(rng, random_legs(rng))
     name = tables["robot"]["model"]
     with tempfile.TemporaryDirectory() as folder:
-        case, proof, out, other = (str(Path(folder) / each) for each in ("case.toml", "proof.json", "result.json", "other.json"))
+        case, proof, out, other = (
+            str(Path(folder) / each) for each in ("case.toml", "proof.json", "result.json", "other.json")
+        )
         Path(case).write_text(text_of(tables), encoding="utf-8")
         words = ["--time", "3", "--jobs", "1", "--json", out, "--proof", proof]
         if kind == "certify":
@@ -126,7 +134,10 @@ def examine(seed: int) -> Row:
         else:
             code, _, err = command("workspace", case, "--gap", "0.3", *words)
         if not Path(proof).exists():
-            return {"counts": {f"{kind}: no proof, exit status {code}": 1}, "faults": [err] if "Traceback" in err else []}
+            return {
+                "counts": {f"{kind}: no proof, exit status {code}": 1},
+                "faults": [err] if "Traceback" in err else [],
+            }
         code, before, err = command("verify-proof", proof, case)
         counts[f"{kind}: {name}: {'accepted' if code == 0 else 'rejected'}"] += 1
         if code:
