@@ -308,7 +308,7 @@ def examine(seed: int) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         case, out = Path(folder) / "case.toml", Path(folder) / "result.json"
         case.write_text(text_of(tables), encoding="utf-8")
-        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([2, 4])), "--jobs", "1"]
+        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([6, 12])), "--jobs", "1"]
         code, _, err = command("workspace", str(case), *words, "--json", str(out))
         if not out.exists():
             return {

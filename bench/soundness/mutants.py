@@ -184,7 +184,8 @@ def environment() -> dict[str, str]:
 def copied() -> None:
     """Make the copy of the project."""
     for name in ("nlp", "models", "cases", "tests", "docs"):
-        shutil.copytree(ROOT / name, COPY / name, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.rmtree(COPY / name, ignore_errors=True)
+        shutil.copytree(ROOT / name, COPY / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "README.md", "CHANGELOG.md"):
         shutil.copy(ROOT / name, COPY / name)
     package = COPY / "path" / "screwsynth"

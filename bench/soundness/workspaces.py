@@ -271,7 +271,7 @@ def examine(seed: int) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         case, out = Path(folder) / "case.toml", Path(folder) / "result.json"
         case.write_text(text_of(tables), encoding="utf-8")
-        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([3, 6])), "--jobs", "1"]
+        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([8, 15])), "--jobs", "1"]
         if tables["robot"]["model"] != "three-upu" and rng.random() < 0.25:
             leg_error = float(np.abs(Legs(tables).platform).max() * rng.choice([1e-4, 1e-3]))
             words += ["--leg-error", repr(leg_error)]
