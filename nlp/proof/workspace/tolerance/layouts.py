@@ -15,8 +15,7 @@ from ....case.pose import HERE, Free, Pose, Rotation
 from ....program.layout import Layout, StatedPoseSymbols, lay_out
 from ....program.places import SymbolTable
 from ...statement.posed_layout import at_one_pose
-from ..robot.pose_box import PoseBox
-from ..robot.posed_model import rotation_of
+from ..robot.pose_box import PoseBox, rotation_of
 from ..robot.tolerance_model import BuiltModel, Family
 
 
