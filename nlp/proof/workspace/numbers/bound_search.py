@@ -217,7 +217,7 @@ class _OracleRule(SmallestValue[tuple[()]]):
         found = self._oracle.bounds(lower, upper)
         centres = self._box.clipped(0.5 * lower + 0.5 * upper)
         values = self._oracle.values(centres)
-        if len(values) and is_smaller(float(np.nanmin(values)), self.best.value):
+        if len(values) and is_smaller(float(np.fmin.reduce(values)), self.best.value):
             best = first_smallest(values)
             self.best = Value(float(values[best]), centres[best])
         bound = np.fmin(-found.lower, boxes.bound[kept])
@@ -231,7 +231,7 @@ def is_smaller(value: float, known: float) -> bool:
 
 def first_smallest(values: FloatArray) -> int:
     """Return the place of the first of the smallest values (K,), up to rounding; NaN are left out."""
-    least = float(np.nanmin(values))
+    least = float(np.fmin.reduce(values))
     return int(np.argmax(values <= least + _TIE * abs(least)))
 
 

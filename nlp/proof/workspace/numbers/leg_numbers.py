@@ -163,7 +163,8 @@ def pose_errors(
     for k, (name, dimension) in enumerate(names):
         y, bound = found[k].at, whole[k]
         # To first order both signs give the same error.
-        reached = max(displaced(legs, box, y, sign * eps * searches[k].worst(y))[k] for sign in (-1.0, 1.0))
+        both = [displaced(legs, box, y, sign * eps * searches[k].worst(y)) for sign in (-1.0, 1.0)]
+        reached = max((each[k] for each in both if each is not None), default=math.nan)
         is_proved = math.isfinite(bound) and not found[k].reason
         reason = found[k].reason or "the errors are too large for a bound of their terms of second order"
         yield Extreme(
@@ -174,7 +175,7 @@ def pose_errors(
             limit=None,
             bound=bound,
             reached=reached,
-            pose=box.pose(y),
+            pose=None if math.isnan(reached) else box.pose(y),
             outcome=Outcome.PROVED if is_proved else Outcome.OPEN,
             boxes=found[k].boxes,
             seconds=found[k].seconds,

@@ -51,6 +51,7 @@ class PosedModel:
         every: all equations of loops, and signs that must be positive.
         signs: (s, 1) numbers that are positive in home's assembly.
         limbs: rows, members and actuators.
+        J: (rows, 6) of the limbs, couples times the characteristic length of the case.
         turned: the limbs with ``inverse * s R`` as the rotation.
         inverse: (1, 1) symbol of ``1 / s``.
         scale: (1, 1) ``s``.
@@ -63,6 +64,7 @@ class PosedModel:
     every: SX
     signs: SX
     limbs: Limbs
+    J: SX
     turned: Limbs
     inverse: SX
     scale: SX
@@ -73,8 +75,7 @@ class PosedModel:
 
     def jacobian(self, length: float) -> SX:
         """Return J (rows, 6), moments about the platform's origin divided by a length."""
-        J = jacobian(self.limbs.wrenches, SX(1), self.limbs.members)
-        return ca.horzcat(*homogenised(J, self.limbs.position, length))
+        return ca.horzcat(*homogenised(self.J, self.limbs.position, length))
 
     def locked_rows(
         self, columns: tuple[tuple[int, ...], ...], rows: tuple[tuple[int, ...], ...], length: float
@@ -272,6 +273,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         every=ca.vertcat(SX(0, 1), *scaled),
         signs=signs,
         limbs=limbs,
+        J=jacobian(limbs.wrenches, SX(case.characteristic_length), limbs.members),
         turned=turned,
         inverse=inverse,
         scale=scale,
