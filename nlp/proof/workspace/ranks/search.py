@@ -281,12 +281,12 @@ class _RankRule(LoopRule):
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
         """Return boxes contracted to the workspace, and record where they lead."""
-        found = contracted_boxes(self._problem, boxes)
+        found, kept, beyond = contracted_boxes(self._problem, boxes)
         if self._recorder is not None:
-            before, after = (self._ends(each.lower, each.upper) for each in (boxes, found.boxes))
-            self._recorder.contractions(before, after, ~found.kept)
-            self._recorder.lacks_boxes |= bool(found.beyond.any())
-        return some(found.boxes, found.kept)
+            before, after = (self._ends(each.lower, each.upper) for each in (boxes, found))
+            self._recorder.contractions(before, after, ~kept)
+            self._recorder.lacks_boxes |= bool(beyond.any())
+        return some(found, kept)
 
     def _ends(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
