@@ -45,8 +45,7 @@ from ...statement.tolerance import (
 )
 from ..numbers.bound_search import Minimum
 from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
-from ..robot.pose_box import PoseBox, PoseNumbers
-from ..robot.posed_model import rotation_of
+from ..robot.pose_box import PoseBox, PoseNumbers, rotation_of
 from ..robot.posed_robot import NotJudgedError, build_problem
 from ..robot.tolerance_model import Family, family_of
 from ..verdict import Outcome
