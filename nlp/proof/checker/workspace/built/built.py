@@ -18,8 +18,7 @@ from ....statement.claims import Claim, exact_length_name, one_machine_name
 from ....statement.machine import LEGS, Legs
 from ...fractions import determinant_sign
 from ...proof_file import ProofClaim, ProofError
-from ..ballrows import Joints
-from ..poseroot import COORDINATES, PoseRoot
+from ..pose_boxes import COORDINATES, PoseRoot
 from .changes import change_of_jacobian
 from .rules import Machines, length_beside
 from .statement import BuiltNumber, BuiltNumbers
@@ -98,7 +97,7 @@ class Built:
         at = min(max(exact + sign * off, number.least), number.most)
         return Shown(at, float(claim.reading.to_value(SX(at))))
 
-    def change(self, joints: Joints, length: float) -> float:
+    def change(self, joints: Legs, length: float) -> float:
         """Return by how much a singular value of J changes at most, moments divided by a length."""
         return change_of_jacobian(joints, self.tolerance, length, self.shortest)
 

@@ -1,9 +1,9 @@
 """How far errors of joint centres change the rows and J, in the arithmetic of the check.
 
-With e and f the errors of both joints of a leg in the world frame, up to t, its row ``(s (p - b) + u, u x (p - b))``
-changes by
+With e and f the errors of both joints of a leg in the world frame, up to t, and ``u = R a``, its row times s,
+``s (p + u - b, u x (p - b))``, changes by
 
-    (s (f - e),  s f x (p - b) - u x e - s f x e).
+    s (f - e,  f x (p - b) - u x e - f x e).
 
 A component of a vector product with f is at most t times the size of the two other components of the other vector.
 """
@@ -15,27 +15,35 @@ import math
 import numpy as np
 
 from ......models import FloatArray
-from ..ballrows import AFTER, BEFORE, BallRows, Joints
-from ..ballslopes import UNIT, UP, BallSlopes
+from ....statement.machine import Legs
+from ...polynomials import UNIT
+
+#: Part of itself by which a sum of a few products moves outwards.
+UP = 1 + 64 * UNIT
+#: Indices after a component, and before it, of a vector.
+_AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
-def change_of_rows(found: BallRows, joints: Joints, tolerance: float) -> FloatArray:
-    """Return bounds (B, 6, 6) of the change of the rows, entry by entry, by errors within a tolerance."""
-    s = _most(found.scale)[:, None, None]
-    span, arm = _most(found.position[:, None].plus(-joints.base)), _most(found.arm)
+def change_of_rows(
+    scale: FloatArray, span: FloatArray, arm: FloatArray, tolerance: float, length: float = 1.0
+) -> FloatArray:
+    """Return bounds (B, 6, 6) of the change of the rows, entry by entry, by errors within a tolerance.
+
+    Args:
+        scale: (B,) largest s.
+        span: (B, 6, 3) largest sizes of ``p - b``.
+        arm: (B, 6, 3) largest sizes of ``s R a``.
+        tolerance: t.
+        length: by which moments are divided.
+    """
+    s = scale[:, None, None]
+    across, along = (np.hypot(each[..., _AFTER], each[..., _BEFORE]) for each in (span, arm))
     # |f x e| is at most t^2, and so is each of its components.
-    moments = s * (np.hypot(span[..., AFTER], span[..., BEFORE]) * UP + tolerance)
-    moments = moments + np.hypot(arm[..., AFTER], arm[..., BEFORE]) * UP
-    forces = np.broadcast_to(2 * s, moments.shape)
-    return np.concatenate([forces, moments], axis=2) * tolerance * UP
+    moments = (s * (across + tolerance) + along) * UP / length
+    return np.concatenate([np.broadcast_to(2 * s, moments.shape), moments], axis=2) * tolerance * UP
 
 
-def _most(numbers: BallSlopes) -> FloatArray:
-    """Return the largest sizes of numbers."""
-    return np.asarray((np.abs(numbers.c) + numbers.spread) * UP)
-
-
-def change_of_jacobian(joints: Joints, tolerance: float, length: float, shortest: float) -> float:
+def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: float) -> float:
     """Return a bound of the Frobenius norm of the change of J, by which every singular value changes at most.
 
     The unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and its moment by ``|a| h + t``.
