@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from ..checker.fingerprint import fingerprint
+from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
 from ..checker.workspace.statement import ERRORS, ExpectedClaim, RobotClaims, expected_claims, robot_claims
-from ..statement.claims import REACH, asked_name, exact_length_name, one_machine_name
+from ..statement.claims import REACH, asked_name, one_machine_name
 from ..statement.machine import Legs, legs_of
+from ..statement.tolerance import second_order_name
 from .proof_record import PaperRecord
 from .singular_sides import singular_sides
 from .verdict import Outcome, Regularity
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
+#: Kinds of claims about ranks.
+_RANKS = ("regular", "constraints")
+#: Kinds of claims that rest on the shortest lengths of legs where machines are meant.
+_OF_ROWS = ("singular value", "condition")
 #: Reason of claims about machines within a tolerance that are not six straight legs.
 _AS_BUILT = "it is about every machine within the tolerance of joint centres, which proofs cover for six straight legs"
 #: Reason of claims of kinds that the checker does not know.
@@ -57,16 +62,17 @@ def paper_of(
     unproved = []
     expected = expected_claims(judged.case, robot, quantities, leg_error)
     for each in expected:
-        if judged.case.joint_centre_tolerance and legs is None:
+        if judged.case.joint_centre_tolerance and (robot.machines is None or (each.kind in _RANKS and legs is None)):
             unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
             continue
         if each.kind == "number" and each.layout is None and not is_reached:
             unproved.append(Unproved(each.name, each.sense, _NO_REACH))
             continue
         extremes = first if each.kind == "number" else last
-        is_rank = each.kind in ("regular", "constraints")
+        is_rank = each.kind in _RANKS
         found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
-        if each.kind == "error" and not _has_lengths(judged, record, proved):
+        is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind in _OF_ROWS)
+        if is_of_lengths and not _has_lengths(judged, proved):
             found = _NO_LENGTHS
         if isinstance(found, ProofClaim):
             proved[each.key] = found
@@ -90,7 +96,7 @@ def paper_of(
         claims=tuple(proved.values()),
         unproved=tuple(unproved),
         tolerance=judged.case.joint_centre_tolerance or 0.0,
-        lemmas=tuple(_lemmas(judged, record, proved)),
+        lemmas=tuple(_lemmas(record, proved)),
     )
 
 
@@ -105,23 +111,23 @@ def _key(judged: Judgement, each: Extreme) -> tuple[str, str]:
     return asked_name(judged.case, each.name) if spectral else each.name, each.sense.value
 
 
-def _lemmas(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> Iterator[ProofClaim]:
+def _lemmas(record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> Iterator[ProofClaim]:
     """Yield the claims that those about every machine rest on."""
-    keys = [(exact_length_name(leg.name), "min") for leg in judged.case.model.legs]
     machines = [name for (name, _), each in proved.items() if each.reason == "one machine"]
-    keys += [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
+    keys = [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
     for key in keys:
         program = record.programs.get(key)
         if program is not None and program.tree is not None:
             yield ProofClaim(*key, "program", program.bound, fingerprint(program.nlp), program.tree)
+    for name, sense in [key for key, each in proved.items() if each.reason == "program"] + keys:
+        rest = record.rests.get((second_order_name(name), sense))
+        if rest is not None:
+            yield ProofClaim(second_order_name(name), sense, "second order", rest)
 
 
-def _has_lengths(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> bool:
-    """Return whether the shortest lengths of the exact machine's legs have proofs."""
-    names = [leg.name for leg in judged.case.model.legs]
-    if judged.case.joint_centre_tolerance:
-        return all((exact_length_name(name), "min") in record.programs for name in names)
-    return all((f"leg_length limb {name}", "min") in proved for name in names)
+def _has_lengths(judged: Judgement, proved: dict[tuple[str, str], ProofClaim]) -> bool:
+    """Return whether the shortest lengths of the legs have proofs."""
+    return all((f"leg_length limb {leg.name}", "min") in proved for leg in judged.case.model.legs)
 
 
 class _Robot(NamedTuple):
@@ -147,7 +153,7 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Mo
         return "it was not judged"
     if found.outcome is Outcome.PROVED:
         own = record.own(each.name)
-        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree())
+        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree(with_open=True))
     if found.outcome is Outcome.REFUTED:
         return _refuted(each, found, judged, model)
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
@@ -187,7 +193,7 @@ def _number(
     if each.kind in ("stroke", "dead length"):
         directions = record.directions.get(one_machine_name(each.name))
         if directions is not None:
-            sides = tuple(tuple(each.tolist()) for each in directions)
+            sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
             return ProofClaim(each.name, each.sense, "one machine", found.bound, sides=sides)
         leg = each.name.partition(" ")[2].removeprefix("limb ")
         missing = any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max"))
@@ -218,4 +224,4 @@ def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> ProofCla
         bound = sign * max(sign * limit, sign * reached)
         if not math.isfinite(bound) or (each.limit is None and not bound > 0):
             return _NO_BOUND
-    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())
+    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree(with_open=True))

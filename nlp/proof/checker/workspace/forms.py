@@ -14,8 +14,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import FloatArray
-from ..polynomialrules import PolynomialArithmetic
-from ..polynomials import UNIT, Polynomial, places
+from ..polynomials import UNIT, Polynomial, PolynomialArithmetic, places
 
 #: Part of itself by which a sum of nonnegative products moves outwards: more than the rounding of fewer than 400 terms.
 UP = 1 + 1024 * UNIT

@@ -15,7 +15,7 @@ of affine matrices and vectors are convex: the corners of the box decide.
 * Two legs, as segments between their joints, are at least ``n.(x - y) / |n|`` apart, for any vector n and the least of
   it over their ends x and y.
 
-With a tolerance on joint centres every singular value changes by at most a number (:mod:`.built.changes`), so that the
+With a tolerance on joint centres every singular value changes by at most a number (:mod:`.tolerance`), so that the
 smallest is claimed to be larger by it, and the largest to be smaller by it.
 """
 

@@ -104,7 +104,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     y = [SX.sym(f"y{k}") if k in free else SX(float(middle[k])) for k in range(6)]
     unknowns = [SX.sym(item.name) for item in model.unknowns]
     position, inverse = ca.vertcat(*y[:3]), SX.sym("inverse")
-    turned, scale = _turned(root, y[3:])
+    turned, scale = turned_rotation(root, y[3:])
     values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
     numbers = Substitution(ca.vertcat(SX(0, 1), *values), ca.vertcat(SX(0, 1), *unknowns), turned / scale, position)
     symbols = Substitution.identity(model).all
@@ -147,7 +147,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     return replace(robot, size=np.concatenate([ranges, [float(next(following)) for _ in model.unknowns]]))
 
 
-def _turned(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
+def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
     """Return the rotation (3, 3) with three coordinates times a positive number, and this number: polynomials."""
 
     def of_quaternion(r: SX) -> tuple[SX, SX]:

@@ -22,11 +22,11 @@ from ....errors import UncoveredError
 from ...statement.claims import CONSTRAINTS
 from ..fractions import sign_of_determinant
 from ..proof_file import ProofError
-from .built.changes import change_of_rows
 from .closed_loops import Assembly, Enclosed, needed_equations, start_of
 from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
 from .motion_matrix import Motions, PosedRobot, free_motions, locked_motions, posed_robot
 from .pose_boxes import Attempt, PoseRoot
+from .tolerance import change_of_rows
 
 #: Largest number of parts of the way between two poses.
 _PARTS = 4096

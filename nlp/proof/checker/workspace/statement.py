@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .....models import Model, WrenchKind
+from .....models.joints import RobotError
 from .....models.joints.closedform import closed_form
 from ....case.case import Case
 from ....case.limits.clearance import LegClearance
@@ -18,12 +19,12 @@ from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....program.layout import Layout
 from ...statement.claims import CONSTRAINTS, REGULAR, SPECTRAL, Claim, asked_name, asked_spectra, claims_of
-from ...statement.closed_layout import closed_layout, reach_claims
 from ...statement.machine import Legs, legs_of
-from ...statement.posed_layout import posed_layout
+from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..premises import exact
 from ..proof_file import ProofError, WorkspaceProof, workspace_numbers
-from .built.statement import with_further
+from .pose_boxes import pose_root
+from .tolerance import Machines
 
 #: Names of the errors of the pose: of its position and of its rotation.
 ERRORS = ("position error", "rotation error")
@@ -88,6 +89,8 @@ class RobotClaims:
         model: the robot without these unknowns, over whose poses its ranks are claimed.
         more: claims about constraint wrenches and reach; none about six straight legs.
         numbers_at: assemblies that its numbers are about, in words; empty for a robot without unknowns.
+        machines: every machine within the tolerance, in whose symbols the numbers and ``more`` are then; None where
+            the design is meant, or machines cannot be put together.
     """
 
     legs: Legs | None
@@ -95,6 +98,7 @@ class RobotClaims:
     model: Model
     more: tuple[ExpectedClaim, ...] = ()
     numbers_at: str = ""
+    machines: Machines | None = None
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
@@ -105,11 +109,16 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         workspace: the poses.
         reached: names of those claims about reach that are proved.
     """
-    legs = legs_of(case)
+    legs, machines = legs_of(case), _machines(case, workspace)
+    if machines is not None:
+        reaches, _ = machines.symbols.claims(())
+        more = [*_of_constraints(machines.model), *map(_of_number, reaches)]
+        home = "the assembly of home" if case.model.unknowns else ""
+        return RobotClaims(legs, machines.symbols.layout, machines.model, tuple(more), home, machines)
     if legs is not None:
         return RobotClaims(legs, posed_layout(case, workspace), case.model)
     closed = closed_form(case.model)
-    more = [ExpectedClaim(CONSTRAINTS, "", "constraints")] if has_constraints(closed.model) else []
+    more = _of_constraints(closed.model)
     numbers_at, layout = "every assembly" if case.model.unknowns else "", None
     if closed.reaches:
         reach = reach_claims(case, closed, workspace)
@@ -119,6 +128,21 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
             partly = "every assembly in which limbs in closed form are as at home"
             numbers_at = partly if closed.model.unknowns else "the assembly of home"
     return RobotClaims(None, layout or posed_layout(case, workspace), closed.model, tuple(more), numbers_at)
+
+
+def _of_constraints(model: Model) -> list[ExpectedClaim]:
+    """Return the claim about the rank of a robot's constraint wrenches, if it has some."""
+    return [ExpectedClaim(CONSTRAINTS, "", "constraints")] if has_constraints(model) else []
+
+
+def _machines(case: Case, workspace: Workspace) -> Machines | None:
+    """Return every machine within the case's tolerance; None for the design, or where machines are not known."""
+    if not case.joint_centre_tolerance:
+        return None
+    try:
+        return Machines(case, closed_form(case.model).model, workspace, pose_root(workspace))
+    except RobotError:
+        return None
 
 
 def has_constraints(model: Model) -> bool:
@@ -141,8 +165,6 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
         InputError: the robot has no measure of a name.
     """
     claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
-    if robot.legs is not None and robot.legs.tolerance:
-        claims = with_further(robot.layout, claims)
     every = [ExpectedClaim(REGULAR, "", "regular"), *robot.more, *map(_of_number, claims)]
     return every if robot.legs is None else [*every, *_of_legs(case, quantities, leg_error)]
 
