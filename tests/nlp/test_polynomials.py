@@ -16,7 +16,7 @@ from screwsynth.nlp.proof.checker.polymodels import forms_of, polynomial_sum, re
 from screwsynth.nlp.proof.checker.polynomials import Polynomial, PolynomialArithmetic, middles, places
 from screwsynth.nlp.proof.checker.premises import program_of
 from screwsynth.nlp.proof.checker.proof_file import ProofError
-from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.certified import certify, proof_of
 

@@ -13,12 +13,20 @@ import pytest
 from hexapods import SMALL
 
 from screwsynth.nlp import InputError, certify, interruption, load_case, solve
-from screwsynth.nlp.interruption import is_requested, one_search, reason_of, seconds_left, stop_if_requested, within
+from screwsynth.nlp.interruption import (
+    is_requested,
+    one_call,
+    one_search,
+    reason_of,
+    seconds_left,
+    stop_if_requested,
+    within,
+)
 from screwsynth.nlp.output.sweepfunction import sweep
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure import instructions
+from screwsynth.nlp.proof.enclosure import tape
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.solver.status import Status
@@ -71,6 +79,18 @@ def test_blocks_take_from_the_time_that_is_left(clock: Clock) -> None:
     assert not is_requested()
 
 
+def test_an_interrupt_between_two_instructions_leaves_no_time_limit() -> None:
+    @one_call
+    def work() -> None:
+        interruption._end.set(interruption._End(at=0.0))  # as in ``within``, before its block begins
+        assert seconds_left() == 0
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert seconds_left() == np.inf
+
+
 def test_only_a_search_is_stopped_in_its_set_up(clock: Clock) -> None:
     def search() -> str:
         stop_if_requested()
@@ -86,15 +106,15 @@ def test_only_a_search_is_stopped_in_its_set_up(clock: Clock) -> None:
 def test_set_up_of_the_whole_box_ends_with_the_time(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     nlp = formulate(load_case(CASE))
     compiled: list[str] = []
-    real = instructions._write_operation
+    real = tape._write_operation
 
     def counted(*arguments: Any) -> None:  # noqa: ANN401
         compiled.append("operation")
         clock.now = 10.0
         real(*arguments)
 
-    monkeypatch.setattr(instructions, "_write_operation", counted)
-    monkeypatch.setattr(instructions, "_LOOK", 8)
+    monkeypatch.setattr(tape, "_write_operation", counted)
+    monkeypatch.setattr(tape, "_LOOK", 8)
     found = certify_program(nlp, nlp.start, time_limit=5.0)
     assert (found.status, found.boxes, found.open) == (CertificateStatus.INCOMPLETE, 0, 1)
     assert found.bound == math.inf

@@ -29,8 +29,9 @@ from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
+from screwsynth.nlp.proof.workspace.numbers.leg_numbers import pose_errors
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examined, Examiner
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
@@ -238,6 +239,25 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
         assert max(np.linalg.norm(part, axis=1).max() for part in oracle.errors(points[0])) <= TOLERANCE
 
 
+def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> None:
+    robot, box = legs(case), pose_box(workspace_of_case(case))
+    for y in box.random(5, np.random.default_rng(3)):
+        wide = robot._replace(tolerance=float(Clearance(robot, box, 0, 1).values(y[None])[0]))
+        assert Clearance(wide, box, 0, 1).values(y[None])[0] == 0
+        made = Clearance(wide, box, 0, 1).errors(y).applied(wide)
+        assert Clearance(made._replace(tolerance=0.0), box, 0, 1).values(y[None])[0] < 1e-9 * wide.tolerance
+
+
+def test_errors_of_a_machine_that_is_singular_at_every_pose_have_no_value(case: Case) -> None:
+    """Joints of base and platform at the same azimuths: Newton's method finds no pose of a machine with errors."""
+    robot = legs(case)
+    similar, box = Legs(robot.base, 0.5 * robot.base), pose_box(Workspace((0.0, 0.0, 20.0), Turns()))
+    for each in pose_errors(similar, box, 1e-3, 10.0):
+        assert each.outcome is Outcome.OPEN
+        assert (each.bound, each.pose) == (math.inf, None)
+        assert math.isnan(each.reached)
+
+
 @pytest.mark.parametrize("kind", list(TurnKind))
 def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: TurnKind) -> None:
     rng = np.random.default_rng(2)
@@ -257,7 +277,7 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
             if family is None
             else (family.locked, family.coordinates, family.start)
         )
-        cells = Cells(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
+        cells = LoopBoxes(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
         return Examiner(exact, RankTest(matrix, z, start), family).examine(cells)
 
     found, changed = examined(family), 0

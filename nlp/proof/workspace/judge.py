@@ -15,9 +15,8 @@ from ...interruption import one_call, within
 from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.closed_layout import closed_layout, reach_claims
 from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
-from ..statement.posed_layout import posed_layout
+from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from .home_poses import Homes
 from .numbers.asked_values import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
@@ -30,7 +29,7 @@ from .ranks.search import RankProgress
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError
 from .tolerance.legs.limits import as_built, refined
-from .tolerance.machines import Effort, Machines, machine_extremes, machines_of, shown_extremes
+from .tolerance.machines import Machines, Proving, machine_extremes, machines_of, shown_extremes
 from .verdict import Outcome, Regularity
 
 if TYPE_CHECKING:
@@ -83,7 +82,7 @@ class Judgement:
         return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
 
 
-@one_call()
+@one_call
 def judge_workspace(
     case: Case,
     *,
@@ -209,8 +208,8 @@ class _Numbers:
             paper=self.paper,
         )
         if self.machines is not None:
-            effort = Effort(self.gap, self.jobs, self.progress)
-            yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
+            proving = Proving(self.gap, self.jobs, self.progress)
+            yield from _add(found, machine_extremes(self.machines, names, proving, with_objective=with_objective))
             yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
             return
         layout = posed_layout(case, self.workspace)
@@ -233,8 +232,8 @@ class _Numbers:
                 each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
             ]
             if is_reached:
-                effort = Effort(self.gap, self.jobs)
-                decided += shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective)
+                proving = Proving(self.gap, self.jobs)
+                decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
         yield from self._add_proved(found, layout, claims, decided)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)
