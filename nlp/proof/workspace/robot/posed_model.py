@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Model, Substitution, jacobian
+from .....models import FloatArray, Model, Substitution
 from .....models.instance import sizes_at
 from ....case.case import Case
 from ....case.pose import Free
@@ -72,7 +72,6 @@ class PosedModel:
         every: all equations of loops, and signs that must be positive.
         signs: (s, 1) numbers that are positive in home's assembly.
         limbs: rows, members and actuators.
-        jacobian: (rows, 6) J.
         turned: the limbs with ``inverse * s R`` as the rotation.
         inverse: (1, 1) symbol of ``1 / s``.
         scale: (1, 1) ``s``.
@@ -85,7 +84,6 @@ class PosedModel:
     every: SX
     signs: SX
     limbs: Limbs
-    jacobian: SX
     turned: Limbs
     inverse: SX
     scale: SX
@@ -155,7 +153,6 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         every=ca.vertcat(SX(0, 1), *scaled),
         signs=signs,
         limbs=limbs,
-        jacobian=jacobian(limbs.wrenches, SX(1), limbs.members),
         turned=turned,
         inverse=inverse,
         scale=scale,

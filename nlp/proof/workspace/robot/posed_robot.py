@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, JointScrews, Member, Model, frozen_array
+from .....models import FloatArray, JointScrews, Member, Model, WrenchKind, frozen_array, jacobian
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
@@ -37,6 +38,25 @@ class NotJudgedError(ValueError):
     """Error of a robot whose loops or limbs are singular where a search begins; the message is a clause."""
 
 
+class ScaledRows(NamedTuple):
+    """J as rows divided by their sizes, moments about the platform's origin in parts of a length.
+
+    The row of a leg times its length is a polynomial of the pose, and so nearer to a linear function than the unit row.
+
+    Attributes:
+        rows: (m, 6) rows of any size.
+        sizes: (m, 1) positive.
+    """
+
+    rows: SX
+    sizes: SX
+
+    @property
+    def jacobian(self) -> SX:
+        """J, (m, 6)."""
+        return self.rows / ca.repmat(self.sizes, 1, 6)
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """A robot over a workspace.
@@ -51,7 +71,7 @@ class Problem:
         start: (n,) closed loops at the middle of the workspace, or near it.
         locked: rows and members with the actuators locked.
         unactuated: the same with free actuators; None for a robot without constraints.
-        jacobian: (rows, 6) J, moments about the platform's origin divided by ``length``.
+        scaled: J, moments divided by ``length``.
         length: of the order of the robot's, length.
         needed: indices of the equations among those of the model.
         columns: indices of the screws of each member that are kept.
@@ -68,7 +88,7 @@ class Problem:
     start: FloatArray
     locked: RankMatrix
     unactuated: RankMatrix | None
-    jacobian: SX
+    scaled: ScaledRows
     length: float
     needed: tuple[int, ...]
     columns: tuple[tuple[int, ...], ...]
@@ -124,7 +144,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         start=frozen_array(start, start.shape),
         locked=locked_rows(posed, columns, rows, length),
         unactuated=_unactuated(model, limbs, posed.z, start),
-        jacobian=about_platform(posed.jacobian, limbs.position, length),
+        scaled=scaled_rows(posed, length, case.characteristic_length),
         length=length,
         needed=tuple(needed),
         columns=columns,
@@ -236,13 +256,36 @@ def locked_rows(
     return RankMatrix(polynomial_rows(plain, turned, posed), 0)
 
 
-def about_platform(rows: SX, position: SX, length: float) -> SX:
-    """Return rows with moments about the platform's origin, divided by a length."""
-    found = [
-        ca.horzcat(rows[i, :3], (rows[i, 3:] - ca.cross(position, rows[i, :3].T).T) / length)
-        for i in range(rows.shape[0])
+def scaled_rows(posed: PosedModel, length: float, characteristic_length: float) -> ScaledRows:
+    """Return J as rows that are linear in the rotation without a division, and their sizes.
+
+    Args:
+        posed: the robot.
+        length: by which moments are divided.
+        characteristic_length: by which couples are multiplied in J.
+    """
+
+    def wrenches(limbs: Limbs) -> SX:
+        """Return the rows of forces and couples, and 1 in a last column: the factor that makes them polynomials."""
+        rows = [
+            ca.horzcat(row.force.T, (row.moment - ca.cross(limbs.position, row.force)).T / length, 1)
+            for row in limbs.wrenches
+        ]
+        return ca.vertcat(SX(0, 7), *rows)
+
+    limbs, L = posed.limbs, SX(characteristic_length)
+    rows = ca.densify(polynomial_rows(wrenches(limbs), wrenches(posed.turned), posed))
+    sizes = [
+        rows[i, 6] * ca.sqrt(row.square) / (L if row.kind is WrenchKind.COUPLE else 1)
+        for i, row in enumerate(limbs.wrenches)
     ]
-    return ca.vertcat(SX(0, 6), *found)
+    of_members = jacobian([], L, limbs.members)
+    moments = [
+        ca.horzcat(row[:3], (row[3:] - ca.cross(limbs.position, row[:3].T).T) / length)
+        for row in ca.vertsplit(of_members)
+    ]
+    ones = SX.ones(of_members.shape[0])
+    return ScaledRows(ca.vertcat(rows[:, :6], *moments), ca.vertcat(SX(0, 1), *sizes, ones))
 
 
 def _unactuated(model: Model, limbs: Limbs, z: SX, start: FloatArray) -> RankMatrix | None:

@@ -24,7 +24,7 @@ from ...statement.machine import INSIDE, CentreErrors
 from .closed_loops import Loops
 from .motion_matrix import RankMatrix, free_matrix
 from .posed_model import PosedModel, posed_model
-from .posed_robot import NotJudgedError, Problem, about_platform, locked_rows
+from .posed_robot import NotJudgedError, Problem, ScaledRows, locked_rows, scaled_rows
 
 #: Errors at which equations that were left out are tested, as a part of the robot's length, and number of tests.
 _OFF, _TESTS = 1e-2, 4
@@ -64,7 +64,7 @@ class Family:
         every: (l, 1) all equations of loops with errors.
         signs: (s, 1) numbers that are positive in home's assembly.
         locked, unactuated: matrices of the problem with errors.
-        jacobian: (rows, 6) J with errors, as in the problem.
+        scaled: J with errors, as in the problem.
     """
 
     problem: Problem
@@ -76,7 +76,7 @@ class Family:
     signs: SX
     locked: RankMatrix
     unactuated: RankMatrix | None
-    jacobian: SX
+    scaled: ScaledRows
 
     @property
     def coordinates(self) -> SX:
@@ -193,7 +193,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
         signs=posed.signs,
         locked=locked_rows(posed, problem.columns, problem.rows, problem.length),
         unactuated=unactuated,
-        jacobian=about_platform(posed.jacobian, limbs.position, problem.length),
+        scaled=scaled_rows(posed, problem.length, case.characteristic_length),
     )
     _check_freedoms(family, posed)
     return family

@@ -1,0 +1,176 @@
+"""Bounds of the singular values of J over boxes of poses, for any robot.
+
+The smallest singular value of J is at least 1 over the norm of any left inverse, whose part of first order in the
+coordinates is known (:mod:`.left_inverse`). The norm ``(tr (P P')^n)^(1/2n)`` is convex in P, not below the largest
+singular value and close to it, so that its largest value over the affine part is that at a corner of a box. The largest
+singular value of J itself is bounded likewise. The Frobenius norm of a rest bounds what it adds.
+
+Errors of joint centres count as further terms of the rows. Those of six straight legs, up to t, change J by a matrix
+whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg, the unit
+force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and its moment about the platform's origin by ``|a| h + t``.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from .....models import FloatArray
+from ...boxes.tapes import MOST_VARIABLES
+from ...enclosure.forms import Encloser, Forms
+from ...statement.machine import JointErrors, Legs
+from ..robot.posed_robot import Problem, ScaledRows
+from ..robot.tolerance_model import Family
+from ..tolerance.legs.singular_values import change_of_rows, worst_rows
+from .bound_search import Bounds
+from .left_inverse import ROUNDING, RowsOver, at_corners, left_inverses, rows_over
+
+#: Squarings in the norm of an inverse: its n is 2 to this power. Two equal singular values make it 2 % too large.
+_SQUARINGS = 4
+
+
+class SpectralBounds:
+    """Lower bounds of the smallest singular value of J, or of minus its condition number, from forms of its rows.
+
+    Args:
+        scaled: J.
+        ratio: by which the moments in it are multiplied.
+        is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
+        change: Frobenius norm of a further change of J.
+
+    Attributes:
+        entries: (7 m, 1) the expressions whose forms are needed.
+    """
+
+    def __init__(self, scaled: ScaledRows, ratio: float, *, is_condition: bool, change: float = 0.0) -> None:
+        self.entries = ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes)
+        self._count, self._ratio = int(scaled.sizes.numel()), ratio
+        self._is_condition, self._change = is_condition, change
+
+    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
+        """Return the bounds (B,) over boxes, and the share (B, f) of each coordinate.
+
+        Args:
+            forms: of the entries.
+            count: number f of the first terms that are coordinates.
+            errors: number of the last terms that are errors of joint centres.
+        """
+        rows = rows_over(forms, self._count, self._ratio, count, errors)
+        inverse = left_inverses(rows)
+        with np.errstate(all="ignore"):
+            norm = _schatten(inverse.at_corners(slice(0, 6))) + _frobenius(inverse.rest)
+            least = np.maximum(1 / norm - self._change, 0.0) if self._change else 1 / norm
+            found = least
+            if self._is_condition:
+                largest = _largest(rows) + self._change
+                found = -largest / least if self._change else -largest * norm
+        floor = -np.inf if self._is_condition else 0.0
+        return Bounds(np.where(np.isfinite(found), found, floor), inverse.shares)
+
+
+class SingularValues:
+    """Smallest singular value, or minus the condition number, of J over a workspace without dependent coordinates.
+
+    Bounds are those of all machines that are meant. Values are those of the design; with legs, of the machine that is
+    worst to first order at each point.
+
+    Args:
+        problem: the robot.
+        length: by which moments about the platform's origin are divided.
+        is_condition: whether minus the condition number is meant.
+        family: all machines that are meant, whose errors count entry by entry; None for the design alone.
+        legs: joint centres of six straight legs with the tolerance that is meant; None for another robot.
+        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of legs alone.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        length: float,
+        *,
+        is_condition: bool,
+        family: Family | None = None,
+        legs: Legs | None = None,
+        shortest: float = 0.0,
+    ) -> None:
+        self._problem, self._length, self._is_condition = problem, length, is_condition
+        self._built = legs if legs is not None and legs.tolerance else None
+        change = 0.0 if self._built is None else change_of_rows(self._built, length, shortest)
+        ratio = problem.length / length
+        meant = problem if family is None else family
+        self._bounds = SpectralBounds(meant.scaled, ratio, is_condition=is_condition, change=change)
+        coordinates = problem.z if family is None else family.coordinates
+        self._encloser = Encloser(coordinates, self._bounds.entries)
+        self._errors = np.zeros(0) if family is None else np.full(family.errors.numel(), family.tolerance)
+        self._is_second = not self._errors.size and len(problem.free) <= MOST_VARIABLES
+        scale = ca.diag(ca.vertcat(ca.SX.ones(3), ratio * ca.SX.ones(3)))
+        self._jacobian = ca.Function("J", [problem.z], [ca.densify(problem.scaled.jacobian @ scale)])
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return the values (K,) at points (K, 6)."""
+        if self._built is not None:
+            rows = worst_rows(self._built, self._problem.box, points, self._length, self._is_condition).rows
+            with np.errstate(all="ignore"):
+                J = rows / np.linalg.norm(rows[:, :, :3], axis=2, keepdims=True)
+            J[:, :, 3:] /= self._length
+        else:
+            flat = self._jacobian(points[:, list(self._problem.free)].T).full()
+            J = flat.reshape(len(flat), len(points), 6).transpose(1, 0, 2)
+        known = np.isfinite(J).all(axis=(1, 2))
+        values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
+        with np.errstate(all="ignore"):
+            found = -values[:, 0] / values[:, -1] if self._is_condition else values[:, -1]
+        return np.asarray(np.where(known, found, np.nan))
+
+    def errors(self, y: FloatArray) -> JointErrors | None:
+        """Return the errors of the machine of legs that is worst at a point (6,) to first order; None for the design."""
+        if self._built is None:
+            return None
+        return worst_rows(self._built, self._problem.box, y[None], self._length, self._is_condition).errors(0)
+
+    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
+        """Return lower bounds over boxes (B, 6)."""
+        free = list(self._problem.free)
+        errors = np.tile(self._errors, (len(lower), 1))
+        ends = np.hstack([lower[:, free], -errors]).T, np.hstack([upper[:, free], errors]).T
+        forms = self._encloser.second(*ends).as_terms() if self._is_second else self._encloser(*ends)
+        found = self._bounds.over(forms, len(free), len(self._errors))
+        shares = np.zeros(lower.shape)
+        shares[:, free] = found.shares
+        box = self._problem.box
+        wide = (upper - lower) / np.where(box.upper > box.lower, box.upper - box.lower, np.inf)
+        return Bounds(found.lower, np.where(shares.any(axis=1, keepdims=True), shares, wide))
+
+
+def _schatten(matrices: FloatArray) -> FloatArray:
+    """Return the largest norm (B,) of matrices (B, S, 6, m): convex, and not below the largest singular value."""
+    square = matrices @ matrices.transpose(0, 1, 3, 2)
+    trace = np.trace(square, axis1=2, axis2=3)
+    power = square / trace[:, :, None, None]
+    for _ in range(_SQUARINGS):
+        power = power @ power
+    norm = np.sqrt(trace) * np.trace(power, axis1=2, axis2=3) ** (0.5 / 2**_SQUARINGS)
+    return np.asarray(norm.max(axis=1) * (1 + ROUNDING))
+
+
+def _largest(rows: RowsOver) -> FloatArray:
+    """Return an upper bound (B,) of the largest singular value of J."""
+    d = rows.spread(rows.bend) + rows.slack
+    # 1 / (1 + e) = 1 - e + e^2 / (1 + e) for the deviation e of a size from 1.
+    room = np.where(d < 1, 1 - d, np.nan)
+    linear = rows.terms - rows.A[:, None] * rows.bend[..., None]
+    rest = rows.rest / room[..., None] + (rows.spread(rows.terms) * (d / room)[..., None])
+    rest += np.abs(rows.A) * (rows.slack + d * d / room)[..., None]
+    rest += rows.spread(linear[:, rows.count :])
+    corners = rows.A[:, None] + at_corners(linear[:, : rows.count])
+    known = np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2))
+    values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
+    return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)
+
+
+def _frobenius(r: FloatArray) -> FloatArray:
+    """Return the Frobenius norms (B,) of matrices (B, r, c), not below their exact values."""
+    return np.asarray(np.sqrt((r * r).sum(axis=(1, 2))) * (1 + ROUNDING))
