@@ -193,7 +193,7 @@ class Bowl:
 
 def bowl() -> Claim:
     found = prove_minimum(Bowl(), legs_and_box()[1], gap=0.2)
-    assert found.bound <= -1.0 <= found.value == Bowl().values(found.y[None])[0]
+    assert found.bound <= -1.0 <= found.value == Bowl().values(found.at[None])[0]
     return Claim(not found.reason, found.bound, found.reason == STOPPED)
 
 

@@ -32,7 +32,7 @@ from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.tolerance import first_order_change as firstorder
 from screwsynth.nlp.proof.workspace.tolerance import machine_number
-from screwsynth.nlp.proof.workspace.tolerance.machines import Effort, Machines, machine_extremes, machines_of
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines, Proving, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
 from screwsynth.nlp.results.schema import result_schema
@@ -226,9 +226,9 @@ SAMPLED: dict[str, Callable[[], Sampled]] = {"3-rps": ThreeRps, "6-rus": SixRus,
 
 def wanted(found: Machines, names: tuple[str, ...], gap: float) -> list[Extreme]:
     """Return the smallest and largest value of each of these numbers."""
-    effort = Effort(gap, 1)
+    proving = Proving(gap, 1)
     quantities = [each.name for each in found.built.model.quantities]
-    every = machine_extremes(found, quantities, effort, with_objective=True, only=names)
+    every = machine_extremes(found, quantities, proving, with_objective=True, only=names)
     return [each for each in every if each.name in names]
 
 

@@ -30,7 +30,7 @@ from .ranks.search import RankProgress
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError
 from .tolerance.legs.limits import as_built, refined
-from .tolerance.machines import Effort, Machines, machine_extremes, machines_of, shown_extremes
+from .tolerance.machines import Machines, Proving, machine_extremes, machines_of, shown_extremes
 from .verdict import Outcome, Regularity
 
 if TYPE_CHECKING:
@@ -209,8 +209,8 @@ class _Numbers:
             paper=self.paper,
         )
         if self.machines is not None:
-            effort = Effort(self.gap, self.jobs, self.progress)
-            yield from _add(found, machine_extremes(self.machines, names, effort, with_objective=with_objective))
+            proving = Proving(self.gap, self.jobs, self.progress)
+            yield from _add(found, machine_extremes(self.machines, names, proving, with_objective=with_objective))
             yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
             return
         layout = posed_layout(case, self.workspace)
@@ -233,8 +233,8 @@ class _Numbers:
                 each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
             ]
             if is_reached:
-                effort = Effort(self.gap, self.jobs)
-                decided += shown_extremes(case, self.closed, box, names, effort, with_objective=with_objective)
+                proving = Proving(self.gap, self.jobs)
+                decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
         yield from self._add_proved(found, layout, claims, decided)
         if legs is not None:
             again = partial(prove, paper=self.paper, again=True)

@@ -83,13 +83,13 @@ def spectral_extremes(
         reached = (
             sign * found.bound,
             sign * found.value,
-            box.pose(found.y),
+            box.pose(found.at),
             Outcome.OPEN if reason else Outcome.PROVED,
         )
         ended = (*reached, found.boxes, found.seconds, reason)
         extreme = Extreme(asked_name(case, name), sense, Dimension.NUMBER, "", None, *ended)
         if case.joint_centre_tolerance and isinstance(oracle, SingularValues):
-            extreme = replace(extreme, errors=oracle.errors(found.y))
+            extreme = replace(extreme, errors=oracle.errors(found.at))
         yield extreme
 
 

@@ -59,7 +59,7 @@ def own_searches(
 
     def with_errors(oracle: SingularValues | Clearance, found: Minimum, extreme: Extreme) -> Extreme:
         """Return an extreme with the errors of the machine that reaches it."""
-        return replace(extreme, errors=oracle.errors(found.y)) if legs.tolerance else extreme
+        return replace(extreme, errors=oracle.errors(found.at)) if legs.tolerance else extreme
 
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue):
@@ -121,7 +121,7 @@ def from_minimum(
         limit=sign * limit,
         bound=sign * found.bound,
         reached=sign * found.value,
-        pose=box.pose(found.y),
+        pose=box.pose(found.at),
         outcome=outcome,
         boxes=found.boxes,
         seconds=found.seconds,
@@ -160,7 +160,7 @@ def pose_errors(
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
     whole = with_rest(first, eps, shortest, reach) if all(map(math.isfinite, first)) else PoseErrors(math.inf, math.inf)
     for k, (name, dimension) in enumerate(names):
-        y, bound = found[k].y, whole[k]
+        y, bound = found[k].at, whole[k]
         # To first order both signs give the same error.
         reached = max(displaced(legs, box, y, sign * eps * searches[k].worst(y))[k] for sign in (-1.0, 1.0))
         is_proved = math.isfinite(bound) and not found[k].reason

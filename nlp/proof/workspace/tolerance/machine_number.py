@@ -12,18 +12,17 @@ first; errors never are. Values are those of machines whose errors are along the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....interruption import one_search
 from ...boxes.rows import Boxes, some
-from ...boxes.search import Effort, Order, Search, Verdicts
+from ...boxes.search import Verdicts
 from ...enclosure.forms import Forms
-from ..numbers.bound_search import Goal, SmallestValue, Value
+from ..numbers.bound_search import Goal, Minimum, SmallestValue, Value, searched
 from ..ranks.covering import APART, Followed, LoopRule
 from ..ranks.krawczyk import ROUNDING, Relation, by_centres
 from ..ranks.loop_boxes import Examiner
@@ -67,27 +66,6 @@ class _Bound:
         return Tested(none.astype(bool), np.nan_to_num(shares), np.where(known, lower, -np.inf), none)
 
 
-@dataclass(frozen=True, eq=False)
-class MachineMinimum:
-    """The smallest value of a number over all machines and poses.
-
-    Attributes:
-        bound: proven: no machine has a smaller value at a pose.
-        value: at ``z``; NaN without a machine.
-        z: (n + 3 m,) coordinates of the pose, and errors, of the machine with the smallest value known; None without.
-        boxes: number of boxes examined.
-        seconds: wall time.
-        reason: for stopping before the gap was met; else empty.
-    """
-
-    bound: float
-    value: float
-    z: FloatArray | None
-    boxes: int
-    seconds: float
-    reason: str
-
-
 def smallest_of_machines(
     family: Family,
     expression: SX,
@@ -96,7 +74,7 @@ def smallest_of_machines(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-) -> MachineMinimum:
+) -> Minimum:
     """Prove the smallest value of an expression over all machines and poses.
 
     Args:
@@ -110,23 +88,12 @@ def smallest_of_machines(
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    effort = Effort()
     with one_search(time_limit):
         rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
-        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
-        reason = effort.run(search, rule.ending(search))
-    bound, (value, z) = -search.bound, rule.best
-    bound = min(bound, value)
-    if math.isfinite(bound) and not rule.is_one_assembly():
-        bound, reason = -math.inf, APART
-    return MachineMinimum(
-        bound=bound if math.isfinite(bound) else -math.inf,
-        value=value if math.isfinite(value) else math.nan,
-        z=z if math.isfinite(value) else None,
-        boxes=search.boxes,
-        seconds=effort.seconds,
-        reason=reason,
-    )
+        found = searched(rule, rule.root, rule.whole, _LEAST_WIDTHS)
+    if not math.isfinite(found.bound):
+        return replace(found, bound=-math.inf)
+    return found if rule.is_one_assembly() else replace(found, bound=-math.inf, reason=APART)
 
 
 class _MachineRule(LoopRule, SmallestValue[Followed]):

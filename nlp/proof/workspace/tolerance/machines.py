@@ -19,6 +19,7 @@ from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
 from ...statement.claims import REACH, Claim, claims_of
+from ..numbers.bound_search import Minimum
 from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, build_problem
@@ -26,7 +27,7 @@ from ..robot.tolerance_model import BuiltModel, Family, built_model, family_of
 from ..verdict import Outcome
 from .first_order_change import Place, worst_number
 from .layouts import box_layout, in_family, machine_layout
-from .machine_number import MachineMinimum, smallest_of_machines
+from .machine_number import smallest_of_machines
 from .second_order_change import is_smooth
 
 #: Reason for numbers of a robot that does not have all poses.
@@ -49,7 +50,7 @@ class Machines(NamedTuple):
     family: Family
 
 
-class Effort(NamedTuple):
+class Proving(NamedTuple):
     """How claims are proved: gap, threads, and a function of the progress."""
 
     gap: float
@@ -76,7 +77,7 @@ def machines_of(case: Case, model: Model, box: PoseBox) -> Machines:
 def machine_extremes(
     machines: Machines,
     quantities: Sequence[str],
-    effort: Effort,
+    proving: Proving,
     *,
     with_objective: bool,
     only: Sequence[str] | None = None,
@@ -86,7 +87,7 @@ def machine_extremes(
     Args:
         machines: the machines.
         quantities: names of measures.
-        effort: how they are proved.
+        proving: how they are proved.
         with_objective: whether F of each task is bounded.
         only: names of the numbers that are meant; None for all.
 
@@ -104,19 +105,19 @@ def machine_extremes(
         exact = box_layout(replace(case, model=machines.model), family.problem.box)
     reached = True
     for done, claim in enumerate([*reaches, *claims]):
-        if effort.progress is not None:
-            effort.progress(claim.name, done, len(reaches) + len(claims))
+        if proving.progress is not None:
+            proving.progress(claim.name, done, len(reaches) + len(claims))
         number = in_family(layout, family, claim.expression)
         if done >= len(reaches) and not reached:
             yield not_bounded(claim, _OUT_OF_REACH)
             continue
-        found = _extreme(machines, exact, claim, number, effort)
+        found = _extreme(machines, exact, claim, number, proving)
         reached = reached and (done >= len(reaches) or found.outcome is Outcome.PROVED)
         yield found
 
 
 def shown_extremes(
-    case: Case, closed: ClosedForm, box: PoseBox, quantities: Sequence[str], effort: Effort, *, with_objective: bool
+    case: Case, closed: ClosedForm, box: PoseBox, quantities: Sequence[str], proving: Proving, *, with_objective: bool
 ) -> Iterator[Extreme]:
     """Yield the extremes of numbers without a limit of a design with loops, in the assembly of home.
 
@@ -129,7 +130,7 @@ def shown_extremes(
         closed: its robot without unknowns in closed form.
         box: the poses.
         quantities: names of measures.
-        effort: how they are proved.
+        proving: how they are proved.
         with_objective: whether F of each task is bounded.
 
     Raises:
@@ -146,7 +147,7 @@ def shown_extremes(
     layout = machine_layout(case, built, family)
     for claim in claims_of(layout, quantities, with_objective=with_objective):
         if claim.limit is None:
-            yield _extreme(machines, None, claim, in_family(layout, family, claim.expression), effort)
+            yield _extreme(machines, None, claim, in_family(layout, family, claim.expression), proving)
 
 
 def not_bounded(claim: Claim, reason: str) -> Extreme:
@@ -174,7 +175,7 @@ def _reach_claims(machines: Machines, layout: Layout) -> list[Claim]:
     ]
 
 
-def _extreme(machines: Machines, exact: Layout | None, claim: Claim, number: SX, effort: Effort) -> Extreme:
+def _extreme(machines: Machines, exact: Layout | None, claim: Claim, number: SX, proving: Proving) -> Extreme:
     """Return the extreme of one number over all machines.
 
     Args:
@@ -182,21 +183,21 @@ def _extreme(machines: Machines, exact: Layout | None, claim: Claim, number: SX,
         exact: the design as symbols of the pose; None where coordinates follow from others.
         claim: the number.
         number: (1, 1) in the coordinates of the family.
-        effort: how it is proved.
+        proving: how it is proved.
     """
     if is_requested():
         return not_bounded(claim, why_stopped())
     try:
         if exact is not None and is_smooth(machines.family, number):
-            found = _by_first_order(machines, exact, claim, number, effort)
+            found = _by_first_order(machines, exact, claim, number, proving)
             if found is not None:
                 return found
-        return _by_search(machines, claim, number, effort)
+        return _by_search(machines, claim, number, proving)
     except UncoveredError as error:
         return not_bounded(claim, str(error))
 
 
-def _by_first_order(machines: Machines, exact: Layout, claim: Claim, number: SX, effort: Effort) -> Extreme | None:
+def _by_first_order(machines: Machines, exact: Layout, claim: Claim, number: SX, proving: Proving) -> Extreme | None:
     """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
 
     Raises:
@@ -214,12 +215,12 @@ def _by_first_order(machines: Machines, exact: Layout, claim: Claim, number: SX,
     return prove_extreme(
         exact,
         replace(claim, expression=design, worst=worst),
-        gap=effort.gap,
-        jobs=effort.jobs,
+        gap=proving.gap,
+        jobs=proving.jobs,
     )
 
 
-def _by_search(machines: Machines, claim: Claim, number: SX, effort: Effort) -> Extreme:
+def _by_search(machines: Machines, claim: Claim, number: SX, proving: Proving) -> Extreme:
     """Return the extreme of a number by a search of boxes of poses for all machines.
 
     Raises:
@@ -230,14 +231,14 @@ def _by_search(machines: Machines, claim: Claim, number: SX, effort: Effort) -> 
     found = smallest_of_machines(
         machines.family,
         -sign * number,
-        gap=effort.gap,
+        gap=proving.gap,
         limit=None if claim.limit is None else -sign * claim.limit,
         slack=slack,
     )
     return _of_minimum(machines.family, claim, found, slack)
 
 
-def _of_minimum(family: Family, claim: Claim, found: MachineMinimum, slack: float) -> Extreme:
+def _of_minimum(family: Family, claim: Claim, found: Minimum, slack: float) -> Extreme:
     """Return the extreme of a claim from the smallest value of its number, or of the negative of it."""
     sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
     is_bounded = math.isfinite(found.bound)
@@ -250,10 +251,10 @@ def _of_minimum(family: Family, claim: Claim, found: MachineMinimum, slack: floa
         elif is_bounded and found.bound >= least - slack:
             outcome = Outcome.PROVED
     pose, centres = None, None
-    if found.z is not None:
+    if math.isfinite(found.value):
         problem = family.problem
-        pose = problem.box.pose(problem.pose_of(found.z))
-        centres = family.errors_of(found.z) if family.names else None
+        pose = problem.box.pose(problem.pose_of(found.at))
+        centres = family.errors_of(found.at) if family.names else None
     return Extreme(
         name=claim.name,
         sense=claim.sense,
@@ -261,7 +262,7 @@ def _of_minimum(family: Family, claim: Claim, found: MachineMinimum, slack: floa
         key=claim.key,
         limit=None if claim.limit is None else read(claim.limit),
         bound=read(-sign * found.bound) if is_bounded else sign * math.inf,
-        reached=math.nan if math.isnan(found.value) else read(-sign * found.value),
+        reached=math.nan if pose is None else read(-sign * found.value),
         pose=pose,
         outcome=outcome,
         boxes=found.boxes,
