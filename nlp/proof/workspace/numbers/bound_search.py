@@ -13,13 +13,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
+from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....interruption import one_search
 from ...boxes.rows import Boxes, Columns, bisected, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
+from ...enclosure.forms import Encloser, Forms
 from ..robot.pose_box import PoseBox
+from ..robot.posed_robot import Problem
+from ..robot.tolerance_model import Family
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,6 +58,63 @@ class Oracle(Protocol):
 
     def values(self, points: FloatArray) -> FloatArray:
         """Return the values (K,) at points (K, 6)."""
+
+
+class Number(Protocol):
+    """A number of which forms of expressions give bounds, and which has values at points.
+
+    Attributes:
+        entries: (E, 1) the expressions, in the coordinates of a robot or of all machines.
+    """
+
+    entries: SX
+
+    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
+        """Return lower bounds over B boxes, and the share (B, f) of each independent coordinate in their slack.
+
+        Args:
+            forms: of the entries.
+            count: number f of the first terms, which are the independent coordinates.
+            errors: number of the last terms, which are errors of joint centres; those between are products of two
+                coordinates.
+        """
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return the values (K,) at points (K, n) of the design."""
+
+
+class OverPoses:
+    """Bounds and values of a number of a robot without dependent coordinates.
+
+    Args:
+        number: the number.
+        problem: the robot.
+        family: all machines that are meant; None for the design alone.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    def __init__(self, number: Number, problem: Problem, family: Family | None = None) -> None:
+        self._number, self._box, self._free = number, problem.box, list(problem.free)
+        self._encloser = Encloser(problem.z if family is None else family.coordinates, number.entries)
+        self._errors = np.zeros(0) if family is None else np.full(family.errors.numel(), family.tolerance)
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return the values (K,) at points (K, 6)."""
+        return self._number.values(points[:, self._free])
+
+    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
+        """Return lower bounds over boxes (B, 6)."""
+        errors, f = np.tile(self._errors, (len(lower), 1)), len(self._free)
+        ends = np.hstack([lower[:, self._free], -errors]).T, np.hstack([upper[:, self._free], errors]).T
+        forms = self._encloser(*ends) if errors.size else self._encloser.second(*ends).as_terms()
+        found = self._number.over(forms, f, errors.shape[1])
+        shares = np.zeros(lower.shape)
+        shares[:, self._free] = found.shares
+        whole = self._box.upper - self._box.lower
+        wide = (upper - lower) / np.where(whole > 0, whole, np.inf)
+        return Bounds(found.lower, np.where(shares.any(axis=1, keepdims=True), shares, wide))
 
 
 @dataclass(frozen=True, eq=False)

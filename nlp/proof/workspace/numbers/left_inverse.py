@@ -82,18 +82,17 @@ class RowsOver:
         return np.abs(linear[:, :t]).sum(axis=1) + by_centres(np.moveaxis(linear[:, t:], 1, -1))
 
 
-def rows_over(forms: Forms, m: int, length: float, count: int, errors: int) -> RowsOver:
+def rows_over(forms: Forms, scale: FloatArray, count: int, errors: int) -> RowsOver:
     """Return the rows over boxes.
 
     Args:
         forms: of the rows (m, 6), column by column, and of their sizes.
-        m: number of rows.
-        length: by which the moments in the rows are multiplied.
+        scale: (6,) by which the columns are multiplied.
         count: number of the first terms that are coordinates.
-        errors: number of the last terms that are errors of joint centres.
+        errors: number of the last terms that are errors of joint centres; those between are products of coordinates.
     """
-    B, t = len(forms.c), forms.a.shape[2]
-    scale = np.array([1.0, 1.0, 1.0, length, length, length])
+    B, entries, t = forms.a.shape
+    m = entries // 7
     sizes = forms.c[:, 6 * m :]
     with np.errstate(all="ignore"):
         unit = 1 / np.where(sizes > 0, sizes, np.nan)

@@ -16,8 +16,7 @@ import casadi as ca
 import numpy as np
 
 from .....models import FloatArray
-from ...boxes.tapes import MOST_VARIABLES
-from ...enclosure.forms import Encloser, Forms
+from ...enclosure.forms import Forms
 from ...statement.machine import JointErrors, Legs
 from ..robot.posed_robot import Problem, ScaledRows
 from ..robot.tolerance_model import Family
@@ -29,47 +28,8 @@ from .left_inverse import ROUNDING, RowsOver, at_corners, left_inverses, rows_ov
 _SQUARINGS = 4
 
 
-class SpectralBounds:
-    """Lower bounds of the smallest singular value of J, or of minus its condition number, from forms of its rows.
-
-    Args:
-        scaled: J.
-        ratio: by which the moments in it are multiplied.
-        is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
-        change: Frobenius norm of a further change of J.
-
-    Attributes:
-        entries: (7 m, 1) the expressions whose forms are needed.
-    """
-
-    def __init__(self, scaled: ScaledRows, ratio: float, *, is_condition: bool, change: float = 0.0) -> None:
-        self.entries = ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes)
-        self._count, self._ratio = int(scaled.sizes.numel()), ratio
-        self._is_condition, self._change = is_condition, change
-
-    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
-        """Return the bounds (B,) over boxes, and the share (B, f) of each coordinate.
-
-        Args:
-            forms: of the entries.
-            count: number f of the first terms that are coordinates.
-            errors: number of the last terms that are errors of joint centres.
-        """
-        rows = rows_over(forms, self._count, self._ratio, count, errors)
-        inverse = left_inverses(rows)
-        with np.errstate(all="ignore"):
-            norm = _schatten(inverse.at_corners(slice(0, 6))) + _frobenius(inverse.rest)
-            least = np.maximum(1 / norm - self._change, 0.0) if self._change else 1 / norm
-            found = least
-            if self._is_condition:
-                largest = _largest(rows) + self._change
-                found = -largest / least if self._change else -largest * norm
-        floor = -np.inf if self._is_condition else 0.0
-        return Bounds(np.where(np.isfinite(found), found, floor), inverse.shares)
-
-
 class SingularValues:
-    """Smallest singular value, or minus the condition number, of J over a workspace without dependent coordinates.
+    """Smallest singular value of J, or minus its condition number, over boxes and at points.
 
     Bounds are those of all machines that are meant. Values are those of the design; with legs, of the machine that is
     worst to first order at each point.
@@ -77,13 +37,13 @@ class SingularValues:
     Args:
         problem: the robot.
         length: by which moments about the platform's origin are divided.
-        is_condition: whether minus the condition number is meant.
+        is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
         family: all machines that are meant, whose errors count entry by entry; None for the design alone.
         legs: joint centres of six straight legs with the tolerance that is meant; None for another robot.
         shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of legs alone.
 
-    Raises:
-        UncoveredError: an expression holds an operation without a rule.
+    Attributes:
+        entries: (7 m, 1) the rows of J, column by column, and their sizes.
     """
 
     def __init__(
@@ -97,52 +57,48 @@ class SingularValues:
         shortest: float = 0.0,
     ) -> None:
         self._problem, self._length, self._is_condition = problem, length, is_condition
-        self._built = legs if legs is not None and legs.tolerance else None
-        change = 0.0 if self._built is None else change_of_rows(self._built, length, shortest)
-        ratio = problem.length / length
-        meant = problem if family is None else family
-        self._bounds = SpectralBounds(meant.scaled, ratio, is_condition=is_condition, change=change)
-        coordinates = problem.z if family is None else family.coordinates
-        self._encloser = Encloser(coordinates, self._bounds.entries)
-        self._errors = np.zeros(0) if family is None else np.full(family.errors.numel(), family.tolerance)
-        self._is_second = not self._errors.size and len(problem.free) <= MOST_VARIABLES
-        scale = ca.diag(ca.vertcat(ca.SX.ones(3), ratio * ca.SX.ones(3)))
-        self._jacobian = ca.Function("J", [problem.z], [ca.densify(problem.scaled.jacobian @ scale)])
+        self._legs = legs if legs is not None and legs.tolerance else None
+        self._change = 0.0 if self._legs is None else change_of_rows(self._legs, length, shortest)
+        self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
+        meant = problem.scaled if family is None else family.scaled
+        self.entries = ca.vertcat(ca.vec(ca.densify(meant.rows)), meant.sizes)
+        self._jacobian = ca.Function("J", [problem.z], [ca.densify(problem.scaled.jacobian)])
 
-    def values(self, points: FloatArray) -> FloatArray:
-        """Return the values (K,) at points (K, 6)."""
-        if self._built is not None:
-            rows = worst_rows(self._built, self._problem.box, points, self._length, self._is_condition).rows
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return the values (K,) at points (K, n) of the problem."""
+        if self._legs is not None:
+            J = worst_rows(self._legs, self._problem.box, self._problem.pose_of(z), self._length, self._is_condition)[0]
             with np.errstate(all="ignore"):
-                J = rows / np.linalg.norm(rows[:, :, :3], axis=2, keepdims=True)
-            J[:, :, 3:] /= self._length
+                J = J / np.linalg.norm(J[:, :, :3], axis=2, keepdims=True) / [1, 1, 1, *[self._length] * 3]
         else:
-            flat = self._jacobian(points[:, list(self._problem.free)].T).full()
-            J = flat.reshape(len(flat), len(points), 6).transpose(1, 0, 2)
+            flat = self._jacobian(z.T).full()
+            J = flat.reshape(len(flat), len(z), 6).transpose(1, 0, 2) * self._scale
         known = np.isfinite(J).all(axis=(1, 2))
         values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
         with np.errstate(all="ignore"):
             found = -values[:, 0] / values[:, -1] if self._is_condition else values[:, -1]
         return np.asarray(np.where(known, found, np.nan))
 
-    def errors(self, y: FloatArray) -> JointErrors | None:
-        """Return the errors of the machine of legs that is worst at a point (6,) to first order; None for the design."""
-        if self._built is None:
+    def errors(self, z: FloatArray) -> JointErrors | None:
+        """Return the errors of the machine of legs that is worst at a point (n,) to first order; None for the design."""
+        if self._legs is None:
             return None
-        return worst_rows(self._built, self._problem.box, y[None], self._length, self._is_condition).errors(0)
+        y = self._problem.pose_of(z[None])
+        return worst_rows(self._legs, self._problem.box, y, self._length, self._is_condition).errors(0)
 
-    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
-        """Return lower bounds over boxes (B, 6)."""
-        free = list(self._problem.free)
-        errors = np.tile(self._errors, (len(lower), 1))
-        ends = np.hstack([lower[:, free], -errors]).T, np.hstack([upper[:, free], errors]).T
-        forms = self._encloser.second(*ends).as_terms() if self._is_second else self._encloser(*ends)
-        found = self._bounds.over(forms, len(free), len(self._errors))
-        shares = np.zeros(lower.shape)
-        shares[:, free] = found.shares
-        box = self._problem.box
-        wide = (upper - lower) / np.where(box.upper > box.lower, box.upper - box.lower, np.inf)
-        return Bounds(found.lower, np.where(shares.any(axis=1, keepdims=True), shares, wide))
+    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
+        """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
+        rows = rows_over(forms, self._scale, count, errors)
+        inverse = left_inverses(rows)
+        with np.errstate(all="ignore"):
+            norm = _schatten(inverse.at_corners(slice(0, 6))) + _frobenius(inverse.rest)
+            least = np.maximum(1 / norm - self._change, 0.0) if self._change else 1 / norm
+            found = least
+            if self._is_condition:
+                largest = _largest(rows) + self._change
+                found = -largest / least if self._change else -largest * norm
+        floor = -np.inf if self._is_condition else 0.0
+        return Bounds(np.where(np.isfinite(found), found, floor), inverse.shares)
 
 
 def _schatten(matrices: FloatArray) -> FloatArray:

@@ -75,6 +75,8 @@ class PosedModel:
         turned: the limbs with ``inverse * s R`` as the rotation.
         inverse: (1, 1) symbol of ``1 / s``.
         scale: (1, 1) ``s``.
+        symbols: those of the model.
+        given: expressions in their place, and those with ``inverse * s R`` as the rotation.
     """
 
     z: SX
@@ -87,6 +89,13 @@ class PosedModel:
     turned: Limbs
     inverse: SX
     scale: SX
+    symbols: list[SX]
+    given: tuple[list[SX], list[SX]]
+
+    def both(self, function: ca.Function) -> tuple[SX, SX]:
+        """Return a function of the model's symbols, and the same with ``inverse * s R`` as the rotation."""
+        plain, turned = (function.call(each)[0] for each in self.given)
+        return plain, turned
 
 
 def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, errors: SX | None = None) -> PosedModel:
@@ -137,7 +146,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
     limbs = limbs_of(following)
     polynomial, scale = polynomial_rotation(box, ca.vertcat(*y[3:]))
     inverse = SX.sym("inverse")
-    turned = limbs_of(iter(function.call([given.parameters, given.unknowns, inverse * polynomial, position])))
+    turned = replace(given, rotation=inverse * polynomial)
     signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
     sizes = sizes_at(
         model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns))
@@ -153,9 +162,11 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         every=ca.vertcat(SX(0, 1), *scaled),
         signs=signs,
         limbs=limbs,
-        turned=turned,
+        turned=limbs_of(iter(function.call(turned.all))),
         inverse=inverse,
         scale=scale,
+        symbols=symbols.all,
+        given=(given.all, turned.all),
     )
 
 
