@@ -27,7 +27,7 @@ from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
-from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.tolerance import first_order_change as firstorder
@@ -317,13 +317,13 @@ def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:
     lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)
     half = rng.uniform(0, 0.3, (count, 1)) * problem.size[own]
     lower[:, own], upper[:, own] = middle - half, middle + half
-    cells = Cells(lower, upper, np.tile(problem.start, (count, 1)), np.full(count, not problem.dependent))
+    cells = LoopBoxes(lower, upper, np.tile(problem.start, (count, 1)), np.full(count, not problem.dependent))
     found = examiner.examine(cells)
     loops, newton = family.loops, SingularPose(problem, family.locked, family)
     M = ca.Function("M", [family.coordinates], [ca.densify(family.locked.matrix)])
     wrong = 0
     for k in np.flatnonzero(found.is_regular):
-        z = family.exact(found.cells.centre[k])
+        z = family.exact(found.boxes.centre[k])
         design = loops.closed(z, list(problem.dependent))
         assert design is not None
         C = np.linalg.pinv(M(design).full())

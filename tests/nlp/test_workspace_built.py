@@ -30,7 +30,7 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examined, Examiner
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
@@ -257,7 +257,7 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
             if family is None
             else (family.locked, family.coordinates, family.start)
         )
-        cells = Cells(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
+        cells = LoopBoxes(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
         return Examiner(exact, RankTest(matrix, z, start), family).examine(cells)
 
     found, changed = examined(family), 0

@@ -21,8 +21,7 @@ from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..robot.tolerance_model import Family, built_model, family_of
 from ..tolerance.singular_machine import SingularMachine
 from ..verdict import Outcome, Regularity
-from .refuters import NewtonRefuter, Refuter, singular_at
-from .search import RankProgress, prove_rank
+from .search import NewtonRefuter, RankProgress, Refuter, prove_rank, singular_at
 from .singular_pose import SingularPose
 
 if TYPE_CHECKING:

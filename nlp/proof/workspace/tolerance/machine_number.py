@@ -24,7 +24,7 @@ from ...boxes.search import Verdicts
 from ...enclosure.forms import Forms
 from ..numbers.bound_search import Goal, Minimum, SmallestValue, Value, searched
 from ..ranks.covering import APART, Followed, LoopRule
-from ..ranks.krawczyk import ROUNDING, Relation, by_centres
+from ..ranks.krawczyk import ROUNDING, by_centres
 from ..ranks.loop_boxes import Examiner
 from ..ranks.rank_rule import Tested
 from ..robot.tolerance_model import Family
@@ -46,22 +46,16 @@ class _Bound:
     def __init__(self, expression: SX) -> None:
         self.entries: SX = expression
 
-    def examine(
-        self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
-    ) -> Tested:
+    def examine(self, forms: Forms, f: int) -> Tested:
         """Return the lower bounds of boxes as their smallest values; none is regular."""
         c, a, r = (each[:, 0] for each in forms)
-        own, size = a[:, dependent], np.abs(a[:, dependent])
+        by_pose = a[:, :f]
         with np.errstate(all="ignore"):
-            by_pose = a[:, independent] - (own[:, None] @ relation.T)[:, 0]
-            by_error = a[:, errors] - (own[:, None] @ relation.E)[:, 0]
-            rest = r + (size * relation.rho).sum(axis=1)
-            whole = np.abs(by_pose).sum(axis=1) + by_centres(by_error) + rest
-            terms = np.abs(c) + np.abs(a).sum(axis=1) + (size * relation.reach).sum(axis=1) + whole
-            lower = c + (own * relation.off).sum(axis=1) - whole - 2 * ROUNDING * terms
+            whole = np.abs(by_pose).sum(axis=1) + by_centres(a[:, f:]) + r
+            lower = c - whole - 2 * ROUNDING * (np.abs(c) + whole)
         known = np.isfinite(lower)
         # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
-        shares = np.abs(by_pose) + rest[:, None] / max(by_pose.shape[1], 1)
+        shares = np.abs(by_pose) + r[:, None] / max(f, 1)
         none = np.zeros(len(c), dtype=np.int32)
         return Tested(none.astype(bool), np.nan_to_num(shares), np.where(known, lower, -np.inf), none)
 
@@ -109,15 +103,15 @@ class _MachineRule(LoopRule, SmallestValue[Followed]):
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return bounds of boxes, and take note of small values in them."""
         found = self.examined(boxes)
-        known = np.flatnonzero(found.cells.is_known & np.isfinite(found.smallest))
+        known = np.flatnonzero(found.boxes.is_known & np.isfinite(found.smallest))
         if known.size:
             order = np.argsort(found.smallest[known])[:_TRIED]
-            best = self._points.smallest_in(some(found.cells, known[order]))
+            best = self._points.smallest_in(some(found.boxes, known[order]))
             if best is not None and best.value < self.best.value:
                 self.best = best
         width = self.widths(found)
         score = found.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
         split = first_largest(np.where(width > 0, score, -1.0))
         # Nothing is known of a box in which dependent coordinates are not.
-        bound = np.where(found.cells.is_known, -found.smallest, np.inf)
+        bound = np.where(found.boxes.is_known, -found.smallest, np.inf)
         return self.verdicts(self.boxes_of(found, bound, split))

@@ -24,7 +24,7 @@ from ...boxes.rows import WHOLE, Boxes
 from ...boxes.search import Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser
 from ..ranks.covering import in_workspace, whole_workspace
-from ..ranks.loop_boxes import Cells
+from ..ranks.loop_boxes import LoopBoxes
 from ..robot.tolerance_model import Family
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class _ChangeRule(Rule[FloatArray]):
     def examine(self, boxes: Boxes[FloatArray]) -> Verdicts[FloatArray]:
         """Return bounds of boxes."""
         known = np.ones(len(boxes.split), dtype=bool)
-        now = in_workspace(self._family.problem, Cells(boxes.lower, boxes.upper, boxes.lower, known))
+        now = in_workspace(self._family.problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
         errors = np.full((len(now.lower), self._errors), self._family.tolerance)
         forms = self._encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
         factor = 0.5 * self._family.tolerance**2 * _OUTWARDS
