@@ -14,7 +14,7 @@ from pathlib import Path
 
 from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Free, Rotation, load_case, solve
-from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.checker.fingerprint import fingerprint
@@ -48,7 +48,7 @@ def measure(name: str, case: Case, gap: float, limit: float = 120.0) -> None:
     nlp, times = solution.nlp, [time.process_time()]
     plain = certify_program(nlp, solution.x, gap=gap, jobs=1, time_limit=limit)
     times.append(time.process_time())
-    recorder = ProofWriter(1)
+    recorder = TreeRecord()
     found = certify_program(nlp, solution.x, gap=gap, jobs=1, time_limit=limit, recorder=recorder)
     times.append(time.process_time())
     begin = f"{name:24} {nlp.n:3} {gap:8g} {plain.boxes:9,} {times[1] - times[0]:7.2f} s"

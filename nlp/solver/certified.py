@@ -13,9 +13,8 @@ from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
 from ..program.formulation import formulate_each
-from ..program.nlp import Nlp
-from ..proof.boxes.proof_writer import ProofWriter
 from ..proof.boxes.tapes import search_tape
+from ..proof.boxes.tree import TreeRecord
 from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.fingerprint import fingerprint
@@ -166,7 +165,7 @@ def _certify(
         reason_of(lambda: "" if search_tape(form, is_short=False).op.size else "empty")
     search = case.search.but(starts, seed)
 
-    def certify_one(own: ProgramSolution, name: str, recorder: ProofWriter | None, programs: int = 1) -> Certificate:
+    def certify_one(own: ProgramSolution, name: str, recorder: TreeRecord | None, programs: int = 1) -> Certificate:
         """Certify a program with an equal part of the time left, which so many programs share."""
         x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
         in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
@@ -186,7 +185,7 @@ def _certify(
         statement = Statement(is_minimum=above is not None and case.tasks[0].sense is Sense.MAX)
         nlp = replace(nlps[0], sense=Sense.MIN) if statement.is_minimum else nlps[0]
         own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
-        writer = _proof_writer(nlp) if with_proof else None
+        writer = TreeRecord() if with_proof and nlp.n else None
         certificate = certify_one(own, case.tasks[0].name, writer)
         if certificate.was_beaten and certificate.x is not None and not is_requested():
             own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
@@ -201,7 +200,7 @@ def _certify(
     if solution.combination is None or solution.combination.combined is None:
         return Certified(solution, alone, None, Statement(), None)
     combined = solution.combination.combined
-    writer = _proof_writer(combined.nlp) if with_proof else None
+    writer = TreeRecord() if with_proof and combined.nlp.n else None
     certificate = certify_one(combined, case.method.value, writer)
     statement = replace(_combined_statement(case, combined), in_home_mode=certificate.nlp.in_home_mode)
     return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
@@ -226,12 +225,7 @@ def proof_of(certified: Certified, text: str) -> Proof:
     return Proof(text, nlp.case.name, certified.statement, graph, bound, certified.tree)
 
 
-def _proof_writer(nlp: Nlp) -> ProofWriter | None:
-    """Return a recorder of the proof of a program; None for a program without variables."""
-    return ProofWriter(len(standard_form(nlp).functions)) if nlp.n else None
-
-
-def _complete_tree(writer: ProofWriter | None, certificate: Certificate) -> bytes | None:
+def _complete_tree(writer: TreeRecord | None, certificate: Certificate) -> bytes | None:
     """Return the nodes of a complete proof; None where nothing is proved or recorded."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     return writer.tree() if writer is not None and complete else None

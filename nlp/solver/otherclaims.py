@@ -11,8 +11,8 @@ from ...models import FloatArray
 from ...models.joints.closedform import closed_form
 from ..case.case import Case
 from ..program.nlp import Nlp
-from ..proof.statement.closed_layout import reach_claims
 from ..proof.statement.machine import workspace_of_case
+from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import Judgement, judge_workspace
 from ..proof.workspace.numbers.extremes import prove_extreme
 from ..proof.workspace.ranks.ranks import not_judged

@@ -14,10 +14,8 @@ from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.boxes.tapes import search_tape
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
-from screwsynth.nlp.proof.enclosure.forms import Enclosures, enclose
-from screwsynth.nlp.proof.enclosure.instructions import compile_tape
-from screwsynth.nlp.proof.enclosure.intervals import midpoints
-from screwsynth.nlp.proof.enclosure.tape import Op, Tape
+from screwsynth.nlp.proof.enclosure.forms import Enclosures, enclose, midpoints
+from screwsynth.nlp.proof.enclosure.tape import Op, Tape, compile_tape
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 

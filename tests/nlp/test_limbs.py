@@ -18,7 +18,7 @@ from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
 from screwsynth.nlp.proof.boxes.limbs.cuts import LeftOwn
 from screwsynth.nlp.proof.boxes.limbs.models import LimbModels
 from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb
-from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
@@ -87,7 +87,7 @@ def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
     lower = nlp.lower.copy()
     lower[:3] = -0.1
     nlp = replace(nlp, lower=lower, upper=upper)
-    recorder = ProofWriter(1)
+    recorder = TreeRecord()
     found = certify_program(nlp, gap=1e-2, recorder=recorder)
     assert found.status is CertificateStatus.INFEASIBLE
     proof = Proof("", "none", Statement(), fingerprint(nlp), None, recorder.tree())

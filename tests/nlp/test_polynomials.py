@@ -17,7 +17,7 @@ from screwsynth.nlp.proof.checker.polynomials import Polynomial, middles, places
 from screwsynth.nlp.proof.checker.premises import program_of
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.proofcheck import check_proof
-from screwsynth.nlp.proof.enclosure.instructions import compile_tape
+from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.certified import certify, proof_of
 

@@ -19,10 +19,8 @@ from screwsynth.nlp.proof.checker.limbs.tilts import tilts_over
 from screwsynth.nlp.proof.checker.polynomialrules import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.polynomials import middles, places
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
-from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of
-from screwsynth.nlp.proof.enclosure.instructions import compile_tape
-from screwsynth.nlp.proof.enclosure.intervals import midpoints
-from screwsynth.nlp.proof.enclosure.tape import Tape
+from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of, midpoints
+from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 flint = pytest.importorskip("flint")

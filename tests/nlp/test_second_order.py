@@ -13,9 +13,8 @@ from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.boxes.engines import Engine
 from screwsynth.nlp.proof.boxes.examination import Examination, Verdict
 from screwsynth.nlp.proof.boxes.tapes import value_tape
-from screwsynth.nlp.proof.enclosure.instructions import compile_tape
-from screwsynth.nlp.proof.enclosure.intervals import midpoints
-from screwsynth.nlp.proof.enclosure.tape import Tape
+from screwsynth.nlp.proof.enclosure.forms import midpoints
+from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
 flint = pytest.importorskip("flint")

@@ -15,7 +15,7 @@ from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
 from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
 from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb, first_largest_of_lists
-from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
@@ -42,7 +42,7 @@ def near_home() -> Case:
 
 def proof_of(nlp: Nlp, gap: float, x: np.ndarray | None = None) -> Proof:
     """The proof that a search records, whatever it is worth."""
-    recorder = ProofWriter(1)
+    recorder = TreeRecord()
     found = certify_program(nlp, x, gap=gap, jobs=1, recorder=recorder)
     assert found.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     bound = None if found.status is CertificateStatus.INFEASIBLE else -nlp.sign * found.bound

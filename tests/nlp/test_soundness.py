@@ -16,7 +16,7 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.program.assembly import assemble
 from screwsynth.nlp.program.layout import lay_out
-from screwsynth.nlp.proof.boxes.proof_writer import ProofWriter
+from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.fingerprint import fingerprint
@@ -69,7 +69,7 @@ def test_parts_of_a_claim_by_limbs_add_up() -> None:
     start = np.array([2.5, 3.0])
     found = certify_program(nlp, start, above=-1.0)
     assert found.status is CertificateStatus.REFUSED
-    recorder = ProofWriter(1)
+    recorder = TreeRecord()
     found = certify_program(nlp, start, above=-2.1, recorder=recorder)
     assert found.status is CertificateStatus.PROVED
     assert -2.1 < found.bound <= -2

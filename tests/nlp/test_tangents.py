@@ -17,9 +17,9 @@ from screwsynth.nlp.proof.boxes.examination import Verdict
 from screwsynth.nlp.proof.boxes.tapes import value_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure.instructions import compile_tape
-from screwsynth.nlp.proof.enclosure.intervals import midpoints
+from screwsynth.nlp.proof.enclosure.forms import midpoints
 from screwsynth.nlp.proof.enclosure.squared_quotients import tangent_rows
+from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
 flint = pytest.importorskip("flint")

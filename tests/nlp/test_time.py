@@ -18,7 +18,7 @@ from screwsynth.nlp.output.sweepfunction import sweep
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure import instructions
+from screwsynth.nlp.proof.enclosure import tape
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.solver.status import Status
@@ -86,15 +86,15 @@ def test_only_a_search_is_stopped_in_its_set_up(clock: Clock) -> None:
 def test_set_up_of_the_whole_box_ends_with_the_time(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     nlp = formulate(load_case(CASE))
     compiled: list[str] = []
-    real = instructions._write_operation
+    real = tape._write_operation
 
     def counted(*arguments: Any) -> None:  # noqa: ANN401
         compiled.append("operation")
         clock.now = 10.0
         real(*arguments)
 
-    monkeypatch.setattr(instructions, "_write_operation", counted)
-    monkeypatch.setattr(instructions, "_LOOK", 8)
+    monkeypatch.setattr(tape, "_write_operation", counted)
+    monkeypatch.setattr(tape, "_LOOK", 8)
     found = certify_program(nlp, nlp.start, time_limit=5.0)
     assert (found.status, found.boxes, found.open) == (CertificateStatus.INCOMPLETE, 0, 1)
     assert found.bound == math.inf

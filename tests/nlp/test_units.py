@@ -27,8 +27,8 @@ from screwsynth.nlp.front.programs import program_of
 from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure.instructions import compile_tape
 from screwsynth.nlp.proof.enclosure.quadratic_models import multipliers
+from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.results.evaluation import evaluation_of

@@ -22,6 +22,7 @@ from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.checker.fractions import determinant_sign, tangent_ends
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
@@ -42,7 +43,7 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstError, with_rest
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord, TreeRecord
+from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
 from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
@@ -308,7 +309,7 @@ def test_random_machines_are_accepted() -> None:
         if found.outcome is not Outcome.PROVED:
             continue
         root = pose_root(workspace)
-        show(rank(root, machine), root, read_leaves(record.tree(), root.lower, root.upper))
+        show(rank(root, machine), root, read_leaves(record.tree(with_open=True), root.lower, root.upper))
         accepted += 1
 
 

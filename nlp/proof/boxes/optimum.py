@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....models import FloatArray
+from ..checker.tree import Node, node_bytes
 from ..statement.standard_form import StandardForm
 from .engines import Engine
-from .examination import Examination, Verdict
+from .examination import COLLAPSED, Examination, Verdict
 from .incumbent import PointKeeper
-from .proof_writer import ProofWriter
-from .rows import SMALL, WHOLE, Boxes, bisected
+from .rows import SMALL, WHOLE, Boxes
 from .search import Order, Rule, Search, Verdicts
+from .tree import TreeRecord, halves_of, keys_of
 
 #: Widths, in parts of the whole box, below which a box is not bisected: one without a finite bound, which is taken to
 #: hold a point without a value, and others.
@@ -23,10 +25,10 @@ LEAST_WIDTHS = 2.0**-16, 2.0**-40
 
 
 def optimum_search(
-    form: StandardForm, engine: Callable[[], Engine], incumbent: PointKeeper, recorder: ProofWriter | None = None
+    form: StandardForm, engine: Callable[[], Engine], incumbent: PointKeeper, recorder: TreeRecord | None = None
 ) -> Search[OptimumRule]:
     """Return the search of the box of a form: see :class:`OptimumRule`."""
-    root = Boxes(form.lower[None], form.upper[None], np.array([np.inf]), np.array([WHOLE]), np.zeros(1, dtype=np.int64))
+    root = Boxes(form.lower[None], form.upper[None], np.array([np.inf]), np.array([WHOLE]), ())
     return Search(
         OptimumRule(form, engine, incumbent, recorder),
         root,
@@ -36,8 +38,8 @@ def optimum_search(
     )
 
 
-class OptimumRule(Rule[NDArray[np.int64]]):
-    """Rule of the maximum of a form. Boxes carry the numbers of their nodes in the tree of the search.
+class OptimumRule(Rule[tuple[()]]):
+    """Rule of the maximum of a form.
 
     Args:
         form: the form.
@@ -55,30 +57,24 @@ class OptimumRule(Rule[NDArray[np.int64]]):
         form: StandardForm,
         engine: Callable[[], Engine],
         incumbent: PointKeeper,
-        recorder: ProofWriter | None = None,
+        recorder: TreeRecord | None = None,
     ) -> None:
         self.form, self.incumbent = form, incumbent
         self._build, self._recorder = engine, recorder
         self._engine: Engine | None = None
         self.block = 1
-        self._nodes, self._turn, self._closed = 1, 0, -math.inf
+        self._turn, self._closed = 0, -math.inf
 
     def close(self) -> None:
         """Stop the engine."""
         if self._engine is not None:
             self._engine.close()
 
-    def fault(self, small: Sequence[Boxes[NDArray[np.int64]]]) -> str:
+    def fault(self, small: Sequence[Boxes[tuple[()]]]) -> str:
         """Return the reason for stopping at boxes without a finite bound, with the place of the first; else empty."""
         return reason_without_bound(self.form, small)
 
-    def divided(self, boxes: Boxes[NDArray[np.int64]]) -> Boxes[NDArray[np.int64]]:
-        """Return the halves of boxes, with their nodes."""
-        parts = bisected(boxes)
-        parts.more[len(boxes.split) :] += 1
-        return parts
-
-    def examine(self, boxes: Boxes[NDArray[np.int64]]) -> Verdicts[NDArray[np.int64]]:
+    def examine(self, boxes: Boxes[tuple[()]]) -> Verdicts[tuple[()]]:
         """Return bounds of boxes, and improve the incumbent."""
         ends = np.ascontiguousarray(boxes.lower.T), np.ascontiguousarray(boxes.upper.T)
         engine = self._engine = self._engine or self._build()
@@ -99,23 +95,22 @@ class OptimumRule(Rule[NDArray[np.int64]]):
         lower, upper = found.lower[:, rest].T, found.upper[:, rest].T
         # A box that collapsed to one that cannot be bisected, such as a corner, has not been examined as that box yet.
         moved = ((lower != boxes.lower[rest]) | (upper != boxes.upper[rest])).any(axis=1)
-        nodes = self._nodes + 2 * np.arange(rest.size)
-        self._nodes += 2 * rest.size
-        left = Boxes(
-            lower, upper, np.fmin(found.bound[rest], boxes.bound[rest]), found.split[rest].astype(np.intp), nodes
-        )
+        left = Boxes(lower, upper, np.fmin(found.bound[rest], boxes.bound[rest]), found.split[rest].astype(np.intp), ())
         return Verdicts(left, self._closed, len(boxes.split), moved, reasons=(found, rest))
 
-    def record(
-        self, boxes: Boxes[NDArray[np.int64]], found: Verdicts[NDArray[np.int64]], split: NDArray[np.intp]
-    ) -> None:
-        """Record a block of boxes."""
+    def record(self, boxes: Boxes[tuple[()]], found: Verdicts[tuple[()]], split: NDArray[np.intp]) -> None:
+        """Record a block of boxes; a contraction closes the part cut off."""
         if self._recorder is None:
             return
-        examined, rest = found.reasons
-        is_cut, children = np.zeros(len(boxes.split), dtype=bool), np.full(len(boxes.split), -1, dtype=np.int64)
-        is_cut[rest], children[rest] = split >= 0, np.where(split == SMALL, -1, found.left.more)
-        self._recorder.record(boxes.more, boxes.upper, examined, is_cut, children)
+        (examined, rest), left = found.reasons, found.left
+        keys, moved = keys_of(boxes.lower, boxes.upper), keys_of(left.lower, left.upper)
+        _, halves = halves_of(left.lower, left.upper, np.maximum(split, 0))
+        parts = {k: halves[j] if split[j] >= 0 else (moved[j],) for j, k in enumerate(rest) if split[j] != SMALL}
+        for k, key in enumerate(keys):
+            if k in parts or examined.verdict[k] != Verdict.OPEN:
+                text = _node_of(examined, k, boxes.upper[k], len(self.form.functions))
+                cut = node_bytes(Node.HALF, int(examined.split[k])) if len(parts.get(k, ())) == 2 else b""
+                self._recorder.add(key, text + cut, *parts.get(k, ()))
 
     def _improve(self, found: Examination) -> None:
         """Improve the incumbent from the best centre of a block, or from the centre of the box with the largest bound.
@@ -149,3 +144,33 @@ def reason_without_bound(form: StandardForm, small: Sequence[Boxes[Any]]) -> str
             at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(form.names, point, strict=True))
             return f"the expressions have no finite bound near {at}, as where a limb has zero length"
     return ""
+
+
+def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> bytes:
+    """Return the bytes of box number ``k``, with upper ends (n,), up to those of a bisection or of its parts."""
+    verdict, reason = int(found.verdict[k]), int(found.reason[k])
+    if verdict == Verdict.BOUNDED:
+        return bytes([Node.BOUNDED])
+    if verdict in (Verdict.INFEASIBLE, Verdict.MONOTONE):
+        return node_bytes(Node.INFEASIBLE if verdict == Verdict.INFEASIBLE else Node.MONOTONE, reason)
+    only = [reason] if verdict == Verdict.EMPTIED else range(len(upper))
+    return b"".join(_contraction(found, k, i, float(upper[i]), functions) for i in only)
+
+
+def _contraction(found: Examination, k: int, i: int, upper: float, functions: int) -> bytes:
+    """Return the nodes of the contraction of box number ``k`` along variable ``i``."""
+    below, above = int(found.cut_lower[i, k]), int(found.cut_upper[i, k])
+    low, high = float(found.lower[i, k]), float(found.upper[i, k])
+    if COLLAPSED in (below, above):
+        return node_bytes(Node.FACE_UPPER if below == COLLAPSED else Node.FACE_LOWER, i)
+    text = b""
+    if below >= 0:
+        text += node_bytes(Node.BELOW, i, value=low) + _reason(below, functions)
+    if above >= 0 and not (below >= 0 and low > upper):
+        text += node_bytes(Node.ABOVE, i, value=high) + _reason(above, functions)
+    return text
+
+
+def _reason(why: int, functions: int) -> bytes:
+    """Return the reason for cutting a part off, from the number of the expression that excludes it."""
+    return bytes([Node.BOUNDED]) if why < functions else node_bytes(Node.INFEASIBLE, why)

@@ -17,8 +17,7 @@ import casadi as ca
 
 from ....models import frozen_array
 from ...errors import UncoveredError
-from ..enclosure.instructions import compile_tape
-from ..enclosure.tape import Op
+from ..enclosure.tape import Op, compile_tape
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -7,9 +7,8 @@ from dataclasses import replace
 import casadi as ca
 
 from ...errors import UncoveredError
-from ..enclosure.instructions import compile_tape
 from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows
-from ..enclosure.tape import Tape
+from ..enclosure.tape import Tape, compile_tape
 from ..statement.piecewise_derivatives import refuse_jumps
 from ..statement.standard_form import StandardForm
 

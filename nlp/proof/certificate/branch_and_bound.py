@@ -26,9 +26,9 @@ from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search
 from ..boxes.optimum import optimum_search
-from ..boxes.proof_writer import ProofWriter
 from ..boxes.search import TOO_SMALL, Effort, SearchMethod
 from ..boxes.symmetry import halved
+from ..boxes.tree import TreeRecord
 from ..enclosure.engine import ENGINE, kernel
 from ..statement.limb_separation import separate
 from ..statement.standard_form import StandardForm, is_in_home_mode, standard_form
@@ -62,7 +62,7 @@ def certify_program(
     time_limit: float | None = None,
     jobs: int | None = None,
     progress: CertifyProgress | None = None,
-    recorder: ProofWriter | None = None,
+    recorder: TreeRecord | None = None,
 ) -> Certificate:
     """Prove a bound of a program's global optimum.
 
@@ -135,7 +135,7 @@ def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate
     )
 
 
-def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder: ProofWriter | None) -> SearchMethod:
+def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder: TreeRecord | None) -> SearchMethod:
     """Return the search for a form: by limbs where it separates, else of the whole box.
 
     A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to

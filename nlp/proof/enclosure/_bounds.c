@@ -19,180 +19,181 @@
 #include "kernel/rank.h"
 
 typedef struct {
-    Py_buffer buffers[24];
+    Py_buffer buffers[32];
     int count;
 } Borrowed;
 
-/* Memory of an array, which must be contiguous and hold so many items of a size. NULL with an exception otherwise. */
-static void *borrow(Borrowed *all, PyObject *object, Py_ssize_t items, Py_ssize_t size, int writable)
+/* An array that a call borrows: where its address goes, its items, the size of each, and whether they are written. */
+typedef struct {
+    void *to;
+    Py_ssize_t items;
+    size_t size;
+    int writable;
+} Array;
+
+#define READ(to, items) {&(to), items, sizeof *(to), 0}
+#define WRITE(to, items) {&(to), items, sizeof *(to), 1}
+#define COUNT(arrays) (int)(sizeof(arrays) / sizeof *(arrays))
+
+/* Borrows the memory of one object, which must be contiguous. 0 with an exception where it is not as expected. */
+static int borrow(Borrowed *all, PyObject *object, Array array)
 {
     Py_buffer *view = &all->buffers[all->count];
-    if (PyObject_GetBuffer(object, view, writable ? PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS : PyBUF_C_CONTIGUOUS) < 0)
-        return NULL;
+    if (PyObject_GetBuffer(object, view, array.writable ? PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS : PyBUF_C_CONTIGUOUS) < 0)
+        return 0;
     all->count++;
-    if (view->len != items * size) {
+    if (view->len != array.items * (Py_ssize_t)array.size) {
         PyErr_SetString(PyExc_ValueError, "an array has another size than the kernel expects");
-        return NULL;
+        return 0;
     }
-    return view->buf;
+    memcpy(array.to, &view->buf, sizeof view->buf);
+    return 1;
+}
+
+/* Borrows the objects of a tuple. */
+static int borrow_all(Borrowed *all, PyObject *tuple, const Array *arrays, int count)
+{
+    int good = PyTuple_Size(tuple) == count;
+    if (!good && !PyErr_Occurred())
+        PyErr_SetString(PyExc_ValueError, "the kernel got another number of arrays than it expects");
+    for (int i = 0; good && i < count; i++)
+        good = borrow(all, PyTuple_GetItem(tuple, i), arrays[i]);
+    return good;
+}
+
+/* Borrows indices of any number, which is written. */
+static int borrow_indices(Borrowed *all, PyObject *object, const int **to, int *count)
+{
+    Py_ssize_t items = PyObject_Length(object);
+    *count = (int)items;
+    return items >= 0 && borrow(all, object, (Array)READ(*to, items));
 }
 
 static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
 {
     PyObject *code, *constants;
-    if (!PyArg_ParseTuple(tuple, "OOiii", &code, &constants, &tape->length, &tape->registers, &tape->outputs))
-        return -1;
-    tape->code = borrow(all, code, (Py_ssize_t)tape->length * 6, sizeof(int), 0);
-    tape->k = tape->code ? borrow(all, constants, tape->length, sizeof(double), 0) : NULL;
-    return tape->k ? 0 : -1;
+    return PyArg_ParseTuple(tuple, "OOiii", &code, &constants, &tape->length, &tape->registers, &tape->outputs) &&
+           borrow(all, code, (Array)READ(tape->code, (Py_ssize_t)tape->length * 6)) &&
+           borrow(all, constants, (Array)READ(tape->k, tape->length));
+}
+
+/* Memory of so many numbers, all 0, for a call whose arguments are good; NULL with an exception otherwise. */
+static double *memory_of_call(int good, size_t count)
+{
+    double *memory = good ? calloc(count, sizeof(double)) : NULL;
+    if (good && !memory)
+        PyErr_NoMemory();
+    else if (!good && !PyErr_Occurred())
+        PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together, or no boxes");
+    return memory;
+}
+
+/* Returns what a call borrowed, and its result. */
+static PyObject *finish_call(Borrowed *all, double *memory)
+{
+    int done = memory != NULL;
+    free(memory);
+    for (int i = 0; i < all->count; i++)
+        PyBuffer_Release(&all->buffers[i]);
+    if (!done)
+        return NULL;
+    Py_RETURN_NONE;
 }
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *tape, *values, *objective, *equation, *depends, *low, *high, *whose, *squared, *arrays[12];
-    PyObject *models = NULL, *least = NULL;
+    PyObject *tape, *values, *objective, *equation, *depends, *low, *high, *whose, *squared, *arrays, *models = NULL, *least = NULL;
     Form form = {0};
     Report report = {0};
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOOO!OOO)(OOOOOOOOOOOO)nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low,
-                          &high, &whose, &PyTuple_Type, &tape, &values, &objective, &squared, &arrays[0], &arrays[1], &arrays[2],
-                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &arrays[9],
-                          &arrays[10], &arrays[11], &report.B, &begin, &finish, &threshold,
-                          &report.shared, &models, &least))
+    if (!PyArg_ParseTuple(args, "(iiOOOOOO!OOO)O!nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low, &high,
+                          &whose, &PyTuple_Type, &tape, &values, &objective, &squared, &PyTuple_Type, &arrays, &report.B,
+                          &begin, &finish, &threshold, &report.shared, &models, &least))
         return NULL;
-    int good = form.n > 0 && form.functions > 0 && read_tape(&all, tape, &form.tape) == 0;
-    Py_ssize_t pairs = good ? PyObject_Length(whose) : 0;
-    good = good && pairs >= 0 && (form.whose = borrow(&all, whose, pairs, sizeof(int), 0));
-    form.quotients = (int)(pairs / 2);
-    form.expressions = good ? form.tape.outputs / (form.n + 1) - 2 * form.quotients : 0;
-    Py_ssize_t squares = good ? PyObject_Length(squared) : 0;
-    good = good && squares >= 0 && (form.squared = borrow(&all, squared, squares, sizeof(int), 0));
-    form.tangents = values == Py_None ? 0 : (int)squares;
-    good = good && (values == Py_None || read_tape(&all, values, &form.values) == 0);
-    good = good && (objective == Py_None || read_tape(&all, objective, &form.objective) == 0);
-    Py_ssize_t n = form.n, R = form.expressions, B = report.B, D = sizeof(double), I = sizeof(int);
-    good = good && (form.equation = borrow(&all, equation, R, I, 0)) && (form.depends = borrow(&all, depends, R * n, I, 0));
-    good = good && (form.low = borrow(&all, low, n, D, 0)) && (form.high = borrow(&all, high, n, D, 0));
-    good = good && (report.lower = borrow(&all, arrays[0], n * B, D, 0)) && (report.upper = borrow(&all, arrays[1], n * B, D, 0));
-    good = good && (report.verdict = borrow(&all, arrays[2], B, I, 1)) && (report.reason = borrow(&all, arrays[3], B, I, 1));
-    good = good && (report.bound = borrow(&all, arrays[4], B, D, 1));
-    good = good && (report.left_lower = borrow(&all, arrays[5], n * B, D, 1));
-    good = good && (report.left_upper = borrow(&all, arrays[6], n * B, D, 1));
-    good = good && (report.cut_lower = borrow(&all, arrays[7], n * B, I, 1));
-    good = good && (report.cut_upper = borrow(&all, arrays[8], n * B, I, 1));
-    good = good && (report.split = borrow(&all, arrays[9], B, I, 1)) && (report.value = borrow(&all, arrays[10], B, D, 1));
-    good = good && (report.centre = borrow(&all, arrays[11], n * B, D, 1));
-    if (good && models) {
-        int valid = report.shared >= 0 && report.shared <= form.n;
-        Py_ssize_t rows = valid ? rows_of_models(form.n, report.shared) : -1;
-        good = (report.models = borrow(&all, models, rows * B, D, 1)) != NULL;
-    } else if (report.shared != 0) {
-        report.shared = 0;
-    }
-    if (good && models && least)
-        good = (report.least = borrow(&all, least, B, D, 0)) != NULL;
-    double *memory = NULL;
-    int fits = form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && finish <= B;
+    int good = form.n > 0 && form.functions > 0 && report.shared >= 0 && report.shared <= form.n && read_tape(&all, tape, &form.tape);
+    good = good && borrow_indices(&all, whose, &form.whose, &form.quotients);
+    good = good && borrow_indices(&all, squared, &form.squared, &form.tangents);
+    good = good && (values == Py_None || read_tape(&all, values, &form.values));
+    good = good && (objective == Py_None || read_tape(&all, objective, &form.objective));
+    form.quotients /= 2;
+    form.tangents = values == Py_None ? 0 : form.tangents;
+    form.expressions = form.tape.outputs / (form.n + 1) - 2 * form.quotients;
+    Py_ssize_t n = form.n, R = form.expressions, B = report.B;
+    Array results[] = {READ(report.lower, n * B), READ(report.upper, n * B), WRITE(report.verdict, B), WRITE(report.reason, B),
+                       WRITE(report.bound, B), WRITE(report.left_lower, n * B), WRITE(report.left_upper, n * B),
+                       WRITE(report.cut_lower, n * B), WRITE(report.cut_upper, n * B), WRITE(report.split, B),
+                       WRITE(report.value, B), WRITE(report.centre, n * B)};
+    good = good && borrow(&all, equation, (Array)READ(form.equation, R)) && borrow(&all, depends, (Array)READ(form.depends, R * n));
+    good = good && borrow(&all, low, (Array)READ(form.low, n)) && borrow(&all, high, (Array)READ(form.high, n));
+    good = good && borrow_all(&all, arrays, results, COUNT(results));
+    good = good && (!models || borrow(&all, models, (Array)WRITE(report.models, rows_of_models(form.n, report.shared) * B)));
+    good = good && (!least || borrow(&all, least, (Array)READ(report.least, B)));
+    report.shared = models ? report.shared : 0;
+    good = good && form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && finish <= B;
     for (int k = 0; good && k < form.quotients; k++)
-        fits = fits && form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
+        good = form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
     for (int k = 0; good && k < form.tangents; k++)
-        fits = fits && form.squared[k] >= 0 && form.squared[k] < form.functions;
-    fits = fits && (values == Py_None || form.values.outputs == R + rows_of_tangents(&form));
-    fits = fits && (values == Py_None || n <= MOST_VARIABLES);
-    if (good && !(fits && (objective == Py_None || form.objective.outputs == form.functions * (n + 1)))) {
-        PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
-        good = 0;
-    }
-    size_t count = finish > begin ? (size_t)(finish - begin) : 1;
-    Kept kept = {NULL, NULL};
-    if (good) {
-        memory = calloc(memory_needed(&form), sizeof(double));
-        kept.open = malloc(count * sizeof(Py_ssize_t));
-        kept.scores = malloc((form.objective.length ? count * (size_t)n : 1) * sizeof(double));
-    }
-    int ready = memory && kept.open && kept.scores;
-    if (good && !ready)
-        PyErr_NoMemory();
-    if (ready) {
+        good = form.squared[k] >= 0 && form.squared[k] < form.functions;
+    good = good && (values == Py_None || (form.values.outputs == R + rows_of_tangents(&form) && n <= MOST_VARIABLES));
+    good = good && (objective == Py_None || form.objective.outputs == form.functions * (n + 1));
+    /* The list of boxes that are open after the first pass, and the scores of their variables, come last. */
+    size_t count = finish > begin ? (size_t)(finish - begin) : 1, needed = good ? memory_needed(&form) : 0;
+    double *memory = memory_of_call(good, needed + count + (form.objective.length ? count * (size_t)n : 1));
+    if (memory) {
+        Kept kept = {(Py_ssize_t *)(memory + needed), memory + needed + count};
         Py_BEGIN_ALLOW_THREADS
         examine_range(&form, &report, begin, finish, threshold, memory, &kept);
         Py_END_ALLOW_THREADS
     }
-    free(memory);
-    free(kept.open);
-    free(kept.scores);
-    for (int i = 0; i < all.count; i++)
-        PyBuffer_Release(&all.buffers[i]);
-    if (!ready)
-        return NULL;
-    Py_RETURN_NONE;
+    return finish_call(&all, memory);
 }
 
 static PyObject *enclose(PyObject *module, PyObject *args)
 {
-    PyObject *tuple, *arrays[9];
+    PyObject *tuple, *arrays;
     Tape tape = {0};
     Enclosed found = {.order = 1};
     int n;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "iO!(OOOOOOOOO)n|i", &n, &PyTuple_Type, &tuple, &arrays[0], &arrays[1], &arrays[2],
-                          &arrays[3], &arrays[4], &arrays[5], &arrays[6], &arrays[7], &arrays[8], &found.B,
-                          &found.order))
+    if (!PyArg_ParseTuple(args, "iO!O!n|i", &n, &PyTuple_Type, &tuple, &PyTuple_Type, &arrays, &found.B, &found.order))
         return NULL;
-    int good = n > 0 && (found.order == 1 || n <= MOST_VARIABLES) && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
-    Py_ssize_t R = tape.outputs, B = found.B, D = sizeof(double);
-    good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
-    good = good && (found.c = borrow(&all, arrays[2], R * B, D, 1)) && (found.p = borrow(&all, arrays[3], R * B, D, 1));
-    good = good && (found.q = borrow(&all, arrays[4], R * B, D, 1)) && (found.s = borrow(&all, arrays[5], R * B, D, 1));
-    good = good && (found.lo = borrow(&all, arrays[6], R * B, D, 1)) && (found.hi = borrow(&all, arrays[7], R * B, D, 1));
-    good = good && (found.a = borrow(&all, arrays[8], R * (Py_ssize_t)terms_to_enclose(n, found.order) * B, D, 1));
-    double *memory = NULL;
-    if (good && !(memory = calloc(memory_to_enclose(&tape, n, found.order), sizeof(double))))
-        PyErr_NoMemory();
+    int good = n > 0 && (found.order == 1 || n <= MOST_VARIABLES) && found.B > 0 && read_tape(&all, tuple, &tape);
+    Py_ssize_t B = found.B, all_rows = tape.outputs * B;
+    Array each[] = {READ(found.lower, n * B), READ(found.upper, n * B), WRITE(found.c, all_rows), WRITE(found.p, all_rows),
+                    WRITE(found.q, all_rows), WRITE(found.s, all_rows), WRITE(found.lo, all_rows), WRITE(found.hi, all_rows),
+                    WRITE(found.a, all_rows * (Py_ssize_t)terms_to_enclose(n, found.order))};
+    good = good && borrow_all(&all, arrays, each, COUNT(each));
+    double *memory = memory_of_call(good, good ? memory_to_enclose(&tape, n, found.order) : 0);
     if (memory) {
         Py_BEGIN_ALLOW_THREADS
         enclose_all(&tape, n, &found, memory);
         Py_END_ALLOW_THREADS
-    } else if (!PyErr_Occurred()) {
-        PyErr_SetString(PyExc_ValueError, "the kernel got no variables or no boxes");
     }
-    free(memory);
-    for (int i = 0; i < all.count; i++)
-        PyBuffer_Release(&all.buffers[i]);
-    if (!memory)
-        return NULL;
-    Py_RETURN_NONE;
+    return finish_call(&all, memory);
 }
 
 static PyObject *models(PyObject *module, PyObject *args)
 {
-    PyObject *arrays[7], *first, *low = NULL, *high = NULL;
+    PyObject *arrays, *first, *low = NULL, *high = NULL;
     Models found = {0};
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "i(OOOOOOO)nO|OO", &found.n, &arrays[0], &arrays[1], &arrays[2], &arrays[3], &arrays[4],
-                          &arrays[5], &arrays[6], &found.B, &first, &low, &high))
+    if (!PyArg_ParseTuple(args, "iO!nO|OO", &found.n, &PyTuple_Type, &arrays, &found.B, &first, &low, &high))
         return NULL;
-    Py_ssize_t n = found.n, B = found.B, D = sizeof(double), rows[] = {1, n, n * n, n, n, n, 1};
-    const double **inputs[] = {&found.middle,   &found.b,        &found.H,       &found.w,
-                               &found.slope_lo, &found.slope_hi, &found.rounding};
-    int good = n > 0 && B > 0;
-    if (!good)
-        PyErr_SetString(PyExc_ValueError, "the kernel got no variables or no boxes");
-    for (int i = 0; good && i < 7; i++)
-        good = (*inputs[i] = borrow(&all, arrays[i], rows[i] * B, D, 0)) != NULL;
+    Py_ssize_t n = found.n, B = found.B;
+    Array each[] = {READ(found.middle, B), READ(found.b, n * B), READ(found.H, n * n * B), READ(found.w, n * B),
+                    READ(found.slope_lo, n * B), READ(found.slope_hi, n * B), READ(found.rounding, B)};
+    int good = n > 0 && B > 0 && borrow_all(&all, arrays, each, COUNT(each));
     if (good && high)
-        good = (found.level = borrow(&all, first, B, D, 0)) && (found.low = borrow(&all, low, n * B, D, 1)) &&
-               (found.high = borrow(&all, high, n * B, D, 1));
+        good = borrow(&all, first, (Array)READ(found.level, B)) && borrow(&all, low, (Array)WRITE(found.low, n * B)) &&
+               borrow(&all, high, (Array)WRITE(found.high, n * B));
     else if (good)
-        good = (found.bound = borrow(&all, first, B, D, 1)) != NULL;
-    double *memory = good ? malloc(memory_for_models(found.n) * sizeof(double)) : NULL;
-    if (good && !memory)
-        PyErr_NoMemory();
+        good = borrow(&all, first, (Array)WRITE(found.bound, B));
+    double *memory = memory_of_call(good, good ? memory_for_models(found.n) : 0);
     if (memory) {
         Py_BEGIN_ALLOW_THREADS
         if (found.bound)
@@ -201,57 +202,41 @@ static PyObject *models(PyObject *module, PyObject *args)
             reach_models(&found, memory);
         Py_END_ALLOW_THREADS
     }
-    free(memory);
-    for (int i = 0; i < all.count; i++)
-        PyBuffer_Release(&all.buffers[i]);
-    if (!memory)
-        return NULL;
-    Py_RETURN_NONE;
+    return finish_call(&all, memory);
 }
 
 static PyObject *rank(PyObject *module, PyObject *args)
 {
-    PyObject *tuple, *at, *scale, *constant, *arrays[6], *change = Py_None;
+    PyObject *tuple, *at, *scale, *constant, *arrays, *change = Py_None;
     Tape tape = {0};
     Matrix matrix = {0};
     Ranks found = {0};
     int n;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "iO!(iiiOOO)(OOOOOO)n|O", &n, &PyTuple_Type, &tuple, &matrix.rows, &matrix.columns,
-                          &matrix.nullity, &at, &scale, &constant, &arrays[0], &arrays[1], &arrays[2], &arrays[3],
-                          &arrays[4], &arrays[5], &found.B, &change))
+    if (!PyArg_ParseTuple(args, "iO!(iiiOOO)O!n|O", &n, &PyTuple_Type, &tuple, &matrix.rows, &matrix.columns,
+                          &matrix.nullity, &at, &scale, &constant, &PyTuple_Type, &arrays, &found.B, &change))
         return NULL;
-    int good = n > 0 && found.B > 0 && read_tape(&all, tuple, &tape) == 0;
-    Py_ssize_t B = found.B, D = sizeof(double), E = matrix.entries = tape.outputs;
-    good = good && n <= MOST_VARIABLES && matrix.columns > 0 && matrix.columns <= 64 && matrix.nullity >= 0 && matrix.nullity < matrix.columns &&
+    int good = n > 0 && n <= MOST_VARIABLES && found.B > 0 && read_tape(&all, tuple, &tape);
+    Py_ssize_t B = found.B, E = matrix.entries = tape.outputs;
+    Array each[] = {READ(found.lower, n * B), READ(found.upper, n * B), WRITE(found.regular, B), WRITE(found.shares, n * B),
+                    WRITE(found.smallest, B), WRITE(found.sign, B)};
+    good = good && matrix.columns > 0 && matrix.columns <= 64 && matrix.nullity >= 0 && matrix.nullity < matrix.columns &&
            matrix.rows + matrix.nullity >= matrix.columns;
-    good = good && (matrix.at = borrow(&all, at, 2 * E, sizeof(int), 0)) && (matrix.scale = borrow(&all, scale, E, D, 0));
-    good = good && (matrix.constant = borrow(&all, constant, (Py_ssize_t)matrix.rows * matrix.columns, D, 0));
-    good = good && (found.lower = borrow(&all, arrays[0], n * B, D, 0)) && (found.upper = borrow(&all, arrays[1], n * B, D, 0));
-    good = good && (found.regular = borrow(&all, arrays[2], B, sizeof(int), 1));
-    good = good && (found.shares = borrow(&all, arrays[3], n * B, D, 1)) && (found.smallest = borrow(&all, arrays[4], B, D, 1));
-    good = good && (found.sign = borrow(&all, arrays[5], B, sizeof(int), 1));
-    good = good && (change == Py_None || (found.change = borrow(&all, change, E * B, D, 0)));
+    good = good && borrow(&all, at, (Array)READ(matrix.at, 2 * E)) && borrow(&all, scale, (Array)READ(matrix.scale, E));
+    good = good && borrow(&all, constant, (Array)READ(matrix.constant, (Py_ssize_t)matrix.rows * matrix.columns));
+    good = good && borrow_all(&all, arrays, each, COUNT(each));
+    good = good && (change == Py_None || borrow(&all, change, (Array)READ(found.change, E * B)));
     for (Py_ssize_t e = 0; good && e < E; e++)
         good = matrix.at[2 * e] >= 0 && matrix.at[2 * e] < matrix.rows && matrix.at[2 * e + 1] >= 0 &&
                matrix.at[2 * e + 1] < matrix.columns;
-    double *memory = NULL;
-    if (good && !(memory = calloc(memory_for_ranks(&tape, &matrix, n), sizeof(double))))
-        PyErr_NoMemory();
+    double *memory = memory_of_call(good, good ? memory_for_ranks(&tape, &matrix, n) : 0);
     if (memory) {
         Py_BEGIN_ALLOW_THREADS
         rank_all(&tape, &matrix, n, &found, memory);
         Py_END_ALLOW_THREADS
-    } else if (!PyErr_Occurred()) {
-        PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together");
     }
-    free(memory);
-    for (int i = 0; i < all.count; i++)
-        PyBuffer_Release(&all.buffers[i]);
-    if (!memory)
-        return NULL;
-    Py_RETURN_NONE;
+    return finish_call(&all, memory);
 }
 
 static PyMethodDef methods[] = {

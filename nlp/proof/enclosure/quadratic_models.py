@@ -20,13 +20,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .engine import kernel
-from .intervals import TINY, ULP
+from .forms import TINY, ULP, Enclosures
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....models import FloatArray
-    from .forms import Enclosures
 
 #: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
 _MULTIPLIER_ROUNDS = 8

@@ -1,7 +1,6 @@
 """Statement of what is proved: programs in standard form, and claims about a workspace.
 
-The modules import each other in this order: ``lift``, ``piecewise_derivatives``, ``form``, ``reduced_form`` (a program
-without unknowns in closed form), ``minors`` (conditions that follow from limits on singular values), ``standard_form``
-and ``limb_separation`` for certificates; ``machine`` (a robot with its dimensions), ``tolerance_bound``, ``claims``,
-``posed_layout`` and ``closed_layout`` (a case as expressions of the pose) for workspaces.
+The modules import each other in this order: ``piecewise_derivatives``, ``form``, ``reduced_form`` (a program without
+unknowns in closed form), ``standard_form`` and ``limb_separation`` for certificates; ``machine`` (a robot with its
+dimensions), ``tolerance_bound``, ``claims`` and ``posed_layout`` (a case as expressions of the pose) for workspaces.
 """

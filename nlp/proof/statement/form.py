@@ -1,7 +1,11 @@
-"""A program in standard form: functions, the least of which is maximised over a box, and conditions."""
+"""A program in standard form: functions, the least of which is maximised over a box, and conditions.
+
+A form may lack variables of the program that follow from the others; its lift returns them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,9 +14,13 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
+from ...program.kernel import Kernel, single_output
 from ...program.nlp import Nlp
-from .lift import Lift
 from .piecewise_derivatives import without_ties
+
+#: Difference of a variable from what replaces it, in radians and in parts of a slide's range, above which the point is
+#: another solution of the loops. Where the two solutions meet, a point that keeps the loops to 1e-9 is so far off one.
+_SAME = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +38,55 @@ class Condition:
     expression: SX
     is_equation: bool
     follows: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Lift:
+    """What replaces variables of a program in a form without them.
+
+    Attributes:
+        x: (n,) symbols of all variables.
+        kept: places of the form's variables, in order.
+        places: places of the variables that are replaced.
+        values: (k, 1) expressions of the form's variables that replace them.
+        is_angle: for each of them, whether whole turns make no difference.
+        ranges: (k,) half range of each, in which differences of slides are measured.
+        signs: (s, 1) expressions of all variables that are at most 0 where the joints hold together.
+    """
+
+    x: SX
+    kept: tuple[int, ...]
+    places: tuple[int, ...]
+    values: SX
+    is_angle: tuple[bool, ...]
+    ranges: FloatArray
+    signs: SX
+
+    def variables(self, point: FloatArray) -> FloatArray:
+        """Return all variables (n,) at a point (m,) of the form."""
+        x = np.zeros(self.x.numel())
+        x[list(self.kept)] = point
+        x[list(self.places)] = self._values_at(point).ravel()
+        return x
+
+    def point(self, x: FloatArray) -> FloatArray:
+        """Return the form's variables (m,) of all variables (n,)."""
+        return np.asarray(x, dtype=np.float64)[list(self.kept)]
+
+    def holds(self, x: FloatArray) -> bool:
+        """Return whether variables (n,) have the values that replace them, and joints that hold together."""
+        index = list(self.places)
+        apart = np.asarray(x, dtype=np.float64)[index] - self.variables(self.point(x))[index]
+        turned = np.where(self.is_angle, np.abs(np.sin(apart / 2)), np.abs(apart / self.ranges))
+        return bool(np.all(turned <= _SAME)) and bool(np.all(self._signs_at(x) <= 0))
+
+    @cached_property
+    def _values_at(self) -> Kernel[FloatArray]:
+        return _kernel(self.x[list(self.kept)], [self.values])
+
+    @cached_property
+    def _signs_at(self) -> Kernel[FloatArray]:
+        return _kernel(self.x, [self.signs])
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +157,7 @@ class StandardForm:
 
     def value_at(self, x: FloatArray) -> float:
         """Return the value that is maximised at a point (n,), as computed in doubles."""
-        return float(np.min(np.array(self._functions_at(x))))
+        return float(np.min(self._functions_at(x)))
 
     def point_of(self, x: FloatArray) -> FloatArray:
         """Return the form's variables (n,) of those of the program (m,)."""
@@ -115,12 +172,17 @@ class StandardForm:
         """Return whether the conditions of the assembly hold at a point (m,) of the program, as computed in doubles."""
         if self.lift is not None:
             return self.lift.holds(np.asarray(x)[: self.lift.x.numel()])
-        return not self.signs or bool(np.all(np.array(self._signs_at(x[: self.n])) <= 0))
+        return not self.signs or bool(np.all(self._signs_at(x[: self.n]) <= 0))
 
     @cached_property
-    def _signs_at(self) -> ca.Function:
-        return ca.Function("signs", [self.x], [ca.densify(ca.vertcat(*[each.expression for each in self.signs]))])
+    def _signs_at(self) -> Kernel[FloatArray]:
+        return _kernel(self.x, [each.expression for each in self.signs])
 
     @cached_property
-    def _functions_at(self) -> ca.Function:
-        return ca.Function("functions", [self.x], [ca.densify(ca.vertcat(*self.functions))])
+    def _functions_at(self) -> Kernel[FloatArray]:
+        return _kernel(self.x, self.functions)
+
+
+def _kernel(x: SX, expressions: Sequence[SX]) -> Kernel[FloatArray]:
+    """Return expressions of x as a function of NumPy arrays."""
+    return Kernel(ca.Function("values", [x], [ca.densify(ca.vertcat(*expressions))]), single_output)

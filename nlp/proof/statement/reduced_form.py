@@ -22,8 +22,7 @@ from ....models.joints.elimination import Eliminated, eliminated
 from ....models.joints.replacing import Solved, with_replaced
 from ...program.layout import reference_of
 from ...program.nlp import Nlp
-from .form import Condition, StandardForm
-from .lift import Lift
+from .form import Condition, Lift, StandardForm
 
 #: Points of the box at which a condition is tested, and how many of them have to be within reach.
 _TESTS, _LEAST = 24, 4

@@ -5,12 +5,24 @@
 A minimum becomes a maximum of ``-F``. The worst case of several tasks is an epigraph in the program: a variable
 ``level`` with one constraint for each task. Here it is the least of the tasks' own functions again, without that
 variable. The program's arguments are put in as doubles, and a proof is about the graph with these constants.
+
+A limit on the smallest singular value is one on an estimate of the smallest eigenvalue of ``A = J'J`` that takes
+thousands of operations. An enclosure of it is of use on small boxes alone. The estimate is from below, so that where it
+is at least ``s^2``
+
+    M = A - s^2 I   has no negative eigenvalue.
+
+So no principal minor of M is negative. Minors are polynomials in J, whose terms cancel in forms of second order. By
+interlacing a box with two eigenvalues of M below 0, where the determinant is positive, has smaller minors that are
+negative. For condition numbers the like, with ``tr A^4 / (c^2 tr A^3)`` in the place of ``s^2``, excludes wide boxes
+too, but saved no boxes of a search.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import casadi as ca
@@ -18,15 +30,22 @@ import numpy as np
 from casadi import SX
 
 from ....models import FloatArray, frozen_array
+from ...case.limits.constraint import End, Spectral
 from ...evidence.state import CLOSED
 from ...program.nlp import Nlp
 from ...program.pairs import with_all_pairs
 from ...program.program import Program
 from .form import Condition, StandardForm
-from .minors import spectral_conditions
 from .reduced_form import without_unknowns
 
 __all__ = ["Condition", "StandardForm", "is_in_home_mode", "standard_form"]
+
+#: Orders of the principal minors. Those of 4 and 5 exclude boxes twice as wide as the determinant alone; smaller ones
+#: gain nothing more, as few poses have so many small singular values.
+_ORDERS = (4, 5, 6)
+#: Part of itself by which s^2 is smaller than stated: rounding of its numbers.
+_ROUNDING = 1e-9
+_SIZE = 6
 
 
 class _BoundedExpression(NamedTuple):
@@ -61,8 +80,8 @@ def standard_form(nlp: Nlp) -> StandardForm:
             if constraint in epigraph.constraints
         ]
         constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
-    further = _further_loop_equations(program, x, nlp.arguments)
-    stated, implied, signs = _conditions(constraints), _conditions(further), _signs(nlp, x)
+    stated, implied = _conditions(constraints), _conditions(_further_loop_equations(nlp, x))
+    signs = _signs(nlp, x)
     stated += _of_singular_values(nlp, x)
     form = StandardForm(
         nlp=nlp,
@@ -77,61 +96,58 @@ def standard_form(nlp: Nlp) -> StandardForm:
     )
     if not nlp.in_home_mode:
         return form
-    loops = _loop_names(program)
+    loops = {f"{each.name}{where}" for each in program.model.closure for where in _poses(program)}
     return without_unknowns(form, [*(each for each in stated if each.name in loops), *implied, *signs])
 
 
 def _of_singular_values(nlp: Nlp, x: SX) -> list[Condition]:
     """Return the conditions that follow from limits on the smallest singular value."""
-    program = nlp.program
     found = [
         condition
-        for k, each in enumerate(program.constraints)
+        for k, each in enumerate(nlp.program.constraints)
         if each.spectral is not None
-        for condition in spectral_conditions(each.name, each.spectral, float(nlp.g_lower[k]))
+        for condition in _spectral_conditions(each.name, each.spectral, float(nlp.g_lower[k]))
     ]
-    if not found:
-        return []
-    function = ca.Function("minors", [program.x, program.p], [each.expression for each in found])
-    values = function.call([x, SX(ca.DM(nlp.arguments))])
+    values = _with_numbers(nlp, x, [each.expression for each in found])
     return [replace(each, expression=value) for each, value in zip(found, values, strict=True)]
 
 
-def _loop_names(program: Program) -> set[str]:
-    """Return the names of all loop equations that a program may have as constraints."""
+def _poses(program: Program) -> list[str]:
+    """Return the end of the names of constraints of each pose."""
     count = len(program.robots)
-    where = [f" pose {k + 1}" for k in range(count)] if count > 1 else [""]
-    return {f"{each.name}{own}" for each in program.model.closure for own in where}
+    return [f" pose {k + 1}" for k in range(count)] if count > 1 else [""] * count
 
 
-def _further_loop_equations(program: Program, x: SX, arguments: FloatArray) -> list[_BoundedExpression]:
+def _with_numbers(nlp: Nlp, x: SX, expressions: Sequence[SX]) -> list[SX]:
+    """Return expressions of a program's symbols with x and numbers in the place of its variables and arguments."""
+    program = nlp.program
+    values = ca.Function("values", [program.x, program.p], list(expressions)) if expressions else None
+    return [] if values is None else list(values.call([x, SX(ca.DM(nlp.arguments))]))
+
+
+def _varying(nlp: Nlp, x: SX, named: dict[str, SX]) -> Iterator[tuple[str, SX]]:
+    """Yield those of some expressions, by name, that depend on a variable, with numbers in them."""
+    for name, each in zip(named, _with_numbers(nlp, x, list(named.values())), strict=True):
+        if any(ca.which_depends(each, x, 1, True)):
+            yield name, each
+
+
+def _further_loop_equations(nlp: Nlp, x: SX) -> list[_BoundedExpression]:
     """Return the loop equations that the program leaves out, and distances that follow, with bounds of a closed loop.
 
     The former follow from those of the program near its answer, but not in the whole box: there joints that are
     assembled in no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding
     error in them, so that an exact equation could hold nowhere.
     """
+    program, model = nlp.program, nlp.program.model
     names = {constraint.name for constraint in program.constraints}
     further: dict[str, SX] = {}
-    for k, robot in enumerate(program.robots):
-        where = f" pose {k + 1}" if len(program.robots) > 1 else ""
-        model = program.model
-        pairs = (
-            *zip(model.closure, ca.vertsplit(robot.closure), strict=True),
-            *zip(model.distances, ca.vertsplit(robot.distances), strict=True),
-        )
-        for equation, expression in pairs:
+    for where, robot in zip(_poses(program), program.robots, strict=True):
+        values = [*ca.vertsplit(robot.closure), *ca.vertsplit(robot.distances)]
+        for equation, expression in zip((*model.closure, *model.distances), values, strict=True):
             if f"{equation.name}{where}" not in names:
                 further[f"{equation.name}{where}"] = expression
-    if not further:
-        return []
-    function = ca.Function("loops", [program.x, program.p], list(further.values()))
-    values = function.call([x, SX(ca.DM(arguments))])
-    return [
-        _BoundedExpression(name, each, -CLOSED, CLOSED)
-        for name, each in zip(further, values, strict=True)
-        if any(ca.which_depends(each, x, 1, True))
-    ]
+    return [_BoundedExpression(name, each, -CLOSED, CLOSED) for name, each in _varying(nlp, x, further)]
 
 
 def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
@@ -147,22 +163,12 @@ def _signs(nlp: Nlp, x: SX) -> list[Condition]:
 
     Those of home's working mode count where the program says so.
     """
-    program = nlp.program
     found: dict[str, SX] = {}
-    for k, robot in enumerate(program.robots):
-        where = f" pose {k + 1}" if len(program.robots) > 1 else ""
-        for each, value in zip(program.model.signs, ca.vertsplit(robot.signs), strict=True):
+    for where, robot in zip(_poses(nlp.program), nlp.program.robots, strict=True):
+        for each, value in zip(nlp.program.model.signs, ca.vertsplit(robot.signs), strict=True):
             if nlp.in_home_mode or not each.is_mode:
                 found[f"{each.name}{where}"] = -value
-    if not found:
-        return []
-    function = ca.Function("signs", [program.x, program.p], list(found.values()))
-    values = function.call([x, SX(ca.DM(nlp.arguments))])
-    return [
-        Condition(name, each, is_equation=False)
-        for name, each in zip(found, values, strict=True)
-        if any(ca.which_depends(each, x, 1, True))
-    ]
+    return [Condition(name, each, is_equation=False) for name, each in _varying(nlp, x, found)]
 
 
 def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:
@@ -185,3 +191,42 @@ def _conditions(constraints: Sequence[_BoundedExpression]) -> list[Condition]:
         if np.isfinite(low):
             conditions.append(Condition(name, low - expression, is_equation=False))
     return conditions
+
+
+def _spectral_conditions(name: str, spectral: Spectral, lower: float) -> Iterator[Condition]:
+    """Yield conditions on the minors of a function of J, given a lower bound of its smallest eigenvalue, if finite."""
+    if spectral.end is not End.SMALLEST or not (np.isfinite(lower) and lower > 0):
+        return
+    scale = SX([1, 1, 1, *[1 / spectral.length] * 3])
+    J = spectral.matrix @ ca.diag(scale)
+    minors = _Minors(J.T @ J - (1 - _ROUNDING) * lower * SX.eye(_SIZE))
+    for order in _ORDERS:
+        for chosen in combinations(range(_SIZE), order):
+            places = "".join(str(k + 1) for k in chosen)
+            yield Condition(f"{name} minor {places}", -minors.of(chosen, chosen), is_equation=False, follows=True)
+
+
+class _Minors:
+    """Minors of a matrix by expansion along rows, each computed once.
+
+    Args:
+        matrix: (n, n) expressions.
+    """
+
+    def __init__(self, matrix: SX) -> None:
+        self._matrix = matrix
+        self._known: dict[tuple[tuple[int, ...], tuple[int, ...]], SX] = {}
+
+    def of(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> SX:
+        """Return the determinant (1, 1) of some rows and as many columns."""
+        key = rows, columns
+        if key not in self._known:
+            first, *others = rows
+            if not others:
+                return self._matrix[first, columns[0]]
+            terms = [
+                (-1) ** k * self._matrix[first, column] * self.of(tuple(others), columns[:k] + columns[k + 1 :])
+                for k, column in enumerate(columns)
+            ]
+            self._known[key] = sum(terms, SX(0))
+        return self._known[key]

@@ -15,9 +15,8 @@ from ...interruption import one_call, within
 from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.closed_layout import closed_layout, reach_claims
 from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
-from ..statement.posed_layout import posed_layout
+from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from .home_poses import Homes
 from .numbers.asked_values import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme

@@ -6,15 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..boxes.proof_writer import ProofWriter
+from ..boxes.tree import TreeRecord
 from ..certificate.certificate import CertificateStatus
-from ..checker.tree import Node, node_bytes
+from ..checker.tree import Node
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from ....models import FloatArray
     from ...program.nlp import Nlp
     from ..certificate.certificate import Certificate
@@ -22,64 +18,6 @@ if TYPE_CHECKING:
 
 #: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
 _FOLDED = 1e-12
-
-
-class TreeRecord:
-    """The boxes that a search has cut, by their ends: a box that is cut nowhere is a leaf.
-
-    Attributes:
-        lacks_boxes: whether boxes were left out that the check has no rule for: a number of the pose that follows from
-            others leaves its range there.
-    """
-
-    def __init__(self) -> None:
-        self.lacks_boxes = False
-        self._root = b""
-        self._outside: set[bytes] = set()
-        self._moved: dict[bytes, bytes] = {}
-        self._cuts: dict[bytes, tuple[bytes, bytes, bytes]] = {}
-
-    def cuts(self, lower: FloatArray, upper: FloatArray, split: NDArray[np.signedinteger]) -> None:
-        """Record boxes (B, 6) that are cut in the middle of a coordinate each, (B,)."""
-        keys, every = _keys(lower, upper), np.arange(len(lower))
-        middle = 0.5 * lower[every, split] + 0.5 * upper[every, split]
-        below, above = upper.copy(), lower.copy()
-        below[every, split] = above[every, split] = middle
-        cuts = zip(keys, split.tolist(), middle.tolist(), _keys(lower, below), _keys(above, upper), strict=True)
-        for key, i, value, one, other in cuts:
-            self._root = self._root or key
-            self._cuts[key] = node_bytes(Node.CUT, i, value=value), one, other
-
-    def contractions(
-        self, before: tuple[FloatArray, FloatArray], after: tuple[FloatArray, FloatArray], outside: NDArray[np.bool_]
-    ) -> None:
-        """Record boxes that were moved to the ball of rotations: ends before and after, and where none is left."""
-        for k, (old, new) in enumerate(zip(_keys(*before), _keys(*after), strict=True)):
-            if outside[k]:
-                self._outside.add(old)
-            elif old != new:
-                self._moved[old] = new
-
-    def tree(self) -> bytes:
-        """Return the tree: every box that was not cut is claimed to be closed."""
-        parts: list[bytes] = []
-        waiting = [self._root]
-        while waiting:
-            key = waiting.pop()
-            key = key if key in self._outside else self._moved.get(key, key)
-            cut = self._cuts.get(key)
-            if cut is not None:
-                parts.append(cut[0])
-                waiting += [cut[2], cut[1]]
-            else:
-                parts.append(bytes([Node.OUTSIDE if key in self._outside else Node.BOUNDED]))
-        return b"".join(parts)
-
-
-def _keys(lower: FloatArray, upper: FloatArray) -> list[bytes]:
-    """Return a text of each box (B, 6)."""
-    ends = np.ascontiguousarray(np.concatenate([lower, upper], axis=1))
-    return [row.tobytes() for row in ends]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +64,7 @@ class PaperRecord:
         tree = bytes([Node.BOUNDED])
         self._keep(claim, ProgramRecord(nlp, bound + _FOLDED * abs(bound), tree))
 
-    def program(self, claim: Claim, found: Certificate, writer: ProofWriter, *, again: bool = False) -> None:
+    def program(self, claim: Claim, found: Certificate, writer: TreeRecord, *, again: bool = False) -> None:
         """Record a search of a number, or a finer one again, of which the better one is kept."""
         has_bound = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE) and math.isfinite(
             found.bound

@@ -148,7 +148,7 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Mo
         return "it was not judged"
     if found.outcome is Outcome.PROVED:
         own = record.own(each.name)
-        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree())
+        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree(with_open=True))
     if found.outcome is Outcome.REFUTED:
         return _refuted(each, found, judged, model)
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
@@ -219,4 +219,4 @@ def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> ProofCla
         bound = sign * max(sign * limit, sign * reached)
         if not math.isfinite(bound) or (each.limit is None and not bound > 0):
             return _NO_BOUND
-    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree())
+    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree(with_open=True))

@@ -15,7 +15,7 @@ from screwsynth.models import FloatArray
 from screwsynth.models.arrays import first_largest
 from screwsynth.nlp.proof.boxes.examination import COLLAPSED, UNMOVED, Examination, Verdict
 from screwsynth.nlp.proof.boxes.tapes import objective_tape, search_tape, value_tape, without_conditions
-from screwsynth.nlp.proof.enclosure.intervals import Midpoints, midpoints
+from screwsynth.nlp.proof.enclosure.forms import Midpoints, midpoints
 from screwsynth.nlp.proof.enclosure.quadratic_models import affine_ends_reaching, gradient_model, multipliers, ranges
 from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows, tangent_rows
 from screwsynth.nlp.proof.statement.standard_form import StandardForm

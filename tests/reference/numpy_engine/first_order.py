@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from screwsynth.nlp.proof.enclosure.forms import Enclosures
-from screwsynth.nlp.proof.enclosure.intervals import midpoints
+from screwsynth.nlp.proof.enclosure.forms import Enclosures, midpoints
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
 from .intervals import LARGEST, TINY, ULP, interval_product, widen

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from screwsynth.nlp.proof.enclosure.intervals import midpoints
+from screwsynth.nlp.proof.enclosure.forms import midpoints
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
 from .intervals import LARGEST, TINY, ULP, Interval, interval_product, widen

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...enclosure.forms import enclose
-from ...enclosure.intervals import midpoints
+from ...enclosure.forms import enclose, midpoints
 from ...enclosure.quadratic_models import GradientModel, gradient_model, multipliers
 from ..tapes import search_tape
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models.arrays import first_largest
-from ...enclosure.intervals import ULP, midpoints
+from ...enclosure.forms import ULP, midpoints
 from ...enclosure.quadratic_models import Ends, GradientModel, QuadraticModel, affine_ends_reaching
 from .boxes import OwnBoxes, SharedBoxes
 from .models import LimbModels

@@ -18,8 +18,8 @@ from ...statement.standard_form import StandardForm
 from ..engines import Engine
 from ..incumbent import Incumbent
 from ..optimum import optimum_search
-from ..proof_writer import ProofWriter
 from ..symmetry import grouped
+from ..tree import TreeRecord
 
 #: Rounding of a sum of a few terms, in parts of their sizes: many times the largest possible.
 _SUM = 1e-14
@@ -94,7 +94,7 @@ class IndependentSearch:
         separation: Separation,
         incumbent: Incumbent,
         jobs: int | None,
-        recorder: ProofWriter | None = None,
+        recorder: TreeRecord | None = None,
     ) -> None:
         self._constant, limbs = separation.constant, separation.limbs
         # A proof has a tree for each limb.

@@ -16,17 +16,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models.arrays import first_largest
+from ...checker.limbs.sharedtree import leaf_bytes
+from ...checker.tree import Node, node_bytes
 from ...enclosure.quadratic_models import ranges
 from ..engines import Engine
 from ..optimum import LEAST_WIDTHS, reason_without_bound
 from ..rows import SMALL, WHOLE, Boxes, some
 from ..search import Order, Rule, Search, Verdicts
 from ..threads import Threads
+from ..tree import TreeRecord, halves_of, keys_of
 from .boxes import OwnBoxes, SharedBoxes
 from .common import CommonPart
 from .cuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
 from .models import LimbModels
-from .record import SharedRecord
 from .sums import LimbBound, bound_limb, first_largest_of_lists, with_tilts
 
 if TYPE_CHECKING:
@@ -36,7 +38,6 @@ if TYPE_CHECKING:
     from ...statement.limb_separation import Separation
     from ...statement.standard_form import StandardForm
     from ..incumbent import Incumbent
-    from ..proof_writer import ProofWriter
 
 #: Shared boxes that are examined at once: with long lists too, a step takes about half a second.
 _BLOCK = 256
@@ -44,6 +45,8 @@ _BLOCK = 256
 _LONGEST = 512
 #: Part of the widest limb's spread from which on a limb's list is refined too.
 _SPREAD = 0.25
+#: Part of the gap that is left between the bound at which a recorded search closes a box and the one that is proved.
+_RESERVE = 0.5
 #: How many times more the limbs' lists must promise than bisections of the shared box to be refined.
 _PATIENCE = 1.0
 
@@ -73,7 +76,7 @@ def shared_search(
     separation: Separation,
     incumbent: Incumbent,
     jobs: int | None,
-    recorder: ProofWriter | None = None,
+    recorder: TreeRecord | None = None,
 ) -> Search[SharedRule]:
     """Return the search of limbs with shared variables: see :class:`SharedRule`."""
     rule = SharedRule(form, separation, incumbent, jobs, recorder)
@@ -108,7 +111,7 @@ class SharedRule(Rule[SharedColumns]):
         separation: Separation,
         incumbent: Incumbent,
         jobs: int | None,
-        recorder: ProofWriter | None = None,
+        recorder: TreeRecord | None = None,
     ) -> None:
         if separation.common is None:
             raise ValueError("the limbs share no variable")
@@ -120,10 +123,9 @@ class SharedRule(Rule[SharedColumns]):
         self._threads = Threads(jobs)
         # Engines of long limbs take seconds, so that each is a step of its own, between which a search can end.
         self._engines, self._opposites = list[Engine](), list[Engine]()
-        self._record: SharedRecord | None = None
+        self._recorder = recorder
         if recorder is not None:
-            self._record = SharedRecord(self.common_form.lower, self.common_form.upper)
-            recorder.leave_to(self._record.tree)
+            recorder.begin = bytes([Node.SHARED])
 
     def fault(self, small: Sequence[Boxes[SharedColumns]]) -> str:
         """Return the reason for stopping at boxes without a finite bound; empty without any."""
@@ -146,10 +148,24 @@ class SharedRule(Rule[SharedColumns]):
         with np.errstate(all="ignore"):
             sums = self._examine(current)
             self._improve(current, sums)
-            left = self._branch(current, sums, self.target)
+            left, alive, emptied = self._branch(current, sums, self.target)
         # What contraction or dropping of own boxes excluded may reach the threshold.
-        examined = sum(own.of.size + own.count for own in current.own)
-        return Verdicts(left, self.target, examined, is_better=self._incumbent.value > before)
+        examined, reasons = sum(own.of.size + own.count for own in current.own), (sums, alive, emptied)
+        return Verdicts(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
+
+    def record(self, boxes: Boxes[SharedColumns], found: Verdicts[SharedColumns], split: NDArray[np.intp]) -> None:
+        """Record bisections and leaves, with the room up to the target shared out among limbs and common part."""
+        if self._recorder is None or found.reasons is None:
+            return
+        sums, alive, emptied = found.reasons
+        emptied = emptied | (np.array([part.best for part in sums.parts]) == -np.inf)
+        keys = keys_of(boxes.lower, boxes.upper)
+        for k in np.flatnonzero(~alive).tolist():
+            self._recorder.add(keys[k], _leaf(sums, k, emptied[:, k], self.target))
+        cut = split >= 0
+        _, halves = halves_of(found.left.lower[cut], found.left.upper[cut], split[cut])
+        for k, i, parts in zip(np.flatnonzero(alive)[cut].tolist(), split[cut].tolist(), halves, strict=True):
+            self._recorder.add(keys[k], node_bytes(Node.HALF, i), *parts)
 
     def _examine(self, boxes: SharedBoxes) -> SharedSums:
         """Return bounds of shared boxes."""
@@ -214,14 +230,23 @@ class SharedRule(Rule[SharedColumns]):
             point[list(limb.own)] = 0.5 * own.lower[:, place] + 0.5 * own.upper[:, place]
         return point
 
-    def _branch(self, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> Boxes[SharedColumns]:
-        """Drop and contract boxes, and refine the lists of those that are not to be bisected."""
+    def _branch(
+        self, boxes: SharedBoxes, sums: SharedSums, threshold: float
+    ) -> tuple[Boxes[SharedColumns], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Drop and contract boxes, and refine the lists of those that are not to be bisected.
+
+        Returns:
+            The parts that are left, of which boxes (B,), and whether each limb (K, B) has no box left, which only its
+            conditions bring about in a search that is recorded.
+        """
         bounded = sums.bound <= threshold
-        if self._record is not None:
-            # An inherited bound says nothing of the numbers of this box, which the proof needs.
-            bounded = sums.sums <= self._record.closing(threshold, self._incumbent.value)
+        if self._recorder is not None:
+            # An inherited bound says nothing of the numbers of this box, which the proof needs; and a checker with
+            # other arithmetic needs room up to the threshold.
+            room = max(threshold - self._incumbent.value, 0.0)
+            bounded = sums.sums <= (threshold - _RESERVE * room if math.isfinite(room) else threshold)
         limbs = range(len(self._engines))
-        if self._record is None:
+        if self._recorder is None:
             left = contract_shared(self.common_form, boxes, sums, threshold)
             lower, upper, alive = collapse_monotone(self.common_form, boxes, sums, left)
             below = threshold
@@ -240,10 +265,6 @@ class SharedRule(Rule[SharedColumns]):
         wider = (spread.sum(axis=0) > _PATIENCE * change.sum(axis=0)) & finite & (sizes.max(axis=0) < _LONGEST)
         refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
         cut = alive & ~refine & can_cut
-        if self._record is not None:
-            emptied = sizes == 0
-            self._record.close(boxes, sums, emptied, bounded | ~sums.is_possible | emptied.any(axis=0), threshold)
-            self._record.bisect(boxes, np.where(cut, first_largest(change.T), -1))
         # A box that collapsed, or one of whose lists did, has not been examined as what is left of it.
         moved = ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
         for before, each in zip(boxes.own, lists, strict=True):
@@ -253,7 +274,7 @@ class SharedRule(Rule[SharedColumns]):
             _refined(each, refine & (spread[k] >= _SPREAD * spread.max(axis=0))) for k, each in enumerate(lists)
         )
         columns = SharedColumns(own, tuple(each.good.T for each in lists))
-        return some(Boxes(lower.T, upper.T, sums.bound, split, columns), alive)
+        return some(Boxes(lower.T, upper.T, sums.bound, split, columns), alive), alive, sizes == 0
 
     def _shared_change(self, boxes: SharedBoxes, sums: SharedSums, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Return how much (m, B) the bound can change along each shared variable of the part that is left."""
@@ -270,3 +291,17 @@ class SharedRule(Rule[SharedColumns]):
 def _refined(each: LeftOwn, which: NDArray[np.bool_]) -> OwnBoxes:
     """Return a limb's lists, those of some shared boxes (B,) with their best boxes bisected."""
     return each.own.bisect(each.is_near & which[each.own.of], each.along)
+
+
+def _leaf(sums: SharedSums, k: int, emptied: NDArray[np.bool_], target: float) -> bytes:
+    """Return the node of closed box number k, in which some limbs (K,) may have no feasible point."""
+    parts = sums.parts
+    if emptied.any():
+        zero = np.zeros((len(parts), len(parts[0].tilt.g)))
+        bounds = np.where(np.cumsum(emptied) * emptied == 1, -np.inf, np.inf)
+        return leaf_bytes(bounds, zero, zero[:, :, None] * zero[:, None])
+    if not sums.sums[k] <= target:
+        return bytes([Node.INFEASIBLE])
+    room = (target - sums.sums[k]) / (len(parts) + 1)
+    g, Q = (np.array([each[..., k] for each in ends]) for ends in zip(*[part.tilt for part in parts], strict=True))
+    return leaf_bytes(np.array([part.best[k] for part in parts]) + room, g, Q)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...enclosure.intervals import TINY, ULP
+from ...enclosure.forms import TINY, ULP
 from ...enclosure.quadratic_models import QuadraticModel
 from .models import LimbModels
 

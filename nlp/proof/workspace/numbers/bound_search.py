@@ -28,7 +28,7 @@ from ..robot.tolerance_model import Family
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..proof_record import TreeRecord
+    from ...boxes.tree import TreeRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 512

@@ -19,7 +19,7 @@ from ....errors import UncoveredError
 from ....interruption import is_requested, one_search, why_stopped
 from ....program.layout import Layout
 from ....program.nlp import Nlp
-from ...boxes.proof_writer import ProofWriter
+from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
@@ -167,11 +167,11 @@ def _search(
     """
     began = time.perf_counter()
     # A program of a claim has one function, and its search is that of certify with or without a record.
-    writer = None if record is None else ProofWriter(1)
+    writer = None if record is None else TreeRecord()
     found = certify_program(nlp, gap=gap, jobs=jobs, recorder=writer)
     boxes = found.boxes
     while (finer := _finer_gap(nlp, claim, found)) is not None and not is_requested():
-        finer_writer = None if record is None else ProofWriter(1)
+        finer_writer = None if record is None else TreeRecord()
         again = certify_program(nlp, found.x, gap=finer, jobs=jobs, recorder=finer_writer)
         boxes += again.boxes
         sign = 1.0 if claim.sense is Sense.MAX else -1.0

@@ -25,7 +25,8 @@ from .pose_error import PoseErrors, WorstError, displaced, with_rest
 from .singular import SingularValues
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord, TreeRecord
+    from ...boxes.tree import TreeRecord
+    from ..proof_record import PaperRecord
 
 #: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
 _NEAR_ZERO = 0.1

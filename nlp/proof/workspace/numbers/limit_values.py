@@ -19,7 +19,7 @@ from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ...enclosure.forms import Encloser, Forms
-from ...enclosure.instructions import compile_tape
+from ...enclosure.tape import compile_tape
 from ...statement.claims import claims_of
 from ..ranks.krawczyk import ROUNDING, Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes

@@ -25,7 +25,7 @@ from .rank_rule import RankTest
 from .singular_pose import SingularPose
 
 if TYPE_CHECKING:
-    from ..proof_record import TreeRecord
+    from ...boxes.tree import TreeRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024

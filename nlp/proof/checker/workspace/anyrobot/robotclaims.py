@@ -11,9 +11,8 @@ from .....case.case import Case
 from .....case.workspace import Workspace
 from .....program.layout import Layout
 from ....statement.claims import CONSTRAINTS
-from ....statement.closed_layout import closed_layout, reach_claims
 from ....statement.machine import legs_of
-from ....statement.posed_layout import posed_layout
+from ....statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..expected import ExpectedClaim
 
 
