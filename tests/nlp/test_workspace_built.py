@@ -11,7 +11,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from hexapods import hexapod_text
+from hexapods import clearance, hexapod_text, over, subject_of
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
@@ -27,9 +27,7 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_c
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
-from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
@@ -220,11 +218,13 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
 ) -> None:
     robot, box = legs(case), pose_box(workspace_of_case(case))
     values = np.linalg.svd(machines.J[:20_000] / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
+    subject = subject_of(robot, box, 15.0)
+    spectra = [subject.spectrum(LENGTH, is_condition=is_condition) for is_condition in (False, True)]
     checks = [
-        (Clearance(robot, box, 0, 1), machines.clearance(0, 1)),
-        (Clearance(robot, box, 0, 2), machines.clearance(0, 2)),
-        (SingularValues(robot, box, LENGTH, is_condition=False, shortest=15.0), values[:, -1]),
-        (SingularValues(robot, box, LENGTH, is_condition=True, shortest=15.0), -values[:, 0] / values[:, -1]),
+        (clearance(robot, box, 0, 1), machines.clearance(0, 1)),
+        (clearance(robot, box, 0, 2), machines.clearance(0, 2)),
+        (over(subject, spectra[0]), values[:, -1]),
+        (over(subject, spectra[1]), -values[:, 0] / values[:, -1]),
     ]
     rng = np.random.default_rng(1)
     for oracle, sampled in checks:
@@ -232,10 +232,13 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
         # At a point the bound and the value of the worst machine differ by the rest, and by the 2 % of the norm.
         points = box.random(50, rng)
         at = oracle.bounds(points, points).lower
-        exact = type(oracle).values(oracle, points)
+        exact = oracle.values(points)
         assert (at <= exact + 1e-12).all()
         assert (at >= exact - 0.05 * np.abs(exact)).all()
-        assert max(np.linalg.norm(part, axis=1).max() for part in oracle.errors(points[0])) <= TOLERANCE
+    for number in spectra:
+        errors = number.errors(points[0])
+        assert errors is not None
+        assert max(np.linalg.norm(part, axis=1).max() for part in errors) <= TOLERANCE
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))
@@ -382,7 +385,7 @@ def test_a_limit_is_refined_until_it_is_decided_whatever_the_gap_is(case: Case) 
         assert {outcome} <= {each.outcome for each in limited} <= {outcome, Outcome.PROVED}
     # The searches that are not those of certificates go on too, and end at a value that meets its limit.
     box = pose_box(workspace_of_case(case))
-    oracle = Clearance(robot, box, 0, 1)
+    oracle = clearance(robot, box, 0, 1)
     least = prove_minimum(oracle, box, gap=1e-4).value
     for limit, slack in ((least - 1e-6, 0.0), (least + 1e-10, 1e-9)):
         found = prove_minimum(oracle, box, gap=1.0, limit=limit, slack=slack, time_limit=20)

@@ -33,7 +33,7 @@ from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
 from screwsynth.nlp.proof.statement.posed_layout import extreme_program, posed_layout
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.asked_values import spectral_extremes
+from screwsynth.nlp.proof.workspace.numbers.searched import Subject, asked_spectra_extremes
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
@@ -485,8 +485,8 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
         assert "wrong" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
-    options = {"gap": 0.1, "shortest": 0.0}
-    for extreme in spectral_extremes(case, case.model, pose_box(judged.workspace), ASKED[1:], **options):  # type: ignore[arg-type]
+    subject = Subject(case, case.model, pose_box(judged.workspace), legs_of(case))
+    for extreme in asked_spectra_extremes(subject, ASKED[1:], gap=0.1):
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 
 

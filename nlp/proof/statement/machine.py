@@ -20,11 +20,11 @@ INSIDE = 1 - 1e-12
 
 
 class Legs(NamedTuple):
-    """Joint centres of a robot's six legs.
+    """Joint centres of a robot's k legs.
 
     Attributes:
-        base: (6, 3) in the world frame, length.
-        platform: (6, 3) in the platform frame, length.
+        base: (k, 3) in the world frame, length.
+        platform: (k, 3) in the platform frame, length.
         tolerance: largest error of each centre in the machines that are meant, length; 0 for the exact machine.
     """
 
@@ -34,7 +34,7 @@ class Legs(NamedTuple):
 
 
 class JointErrors(NamedTuple):
-    """Errors of the joint centres of one machine, (6, 3) each: base in the world frame, platform in its own, length."""
+    """Errors of the joint centres of one machine, (k, 3) each: base in the world frame, platform in its own, length."""
 
     base: FloatArray
     platform: FloatArray
@@ -42,6 +42,10 @@ class JointErrors(NamedTuple):
     def applied(self, legs: Legs) -> Legs:
         """Return the exact legs of the machine with these errors."""
         return Legs(legs.base + self.base, legs.platform + self.platform)
+
+    def of_centres(self, names: tuple[str, ...]) -> CentreErrors:
+        """Return the errors by the names of the centres: base, then platform, leg by leg."""
+        return CentreErrors(names, np.stack([self.base, self.platform], axis=1).reshape(-1, 3))
 
 
 class CentreErrors(NamedTuple):
@@ -91,20 +95,23 @@ def has_straight_legs(model: Model) -> bool:
 
 
 def legs_of(case: Case) -> Legs | None:
-    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs.
+    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs."""
+    return joint_centres(case) if has_straight_legs(case.model) else None
 
-    Their tolerance is the case's.
-    """
-    model = case.model
-    if not has_straight_legs(model):
+
+def joint_centres(case: Case) -> Legs | None:
+    """Return the k straight legs of a robot with fixed dimensions, with the case's tolerance; None without legs."""
+    legs = case.model.legs
+    if not legs:
         return None
-    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
+    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in case.model.parameters])
     parts = [value for name in case.parameters for value in case.components(name)]
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
-    outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
+    outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in legs])) for end in ("base", "platform")]
     base, platform = ca.Function("legs", [symbols], outputs).call([values])
+    shape = len(legs), 3
     return Legs(
-        frozen_array(np.array(base).T, (LEGS, 3)),
-        frozen_array(np.array(platform).T, (LEGS, 3)),
+        frozen_array(np.array(base).T, shape),
+        frozen_array(np.array(platform).T, shape),
         case.joint_centre_tolerance or 0.0,
     )

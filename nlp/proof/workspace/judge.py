@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -15,15 +15,14 @@ from ...interruption import one_call, within
 from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
+from ..statement.machine import Legs, check_leg_error, joint_centres, legs_of, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from .home_poses import Homes
-from .numbers.asked_values import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
-from .numbers.leg_numbers import own_searches, pose_errors
 from .numbers.loop_limits import loop_extremes
-from .numbers.robot_limits import limited_spectrum
-from .numbers.strokes import with_strokes
+from .numbers.pose_error import pose_errors
+from .numbers.searched import Subject, asked_spectra_extremes, searched_limits
+from .numbers.strokes import Refine, with_strokes
 from .ranks.ranks import Ranks, not_judged, prove_ranks
 from .ranks.search import RankProgress
 from .robot.pose_box import PoseBox, pose_box
@@ -197,21 +196,39 @@ class _Numbers:
         Raises:
             InputError: the robot has no measure of a name.
         """
-        case, box, legs = self.case, pose_box(self.workspace), self.legs
+        case, legs = self.case, self.legs
         names = [name for name in quantities if name not in SPECTRAL]
-        family = None if self.machines is None else self.machines.family
-        spectral = partial(
-            spectral_extremes,
-            family=family,
-            unknown=self.unknown,
-            gap=self.gap,
-            paper=self.paper,
-        )
+        subject = Subject(case, self.closed.model, pose_box(self.workspace), joint_centres(case), unknown=self.unknown)
+        refine: Refine | None
         if self.machines is not None:
+            subject = replace(subject, built=(self.machines.built, self.machines.family))
             proving = Proving(self.gap, self.jobs, self.progress)
             yield from _add(found, machine_extremes(self.machines, names, proving, with_objective=with_objective))
-            yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
-            return
+            refine = None
+        else:
+            shortest, refine = yield from self._add_design(found, names, with_objective=with_objective)
+            subject = replace(subject, shortest=shortest)
+        before = len(found)
+        found[:] = with_strokes(subject, found, refine)
+        yield from found[before:]
+        yield from _add(found, searched_limits(subject, gap=self.gap, paper=self.paper))
+        yield from _add(found, asked_spectra_extremes(subject, quantities, gap=self.gap, paper=self.paper))
+        eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
+        if legs is not None and with_objective and eps > 0:
+            least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
+            shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
+            yield from _add(found, pose_errors(legs, subject.problem, eps, shortest, paper=self.paper))
+
+    def _add_design(
+        self, found: list[Extreme], names: Sequence[str], *, with_objective: bool
+    ) -> Generator[Extreme, None, tuple[float, Refine]]:
+        """Add the extremes of expressions of the design, or of six straight legs as built, and yield each.
+
+        Returns:
+            A proven shortest length of the legs of the exact machine, where errors rest on it, and the function that
+            proves a length more finely.
+        """
+        case, box, legs = self.case, pose_box(self.workspace), self.legs
         layout = posed_layout(case, self.workspace)
         claims, is_reached = claims_of(layout, names, with_objective=with_objective), True
         if self.closed.reaches:
@@ -227,7 +244,7 @@ class _Numbers:
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         decided: list[Extreme] = []
-        if legs is None and not case.joint_centre_tolerance:
+        if not case.joint_centre_tolerance:
             decided = [
                 each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
             ]
@@ -235,29 +252,8 @@ class _Numbers:
                 proving = Proving(self.gap, self.jobs)
                 decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
         yield from self._add_proved(found, layout, claims, decided)
-        if legs is not None:
-            again = partial(prove, paper=self.paper, again=True)
-            refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
-            before = len(found)
-            found[:] = with_strokes(case, legs, found, refine)
-            yield from found[before:]
-            others = own_searches(case, legs, box, gap=self.gap, shortest=shortest, paper=self.paper)
-            yield from _add(found, others)
-        yield from self._add_others(found, spectral(case, self.closed.model, box, quantities, shortest=shortest))
-        eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
-        if legs is not None and with_objective and eps > 0:
-            least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
-            shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
-            yield from _add(found, pose_errors(legs, box, eps, shortest, paper=self.paper))
-
-    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Extreme]:
-        """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
-        if self.legs is None:
-            family = None if self.machines is None else self.machines.family
-            box = pose_box(self.workspace)
-            own = limited_spectrum(self.case, self.closed.model, box, family, self.unknown, gap=self.gap)
-            yield from _add(found, own)
-        yield from _add(found, asked)
+        again = partial(prove, paper=self.paper, again=True)
+        return shortest, partial(refined, layout, legs, shortest, claims, again, self.paper)
 
     def _prove(self, layout: Layout) -> Callable[..., Extreme]:
         """Return the function that proves a claim to a gap."""

@@ -79,7 +79,7 @@ class RowsOver:
     def spread(self, linear: FloatArray) -> FloatArray:
         """Return the largest sizes (B, ...) of linear parts (B, t, ...); the errors of a centre are a vector."""
         t = linear.shape[1] - self.errors
-        return np.abs(linear[:, :t]).sum(axis=1) + by_centres(np.moveaxis(linear[:, t:], 1, -1))
+        return np.asarray(np.abs(linear[:, :t]).sum(axis=1) + by_centres(np.moveaxis(linear[:, t:], 1, -1)))
 
 
 def rows_over(forms: Forms, scale: FloatArray, count: int, errors: int) -> RowsOver:
@@ -106,7 +106,7 @@ def rows_over(forms: Forms, scale: FloatArray, count: int, errors: int) -> RowsO
 
 def left_inverses(rows: RowsOver) -> LeftInverses:
     """Return left inverses of J over boxes."""
-    known = np.isfinite(rows.A).all(axis=(1, 2)) & np.isfinite(rows.terms).all(axis=(1, 2, 3))
+    known = np.asarray(np.isfinite(rows.A).all(axis=(1, 2)) & np.isfinite(rows.terms).all(axis=(1, 2, 3)))
     A = np.where(known[:, None, None], rows.A, np.eye(rows.A.shape[1], 6))
     f, eye = rows.count, np.eye(6)
     with np.errstate(all="ignore"):

@@ -18,7 +18,7 @@ import numpy as np
 from .....models import FloatArray
 from ...enclosure.forms import Forms
 from ...statement.machine import JointErrors, Legs
-from ..robot.posed_robot import Problem, ScaledRows
+from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
 from ..tolerance.legs.singular_values import change_of_rows, worst_rows
 from .bound_search import Bounds
@@ -73,14 +73,14 @@ class SingularValues:
         else:
             flat = self._jacobian(z.T).full()
             J = flat.reshape(len(flat), len(z), 6).transpose(1, 0, 2) * self._scale
-        known = np.isfinite(J).all(axis=(1, 2))
+        known = np.asarray(np.isfinite(J).all(axis=(1, 2)))
         values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
         with np.errstate(all="ignore"):
             found = -values[:, 0] / values[:, -1] if self._is_condition else values[:, -1]
         return np.asarray(np.where(known, found, np.nan))
 
     def errors(self, z: FloatArray) -> JointErrors | None:
-        """Return the errors of the machine of legs that is worst at a point (n,) to first order; None for the design."""
+        """Return the errors of the legs that are worst at a point (n,) to first order; None for the design."""
         if self._legs is None:
             return None
         y = self._problem.pose_of(z[None])
@@ -122,7 +122,7 @@ def _largest(rows: RowsOver) -> FloatArray:
     rest += np.abs(rows.A) * (rows.slack + d * d / room)[..., None]
     rest += rows.spread(linear[:, rows.count :])
     corners = rows.A[:, None] + at_corners(linear[:, : rows.count])
-    known = np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2)))
     values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
     return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)
 

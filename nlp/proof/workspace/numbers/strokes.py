@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from .....models import Dimension
-from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.task import Sense
-from ...statement.machine import LEGS, Legs
+from ...statement.machine import Legs
 from ..tolerance.legs.worst import Directions, along, spans
 from ..verdict import Outcome
 from .extremes import Extreme, slack_of
+from .searched import Subject
 
 #: Smallest gap of a length, as a part of it, and part of the room that lengths may leave: that of rounding.
 _FINEST, _SHARE = 1e-11, 0.9
@@ -39,7 +39,7 @@ class _Kind(NamedTuple):
     short: float
 
 
-def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Refine) -> list[Extreme]:
+def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine | None) -> list[Extreme]:
     """Return extremes, and after them those of the case's limits on telescoping legs.
 
     A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace. Where a limit
@@ -47,27 +47,30 @@ def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Re
     those given.
 
     Args:
-        case: the case.
-        legs: its joint centres.
+        subject: the robot.
         extremes: among them the smallest and the largest length of each leg.
-        refine: proves a length more finely.
+        refine: proves a length more finely; None where it cannot.
     """
-    limit = next((each for each in case.limits if isinstance(each, Actuator)), None)
+    legs, family = subject.legs, subject.family
+    limit = next((each for each in subject.case.limits if isinstance(each, Actuator)), None)
     found, added = list(extremes), list[Extreme]()
-    if limit is None:
+    if limit is None or legs is None:
         return found
-    kinds = []
-    if limit.stroke_max is not None:
-        kinds.append(_Kind("actuator.stroke_max", Sense.MAX, limit.stroke_max, 1.0, -1.0))
-    if limit.dead_length is not None:
-        kinds.append(_Kind("actuator.dead_length", Sense.MIN, limit.dead_length, -1.0, 2.0))
+    kinds = [
+        _Kind(f"actuator.{name}", sense, value, long, short)
+        for name, sense, value, long, short in (
+            ("stroke_max", Sense.MAX, limit.stroke_max, 1.0, -1.0),
+            ("dead_length", Sense.MIN, limit.dead_length, -1.0, 2.0),
+        )
+        if value is not None
+    ]
     place = {(each.name, each.sense): k for k, each in enumerate(found)}
-    for i, leg in enumerate(case.model.legs):
+    for i, leg in enumerate(subject.case.model.legs):
         short, long = (place[f"leg_length limb {leg.name}", sense] for sense in (Sense.MIN, Sense.MAX))
         for kind in kinds:
             name = f"{kind.key} limb {leg.name}"
             extreme = _of_lengths(name, kind, legs, i, found[short], found[long])
-            while (gap := _finer_gap(kind, extreme, found[short], found[long])) is not None:
+            while refine is not None and (gap := _finer_gap(kind, extreme, found[short], found[long])) is not None:
                 finer = [refine(i, sense, gap, None) for sense in (Sense.MIN, Sense.MAX)]
                 if finer[0] is None or finer[1] is None:
                     break
@@ -75,7 +78,11 @@ def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Re
                 before, extreme = extreme, _of_lengths(name, kind, legs, i, found[short], found[long])
                 if extreme.bound == before.bound:
                     break
-            added.append(_of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine))
+            if refine is not None:
+                extreme = _of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine)
+            if family is not None and extreme.errors is not None:
+                extreme = replace(extreme, errors=None, centres=extreme.errors.of_centres(family.names))
+            added.append(extreme)
     return [*found, *added]
 
 
@@ -142,7 +149,7 @@ def _of_lengths(name: str, kind: _Kind, legs: Legs, i: int, short: Extreme, long
         # One machine has both lengths: its errors are along the change of the number, to first order.
         at = [spans(legs, pose).n for pose in (long.pose, short.pose)]
         turned = [n @ pose.rotation for n, pose in zip(at, (long.pose, short.pose), strict=True)]
-        base, platform = np.zeros((LEGS, 3)), np.zeros((LEGS, 3))
+        base, platform = np.zeros_like(legs.base), np.zeros_like(legs.base)
         base[i] = -sign * (kind.long * at[0][i] + kind.short * at[1][i])
         platform[i] = sign * (kind.long * turned[0][i] + kind.short * turned[1][i])
         errors = along(legs, replace(long.pose, rotation=np.eye(3)), base, platform)

@@ -14,7 +14,6 @@ from ....errors import UncoveredError
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ...statement.machine import Legs
 from ..home_poses import Homes
-from ..regular.signs import SignRefuter
 from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -22,6 +21,7 @@ from ..robot.tolerance_model import Family, built_model, family_of
 from ..tolerance.singular_machine import SingularMachine
 from ..verdict import Outcome, Regularity
 from .search import NewtonRefuter, RankProgress, Refuter, prove_rank, singular_at
+from .signs import SignRefuter
 from .singular_pose import SingularPose
 
 if TYPE_CHECKING:

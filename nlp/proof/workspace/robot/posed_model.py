@@ -184,4 +184,4 @@ def polynomial_rows(matrix: SX, turned: SX, posed: PosedModel) -> SX:
         matrix[i, :] if ca.depends_on(slopes[i, :], posed.inverse) else constant[i, :] * posed.scale + slopes[i, :]
         for i in range(matrix.shape[0])
     ]
-    return ca.sparsify(ca.vertcat(*rows))
+    return ca.sparsify(ca.vertcat(SX(0, matrix.shape[1]), *rows))

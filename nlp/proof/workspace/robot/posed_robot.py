@@ -282,7 +282,7 @@ def scaled_rows(posed: PosedModel, length: float, characteristic_length: float) 
     of_members = jacobian([], L, limbs.members)
     moments = [
         ca.horzcat(row[:3], (row[3:] - ca.cross(limbs.position, row[:3].T).T) / length)
-        for row in ca.vertsplit(of_members)
+        for row in (of_members[i, :] for i in range(of_members.shape[0]))
     ]
     ones = SX.ones(of_members.shape[0])
     return ScaledRows(ca.vertcat(rows[:, :6], *moments), ca.vertcat(SX(0, 1), *sizes, ones))

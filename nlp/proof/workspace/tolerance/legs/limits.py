@@ -50,7 +50,7 @@ def as_built(
 
 def refined(
     layout: Layout,
-    legs: Legs,
+    legs: Legs | None,
     shortest: float,
     claims: Sequence[Claim],
     prove: Callable[..., Extreme],
@@ -66,7 +66,7 @@ def refined(
     claim = next(each for each in claims if each.leg == leg and each.sense is sense)
     if about is None:
         return prove(claim, gap=gap)
-    if not shortest > 2 * legs.tolerance:
+    if legs is None or not shortest > 2 * legs.tolerance:
         return None
     sign = 1.0 if sense is Sense.MAX else -1.0
     expression = length_beside(legs, leg, layout.robots[0], sign, shortest, about)
