@@ -6,7 +6,6 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from contextvars import copy_context
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -27,7 +26,7 @@ from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.interruption import STOPPED, is_requested
+from screwsynth.nlp.interruption import STOPPED, is_requested, one_call
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.boxes.optimum import OptimumRule
 from screwsynth.nlp.proof.certificate import branch_and_bound
@@ -281,9 +280,8 @@ def interrupted(search: Search, error: type[BaseException], watched: tuple[str, 
     answers = 0
     for n in np.random.default_rng(seed).integers(1, instructions + 1, moments).tolist():
         try:
-            # An interrupt may leave context variables as they are: those of a copy.
             with at_instruction(n, error, watched):
-                found = copy_context().run(search)
+                found = one_call(search)()
         except error:
             continue
         if found == whole:  # the number of instructions depends on the clock by a few

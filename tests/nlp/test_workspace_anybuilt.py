@@ -379,6 +379,28 @@ def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
     assert '"joint": "1:1"' in json.dumps(data)
 
 
+@pytest.mark.parametrize("asked", ["smallest_singular_value", "condition_number"])
+def test_singular_values_of_couples_have_the_characteristic_length(asked: str) -> None:
+    """Rows are force and couple of each limb; a couple counts as the case says, not as 1."""
+    limit = f"{asked} = {{ {'max = 9' if asked[0] == 'c' else 'min = 0.1'}, length = 0.4 }}\n"
+    exact = HEAD.replace("[tolerance]\njoint_centre = 1e-3\n", "")
+    text = ROBOTS["three-upu"].replace("snu", "tsai") + limit + exact + TURN
+    case = case_from_tables(tomllib.loads(text), name="upu", source="upu.toml")
+    judged = judge_workspace(case, with_objective=False, gap=0.1)
+    (found,) = (each for each in judged.extremes if each.name == asked)
+    assert found.pose is not None
+    third = 2 * np.pi / 3 * np.arange(3)
+    radial = np.stack([np.cos(third), np.sin(third), 0 * third], axis=1)
+    arms, u = (each @ found.pose.rotation.T for each in (0.6 * radial, np.cross([0, 0, 1.0], radial)))
+    s = found.pose.position + arms - radial
+    s /= np.linalg.norm(s, axis=1)[:, None]
+    couples = s - u * (u * s).sum(axis=1)[:, None]
+    couples *= 0.5 / np.linalg.norm(couples, axis=1)[:, None]
+    J = np.block([[s, np.cross(arms, s) / 0.4], [np.zeros((3, 3)), couples / 0.4]])
+    values = np.linalg.svd(J, compute_uv=False)
+    assert found.reached == pytest.approx(values[0] / values[-1] if asked[0] == "c" else values[-1], rel=1e-9)
+
+
 def test_a_machine_far_off_is_singular() -> None:
     text = (
         '[robot]\nmodel = "6-ups"\nparameters = { rb = 1.0, rp = 0.45, base_half = 60, platform_half = 5, h = 0.8 }\n'

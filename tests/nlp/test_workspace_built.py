@@ -27,7 +27,9 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_c
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.clearance import Pair
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
+from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
@@ -239,6 +241,27 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
         errors = number.errors(points[0])
         assert errors is not None
         assert max(np.linalg.norm(part, axis=1).max() for part in errors) <= TOLERANCE
+
+
+def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> None:
+    robot, box = legs(case), pose_box(workspace_of_case(case))
+    for y in box.random(5, np.random.default_rng(3)):
+        wide = robot._replace(tolerance=float(clearance(robot, box, 0, 1).values(y[None])[0]))
+        assert clearance(wide, box, 0, 1).values(y[None])[0] == 0
+        errors = subject_of(wide, box).nearest(Pair(("", ""), (0, 1)), y)
+        assert errors is not None
+        made = errors.applied(wide)
+        assert clearance(made._replace(tolerance=0.0), box, 0, 1).values(y[None])[0] < 1e-9 * wide.tolerance
+
+
+def test_errors_of_a_machine_that_is_singular_at_every_pose_have_no_value(case: Case) -> None:
+    """Joints of base and platform at the same azimuths: Newton's method finds no pose of a machine with errors."""
+    robot = legs(case)
+    similar, box = Legs(robot.base, 0.5 * robot.base), pose_box(Workspace((0.0, 0.0, 20.0), Turns()))
+    for each in pose_errors(similar, subject_of(similar, box).problem, 1e-3, 10.0):
+        assert each.outcome is Outcome.OPEN
+        assert (each.bound, each.pose) == (math.inf, None)
+        assert math.isnan(each.reached)
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))

@@ -81,7 +81,7 @@ class Judgement:
         return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
 
 
-@one_call()
+@one_call
 def judge_workspace(
     case: Case,
     *,

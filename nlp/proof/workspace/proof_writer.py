@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from ..checker.fingerprint import fingerprint
+from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
 from ..checker.workspace.anyrobot.robotclaims import RobotClaims, robot_claims
 from ..checker.workspace.expected import ERRORS, ExpectedClaim, expected_claims

@@ -21,8 +21,8 @@ from ....errors import ScrewsynthError
 from ....program.layout import Layout
 from ...statement.machine import check_leg_error, legs_of, workspace_of_case
 from ...statement.posed_layout import extreme_program
+from ..check import check_proof
 from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
-from ..proofcheck import check_proof
 from .anyrobot.rankofrobot import rank_claim
 from .anyrobot.robotclaims import robot_claims
 from .anyrobot.signchange import show_sign_change

@@ -108,7 +108,9 @@ class OverPoses:
 
     def __init__(self, number: Number, problem: Problem, family: Family | None = None) -> None:
         self._number, self._box, self._free = number, problem.box, list(problem.free)
-        self._encloser = Encloser(problem.z if family is None else family.coordinates, number.entries)
+        # A single pose has no coordinate, and forms need one.
+        coordinates = problem.z if family is None else family.coordinates
+        self._encloser = Encloser(coordinates if coordinates.numel() else SX.sym("none"), number.entries)
         self._errors = np.zeros(0) if family is None else np.full(family.errors.numel(), family.tolerance)
 
     def values(self, points: FloatArray) -> FloatArray:
@@ -119,6 +121,8 @@ class OverPoses:
         """Return forms of the number's entries over boxes (B, 6): coordinates, their products or errors of centres."""
         errors = np.tile(self._errors, (len(lower), 1))
         ends = np.hstack([lower[:, self._free], -errors]).T, np.hstack([upper[:, self._free], errors]).T
+        if not len(ends[0]):
+            ends = np.zeros((1, len(lower))), np.zeros((1, len(lower)))
         return self._encloser(*ends) if errors.size else self._encloser.second(*ends).as_terms()
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
@@ -291,7 +295,7 @@ class _OracleRule(SmallestValue[tuple[()]]):
         found = self._oracle.bounds(lower, upper)
         centres = self._box.clipped(0.5 * lower + 0.5 * upper)
         values = self._oracle.values(centres)
-        if len(values) and is_smaller(float(np.nanmin(values)), self.best.value):
+        if len(values) and is_smaller(float(np.fmin.reduce(values)), self.best.value):
             best = first_smallest(values)
             self.best = Value(float(values[best]), centres[best])
         bound = np.fmin(-found.lower, boxes.bound[kept])
@@ -305,7 +309,7 @@ def is_smaller(value: float, known: float) -> bool:
 
 def first_smallest(values: FloatArray) -> int:
     """Return the place of the first of the smallest values (K,), up to rounding; NaN are left out."""
-    least = float(np.nanmin(values))
+    least = float(np.fmin.reduce(values))
     return int(np.argmax(values <= least + _TIE * abs(least)))
 
 

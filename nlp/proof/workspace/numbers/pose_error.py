@@ -49,6 +49,8 @@ _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=LEGS)))[: 2 ** (LE
 _STEPS = 200
 #: Steps of Newton's method for a pose whose errors are small.
 _NEWTON = 8
+#: Part of the longest leg by which lengths may differ from those that are wanted: rounding.
+_CLOSED = 1e-10
 #: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
 _GAP = 0.1
 
@@ -80,6 +82,9 @@ def pose_errors(
     for k, (name, dimension) in enumerate(names):
         y, bound = found[k].at, whole[k]
         worst = eps * searches[k].worst(y[list(problem.free)])
+        # To first order both signs give the same error.
+        both = [displaced(legs, box, y, sign * worst) for sign in (-1.0, 1.0)]
+        reached = max((each[k] for each in both if each is not None), default=math.nan)
         is_proved = math.isfinite(bound) and not found[k].reason
         reason = found[k].reason or "the errors are too large for a bound of their terms of second order"
         yield Extreme(
@@ -89,9 +94,8 @@ def pose_errors(
             key="",
             limit=None,
             bound=bound,
-            # To first order both signs give the same error.
-            reached=max(displaced(legs, box, y, sign * worst)[k] for sign in (-1.0, 1.0)),
-            pose=box.pose(y),
+            reached=reached,
+            pose=None if math.isnan(reached) else box.pose(y),
             outcome=Outcome.PROVED if is_proved else Outcome.OPEN,
             boxes=found[k].boxes,
             seconds=found[k].seconds,
@@ -173,8 +177,10 @@ def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> P
     return PoseErrors(math.inf, math.inf)
 
 
-def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> PoseErrors:
+def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> PoseErrors | None:
     """Return the errors of the pose of a machine whose legs are longer by given lengths, by Newton's method.
+
+    None where it finds no pose with these lengths, as about a singular one.
 
     Args:
         legs: joint centres.
@@ -185,14 +191,21 @@ def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> Po
     pose = box.pose(y)
     wanted = np.linalg.norm(pose.position + legs.platform @ pose.rotation.T - legs.base, axis=1) + errors
     position, rotation = np.array(pose.position), np.array(pose.rotation)
-    for _ in range(_NEWTON):
+    for k in range(_NEWTON + 1):
         arm = legs.platform @ rotation.T
         span = position + arm - legs.base
         lengths = np.linalg.norm(span, axis=1)
+        if k == _NEWTON:
+            break
         unit = span / lengths[:, None]
-        step = np.linalg.solve(np.hstack([unit, np.cross(arm, unit)]), wanted - lengths)
+        try:
+            step = np.linalg.solve(np.hstack([unit, np.cross(arm, unit)]), wanted - lengths)
+        except np.linalg.LinAlgError:
+            return None
         position = position + step[:3]
         rotation = _turned(step[3:]) @ rotation
+    if not np.abs(lengths - wanted).max() <= _CLOSED * wanted.max():
+        return None
     turned = rotation @ pose.rotation.T
     sine = np.linalg.norm([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
     angle = math.atan2(float(sine), (float(np.trace(turned)) - 1) / 2)

@@ -106,6 +106,17 @@ class Subject:
         nearer = 0.0 if self.legs is None else 2 * self.legs.tolerance
         return Clearance(self.problem.z, design.of(pair)[0], built.of(pair)[1], nearer=nearer)
 
+    def nearest(self, pair: Pair, y: FloatArray) -> JointErrors | None:
+        """Return the errors with which two legs are nearest to each other at a pose (6,); None without legs."""
+        if self.legs is None:
+            return None
+        moved, between = np.zeros_like(self.legs.base), self.clearance(pair).between(y[None, list(self.problem.free)])
+        moved[list(pair.places)] = np.array([[-1.0], [1.0]]) * between
+        errors = along(self.legs, self.box.pose(y), moved, moved)
+        # Legs that the whole errors would move through each other touch with a part of them.
+        part = min(1.0, float(np.linalg.norm(between)) / (2 * self.legs.tolerance))
+        return JointErrors(part * errors.base, part * errors.platform)
+
 
 class Question(NamedTuple):
     """A number with a search of its own.
@@ -235,14 +246,11 @@ def _worst(
     subject: Subject, question: Question, number: SingularValues | Clearance, y: FloatArray
 ) -> JointErrors | None:
     """Return the errors of legs with which a value is reached at a pose (6,); None for the design."""
-    legs, z = subject.legs, y[list(subject.problem.free)]
-    if legs is None or not legs.tolerance:
+    if subject.legs is None or not subject.legs.tolerance:
         return None
-    if isinstance(number, SingularValues) or question.pair is None:
-        return number.errors(z) if isinstance(number, SingularValues) else None
-    moved = np.zeros_like(legs.base)
-    moved[list(question.pair.places)] = np.array([[-1.0], [1.0]]) * number.between(z[None])
-    return along(legs, subject.box.pose(y), moved, moved)
+    if isinstance(number, SingularValues):
+        return number.errors(y[list(subject.problem.free)])
+    return None if question.pair is None else subject.nearest(question.pair, y)
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:
