@@ -95,23 +95,25 @@ def has_straight_legs(model: Model) -> bool:
 
 
 def legs_of(case: Case) -> Legs | None:
-    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs."""
+    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs.
+
+    Their tolerance is the case's.
+    """
     return joint_centres(case) if has_straight_legs(case.model) else None
 
 
 def joint_centres(case: Case) -> Legs | None:
-    """Return the k straight legs of a robot with fixed dimensions, with the case's tolerance; None without legs."""
-    legs = case.model.legs
-    if not legs:
-        return None
-    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in case.model.parameters])
+    """Return the straight legs of a robot with fixed dimensions, with the case's tolerance; None without legs."""
+    return Legs(*leg_joints(case), case.joint_centre_tolerance or 0.0) if case.model.legs else None
+
+
+def leg_joints(case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return the joint centres (L, 3) of the L legs of a robot with fixed dimensions, on base and platform, length."""
+    model = case.model
+    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
     parts = [value for name in case.parameters for value in case.components(name)]
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
-    outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in legs])) for end in ("base", "platform")]
+    outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
     base, platform = ca.Function("legs", [symbols], outputs).call([values])
-    shape = len(legs), 3
-    return Legs(
-        frozen_array(np.array(base).T, shape),
-        frozen_array(np.array(platform).T, shape),
-        case.joint_centre_tolerance or 0.0,
-    )
+    shape = len(model.legs), 3
+    return frozen_array(np.array(base).T, shape), frozen_array(np.array(platform).T, shape)

@@ -88,7 +88,13 @@ class Bounded(Protocol):
 
 
 class Number(Bounded, Protocol):
-    """A number with bounds and values."""
+    """A number with bounds and values.
+
+    Attributes:
+        family: all machines in whose coordinates the entries are; None for the design alone.
+    """
+
+    family: Family | None
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (K,) at points (K, n) of the design."""
@@ -100,13 +106,13 @@ class OverPoses:
     Args:
         number: the number.
         problem: the robot.
-        family: all machines that are meant; None for the design alone.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, number: Number, problem: Problem, family: Family | None = None) -> None:
+    def __init__(self, number: Number, problem: Problem) -> None:
+        family = number.family
         self._number, self._box, self._free = number, problem.box, list(problem.free)
         # A single pose has no coordinate, and forms need one.
         coordinates = problem.z if family is None else family.coordinates
@@ -405,7 +411,6 @@ class FollowedRule(LoopRule, SmallestValue[Followed]):
 def smallest_number(
     number: Number,
     problem: Problem,
-    family: Family | None = None,
     *,
     gap: float,
     limit: float | None = None,
@@ -417,7 +422,6 @@ def smallest_number(
     Args:
         number: the number.
         problem: the robot.
-        family: all machines that are meant; None for the design alone.
         gap: allowed distance of the bound from the best value known, in the number's unit.
         limit: the search ends once the bound is at least this.
         slack: how far a value may be below the limit and still count as on it.
@@ -427,7 +431,7 @@ def smallest_number(
         UncoveredError: an expression holds an operation without a rule.
     """
     if not problem.dependent:
-        over = OverPoses(number, problem, family)
+        over = OverPoses(number, problem)
         return prove_minimum(over, problem.box, gap=gap, limit=limit, slack=slack, recorder=recorder)
     loops, D, box = (
         Loops(problem.z, problem.equations, problem.equations, SX(0, 1), problem.size),
@@ -444,5 +448,5 @@ def smallest_number(
         return None if k < 0 else Value(float(values[k]), z[k])
 
     with one_search():
-        found = FollowedRule(problem, family, number, smallest_in, Goal(gap, limit, slack)).minimum()
+        found = FollowedRule(problem, number.family, number, smallest_in, Goal(gap, limit, slack)).minimum()
     return found._replace(at=problem.pose_of(found.at[: len(problem.start)]))

@@ -23,6 +23,7 @@ from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
 from ..ranks.krawczyk import by_centres
 from ..robot.posed_model import PosedModel, polynomial_rows
+from ..robot.tolerance_model import Family
 from .bound_search import Bounds
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
@@ -101,10 +102,11 @@ class Clearance:
         ends: (12, 1) ends of the links of the design in these coordinates.
         entries: (13, 1) ends of the links of all machines that are meant, times a scale, and the scale.
         nearer: by how much the links of any machine may be nearer to each other at a pose, length.
+        family: all machines in whose coordinates the entries are; None for the design.
     """
 
-    def __init__(self, z: SX, ends: SX, entries: SX, *, nearer: float = 0.0) -> None:
-        self.entries, self._nearer = ca.densify(entries), nearer
+    def __init__(self, z: SX, ends: SX, entries: SX, *, nearer: float = 0.0, family: Family | None = None) -> None:
+        self.entries, self._nearer, self.family = ca.densify(entries), nearer, family
         self._ends = ca.Function("ends", [z], [ca.densify(ends)])
 
     def values(self, z: FloatArray) -> FloatArray:

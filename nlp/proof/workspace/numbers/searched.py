@@ -18,12 +18,13 @@ from ....case.limits.singular_values import ConditionNumber, SmallestSingularVal
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ...statement.claims import asked_name, asked_spectra
-from ...statement.machine import JointErrors, Legs
+from ...statement.machine import CentreErrors, JointErrors, Legs, has_straight_legs
+from ...statement.tolerance import BuiltModel
 from ..robot.pose_box import PoseBox
 from ..robot.posed_model import posed_model
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
-from ..robot.tolerance_model import BuiltModel, Family
-from ..tolerance.legs.worst import along
+from ..robot.tolerance_model import Family
+from ..tolerance.leg_errors import along
 from ..verdict import Outcome
 from .bound_search import OverPoses, smallest_number
 from .clearance import Clearance, Ends, Pair, links_of, pairs_of
@@ -51,9 +52,9 @@ class Subject:
         box: the poses.
         legs: joint centres of straight legs, with the tolerance; None for a robot without any.
         built: the robot with errors of its joint centres, and the machines within the tolerance; None for the design
-            alone, and for six straight legs.
+            alone.
         unknown: reason why the machines that are meant are not judged; else empty.
-        shortest: no leg of the design of six straight legs is shorter over the workspace.
+        shortest: no leg of any machine is shorter over the workspace.
         design: the design over the workspace, where it is known.
     """
 
@@ -68,8 +69,14 @@ class Subject:
 
     @property
     def family(self) -> Family | None:
-        """The machines within the tolerance of a robot that is not six straight legs."""
+        """The machines within the tolerance; None for the design alone."""
         return None if self.built is None else self.built[1]
+
+    def centres(self, errors: JointErrors | None) -> CentreErrors | None:
+        """Return errors of legs by the names of centres; None for six straight legs, which are told by their legs."""
+        if errors is None or self.family is None or has_straight_legs(self.case.model):
+            return None
+        return errors.of_centres(self.family.names)
 
     @cached_property
     def problem(self) -> Problem:
@@ -86,7 +93,8 @@ class Subject:
 
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
         """Return the smallest singular value of J, or minus its condition number."""
-        legs, family = (self.legs, None) if self.family is None else (None, self.family)
+        # The change of J by errors of six straight legs has a bound of its own.
+        legs, family = (self.legs, None) if has_straight_legs(self.case.model) else (None, self.family)
         return SingularValues(
             self.problem, length, is_condition=is_condition, family=family, legs=legs, shortest=self.shortest
         )
@@ -103,8 +111,8 @@ class Subject:
     def clearance(self, pair: Pair) -> Clearance:
         """Return the distance of two links."""
         design, built = self.ends
-        nearer = 0.0 if self.legs is None else 2 * self.legs.tolerance
-        return Clearance(self.problem.z, design.of(pair)[0], built.of(pair)[1], nearer=nearer)
+        nearer, family = (0.0, self.family) if self.legs is None else (2 * self.legs.tolerance, None)
+        return Clearance(self.problem.z, design.of(pair)[0], built.of(pair)[1], nearer=nearer, family=family)
 
     def nearest(self, pair: Pair, y: FloatArray) -> JointErrors | None:
         """Return the errors with which two legs are nearest to each other at a pose (6,); None without legs."""
@@ -112,7 +120,7 @@ class Subject:
             return None
         moved, between = np.zeros_like(self.legs.base), self.clearance(pair).between(y[None, list(self.problem.free)])
         moved[list(pair.places)] = np.array([[-1.0], [1.0]]) * between
-        errors = along(self.legs, self.box.pose(y), moved, moved)
+        errors = along(self.legs, self.box.pose(y).rotation, moved, moved)
         # Legs that the whole errors would move through each other touch with a part of them.
         part = min(1.0, float(np.linalg.norm(between)) / (2 * self.legs.tolerance))
         return JointErrors(part * errors.base, part * errors.platform)
@@ -207,9 +215,7 @@ def _answer(subject: Subject, question: Question, gap: float, paper: PaperRecord
         least, slack = None if limit is None else sign * limit, 0.0 if limit is None else slack_of(limit)
         allowed = gap * max(abs(limit), _NEAR_ZERO) if limit is not None else _asked_gap(subject, number, gap)
         recorder = None if paper is None else paper.own(name)
-        found = smallest_number(
-            number, problem, subject.family, gap=allowed, limit=least, slack=slack, recorder=recorder
-        )
+        found = smallest_number(number, problem, gap=allowed, limit=least, slack=slack, recorder=recorder)
     except (UncoveredError, NotJudgedError) as error:
         return nothing_known(name, sense, dimension, str(error), key=key, limit=limit)
     # A smallest singular value of at least 0, or an infinite condition number, says nothing.
@@ -237,8 +243,8 @@ def _answer(subject: Subject, question: Question, gap: float, paper: PaperRecord
         boxes=found.boxes,
         seconds=found.seconds,
         reason=(reason or CLOSE) if outcome is Outcome.OPEN else "",
-        errors=errors if subject.family is None else None,
-        centres=None if subject.family is None or errors is None else errors.of_centres(subject.family.names),
+        errors=errors if has_straight_legs(subject.case.model) else None,
+        centres=subject.centres(errors),
     )
 
 
@@ -264,7 +270,7 @@ def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float)
     allowed = gap * (abs(float(number.values(z)[0])) or 1.0)
     if not subject.case.joint_centre_tolerance or problem.dependent:
         return allowed
-    over, rng = OverPoses(number, problem, subject.family), np.random.default_rng(_SEED)
+    over, rng = OverPoses(number, problem), np.random.default_rng(_SEED)
     points = box.random(_POINTS, rng)
     points = np.concatenate([points, box.clipped(np.where(rng.uniform(size=points.shape) < 0.5, box.lower, box.upper))])
     return allowed + float(np.nanmax(over.values(points) - over.bounds(points, points).lower, initial=0.0))

@@ -6,8 +6,9 @@ singular value and close to it, so that its largest value over the affine part i
 singular value of J itself is bounded likewise. The Frobenius norm of a rest bounds what it adds.
 
 Errors of joint centres count as further terms of the rows. Those of six straight legs, up to t, change J by a matrix
-whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg, the unit
-force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and its moment about the platform's origin by ``|a| h + t``.
+whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg of any
+machine, the unit force of a leg changes by at most ``h = 2 t / l``, and its moment about the platform's origin by
+``|a| h + t``.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from ...enclosure.forms import Forms
 from ...statement.machine import JointErrors, Legs
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
-from ..tolerance.legs.singular_values import change_of_rows, worst_rows
+from ..tolerance.leg_errors import change_of_rows, worst_rows
 from .bound_search import Bounds
 from .left_inverse import ROUNDING, RowsOver, at_corners, left_inverses, rows_over
 
@@ -40,7 +41,7 @@ class SingularValues:
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
         family: all machines that are meant, whose errors count entry by entry; None for the design alone.
         legs: joint centres of six straight legs with the tolerance that is meant; None for another robot.
-        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of legs alone.
+        shortest: no leg of any machine is shorter over the workspace; used with a tolerance of legs alone.
 
     Attributes:
         entries: (7 m, 1) the rows of J, column by column, and their sizes.
@@ -60,7 +61,7 @@ class SingularValues:
         self._legs = legs if legs is not None and legs.tolerance else None
         self._change = 0.0 if self._legs is None else change_of_rows(self._legs, length, shortest)
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
-        meant = problem.scaled if family is None else family.scaled
+        self.family, meant = family, problem.scaled if family is None else family.scaled
         self.entries = ca.vertcat(ca.vec(ca.densify(meant.rows)), meant.sizes)
         self._jacobian = ca.Function("J", [problem.z], [ca.densify(problem.scaled.jacobian)])
 
@@ -84,7 +85,8 @@ class SingularValues:
         if self._legs is None:
             return None
         y = self._problem.pose_of(z[None])
-        return worst_rows(self._legs, self._problem.box, y, self._length, self._is_condition).errors(0)
+        _, base, platform = worst_rows(self._legs, self._problem.box, y, self._length, self._is_condition)
+        return JointErrors(base[0], platform[0])
 
     def over(self, forms: Forms, count: int, errors: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""

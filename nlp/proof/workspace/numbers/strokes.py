@@ -9,11 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .....models import Dimension
+from .....models import Dimension, FloatArray
 from ....case.limits.legs import Actuator
 from ....case.task import Sense
 from ...statement.machine import Legs
-from ..tolerance.legs.worst import Directions, along, spans
+from ...statement.tolerance import Directions
+from ..robot.pose_box import PoseNumbers
+from ..tolerance.leg_errors import along, spans
 from ..verdict import Outcome
 from .extremes import Extreme, slack_of
 from .searched import Subject
@@ -39,7 +41,7 @@ class _Kind(NamedTuple):
     short: float
 
 
-def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine | None) -> list[Extreme]:
+def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine) -> list[Extreme]:
     """Return extremes, and after them those of the case's limits on telescoping legs.
 
     A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace. Where a limit
@@ -49,9 +51,9 @@ def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine |
     Args:
         subject: the robot.
         extremes: among them the smallest and the largest length of each leg.
-        refine: proves a length more finely; None where it cannot.
+        refine: proves a length more finely.
     """
-    legs, family = subject.legs, subject.family
+    legs = subject.legs
     limit = next((each for each in subject.case.limits if isinstance(each, Actuator)), None)
     found, added = list(extremes), list[Extreme]()
     if limit is None or legs is None:
@@ -70,7 +72,7 @@ def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine |
         for kind in kinds:
             name = f"{kind.key} limb {leg.name}"
             extreme = _of_lengths(name, kind, legs, i, found[short], found[long])
-            while refine is not None and (gap := _finer_gap(kind, extreme, found[short], found[long])) is not None:
+            while (gap := _finer_gap(kind, extreme, found[short], found[long])) is not None:
                 finer = [refine(i, sense, gap, None) for sense in (Sense.MIN, Sense.MAX)]
                 if finer[0] is None or finer[1] is None:
                     break
@@ -78,11 +80,9 @@ def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine |
                 before, extreme = extreme, _of_lengths(name, kind, legs, i, found[short], found[long])
                 if extreme.bound == before.bound:
                     break
-            if refine is not None:
-                extreme = _of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine)
-            if family is not None and extreme.errors is not None:
-                extreme = replace(extreme, errors=None, centres=extreme.errors.of_centres(family.names))
-            added.append(extreme)
+            extreme = _of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine)
+            centres = subject.centres(extreme.errors)
+            added.append(extreme if centres is None else replace(extreme, errors=None, centres=centres))
     return [*found, *added]
 
 
@@ -102,12 +102,12 @@ def _of_one_machine(
     poses = [each.pose for each in ends if each.pose is not None]
     if not legs.tolerance or extreme.outcome is not Outcome.OPEN or len(poses) < 2:
         return extreme
-    at = [spans(legs, pose).n[i] for pose in poses]
+    at = [_directions(legs, pose)[i] for pose in poses]
     turned = [n @ pose.rotation for n, pose in zip(at, poses, strict=True)]
-    about = Directions(0.5 * (at[0] + at[1]), 0.5 * (turned[0] + turned[1]), extreme.name)
+    about = Directions(extreme.name, 0.5 * (at[0] + at[1]), 0.5 * (turned[0] + turned[1]))
     sign = 1.0 if kind.sense is Sense.MAX else -1.0
     # What does not cancel: nothing in a stroke.
-    left = abs(kind.long + kind.short) * legs.tolerance * sum(float(np.linalg.norm(each)) for each in about[:2])
+    left = abs(kind.long + kind.short) * legs.tolerance * sum(float(np.linalg.norm(each)) for each in about[1:])
     for gap in _GAPS:
         short, long = (refine(i, sense, gap, about) for sense in (Sense.MIN, Sense.MAX))
         if short is None or long is None:
@@ -118,6 +118,12 @@ def _of_one_machine(
         if sign * (extreme.bound - kind.limit) <= slack_of(kind.limit):
             return replace(extreme, outcome=Outcome.PROVED, reason="")
     return extreme
+
+
+def _directions(legs: Legs, pose: PoseNumbers) -> FloatArray:
+    """Return the unit directions (6, 3) of the legs at a pose."""
+    d = spans(legs, pose)
+    return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
 
 
 def _finer_gap(kind: _Kind, extreme: Extreme, short: Extreme, long: Extreme) -> float | None:
@@ -147,14 +153,14 @@ def _of_lengths(name: str, kind: _Kind, legs: Legs, i: int, short: Extreme, long
     reached, errors = kind.long * long.reached + kind.short * short.reached, None
     if legs.tolerance and short.pose is not None and long.pose is not None:
         # One machine has both lengths: its errors are along the change of the number, to first order.
-        at = [spans(legs, pose).n for pose in (long.pose, short.pose)]
+        at = [_directions(legs, pose) for pose in (long.pose, short.pose)]
         turned = [n @ pose.rotation for n, pose in zip(at, (long.pose, short.pose), strict=True)]
         base, platform = np.zeros_like(legs.base), np.zeros_like(legs.base)
         base[i] = -sign * (kind.long * at[0][i] + kind.short * at[1][i])
         platform[i] = sign * (kind.long * turned[0][i] + kind.short * turned[1][i])
-        errors = along(legs, replace(long.pose, rotation=np.eye(3)), base, platform)
+        errors = along(legs, np.eye(3), base, platform)
         machine = errors.applied(legs)
-        lengths = [float(spans(machine, pose).l[i]) for pose in (long.pose, short.pose)]
+        lengths = [float(np.linalg.norm(spans(machine, pose)[i])) for pose in (long.pose, short.pose)]
         reached = kind.long * lengths[0] + kind.short * lengths[1]
     slack, outcome = slack_of(kind.limit), Outcome.OPEN
     if sign * (reached - kind.limit) > slack:
