@@ -52,7 +52,7 @@ class LeftInverses:
 def at_corners(linear: FloatArray) -> FloatArray:
     """Return the sums (B, 2^f, r, m) of linear parts (B, f, r, m) at the corners of boxes."""
     f = linear.shape[1]
-    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=f))).reshape(-1, f)
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=f))).reshape(2**f, f)
     return np.asarray(np.einsum("sf,bfij->bsij", signs, linear))
 
 
