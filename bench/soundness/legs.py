@@ -1,4 +1,4 @@
-"""Straight legs between joint centres, in NumPy from a case's tables alone: numbers of many poses and machines at once."""
+"""Straight legs between joint centres, in NumPy from a case's tables: numbers of many poses and machines at once."""
 
 from __future__ import annotations
 
@@ -152,7 +152,6 @@ class Legs:
         self.tasks = {each.get("name", "task 1"): twist_of(each) for each in tables["task"]}
         self.limits = tables.get("limits", {})
         self.parameters = given
-        self.home = self.limits.get("home")
 
     def values(
         self, poses: Poses, base_errors: Array | float = 0.0, platform_errors: Array | float = 0.0
@@ -240,13 +239,14 @@ class Legs:
         return segment_distance(b[:, one], a[:, one], b[:, other], a[:, other])
 
     def mounting(self, plate: str, about: Any, platform: Array, base: Array) -> Array:  # noqa: ANN401
-        """Return mounting axes ([N,] m, 3) in the frame of a plate: from home, along the legs of the design for six legs,
-        and of the machine for another robot."""
+        """Return mounting axes ([N,] m, 3) in the frame of a plate.
+
+        From home, they are along the legs of the design of six legs, and of the machine of another robot.
+        """
         if about == "normal":
             return np.broadcast_to(Z, self.base.shape)
         if about == "home":
-            home = self.home
-            assert home is not None
+            home = self.limits["home"]
             R = turned(
                 np.array(home.get("axis", [0, 0, 1.0]), float)[None], np.array([home.get("angle", 0.0) * self.unit])
             )[0]

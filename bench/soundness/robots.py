@@ -1,8 +1,8 @@
-"""Robots of the gallery from their files alone, in NumPy: joints moved by exponentials, loops closed by Newton's method.
+"""Robots of the gallery from their files, in NumPy: joints moved by exponentials, loops closed by Newton's method.
 
 Every joint is one or more turns or slides about axes at home; a limb is a trunk and branches, each from the base to the
-platform. Poses and joints of many machines are computed at once: those of a pose that a robot cannot have are projected to
-one that it can. Ranks are those of velocities, as in docs/formulation.md, and F that of projectors.
+platform. Poses and joints of many machines are computed at once: a pose that a robot cannot have is projected to one
+that it can. Ranks are those of velocities, as in docs/formulation.md, and F that of projectors.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Turn(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """The turns from the base to the platform, the limb, and the member's centre: a turn that carries it, and its point."""
+    """The turns from base to platform, the limb, and the member's centre: a turn that carries it, and its point."""
 
     turns: list[Turn]
     limb: int
@@ -142,7 +142,7 @@ class Robot:
             if one.slides or other.slides or one.coordinate == other.coordinate:
                 continue
             p, q = self.points[one.centre], self.points[other.centre]
-            t, rest, rank, _ = np.linalg.lstsq(np.stack([one.axis, -other.axis], 1), q - p, rcond=1e-9)
+            t, _, rank, _ = np.linalg.lstsq(np.stack([one.axis, -other.axis], 1), q - p, rcond=1e-9)
             at = p + t[0] * one.axis
             if rank == 2 and np.linalg.norm(at - q - t[1] * other.axis) < 1e-9:
                 if one.centre == other.centre:
@@ -153,7 +153,7 @@ class Robot:
         return passive[-1], turns[passive[-1]].centre
 
     def moved(self, q: Array, points: Array) -> tuple[Array, Array, Array]:
-        """Return displacements (N, chains, 4, 4), screws (N, chains, 6, count) as (v at origin, omega), centres (N, chains, 3)."""
+        """Return displacements (N, chains, 4, 4), screws (N, chains, 6, count), and centres (N, chains, 3)."""
         n, m = len(q), len(self.chains)
         T = np.tile(np.eye(4), (n, m, 1, 1))
         S, centres = np.zeros((n, m, 6, self.count)), np.zeros((n, m, 3))
@@ -244,7 +244,7 @@ def cross_matrix(p: Array) -> Array:
 
 
 def numbers(robot: Robot, poses: Poses, q: Array, points: Array, chi: Array) -> dict[str, Array]:
-    """Return F and its shares, and singular values of motions with actuators locked and free, in parts of the robot's size."""
+    """Return F, its shares, and singular values of motions with actuators locked and free, by the robot's size."""
     n, m = len(q), len(robot.chains)
     _, S, centres = robot.moved(q, points)
     size = float(np.abs(robot.points_array).max())

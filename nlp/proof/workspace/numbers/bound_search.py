@@ -23,7 +23,6 @@ from ...enclosure.forms import Encloser, Forms
 from ..ranks.covering import APART, Followed, LoopRule
 from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
 from ..ranks.rank_rule import Tested
-from ..robot.closed_loops import Loops
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
@@ -433,11 +432,7 @@ def smallest_number(
     if not problem.dependent:
         over = OverPoses(number, problem)
         return prove_minimum(over, problem.box, gap=gap, limit=limit, slack=slack, recorder=recorder)
-    loops, D, box = (
-        Loops(problem.z, problem.equations, problem.equations, SX(0, 1), problem.size),
-        list(problem.dependent),
-        problem.box,
-    )
+    loops, D, box = problem.loops, list(problem.dependent), problem.box
 
     def smallest_in(boxes: LoopBoxes) -> Value | None:
         """Return the smallest value of the design in the middle of boxes."""

@@ -22,7 +22,7 @@ from casadi import SX
 from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
 from ..ranks.krawczyk import by_centres
-from ..robot.posed_model import PosedModel, polynomial_rows
+from ..robot.posed_robot import PosedModel
 from ..robot.tolerance_model import Family
 from .bound_search import Bounds
 
@@ -81,12 +81,7 @@ class Ends:
     def __init__(self, posed: PosedModel, model: Model) -> None:
         self.links = links_of(model)
         ends = ca.vertcat(SX(0, 1), *[part for each in self.links for part in (each.start, each.end)])
-        plain, turned = (
-            ca.horzcat(each, SX.ones(ends.shape[0])) for each in posed.both(ca.Function("ends", posed.symbols, [ends]))
-        )
-        rows = polynomial_rows(plain, turned, posed)
-        scaled = [rows[i, 0] * (posed.scale if rows[i, 1].is_one() else 1) for i in range(rows.shape[0])]
-        self._scaled, self._plain, self.scale = ca.vertcat(SX(0, 1), *scaled), plain[:, 0], posed.scale
+        (self._plain, self._scaled), self.scale = posed.scaled_points(ends), posed.scale
 
     def of(self, pair: Pair) -> tuple[SX, SX]:
         """Return the ends of two links, (12, 1), and these times the scale, with it, (13, 1)."""

@@ -21,8 +21,7 @@ from ...statement.claims import asked_name, asked_spectra
 from ...statement.machine import CentreErrors, JointErrors, Legs, has_straight_legs
 from ...statement.tolerance import BuiltModel
 from ..robot.pose_box import PoseBox
-from ..robot.posed_model import posed_model
-from ..robot.posed_robot import NotJudgedError, Problem, build_problem
+from ..robot.posed_robot import NotJudgedError, Problem, build_problem, posed_model
 from ..robot.tolerance_model import Family
 from ..tolerance.leg_errors import along
 from ..verdict import Outcome
