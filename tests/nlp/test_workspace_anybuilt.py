@@ -466,7 +466,7 @@ def test_clearance_and_strokes_of_three_legs_hold_for_every_machine() -> None:
     bounds = []
     for each in (case, replace(case, joint_centre_tolerance=None)):
         judged = judge_workspace(each, with_objective=False)
-        found = {one.name: one for one in judged.extremes if one.key.startswith(("leg_clearance", "actuator"))}
+        found = {one.name: one for one in judged.extremes if one.key.startswith(("leg_clearance", "actuator."))}
         assert len(found) == 6
         assert {one.outcome for one in found.values()} == {Outcome.PROVED}
         bounds.append(found)
