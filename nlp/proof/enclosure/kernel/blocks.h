@@ -38,8 +38,9 @@ static void read_form2(Box *x, int rows, Store out, int l)
 {
     int n = x->n;
     for (int k = 0; k < rows; k++) {
-        Form2 *v = form2_of(out, k);
-        const Lane *a = terms_of_form2(v), *Q = a + n;
+        Form2 *form = form2_of(out, k);
+        const Value *v = &form->v;
+        const Lane *a = terms_of_form2(form), *Q = a + n;
         x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
         x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
         double *H = x->gA + k * n * n;

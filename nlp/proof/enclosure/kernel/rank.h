@@ -214,15 +214,16 @@ static RankParts carve_rank(const Matrix *m, int n, double *memory)
 static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py_ssize_t start, RankParts x)
 {
     for (int e = 0; e < m->entries; e++) {
-        Form2 *v = form2_of(out, e);
-        const Lane *terms = terms_of_form2(v);
+        Form2 *form = form2_of(out, e);
+        const Value *v = &form->v;
+        const Lane *terms = terms_of_form2(form);
         double scale = m->scale[e];
         double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
         EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        EACH_OF(i, 0, v->terms.linear)
+        EACH_OF(i, 0, form->terms.linear)
         {
             EACH size[l] += fabs(terms[i][l]);
-            EACH_OF(j, i, v->terms.pairs[i])
+            EACH_OF(j, i, form->terms.pairs[i])
             {
                 const double *term = terms[n + row_of(n, i) + j];
                 if (i == j)
