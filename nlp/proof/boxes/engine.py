@@ -292,6 +292,11 @@ def objective_tape(form: StandardForm, length: int) -> Tape | None:
     """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
     if form.n > MOST_VARIABLES or not form.conditions:
         return None
+    # Without derivatives it is shorter, and mostly too long already.
+    values = ca.Function("values", [form.x], [ca.cse(ca.vertcat(*form.functions))])
+    shortest = sum(values.instruction_id(k) != ca.OP_CONST for k in range(values.n_instructions()))
+    if (shortest + len(form.functions) * form.n) * _MANY_CONDITIONS > length:
+        return None
     tape = search_tape(without_conditions(form))
     return tape if len(tape) * _MANY_CONDITIONS <= length else None
 
