@@ -13,8 +13,8 @@ from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Free, Rotation, Solution, Task, load_case, solve
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import Certificate
+from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import program_of
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
 from screwsynth.nlp.solver.certified import certify, proof_of
 
 LIMIT = 60.0

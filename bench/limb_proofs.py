@@ -17,9 +17,9 @@ from screwsynth.nlp import Case, Free, Rotation, load_case, solve
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
-from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.check import check_proof
+from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests" / "models")]
 from limb_cases import poses  # noqa: E402 - the tests' cases

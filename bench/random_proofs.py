@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from screwsynth.nlp import case_from_tables
+from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import program_of
 from screwsynth.nlp.proof.checker.proof_file import ProofError
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
 from screwsynth.nlp.solver.certified import certify, proof_of
 from screwsynth.nlp.solver.solve import solve
 

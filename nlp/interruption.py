@@ -19,12 +19,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
+from functools import wraps
 from pathlib import Path
 from threading import Event, Lock
 from types import FrameType
-from typing import NamedTuple
+from typing import NamedTuple, ParamSpec, TypeVar
 
+Inputs = ParamSpec("Inputs")
+Result = TypeVar("Result")
 #: Exit status of an interrupted command, by the convention of shells: 128 and the number of the signal.
 INTERRUPTED = 130
 #: Seconds that interrupted work may take to show what it has, and that a file may take to be complete.
@@ -167,17 +170,22 @@ def one_search(seconds: float | None = None) -> AbstractContextManager[None]:
     return within(left * part if seconds is None else min(seconds, left * part))
 
 
-@contextmanager
-def one_call() -> Iterator[None]:
-    """Let an interrupt that ends a search end all others of this block, or of the outermost one, at once too."""
-    if _call.get() is not None:
-        yield
-        return
-    token = _call.set(Event())
-    try:
-        yield
-    finally:
-        _call.reset(token)
+def one_call(function: Callable[Inputs, Result]) -> Callable[Inputs, Result]:
+    """Let an interrupt that ends a search of a function, or of the outermost one, end all its others at once too.
+
+    The outermost call runs in a copy of its context: an interrupt at any moment of it leaves no time limit and no
+    request behind in a program that goes on.
+    """
+
+    @wraps(function)
+    def call(*args: Inputs.args, **kwargs: Inputs.kwargs) -> Result:
+        if _call.get() is not None:
+            return function(*args, **kwargs)
+        context = copy_context()
+        context.run(_call.set, Event())
+        return context.run(function, *args, **kwargs)
+
+    return call
 
 
 def reason_of(search: Callable[[], str]) -> str:

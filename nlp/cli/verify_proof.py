@@ -68,9 +68,9 @@ def _verify(proof: Proof, case: Case, above: float | None, *, all_assemblies: bo
         Exit: with status 1 where the proof does not hold.
     """
     from ..errors import one_line
+    from ..proof.checker.check import check_proof
     from ..proof.checker.premises import claim_words, hold_statement, program_of
     from ..proof.checker.proof_file import ProofError
-    from ..proof.checker.proofcheck import check_proof
 
     try:
         hold_statement(case, proof.statement, above=above, all_assemblies=all_assemblies)

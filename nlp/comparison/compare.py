@@ -71,7 +71,7 @@ class Comparison:
         return tuple(each for each in self.entries if part_of(each) == "ranked")
 
 
-@one_call()
+@one_call
 def compare(
     case: Case,
     robots: Sequence[str | Path | Model],

@@ -79,7 +79,7 @@ class Front:
     seconds: float
 
 
-@one_call()
+@one_call
 def find_front(
     case: Case,
     goals: tuple[Goal, ...],

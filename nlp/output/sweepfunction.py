@@ -12,7 +12,7 @@ import numpy as np
 from ...models import FloatArray
 from ..case.case import Case
 from ..errors import InputError, check_seconds
-from ..interruption import within
+from ..interruption import one_call, within
 from ..sweeps.columns import SweepColumns, columns_of
 from ..sweeps.engines import EngineKind
 from ..sweeps.points import Points, grid_of
@@ -21,6 +21,7 @@ from ..sweeps.sweep import Sweep, SweepProgress, run_sweep
 from .sweeptable import check_table, is_written, table_rows, write_table
 
 
+@one_call
 def sweep(
     case: Case,
     over: Mapping[str, Iterable[float]] | None = None,

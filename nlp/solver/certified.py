@@ -17,8 +17,7 @@ from ..proof.boxes.engine import search_tape
 from ..proof.boxes.tree import TreeRecord
 from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
 from ..proof.certificate.certificate import Certificate, CertificateStatus
-from ..proof.checker.fingerprint import fingerprint
-from ..proof.checker.premises import check_minimum, has_both_senses, has_modes, program_of
+from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses, has_modes, program_of
 from ..proof.checker.proof_file import Proof, Statement
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
@@ -94,7 +93,7 @@ class Certified(Whole, Shown, Answer):
         return all(each.status is CertificateStatus.PROVED for each in every)
 
 
-@one_call()
+@one_call
 def certify(
     found: Case | Solution,
     *,

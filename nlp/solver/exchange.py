@@ -88,7 +88,7 @@ class Exchanged(NamedTuple):
     proof: WorkspaceProof | None
 
 
-@one_call()
+@one_call
 def solve_over_workspace(case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None) -> Exchanged:
     """Return the solution of a case whose limits hold over its workspace, and the proof.
 

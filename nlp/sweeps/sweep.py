@@ -93,7 +93,7 @@ class Sweep:
         return Journal(Path(f"{out}{ENDING}"), self.fingerprint, len(self.points))
 
 
-@one_call()
+@one_call
 def run_sweep(
     sweep: Sweep,
     journal: Journal,

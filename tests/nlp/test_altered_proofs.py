@@ -23,8 +23,7 @@ from hexapods import hexapod_text
 from screwsynth.nlp import InputError, case_from_tables
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.checker import proof_file
-from screwsynth.nlp.proof.checker.fingerprint import fingerprint
-from screwsynth.nlp.proof.checker.premises import program_of
+from screwsynth.nlp.proof.checker.premises import fingerprint, program_of
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim, Statement, WorkspaceProof
 
 Run = Callable[..., tuple[int, str, str]]

@@ -8,9 +8,9 @@ import pytest
 from casadi import SX
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.proof.checker.limbs.limbpart import LimbPartChecker
-from screwsynth.nlp.proof.checker.parts import Claim
-from screwsynth.nlp.proof.checker.polynomialrules import PolynomialArithmetic
+from screwsynth.nlp.proof.checker.bisection import show
+from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
+from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
 from screwsynth.nlp.proof.checker.tree import Node
@@ -69,13 +69,6 @@ def test_a_step_is_known_where_its_argument_has_one_sign() -> None:
             assert (np.abs(side[:, known]) < 1e-300).all()
 
 
-class Nothing:
-    """What shows no claim."""
-
-    def show(self, kind: Node, index: int, claims: list[Claim]) -> int:
-        raise ProofError(f"{len(claims)} claims {kind} {index} are left")
-
-
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_bounds_of_a_limb_are_shown_for_the_boxes_claimed(count: int, side: int) -> None:
@@ -89,10 +82,14 @@ def test_bounds_of_a_limb_are_shown_for_the_boxes_claimed(count: int, side: int)
         upper = lower + rng.uniform(0.01, 0.2, (count, 2))
         corner = upper if side > 0 else -lower
         highest = float(((5 + corner[:, 0] + 2 * corner[:, 1]) ** 2 / (4 - corner[:, 0])).max())
-        claims = [Claim(Node.BOUNDED, 0, *ends) for ends in zip(lower, upper, strict=True)]
-        assert LimbPartChecker(form, highest + 1e-6, Nothing()).show(Node.BOUNDED, 0, claims) >= count
-        with pytest.raises(ProofError, match="are left"):
-            LimbPartChecker(form, highest - 1e-6, Nothing()).show(Node.BOUNDED, 0, claims)
+        for more, is_shown in ((1e-6, True), (-1e-6, False)):
+            bounds = np.full(count, highest + more)
+            claims = Claims(form, Node.BOUNDED, 0, lower.T, upper.T, bounds)
+            if is_shown:
+                assert show(rule_of(claims), claims.lower, claims.upper) >= count
+            else:
+                with pytest.raises(ProofError, match="could not be shown"):
+                    show(rule_of(claims), claims.lower, claims.upper)
 
 
 def sign_of(block: np.ndarray) -> int:

@@ -17,7 +17,7 @@ from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.proof.boxes.engine import Engine, Verdict
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
+from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.statement import standard_form as statement
 from screwsynth.nlp.proof.statement.form import StandardForm
 from screwsynth.nlp.proof.statement.standard_form import is_in_home_mode, standard_form

@@ -6,7 +6,6 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from contextvars import copy_context
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -27,7 +26,7 @@ from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.interruption import STOPPED, is_requested
+from screwsynth.nlp.interruption import STOPPED, is_requested, one_call
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.boxes.optimum import OptimumRule
 from screwsynth.nlp.proof.certificate import branch_and_bound
@@ -193,7 +192,7 @@ class Bowl:
 
 def bowl() -> Claim:
     found = prove_minimum(Bowl(), legs_and_box()[1], gap=0.2)
-    assert found.bound <= -1.0 <= found.value == Bowl().values(found.y[None])[0]
+    assert found.bound <= -1.0 <= found.value == Bowl().values(found.at[None])[0]
     return Claim(not found.reason, found.bound, found.reason == STOPPED)
 
 
@@ -281,9 +280,8 @@ def interrupted(search: Search, error: type[BaseException], watched: tuple[str, 
     answers = 0
     for n in np.random.default_rng(seed).integers(1, instructions + 1, moments).tolist():
         try:
-            # An interrupt may leave context variables as they are: those of a copy.
             with at_instruction(n, error, watched):
-                found = copy_context().run(search)
+                found = one_call(search)()
         except error:
             continue
         if found == whole:  # the number of instructions depends on the clock by a few

@@ -21,9 +21,9 @@ from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.check import check_proof
+from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
 from screwsynth.nlp.proof.enclosure.quadratic_models import QuadraticModel
 from screwsynth.nlp.proof.statement.limb_separation import separate
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form

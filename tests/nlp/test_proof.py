@@ -16,12 +16,10 @@ import pytest
 
 from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.proof.checker.fingerprint import fingerprint, is_same_program
-from screwsynth.nlp.proof.checker.parts import read_claims
-from screwsynth.nlp.proof.checker.premises import program_of
+from screwsynth.nlp.proof.checker.check import check_proof
+from screwsynth.nlp.proof.checker.premises import fingerprint, is_same_program, program_of
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
-from screwsynth.nlp.proof.checker.tree import Leaf, Node, TreeReader
+from screwsynth.nlp.proof.checker.tree import Leaf, Node, TreeReader, read_claims
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 from screwsynth.nlp.solver.certified import certify, proof_of
 

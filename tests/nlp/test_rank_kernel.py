@@ -24,12 +24,13 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
+from screwsynth.nlp.proof.statement.tolerance import built_model
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, built_model, family_of
+from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, family_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 FOLDER = Path(__file__).parents[2] / "nlp" / "proof" / "enclosure"
@@ -86,7 +87,7 @@ def test_the_kernel_agrees_with_the_reference_box_by_box(tolerance: float) -> No
     box = problem.box
     lower = box.random(300, rng)
     upper = lower + (box.upper - box.lower) * rng.uniform(0, 0.2, (300, 1))
-    cells = Cells(lower, upper, 0.5 * (lower + upper), np.ones(300, dtype=bool))
+    cells = LoopBoxes(lower, upper, 0.5 * (lower + upper), np.ones(300, dtype=bool))
     ours, theirs = (
         Examiner(problem, test(meant.locked, z, meant.start), family).examine(cells)
         for test in (RankTest, NumpyRankTest)
@@ -171,7 +172,7 @@ def is_found(copy: Copy, problem: Problem, family: Family | None = None) -> bool
         half = problem.size * rng.uniform(0.05, 0.5) * free
         centre = problem.start + 0.5 * problem.size * rng.uniform(-1, 1, n)
         lower, upper = (centre - half)[None], (centre + half)[None]
-        found = examiner.examine(Cells(lower, upper, centre[None], np.ones(1, dtype=bool)))
+        found = examiner.examine(LoopBoxes(lower, upper, centre[None], np.ones(1, dtype=bool)))
         C, B, V = copy.kept(columns)
         if found.is_regular[0] and np.abs(np.linalg.eigvals(B)).max() >= 1:
             return True

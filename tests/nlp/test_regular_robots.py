@@ -26,9 +26,8 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.spectrum import Spectrum
 from screwsynth.nlp.proof.workspace.ranks import loop_boxes
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
-from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
-from screwsynth.nlp.proof.workspace.ranks.refuters import BY_NEWTON
-from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
+from screwsynth.nlp.proof.workspace.ranks.search import BY_NEWTON, prove_rank
 from screwsynth.nlp.proof.workspace.robot.motion_matrix import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
@@ -52,7 +51,7 @@ def problem_of(name: str, part: float, degrees: float) -> Problem:
     return build_problem(case, closed_form(model).model, box)
 
 
-def random_cells(problem: Problem, count: int, width: float, rng: np.random.Generator) -> Cells:
+def random_cells(problem: Problem, count: int, width: float, rng: np.random.Generator) -> LoopBoxes:
     """Boxes of independent coordinates with random places and widths, within the whole box."""
     n, own = len(problem.start), list(problem.independent)
     lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)
@@ -61,7 +60,7 @@ def random_cells(problem: Problem, count: int, width: float, rng: np.random.Gene
     middle = problem.start[own] + (size - half) * rng.uniform(-1, 1, half.shape)
     lower[:, own], upper[:, own] = middle - half, middle + half
     near = np.broadcast_to(problem.start, (count, n)).copy()
-    return Cells(lower, upper, near, np.full(count, not problem.dependent))
+    return LoopBoxes(lower, upper, near, np.full(count, not problem.dependent))
 
 
 def wrong_boxes(problem: Problem, matrix: RankMatrix, width: float, seed: int) -> tuple[int, int]:
@@ -77,7 +76,7 @@ def wrong_boxes(problem: Problem, matrix: RankMatrix, width: float, seed: int) -
     function = ca.Function("M", [problem.z], [ca.densify(matrix.matrix)])
     wrong = 0
     for k in np.flatnonzero(found.is_regular):
-        low, high = found.cells.lower[k], found.cells.upper[k]
+        low, high = found.boxes.lower[k], found.boxes.upper[k]
         z = np.broadcast_to(0.5 * low + 0.5 * high, (12, len(low))).copy()
         corners = rng.choice([0.0, 1.0], (12, len(own)))
         z[1:, own] = (

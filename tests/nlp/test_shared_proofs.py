@@ -19,13 +19,12 @@ from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.checker.fingerprint import fingerprint
-from screwsynth.nlp.proof.checker.limbs.sharedtree import Leaf, leaf_bytes, read_shared
-from screwsynth.nlp.proof.checker.limbs.tilted import TiltedForm
-from screwsynth.nlp.proof.checker.limbs.tilts import sum_of_tilts, tilts_over
+from screwsynth.nlp.proof.checker.check import check_proof
+from screwsynth.nlp.proof.checker.polymodels import Tilts, forms_of, polynomial_sum
+from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic, difference
+from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Statement
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
-from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.checker.tree import Node, SharedLeaf, leaf_bytes, read_shared
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
 
@@ -64,11 +63,12 @@ def proof(best: ProgramSolution) -> Proof:
     return proof_of(best.nlp, GAP, best.x)
 
 
-def middle_leaf(proof: Proof, nlp: Nlp) -> Leaf:
+def middle_leaf(proof: Proof, nlp: Nlp) -> SharedLeaf:
     """The leaf whose box is nearest to home's rotation, in which poses are feasible."""
     _, found = separated(nlp.case)
     assert found.common is not None
-    leaves = read_shared(proof.tree, found.common.lower, found.common.upper, len(found.limbs)).bounded
+    leaves = read_shared(proof.tree, found.common.lower, found.common.upper, len(found.limbs))
+    leaves = [each for each in leaves if np.isfinite(each.bounds).all()]
     return min(leaves, key=lambda each: float(np.linalg.norm(np.clip(0.0, each.lower[3:], each.upper[3:]))))
 
 
@@ -179,7 +179,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
 
 
 @pytest.mark.parametrize("kind", ["limb", "minus limb", "zeros", "minus zeros"])
-def test_models_of_limbs_without_tilts_bound_every_point(kind: str) -> None:
+def test_models_of_limbs_minus_tilts_bound_every_point(kind: str) -> None:
     """phi_k - t_k at random points of random pieces of random boxes, for both signs of the squared quotients."""
     _, found = separated(near_home())
     m, limb = len(found.shared), found.limbs[1].form
@@ -199,30 +199,19 @@ def test_models_of_limbs_without_tilts_bound_every_point(kind: str) -> None:
     outer = low[:m] - rng.random((m, L)) * room[:m], high[:m] + rng.random((m, L)) * room[:m]
     scale = 10.0 ** rng.uniform(-1, 2, L) * rng.integers(0, 2, L)
     Q = rng.normal(size=(m, m, L)) * scale
-    tilts = tilts_over(*outer, rng.normal(size=(m, L)) * scale, Q + Q.swapaxes(0, 1))
-    form = TiltedForm(limb)
-    slopes = form.slopes(low, high)
-    assert [each.factor for each in slopes.squares] == [sign]
-    (model,) = form.sums(slopes, tilts)
-    bound = model.bound()
-    assert slopes.defined.all()
+    tilts = Tilts.over(*outer, rng.normal(size=(m, L)) * scale, Q + Q.swapaxes(0, 1))
+    with np.errstate(all="ignore"):
+        (value,) = PolynomialArithmetic(ca.Function("f", [limb.x], [limb.functions[0]]))(low, high)
+        assert np.isfinite(value.s).all()
+        forms = forms_of([difference(value, tilts.polynomial(low, high))], low, high, limb)
+        bound = polynomial_sum(forms, np.ones((1, L))).bound()
     share = np.concatenate([rng.random((limb.n, L, points)), rng.integers(0, 2, (limb.n, L, points))], axis=2)
     x = low[:, :, None] + share * size[:, :, None]
     flat = x.reshape(limb.n, -1)
     value = ca.Function("f", [limb.x], [limb.functions[0]]).map(flat.shape[1])(flat).full().reshape(L, -1)
     t = tilts.select(np.repeat(np.arange(L), 2 * points)).at(flat[:m]).reshape(L, -1)
     excess = (value - t).max(axis=1) - bound
-    slack = 1e-14 * (np.abs(value).max(axis=1) + tilts.total())
-    assert (excess <= slack).all()
-    # Ranges of the parts, without tilts: they show no bound that a point exceeds.
-    largest = value.max(axis=1)
-    assert not slopes.is_below(largest - slack).any()
-    assert slopes.is_below(2 * np.abs(largest) + 1e6).all()
+    size = np.abs(value).max(axis=1) + tilts.sizes()
+    assert (excess <= 1e-14 * size).all()
     # The bound is no wider than it must be: at small boxes it is reached.
-    assert (np.median(-excess) < 0.5 * np.median(np.abs(value).max(axis=1) + tilts.total())) or "zeros" in kind
-    gradient = ca.Function("g", [limb.x], [ca.jacobian(limb.functions[0], limb.x).T]).map(flat.shape[1])(flat).full()
-    gradient = gradient.reshape(limb.n, L, -1)
-    slack = 1e-12 * np.abs(gradient).max(axis=(0, 2))
-    assert (gradient.min(axis=2) >= slopes.rises_low - slack).all()
-    assert (gradient.max(axis=2) <= slopes.rises_high + slack).all()
-    assert np.allclose(sum_of_tilts([tilts, tilts]).g, 2 * tilts.g)
+    assert (np.median(-excess) < 0.5 * np.median(size)) or "zeros" in kind

@@ -19,9 +19,9 @@ from screwsynth.nlp.program.layout import lay_out
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.checker.fingerprint import fingerprint
+from screwsynth.nlp.proof.checker.check import check_proof
+from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties

@@ -13,7 +13,15 @@ import pytest
 from hexapods import SMALL
 
 from screwsynth.nlp import InputError, certify, interruption, load_case, solve
-from screwsynth.nlp.interruption import is_requested, one_search, reason_of, seconds_left, stop_if_requested, within
+from screwsynth.nlp.interruption import (
+    is_requested,
+    one_call,
+    one_search,
+    reason_of,
+    seconds_left,
+    stop_if_requested,
+    within,
+)
 from screwsynth.nlp.output.sweepfunction import sweep
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
@@ -69,6 +77,18 @@ def test_blocks_take_from_the_time_that_is_left(clock: Clock) -> None:
         clock.now = 9.0
         assert (seconds_left(), is_requested()) == (0.0, True)
     assert not is_requested()
+
+
+def test_an_interrupt_between_two_instructions_leaves_no_time_limit() -> None:
+    @one_call
+    def work() -> None:
+        interruption._end.set(interruption._End(at=0.0))  # as in ``within``, before its block begins
+        assert seconds_left() == 0
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert seconds_left() == np.inf
 
 
 def test_only_a_search_is_stopped_in_its_set_up(clock: Clock) -> None:

@@ -17,8 +17,8 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.proof_file import ProofError
-from screwsynth.nlp.proof.checker.proofcheck import check_proof
 from screwsynth.nlp.proof.statement.standard_form import is_in_home_mode, standard_form
 from screwsynth.nlp.solver.certified import proof_of
 

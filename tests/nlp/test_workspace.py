@@ -31,8 +31,7 @@ from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
-from screwsynth.nlp.proof.workspace.slices.regions import Region
-from screwsynth.nlp.proof.workspace.slices.slices import slices_of
+from screwsynth.nlp.proof.workspace.slices.slices import Region, slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema

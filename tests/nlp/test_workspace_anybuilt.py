@@ -27,12 +27,12 @@ from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
-from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Cells, Examiner
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
-from screwsynth.nlp.proof.workspace.tolerance import first_order_change as firstorder
 from screwsynth.nlp.proof.workspace.tolerance import machine_number
-from screwsynth.nlp.proof.workspace.tolerance.machines import Effort, Machines, machine_extremes, machines_of
+from screwsynth.nlp.proof.workspace.tolerance import machines as tolerance
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines, Proving, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
 from screwsynth.nlp.results.schema import result_schema
@@ -226,9 +226,9 @@ SAMPLED: dict[str, Callable[[], Sampled]] = {"3-rps": ThreeRps, "6-rus": SixRus,
 
 def wanted(found: Machines, names: tuple[str, ...], gap: float) -> list[Extreme]:
     """Return the smallest and largest value of each of these numbers."""
-    effort = Effort(gap, 1)
+    proving = Proving(gap, 1)
     quantities = [each.name for each in found.built.model.quantities]
-    every = machine_extremes(found, quantities, effort, with_objective=True, only=names)
+    every = machine_extremes(found, quantities, proving, with_objective=True, only=names)
     return [each for each in every if each.name in names]
 
 
@@ -268,7 +268,7 @@ def ratios(name: str, gap: float = 1e-4, only: tuple[str, ...] | None = None) ->
     names = robot.names if only is None else only
     bounds = wanted(found, names, gap)
     box = found.family.problem.box
-    poses = np.array([firstorder.coordinates_of(box, each.pose) for each in bounds if each.pose is not None])
+    poses = np.array([box.coordinates(each.pose) for each in bounds if each.pose is not None])
     built, exact = samples(robot, box, found.family.tolerance, poses)
     result = {}
     for each in bounds:
@@ -296,7 +296,7 @@ def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
 
 def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     spread = machine_number.by_centres
-    monkeypatch.setattr(firstorder, "_OUTWARDS", 0.8)
+    monkeypatch.setattr(tolerance, "_OUTWARDS", 0.8)
     monkeypatch.setattr(machine_number, "by_centres", lambda slopes: 0.8 * spread(slopes))
     for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
         assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
@@ -317,13 +317,13 @@ def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:
     lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)
     half = rng.uniform(0, 0.3, (count, 1)) * problem.size[own]
     lower[:, own], upper[:, own] = middle - half, middle + half
-    cells = Cells(lower, upper, np.tile(problem.start, (count, 1)), np.full(count, not problem.dependent))
+    cells = LoopBoxes(lower, upper, np.tile(problem.start, (count, 1)), np.full(count, not problem.dependent))
     found = examiner.examine(cells)
     loops, newton = family.loops, SingularPose(problem, family.locked, family)
     M = ca.Function("M", [family.coordinates], [ca.densify(family.locked.matrix)])
     wrong = 0
     for k in np.flatnonzero(found.is_regular):
-        z = family.exact(found.cells.centre[k])
+        z = family.exact(found.boxes.centre[k])
         design = loops.closed(z, list(problem.dependent))
         assert design is not None
         C = np.linalg.pinv(M(design).full())
@@ -369,7 +369,7 @@ def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
     errors = found.centres.vectors
     assert np.linalg.norm(errors, axis=1).max() <= 1e-3
     assert found.centres.names == ("1:1", "1:3", "2:1", "2:3", "3:1", "3:3")
-    y = firstorder.coordinates_of(pose_box(workspace_of_case(case)), found.pose)
+    y = pose_box(workspace_of_case(case)).coordinates(found.pose)
     y[3:] = 2 * np.arctan(y[3:])
     value = robot.values(y[None], errors[None])[0, 0]
     assert value > largest
@@ -377,6 +377,28 @@ def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
     data = json_data(workspace_of(judged))
     jsonschema.validate(json.loads(json.dumps(data)), result_schema())
     assert '"joint": "1:1"' in json.dumps(data)
+
+
+@pytest.mark.parametrize("asked", ["smallest_singular_value", "condition_number"])
+def test_singular_values_of_couples_have_the_characteristic_length(asked: str) -> None:
+    """Rows are force and couple of each limb; a couple counts as the case says, not as 1."""
+    limit = f"{asked} = {{ {'max = 9' if asked[0] == 'c' else 'min = 0.1'}, length = 0.4 }}\n"
+    exact = HEAD.replace("[tolerance]\njoint_centre = 1e-3\n", "")
+    text = ROBOTS["three-upu"].replace("snu", "tsai") + limit + exact + TURN
+    case = case_from_tables(tomllib.loads(text), name="upu", source="upu.toml")
+    judged = judge_workspace(case, with_objective=False, gap=0.1)
+    (found,) = (each for each in judged.extremes if each.name == asked)
+    assert found.pose is not None
+    third = 2 * np.pi / 3 * np.arange(3)
+    radial = np.stack([np.cos(third), np.sin(third), 0 * third], axis=1)
+    arms, u = (each @ found.pose.rotation.T for each in (0.6 * radial, np.cross([0, 0, 1.0], radial)))
+    s = found.pose.position + arms - radial
+    s /= np.linalg.norm(s, axis=1)[:, None]
+    couples = s - u * (u * s).sum(axis=1)[:, None]
+    couples *= 0.5 / np.linalg.norm(couples, axis=1)[:, None]
+    J = np.block([[s, np.cross(arms, s) / 0.4], [np.zeros((3, 3)), couples / 0.4]])
+    values = np.linalg.svd(J, compute_uv=False)
+    assert found.reached == pytest.approx(values[0] / values[-1] if asked[0] == "c" else values[-1], rel=1e-9)
 
 
 def test_a_machine_far_off_is_singular() -> None:

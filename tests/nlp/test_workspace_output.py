@@ -15,6 +15,7 @@ from hexapods import hexapod_text
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
+from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Limits, load_case, load_result
 from screwsynth.nlp.case.limits.clearance import LegClearance
 from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
@@ -23,9 +24,11 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.output.pictures.workspaceslices import slices_legend
 from screwsynth.nlp.proof.statement.machine import legs_of
+from screwsynth.nlp.proof.workspace.ranks.krawczyk import Coordinates, no_relation
+from screwsynth.nlp.proof.workspace.ranks.loop_boxes import LoopBoxes
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
-from screwsynth.nlp.proof.workspace.slices.limitcells import LimitCells, LimitState
-from screwsynth.nlp.proof.workspace.slices.regions import UNDECIDED
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
+from screwsynth.nlp.proof.workspace.slices.slice_limits import UNDECIDED, LimitState, SliceLimits
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.results.workspace import WorkspaceResult
 from screwsynth.nlp.results.workspaceposes import refuted_claims, worst_claim
@@ -98,15 +101,18 @@ def test_limits_over_boxes_are_those_at_their_poses(limited: Path, kind: TurnKin
     turns = Turns(kind, (Free(-0.7, 0.7),) * count, (0.6, 0.0, 0.8))
     box = pose_box(Workspace((Free(-12.0, 12.0), 0.0, Free(11.0, 29.0)), turns))
     chosen = (0, 3) if kind is TurnKind.AXIS else (3, 4)
-    machine = legs_of(case)
-    assert machine is not None
-    cells = LimitCells(case, machine, box, chosen)
+    closed = closed_form(case.model)
+    problem = build_problem(case, closed.model, box)
+    cells, free = SliceLimits(case, closed, problem), list(problem.free)
     lower = np.repeat(0.5 * (box.lower + box.upper)[None], BOXES, axis=0)
     upper = lower.copy()
     size = (box.upper - box.lower)[list(chosen)] * 2.0 ** -rng.integers(3, 8, size=(BOXES, 1))
     lower[:, chosen] = rng.uniform(box.lower[list(chosen)], box.upper[list(chosen)] - size)
     upper[:, chosen] = lower[:, chosen] + size
-    states = cells.states(cells.examine(np.repeat(cells.unknown, BOXES, axis=1), lower, upper))
+    ends = lower[:, free], upper[:, free]
+    boxes = LoopBoxes(*ends, ends[0], np.ones(BOXES, dtype=bool))
+    relation = no_relation(BOXES, Coordinates(list(range(len(free))), [], []))
+    states = cells.of_limits(cells.examine(boxes, relation, np.repeat(cells.unknown, BOXES, axis=0)))
     points = rng.uniform(np.repeat(lower, POSES, axis=0), np.repeat(upper, POSES, axis=0))
     found = violations(case, points[:, :3], np.array([box.pose(point).rotation for point in points]))
     for limit, row in zip(cells.limits, states, strict=True):

@@ -20,8 +20,8 @@ from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.front.data import front_result
 from screwsynth.nlp.output.fronttable import front_words
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.slices.regions import KEPT, UNDECIDED, Region
-from screwsynth.nlp.proof.workspace.slices.slices import Slice, slices_of
+from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
+from screwsynth.nlp.proof.workspace.slices.slices import Region, Slice, slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.solver.exchange import WorkspaceProof
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ....models import Dimension, FloatArray
 from ...case.case import Case
-from ...proof.workspace.slices.regions import KEPT, UNDECIDED, Region
-from ...proof.workspace.slices.slices import Slice
+from ...proof.workspace.slices.slice_limits import KEPT, UNDECIDED
+from ...proof.workspace.slices.slices import Region, Slice
 from ...results.rounding import number
 from .canvas import INK, MUTED
 from .figures import picture_of

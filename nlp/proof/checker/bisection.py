@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Largest number of bisections on the way to a piece.
 _MOST_BISECTIONS = 60
+#: Number of claims whose boxes wait at a time.
+_CLAIMS = 4096
 #: Every so many bisections the widest variable is halved, so that all become narrow whatever the models tell of them.
 _WIDEST = 5
 
@@ -85,6 +87,14 @@ def show(rule: Rule, lower: FloatArray, upper: FloatArray, done: Callable[[int],
     Raises:
         ProofError: a claim could not be shown.
     """
+    every = range(0, lower.shape[1], _CLAIMS)
+    return sum(_show(rule, lower[:, k : k + _CLAIMS], upper[:, k : k + _CLAIMS], k, done) for k in every)
+
+
+def _show(
+    rule: Rule, lower: FloatArray, upper: FloatArray, number: int, done: Callable[[int], None] | None = None
+) -> int:
+    """Show some claims, the first of which has this number."""
     count = lower.shape[1]
     owner, depth = np.arange(count), np.zeros(count, dtype=np.intp)
     used, total, waiting = np.zeros(count, dtype=np.intp), 0, count
@@ -95,7 +105,7 @@ def show(rule: Rule, lower: FloatArray, upper: FloatArray, done: Callable[[int],
         np.add.at(used, of, 1)
         total += of.size
         with np.errstate(all="ignore"):
-            found = rule.examine(a, b, of)
+            found = rule.examine(a, b, number + of)
             left = np.flatnonzero(~(found.holds | (found.lower > found.upper).any(axis=0)))
             along = _variables_to_bisect(found, a, b, rule.width, deep)[left]
         low, high, of, deep = found.lower[:, left], found.upper[:, left], of[left], deep[left] + 1
@@ -103,7 +113,7 @@ def show(rule: Rule, lower: FloatArray, upper: FloatArray, done: Callable[[int],
         if found.is_wrong is not None:
             failed |= found.is_wrong[left]
         if failed.any():
-            raise ProofError(rule.sentence(int(of[failed.argmax()])))
+            raise ProofError(rule.sentence(number + int(of[failed.argmax()])))
         columns = np.arange(of.size)
         middle = 0.5 * low[along, columns] + 0.5 * high[along, columns]
         below, above = high.copy(), low.copy()

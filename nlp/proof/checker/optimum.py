@@ -1,19 +1,26 @@
-"""Claims about boxes shown by polynomials of second order: what holds, and what part of each box is left."""
+"""Rules of claims about boxes of a form, shown by polynomials of second order: what holds, and what is left of boxes.
+
+A claim that is clearly wrong at the centre of what is left of a box is refused at once, without many bisections. The
+centres are evaluated in doubles, and count only where they miss the claim by far more than rounding; nothing that is
+accepted rests on this.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from ..statement.standard_form import StandardForm
 from .bisection import Shown
-from .polymodels import Forms, forms_of, polynomial_sum, reaching_part
-from .polynomialrules import PolynomialArithmetic
-from .polynomials import places
-from .slopeweights import weights_of
-from .tree import Node
+from .polymodels import Forms, Tilts, forms_of, polynomial_sum, reaching_part, weights_of
+from .polynomials import Polynomial, PolynomialArithmetic, difference, places
+from .tree import FACES, Node
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,35 +30,123 @@ if TYPE_CHECKING:
 #: Least and largest number of boxes that are evaluated at once, and largest number of coefficients of a value over them
 #: in between: a call of NumPy costs as much as a hundred boxes, and more coefficients do not fit in a cache.
 _FEWEST, _MOST, _COEFFICIENTS = 128, 1024, 2**16
+#: Distance from a claim, in parts of the numbers compared or of 1, that rounding does not explain.
+_CLEARLY = 1e-9
 
 
-def boxes_at_once(n: int) -> int:
-    """Return the number of boxes of n variables that are best evaluated at once."""
-    return min(max(_COEFFICIENTS // places(n).total, _FEWEST), _MOST)
+@dataclass(frozen=True, eq=False)
+class Claims:
+    """Claims of one kind about L boxes of a form.
 
-
-class BoundClaim:
-    """Claims that no feasible point of a box has a value above a bound.
-
-    Args:
+    Attributes:
         form: the form.
-        bound: the bound.
+        kind: ``BOUNDED``, ``INFEASIBLE``, ``MONOTONE`` or a face's.
+        index: of the condition or variable; 0 where the kind has none.
+        lower, upper: (n, L) ends of the boxes.
+        bounds: (L,) of the value of the form, minus its tilt; -inf where there is no feasible point.
+        tilts: of the claims about a limb, over the shared variables, which come first; None without any.
     """
 
-    def __init__(self, form: StandardForm, bound: float) -> None:
-        self._form, self._bound, self._functions = form, bound, len(form.functions)
+    form: StandardForm
+    kind: Node
+    index: int
+    lower: FloatArray
+    upper: FloatArray
+    bounds: FloatArray
+    tilts: Tilts | None = None
+
+
+class FormRule(ABC):
+    """The rule of some claims, for the loop of the checker.
+
+    Args:
+        claims: the claims.
+        at_centres: the expressions (K, 1) that tell at the centre of a box whether a claim is wrong.
+    """
+
+    most_pieces = 5_000
+
+    def __init__(self, claims: Claims, at_centres: SX) -> None:
+        self._claims, form = claims, claims.form
+        self._form, self._J, self._equation = form, len(form.functions), form.is_equation
+        self.width = form.upper - form.lower
+        self.block = min(max(_COEFFICIENTS // places(form.n).total, _FEWEST), _MOST)
+        self._at_centres = ca.Function("centres", [form.x], [at_centres])
+
+    def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (n, N) of the claims with these numbers (N,)."""
+        shown = self._attempt(lower, upper, of)
+        shown.is_wrong = np.zeros(of.size, dtype=bool)
+        left = np.flatnonzero(~shown.holds)
+        if left.size:
+            points = 0.5 * shown.lower[:, left] + 0.5 * shown.upper[:, left]
+            shown.is_wrong[left] = self._are_wrong(self._at_centres(points).full(), points, of[left])
+        return shown
+
+    @abstractmethod
+    def _attempt(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
+        """Try to show the claims on pieces."""
+
+    @abstractmethod
+    def _are_wrong(self, values: FloatArray, points: FloatArray, of: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Return which points (n, K), with these values of the expressions at centres, are counterexamples."""
+
+    def sentence(self, claim: int) -> str:
+        """Return the sentence that a claim could not be shown."""
+        claims, names = self._claims, self._form.names
+        what = f"the reason '{claims.kind.name.lower()} {claims.index}'"
+        if claims.tilts is not None:
+            names, own = names[: len(claims.tilts.g)], names[len(claims.tilts.g) :]
+            what = f"the bound of {f'the limb with {own[0]}' if own else 'the sum of the limbs'}"
+        ends = zip(names, claims.lower[:, claim], claims.upper[:, claim], strict=False)
+        box = ", ".join(f"{name} in [{low:.6g}, {high:.6g}]" for name, low, high in ends)
+        return f"{what} could not be shown for the box {box}"
+
+    def _cut_by_conditions(
+        self, shown: Shown, which: NDArray[np.intp], forms: Forms, lower: FloatArray, upper: FloatArray
+    ) -> None:
+        """Leave only parts of some pieces, with their forms, where no single condition excludes a point."""
+        for r in range(self._J, len(self._equation)):
+            for sign in (-1.0, 1.0) if self._equation[r] else (-1.0,):
+                if sign < 0 and not (forms.high[r] >= 0).any():
+                    continue
+                model = polynomial_sum(forms.only(r), np.full((1, which.size), sign))
+                shown.cut(which, reaching_part(model, 0.0, lower[:, which], upper[:, which]))
+
+
+def rule_of(claims: Claims) -> FormRule:
+    """Return the rule of some claims."""
+    if claims.kind == Node.BOUNDED:
+        return BoundRule(claims)
+    return InfeasibleRule(claims) if claims.kind == Node.INFEASIBLE else MonotoneRule(claims)
+
+
+class BoundRule(FormRule):
+    """The rule of claims that no feasible point of a box has a value above a bound.
+
+    A function is at most the bound, or a condition cannot hold, or a weighted sum of all is at most the bound. What is
+    left of a limb's box collapses on its face where the limb rises along a variable of its own, which no condition
+    stops: a feasible point above the bound could be moved to that face, where it would be feasible and above the bound
+    too. Its gradient has no tilt, which depends on the shared variables alone. A tree over all variables has faces
+    itself.
+    """
+
+    def __init__(self, claims: Claims) -> None:
+        form = claims.form
+        super().__init__(claims, form.expressions)
         self._arithmetic = PolynomialArithmetic(ca.Function("values", [form.x], [ca.cse(form.expressions)]))
+        own = range(0) if claims.tilts is None else range(len(claims.tilts.g), form.n)
+        self._slopes = _Slopes(form, own)
+        self._gradient = PolynomialArithmetic(ca.Function("slopes", [form.x], [ca.cse(self._slopes.expressions)]))
 
-    def show(self, lower: FloatArray, upper: FloatArray) -> Shown:
-        """Show the claim on boxes with ends (n, N).
-
-        A function is at most the bound, or a condition cannot hold, or a weighted sum of all is at most the bound.
-        """
-        J, equation = self._functions, self._form.is_equation
-        forms = forms_of(self._arithmetic(lower, upper), lower, upper, self._form)
+    def _attempt(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
+        J, bound, values = self._J, self._claims.bounds[of], self._arithmetic(lower, upper)
+        if self._claims.tilts is not None:
+            values[0] = difference(values[0], self._claims.tilts.select(of).polynomial(lower, upper))
+        forms = forms_of(values, lower, upper, self._form)
         defined = np.isfinite(forms.high[:J]).all(axis=0)
-        holds = defined & (forms.high[:J].min(axis=0) <= self._bound)
-        for low, high, is_equation in zip(forms.low[J:], forms.high[J:], equation[J:], strict=True):
+        holds = defined & (forms.high[:J].min(axis=0) <= bound)
+        for low, high, is_equation in zip(forms.low[J:], forms.high[J:], self._equation[J:], strict=True):
             holds |= (low > 0) | (is_equation & (high < 0))
         shown = Shown(holds, np.zeros_like(lower), lower.copy(), upper.copy())
         left = np.flatnonzero(~holds & defined)
@@ -59,52 +154,49 @@ class BoundClaim:
             return shown
         forms = forms.select(left)
         models = []
-        for weights in weights_of(J, equation, forms.centres(), forms.high, forms.gradients()):
+        for weights in weights_of(J, self._equation, forms.centres(), forms.high, forms.gradients()):
             model = polynomial_sum(forms, weights)
-            shown.keep(left, model.bound() <= self._bound, model.change())
+            shown.keep(left, model.bound() <= bound[left], model.change())
             models.append(model)
         rest = np.flatnonzero(~shown.holds[left])
         if rest.size:
-            which = left[rest]
+            which, forms = left[rest], forms.select(rest)
             for model in models:
                 few = model.select(rest)
-                shown.cut(which, reaching_part(few, self._bound, lower[:, which], upper[:, which]))
-            _cut_by_conditions(shown, which, forms.select(rest), J, equation, lower, upper)
+                shown.cut(which, reaching_part(few, bound[which], lower[:, which], upper[:, which]))
+            self._cut_by_conditions(shown, which, forms, lower, upper)
+            self._collapse(shown, which, forms)
         return shown
 
+    def _collapse(self, shown: Shown, which: NDArray[np.intp], forms: Forms) -> None:
+        """Leave only the faces of some pieces, with their forms, along own variables in which the limb rises."""
+        low, high = shown.lower[:, which], shown.upper[:, which]
+        slopes, nothing = self._gradient(low, high), self._slopes.nothing
+        for i in self._slopes.stops:
+            up, down = (self._slopes.first_stop(i, side, slopes, forms.high) == nothing for side in (1, -1))
+            shown.lower[i, which] = np.where(up, high[i], low[i])
+            shown.upper[i, which] = np.where(down & ~up, low[i], high[i])
 
-def _cut_by_conditions(
-    shown: Shown,
-    which: NDArray[np.intp],
-    forms: Forms,
-    first: int,
-    equation: tuple[bool, ...],
-    lower: FloatArray,
-    upper: FloatArray,
-) -> None:
-    """Leave only parts of boxes where no single condition excludes a point."""
-    for r in range(first, len(equation)):
-        for sign in (-1.0, 1.0) if equation[r] else (-1.0,):
-            if sign < 0 and not (forms.high[r] >= 0).any():
-                continue
-            model = polynomial_sum(forms.only(r), np.full((1, which.size), sign))
-            shown.cut(which, reaching_part(model, 0.0, lower[:, which], upper[:, which]))
+    def _are_wrong(self, values: FloatArray, points: FloatArray, of: NDArray[np.intp]) -> NDArray[np.bool_]:
+        bound, best = self._claims.bounds[of], values[: self._J].min(axis=0)
+        sizes = np.abs(best) + np.where(np.isfinite(bound), np.abs(bound), 0.0)
+        if self._claims.tilts is not None:
+            tilts = self._claims.tilts.select(of)
+            best, sizes = best - tilts.at(points[: len(tilts.g)]), sizes + tilts.sizes()
+        feasible = (values[self._J :] < -_CLEARLY).all(axis=0)
+        return np.asarray(feasible & (best - bound > _CLEARLY * sizes) & (not any(self._equation)))
 
 
-class InfeasibleClaim:
-    """Claims that a condition is positive on a box; for an equation, positive or negative.
+class InfeasibleRule(FormRule):
+    """The rule of claims that a condition is positive on a box; for an equation, positive or negative."""
 
-    Args:
-        form: the form.
-        r: number of the condition, counted after the functions.
-    """
-
-    def __init__(self, form: StandardForm, r: int) -> None:
-        self._form, self._is_equation = form, form.is_equation[r]
+    def __init__(self, claims: Claims) -> None:
+        form, r = claims.form, claims.index
+        super().__init__(claims, form.expressions[r])
+        self._is_equation = form.is_equation[r]
         self._arithmetic = PolynomialArithmetic(ca.Function("values", [form.x], [ca.cse(form.expressions[r])]))
 
-    def show(self, lower: FloatArray, upper: FloatArray) -> Shown:
-        """Show the claim on boxes with ends (n, N)."""
+    def _attempt(self, lower: FloatArray, upper: FloatArray, *_: object) -> Shown:
         forms = forms_of(self._arithmetic(lower, upper), lower, upper, self._form)
         holds = forms.low[0] > 0
         if self._is_equation:
@@ -119,58 +211,106 @@ class InfeasibleClaim:
                 shown.cut(left, reaching_part(model, 0.0, lower[:, left], upper[:, left]))
         return shown
 
+    def _are_wrong(self, values: FloatArray, *_: object) -> NDArray[np.bool_]:
+        return np.asarray((values[0] < -_CLEARLY) & (not self._is_equation))
 
-class MonotoneClaim:
-    """Claims that no maximum lies in a box, since every function rises along a variable and no condition stops a point.
+
+class _Slopes:
+    """Derivatives of a form's functions, and of the conditions that depend on a variable, along some variables.
 
     Args:
         form: the form.
-        kind: ``MONOTONE``, for either direction, or a face's kind for one.
-        i: the variable.
+        variables: the variables.
+
+    Attributes:
+        stops: numbers of these conditions, for each variable.
+        nothing: the number that stands for no condition.
+        expressions: the derivatives, (E, 1): for each variable, of the J functions and then of its conditions.
     """
 
-    def __init__(self, form: StandardForm, kind: Node, i: int) -> None:
-        self._form, self._kind, self._i = form, kind, i
-        J, R = len(form.functions), form.expressions.numel()
-        self._stops = [r for r in range(J, R) if form.dependence[r][i]]
-        slopes = ca.vertcat(*(form.jacobian[r, i] for r in [*range(J), *self._stops]))
-        self._arithmetic = PolynomialArithmetic(
-            ca.Function("slopes", [form.x], ca.cse([form.expressions, ca.densify(slopes)]))
-        )
+    def __init__(self, form: StandardForm, variables: Sequence[int]) -> None:
+        self._J, self._equation, self.nothing = len(form.functions), form.is_equation, len(form.is_equation)
+        depends = form.dependence
+        self.stops = {i: [r for r in range(self._J, self.nothing) if depends[r][i]] for i in variables}
+        entries = [(r, i) for i, stops in self.stops.items() for r in [*range(self._J), *stops]]
+        self._at = {entry: k for k, entry in enumerate(entries)}
+        self.expressions = ca.densify(ca.vertcat(*(form.jacobian[r, i] for r, i in entries)))
 
-    def show(self, lower: FloatArray, upper: FloatArray) -> Shown:
-        """Show the claim on boxes with ends (n, N)."""
-        form, i = self._form, self._i
-        J, R, boxes = len(form.functions), form.expressions.numel(), lower.shape[1]
+    def first_stop(self, i: int, side: int, slopes: Sequence[Polynomial], high: FloatArray) -> NDArray[np.intp]:
+        """Return the first condition (N,) that may stop a point on its way to a side; 0 if a function may not rise.
+
+        Args:
+            i: the variable.
+            side: 1 for the upper end of the variable, -1 for the lower one.
+            slopes: the derivatives.
+            high: (R, N) upper ends of functions and conditions.
+        """
+
+        def least(r: int, way: int) -> FloatArray:
+            low, up = slopes[self._at[r, i]].V
+            return low if way > 0 else -up
+
+        found = np.full(high.shape[1], self.nothing)
+        for r in reversed(self.stops[i]):
+            is_free = (high[r] < 0) | ((least(r, -side) > 0) & (not self._equation[r]))
+            found = np.where(is_free, found, r)
+        for r in range(self._J):
+            found = np.where(least(r, side) > 0, found, 0)
+        return found
+
+
+class MonotoneRule(FormRule):
+    """The rule of claims that no maximum lies in a box.
+
+    Every function rises along a variable, and no condition stops a point: in either direction for ``MONOTONE``, which
+    needs room beyond the box, and in one for a face.
+    """
+
+    def __init__(self, claims: Claims) -> None:
+        form = claims.form
+        super().__init__(claims, ca.vertcat(form.expressions, form.jacobian[:, claims.index]))
+        self._i, self._slopes = claims.index, _Slopes(form, [claims.index])
+        self._sides = {Node.FACE_UPPER: (1,), Node.FACE_LOWER: (-1,)}.get(claims.kind, (1, -1))
+        both = ca.cse([form.expressions, self._slopes.expressions])
+        self._arithmetic = PolynomialArithmetic(ca.Function("both", [form.x], both))
+
+    def _attempt(self, lower: FloatArray, upper: FloatArray, *_: object) -> Shown:
+        form, i, R = self._form, self._i, self._slopes.nothing
         both = self._arithmetic(lower, upper)
         values, slopes = (forms_of(some, lower, upper, form) for some in (both[:R], both[R:]))
-        holds = np.zeros(boxes, dtype=bool)
-        change = _steepness(slopes, range(J))
-        for side in {Node.FACE_UPPER: (1,), Node.FACE_LOWER: (-1,)}.get(self._kind, (1, -1)):
-            ends = slopes.low if side > 0 else -slopes.high
-            rises = (ends[:J] > 0).all(axis=0)
-            for k, r in enumerate(self._stops, start=J):
-                free = values.high[r] < 0
-                if not form.is_equation[r]:
-                    falls = slopes.high[k] < 0 if side > 0 else slopes.low[k] > 0
-                    free |= falls
+        holds, change = np.zeros(lower.shape[1], dtype=bool), _steepness(slopes, range(self._J))
+        for side in self._sides:
+            stop = self._slopes.first_stop(i, side, both[R:], values.high)
+            for r in self._slopes.stops[i]:
                 # The functions rise, and this condition may stop a point: it decides where to cut.
-                change = np.where(rises & ~free, _steepness(values, [r]), change)
-                rises &= free
-            if self._kind == Node.MONOTONE:
+                if (stop == r).any():
+                    change = np.where(stop == r, _steepness(values, [r]), change)
+            rises = stop == R
+            if self._claims.kind not in FACES:
                 rises &= (upper[i] < form.upper[i]) if side > 0 else (lower[i] > form.lower[i])
             holds |= rises
         shown = Shown(holds, change, lower.copy(), upper.copy())
         left = np.flatnonzero(~holds)
         if left.size:
-            _cut_by_conditions(shown, left, values.select(left), J, form.is_equation, lower, upper)
+            self._cut_by_conditions(shown, left, values.select(left), lower, upper)
         return shown
 
+    def _are_wrong(self, values: FloatArray, *_: object) -> NDArray[np.bool_]:
+        J, R = self._J, self._slopes.nothing
+        values, slopes = values[:R], values[R:]
+        # A function that falls there, or a condition that does not hold strictly and grows, excludes a direction.
+        excluded, clear = [], _CLEARLY * (1 + np.abs(slopes))
+        for side in self._sides:
+            falls = (side * slopes[:J] < -clear[:J]).any(axis=0)
+            grows = (values[J:] > _CLEARLY) & (side * slopes[J:] > clear[J:])
+            excluded.append(falls | grows.any(axis=0))
+        return np.asarray(np.all(excluded, axis=0))
 
-def _steepness(forms: Forms, which: range | list[int]) -> FloatArray:
+
+def _steepness(forms: Forms, which: Sequence[int]) -> FloatArray:
     """Return the largest sizes (n, N) of the slopes of some forms along each variable, times the radius."""
     steep = np.zeros_like(forms.share)
     for r in which:
         model = polynomial_sum(forms.only(r), np.ones((1, steep.shape[1])))
-        steep = np.fmax(steep, np.fmax(np.abs(model.slope_low), np.abs(model.slope_high)))
+        steep = np.fmax(steep, np.abs(model.b) + model.reach)
     return steep

@@ -1,4 +1,7 @@
-"""Upper models of weighted sums of polynomials with balls, and parts of boxes where they reach a level."""
+"""Quadratic models over boxes for the check of a proof: weighted sums of polynomials, their weights, and tilts.
+
+Coordinates of a box are e in [-1, 1]^n, as those of its polynomials.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..statement.standard_form import StandardForm
-from .polynomials import Polynomial, middles, places
-from .slopebounds import SumModel
-from .slopecut import cut_off
+from .polynomials import Polynomial, middles, places, settled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,8 +21,12 @@ if TYPE_CHECKING:
 
 #: Error of a sum of a few hundred rounded terms, in parts of their sizes.
 _SUMS = 1e-13
+#: More than underflow can cost a sum.
+_TINY = 1e-290
 #: Weight, in the choice of the variable to bisect, of those at their ends on a whole box: it decides if no other does.
 _AT_END = 0.05
+#: Sweeps over all expressions of the two searches of weights.
+_SWEEPS, _EDGE_SWEEPS = 12, 3
 
 
 class Forms(NamedTuple):
@@ -69,33 +74,52 @@ def forms_of(polynomials: Sequence[Polynomial], lower: FloatArray, upper: FloatA
 
 
 @dataclass(frozen=True, eq=False)
-class PolynomialModel(SumModel):
-    """An upper model of a sum of polynomials.
+class SumModel:
+    """An upper model ``fixed + b e + 1/2 e'He`` of a weighted sum over N boxes.
 
     Attributes:
+        fixed: (N,) with the balls of the polynomials, and with rounding.
+        b: (n, N).
+        H: (n, n, N) symmetric.
         balls: (n, N) radii of the balls of the polynomials that depend on each variable, times their weights and the
             variable's share of the width of the box.
     """
 
+    fixed: FloatArray
+    b: FloatArray
+    H: FloatArray
     balls: FloatArray
+
+    def select(self, which: NDArray[np.intp]) -> SumModel:
+        """Return the model over some boxes."""
+        return SumModel(*(getattr(self, each.name)[..., which] for each in fields(self)))
+
+    @property
+    def reach(self) -> FloatArray:
+        """Largest change (n, N) of each slope from that at the centre."""
+        return np.asarray(np.abs(self.H).sum(axis=1))
+
+    def bound(self) -> FloatArray:
+        """Return an upper bound (N,) over the boxes."""
+        # Where the sum rises along a variable on the whole box, it is largest on that face.
+        reach = self.reach
+        side = np.where(np.abs(self.b) > reach + _SUMS * (np.abs(self.b) + reach), np.sign(self.b), 0.0)
+        return np.asarray(self.fixed + _largest(self.b, self.H, side) + _TINY)
 
     def change(self) -> FloatArray:
         """Return how much (n, N) the bound can gain from halving each variable; the balls are of third order.
 
         Where the sum rises or falls along a variable on the whole box, the bound is taken at its end already.
         """
-        free = (self.slope_low <= 0) & (self.slope_high >= 0)
+        reach = self.reach
+        free = np.abs(self.b) <= reach
         coupled = np.where(free[:, None] & free[None], np.abs(self.H), 0.0).sum(axis=0)
         own = np.where(free, coupled + 0.3 * np.abs(self.b), 0.0)
-        return np.asarray(own + _AT_END * super().change() + 2 * self.balls)
-
-    def select(self, which: NDArray[np.intp]) -> PolynomialModel:
-        """Return the model over some boxes."""
-        return PolynomialModel(*(getattr(self, each.name)[..., which] for each in fields(self)))
+        return np.asarray(own + _AT_END * (reach + 0.3 * np.abs(self.b)) + 2 * self.balls)
 
 
-def polynomial_sum(forms: Forms, weights: FloatArray) -> PolynomialModel:
-    """Return the upper model of a sum with weights (R, N), in coordinates from -1 to 1 of each box."""
+def polynomial_sum(forms: Forms, weights: FloatArray) -> SumModel:
+    """Return the upper model of a sum with weights (R, N)."""
     n, N = forms.share.shape
     b, H, balls = np.zeros((n, N)), np.zeros((n, n, N)), np.zeros((n, N))
     fixed, ball, sizes = np.zeros(N), np.zeros(N), np.zeros(N)
@@ -117,23 +141,195 @@ def polynomial_sum(forms: Forms, weights: FloatArray) -> PolynomialModel:
         balls[on] += own
         sizes += np.where(used, np.abs(weight) * value.size, 0.0)
     fixed = fixed + ball * (1 + _SUMS) + _SUMS * sizes
-    reach = np.abs(H).sum(axis=1)
-    loose = np.zeros_like(b)
-    return PolynomialModel(fixed, fixed, b, H, loose, b - reach, b + reach, np.ones_like(b), balls * forms.share)
+    return SumModel(fixed, b, H, balls * forms.share)
+
+
+def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
+    """Return an upper bound (N,) of ``b e + 1/2 e'He`` for e in [-1, 1]^n, with ``e_i = s_i`` where ``s_i`` is not 0.
+
+    It is the lesser of two: the sum over free variables one by one, with absolute values of the terms that couple them;
+    and that from a tangent plane to a concave part, which Gershgorin's circles give.
+    """
+    Hs = np.einsum("ijb,jb->ib", H, s)
+    base = (b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0)
+    free = s == 0
+    b, H = np.where(free, b + Hs, 0.0), np.where(free[:, None] & free[None], H, 0.0)
+    diagonal = np.einsum("iib->ib", H)
+    others = np.abs(H).sum(axis=1) - np.abs(diagonal)
+    peak = (diagonal < 0) & (np.abs(b) < -diagonal)
+    alone = np.where(peak, b * (b / np.where(peak, -2 * diagonal, 1.0)), np.abs(b) + 0.5 * diagonal)
+    separate = (alone + 0.5 * others).sum(axis=0)
+    shift = np.maximum(diagonal + others, 0.0)
+    C = H.copy()
+    for i in range(len(b)):
+        C[i, i] -= shift[i]
+    e = np.zeros_like(b)
+    for _ in range(3):
+        for i in range(len(b)):
+            rest = b[i] + np.einsum("jb,jb->b", C[i], e) - C[i, i] * e[i]
+            step = np.where(C[i, i] < 0, rest / np.where(C[i, i] < 0, -C[i, i], 1.0), np.sign(rest))
+            e[i] = np.clip(np.where(np.isfinite(step), step, 0.0), -1.0, 1.0)
+    Ce = np.einsum("ijb,jb->ib", C, e)
+    plane = np.abs(b + Ce).sum(axis=0) - 0.5 * (e * Ce).sum(axis=0) + 0.5 * shift.sum(axis=0)
+    return np.asarray(base + np.fmin(separate, plane))
 
 
 def reaching_part(
     model: SumModel, level: FloatArray | float, lower: FloatArray, upper: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return ends (n, N) of the parts of boxes that hold every point where a model reaches a level; crossed if none."""
-    half = 0.5 * np.abs(model.H).sum(axis=1)
-    one = np.ones_like(model.b)
-    missing = level - model.fixed - _SUMS * (np.abs(level) + np.abs(model.fixed))
-    low, high = cut_off(missing, -model.b - half, half - model.b, -one, one)
-    centre, radius = middles(lower, upper)
-    margin = _SUMS * (np.abs(centre) + radius)
     with np.errstate(all="ignore"):
-        # Only an end that was moved is written in the box's own numbers.
-        first = np.where(low > -1, centre + radius * low - margin, lower)
-        last = np.where(high < 1, centre + radius * high + margin, upper)
-    return np.fmax(lower, first), np.fmin(upper, last)
+        missing = level - model.fixed - _SUMS * (np.abs(level) + np.abs(model.fixed))
+        half = 0.5 * model.reach
+        steepest = np.abs(model.b) + half
+        total = steepest.sum(axis=0)
+        sizes = np.abs(missing) + total
+        # Along e_i alone the model gains at most ``(b_i + half_i) e_i``, or ``(half_i - b_i) |e_i|`` on the other side;
+        # the other variables give no more than the rest of the total.
+        rest = (missing - (total - steepest)) - (_SUMS * sizes + _TINY)
+        right, left = (np.where(up > 0, rest / up, np.inf) * (1 - _SUMS) for up in (half + model.b, half - model.b))
+        known = (rest > 0) & np.isfinite(sizes)
+        no_right, no_left = known & (right > 1), known & (left > 1)
+        centre, radius = middles(lower, upper)
+        margin = _SUMS * (np.abs(centre) + radius)
+        # Only an end that is moved is written in the box's own numbers.
+        low = np.where(no_left, centre + radius * (right - _SUMS) - margin, lower)
+        high = np.where(no_right, centre - radius * (left - _SUMS) + margin, upper)
+        none = no_left & no_right
+        return np.where(none, np.inf, np.fmax(lower, low)), np.where(none, -np.inf, np.fmin(upper, high))
+
+
+def weights_of(
+    functions: int, is_equation: Sequence[bool], values: FloatArray, high: FloatArray, G: FloatArray
+) -> list[FloatArray]:
+    """Return two choices of weights (R, N): of functions, not negative with sum 1; of inequalities, not positive.
+
+    Any weights give a bound, and these make it small. The bound of ``L = sum_r w_r v_r`` over a box is about
+    ``L(c) + sum_i r_i |dL/dx_i (c)|``. The weights are found in two steps: coordinate descent on the sum of squares of
+    the scaled gradient, and then on this bound itself, which also counts how far a condition is violated at the
+    centre. The first weights are better where the optimum lies in the box, the second ones for a box on the edge of the
+    feasible set.
+
+    Args:
+        functions: number of functions, which come before the conditions.
+        is_equation: whether each of the R expressions must be 0.
+        values: (R, N) values at the centres of the boxes.
+        high: (R, N) largest values on the boxes.
+        G: (R, n, N) gradients at the centres times the radii of the boxes.
+    """
+    usable = np.isfinite(G).all(axis=1) & np.isfinite(values) & np.isfinite(high)
+    for r in range(functions, len(G)):
+        if not is_equation[r]:
+            # A condition that cannot bind gets no weight.
+            usable[r] &= ~(high[r] < 0)
+    G, values = np.where(usable[:, None], G, 0.0), np.where(usable, values, 0.0)
+    weights = np.zeros_like(values)
+    weights[0] = 1.0
+    if len(G) == 1:
+        return [weights]
+    left = G[0].copy()
+    bind = [r for r in range(functions, len(G)) if usable[r].any()]
+    sizes = np.einsum("rin,rin->rn", G, G)
+    for _ in range(_SWEEPS):
+        for r in range(1, functions):
+            _move_towards(r, functions, weights, G, left)
+        for r in bind:
+            step = np.einsum("in,in->n", G[r], left) / np.where(sizes[r] > 0, sizes[r], np.inf)
+            new = weights[r] - step if is_equation[r] else np.minimum(weights[r] - step, 0.0)
+            left += (new - weights[r]) * G[r]
+            weights[r] = new
+    edge = weights.copy()
+    for _ in range(_EDGE_SWEEPS):
+        for r in bind:
+            _minimise_bound(edge[r], G[r], values[r], left, is_equation[r])
+    return [weights, edge]
+
+
+def _move_towards(r: int, functions: int, weights: FloatArray, G: FloatArray, left: FloatArray) -> None:
+    """Move the weights of the functions towards function r alone, as far as the gradient ``left`` gets smaller."""
+    direction = G[r] - np.einsum("jn,jin->in", weights[:functions], G[:functions])
+    size = np.einsum("in,in->n", direction, direction)
+    part = -np.einsum("in,in->n", direction, left) / np.where(size > 0, size, np.inf)
+    part = np.clip(part, 0.0, 1.0)
+    left += part * direction
+    weights[:functions] *= 1 - part
+    weights[r] += part
+    # The sum is 1 in spite of rounding.
+    weights[:functions] /= weights[:functions].sum(axis=0)
+
+
+def _minimise_bound(
+    weight: FloatArray, gradient: FloatArray, value: FloatArray, left: FloatArray, is_equation: bool
+) -> None:
+    """Change one weight (N,) so that ``weight value + sum |left|`` is least; written in place, as is ``left`` (n, N).
+
+    The function is convex and piecewise linear in the weight: it is least where a component of ``left`` is 0, or at 0.
+    """
+    without = left - weight * gradient
+    with np.errstate(all="ignore"):
+        breaks = np.where(np.abs(gradient) > 0, -without / gradient, 0.0)
+    breaks = np.where(np.isfinite(breaks), breaks, 0.0)
+    tried = np.concatenate([breaks, np.zeros((1, weight.size)), weight[None]])
+    if not is_equation:
+        tried = np.minimum(tried, 0.0)
+    bounds = tried * value + np.abs(without[None] + tried[:, None] * gradient[None]).sum(axis=1)
+    best = tried[bounds.argmin(axis=0), np.arange(weight.size)]
+    left += (best - weight) * gradient
+    weight[:] = best
+
+
+@dataclass(frozen=True, eq=False)
+class Tilts:
+    """Quadratic functions of m shared variables, one for each of L boxes of these.
+
+        t(s) = g.e + 1/2 e'Q e,    e_i = (s_i - c_i) / r_i
+
+    has the centre c and half widths r of the box, as computed in doubles; a half width of 0 is 1 here, as e is 0 then.
+    Any tilts give a bound, so that nothing of them has to be trusted.
+
+    Attributes:
+        centre, radius: (m, L) of the boxes.
+        g: (m, L).
+        Q: (m, m, L) symmetric.
+    """
+
+    centre: FloatArray
+    radius: FloatArray
+    g: FloatArray
+    Q: FloatArray
+
+    @classmethod
+    def over(cls, lower: FloatArray, upper: FloatArray, g: FloatArray, Q: FloatArray) -> Tilts:
+        """Return tilts over boxes with ends (m, L)."""
+        radius = 0.5 * (upper - lower)
+        return cls(0.5 * (lower + upper), np.where(radius > 0, radius, 1.0), g, Q)
+
+    def select(self, which: NDArray[np.intp]) -> Tilts:
+        """Return the tilts of some boxes, which may repeat."""
+        return Tilts(self.centre[:, which], self.radius[:, which], self.g[:, which], self.Q[:, :, which])
+
+    def sizes(self, e: FloatArray | float = 1.0) -> FloatArray:
+        """Return the sums (L,) of the sizes of all terms, for coordinates of at most ``e`` in size, (m, L)."""
+        far = np.broadcast_to(e, self.g.shape)
+        return np.asarray(
+            (np.abs(self.g) * far).sum(axis=0) + 0.5 * np.einsum("ib,ijb,jb->b", far, np.abs(self.Q), far)
+        )
+
+    def at(self, s: FloatArray) -> FloatArray:
+        """Return values (L,) at one point (m, L) for each, as computed in doubles."""
+        e = (s - self.centre) / self.radius
+        return np.asarray((self.g * e).sum(axis=0) + 0.5 * np.einsum("ib,ijb,jb->b", e, self.Q, e))
+
+    def polynomial(self, lower: FloatArray, upper: FloatArray) -> Polynomial:
+        """Return the tilts over pieces of the boxes, ends (n, N), whose first m variables are the shared ones."""
+        m, at = len(self.g), places(len(self.g))
+        centre, radius = middles(lower[:m], upper[:m])
+        e, r = (centre - self.centre) / self.radius, radius / self.radius
+        P = np.zeros((at.total, e.shape[1]))
+        P[0] = self.at(centre)
+        P[at.linear] = (self.g + np.einsum("ijb,jb->ib", self.Q, e)) * r
+        P[at.squares] = 0.5 * np.einsum("iib->ib", self.Q) * r * r
+        P[at.products] = self.Q[at.first, at.second] * r[at.first] * r[at.second]
+        s = _SUMS * self.sizes(np.abs(e) + r) + _TINY
+        anything = np.full_like(s, np.inf)
+        return settled(tuple(range(m)), P, s, (-anything, anything))

@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import casadi as ca
 import numpy as np
 
 from . import intervals as ends
@@ -25,7 +24,6 @@ from .arithmetic import Composed, Steps
 if TYPE_CHECKING:
     from ....models import FloatArray
     from .intervals import Ends
-
 
 #: More than underflow can cost a sum.
 _TINY = 1e-300
@@ -46,48 +44,30 @@ class Slope:
     S: Ends
 
 
-class SlopeArithmetic:
-    """Slopes of a function of one vector.
-
-    Args:
-        function: made of ``SX``, with one dense input (n, 1) and dense outputs.
-
-    Raises:
-        UncoveredError: the function holds an operation without a rule.
-    """
-
-    def __init__(self, function: ca.Function) -> None:
-        self._steps = Steps(function)
+class SlopeArithmetic(Steps):
+    """Slopes of a function of one vector."""
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> list[Slope]:
         """Return slopes of the outputs' elements over boxes with ends (n, N)."""
-        centre = np.clip(0.5 * (lower + upper), lower, upper)
-        radius = np.nextafter(np.maximum(upper - centre, centre - lower), np.inf)
-        return self._steps.run(_Boxes(lower, upper, centre, radius))
+        return self.run(_Boxes(lower, upper))
 
 
-@dataclass(frozen=True, eq=False)
 class _Boxes(Composed[Slope]):
-    """N boxes, and the operations on values over them.
+    """N boxes with ends (n, N), and the operations on values over them."""
 
-    Attributes:
-        lower, upper: (n, N) ends.
-        centre: (n, N).
-        radius: (n, N) distance of the farther end from the centre, rounded up.
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    centre: FloatArray
-    radius: FloatArray
+    def __init__(self, lower: FloatArray, upper: FloatArray) -> None:
+        self._lower, self._upper = lower, upper
+        self._centre = np.clip(0.5 * (lower + upper), lower, upper)
+        # Distance of the farther end from the centre, rounded up.
+        self._radius = np.nextafter(np.maximum(upper - self._centre, self._centre - lower), np.inf)
 
     def variable(self, i: int) -> Slope:
-        unit = np.zeros_like(self.lower)
+        unit = np.zeros_like(self._lower)
         unit[i] = 1.0
-        return Slope((self.lower[i], self.upper[i]), (self.centre[i], self.centre[i]), (unit, unit))
+        return Slope((self._lower[i], self._upper[i]), (self._centre[i], self._centre[i]), (unit, unit))
 
     def constant(self, value: float) -> Slope:
-        flat, none = np.full(self.lower.shape[1], value), np.zeros_like(self.lower)
+        flat, none = np.full(self._lower.shape[1], value), np.zeros_like(self._lower)
         return Slope((flat, flat), (flat, flat), (none, none))
 
     def number(self, u: Slope) -> float | None:
@@ -95,7 +75,7 @@ class _Boxes(Composed[Slope]):
 
     def slope(self, V: Ends, C: Ends, S: Ends) -> Slope:
         """Return a value, its range intersected with the centred form."""
-        reach = np.maximum(np.abs(S[0]), np.abs(S[1])) * self.radius
+        reach = np.maximum(np.abs(S[0]), np.abs(S[1])) * self._radius
         spread = reach.sum(axis=0) * (1 + 1e-14) + _TINY
         low, high = ends.out(C[0] - spread, C[1] + spread)
         return Slope((np.fmax(V[0], low), np.fmin(V[1], high)), C, S)

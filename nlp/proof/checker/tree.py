@@ -13,6 +13,22 @@
 
 The leaves therefore cover the root by construction, and a tree with too few or too many bytes is no proof. Expressions
 are counted from 0, the functions first and then the conditions. Numbers are doubles, little-endian.
+
+Where the limbs of a form share no variable, a tree may begin with the byte ``LIMBS``. For each limb then follow its
+bound and its tree, over its own variables, and the sum of the bounds must not exceed the proven one. A limb with the
+bound minus infinity has no feasible point, and then the trees of the others are bare leaves without a bound.
+
+Where the limbs share variables, a tree may begin with the byte ``SHARED``. Then come the nodes ``half``, ``infeasible``
+and ``bounded``; the root is the box of the shared variables. An infeasible leaf says that no point of the box keeps the
+conditions on shared variables alone. After the byte of a bounded leaf there is for each limb its bound ``b_k``, and
+where that is finite its tilt ``t_k``, a quadratic function of the shared variables: g, then the upper triangle of Q by
+rows. The claims of a bounded leaf over its box S of the shared variables s are
+
+    phi_k(s, o) - t_k(s) <= b_k          for each limb, all of its own variables o, where its conditions hold,
+    phi_0(s) + sum t_k(s) <= T - sum b_k    where the conditions on s hold, with T the proven bound.
+
+Together they bound ``phi_0 + sum phi_k`` by T. A limb with the bound minus infinity has no feasible point over S; then
+nothing is claimed of the others, whose bounds must be infinite.
 """
 
 from __future__ import annotations
@@ -20,10 +36,12 @@ from __future__ import annotations
 import enum
 import struct
 from collections.abc import Callable, Set
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..statement.standard_form import StandardForm
 from .proof_file import ProofError
 
 if TYPE_CHECKING:
@@ -165,3 +183,114 @@ class TreeReader:
             return [above] if value <= box[1][i] else []
         leaf(reason, -1, *above)
         return [below] if value >= box[0][i] else []
+
+
+@dataclass(frozen=True, eq=False)
+class Claim:
+    """The claim of a leaf or of a face about its box.
+
+    Attributes:
+        kind: kind of the node.
+        index: of the condition or variable; 0 where the kind has none.
+        lower, upper: (n,) ends of the box.
+    """
+
+    kind: Node
+    index: int
+    lower: FloatArray
+    upper: FloatArray
+
+
+def read_claims(reader: TreeReader, form: StandardForm) -> list[Claim]:
+    """Read the claims of a tree; their boxes cover the form's.
+
+    Raises:
+        ProofError: the bytes are no tree.
+    """
+    claims: list[Claim] = []
+    conditions = range(len(form.functions), len(form.functions) + len(form.conditions))
+
+    def leaf(kind: int, i: int, lower: FloatArray, upper: FloatArray) -> None:
+        index = max(i, 0)
+        if kind == Node.INFEASIBLE:
+            index = reader.index(conditions, "row")
+        elif kind == Node.MONOTONE:
+            index = reader.index(range(form.n), "variable")
+        elif kind not in (Node.BOUNDED, *FACES) or (kind in FACES) != (i >= 0):
+            raise ProofError(f"the tree holds {kind} where a reason must stand")
+        claims.append(Claim(Node(kind), index, lower, upper))
+
+    reader.walk(form.lower, form.upper, leaf, frozenset({Node.HALF, Node.ABOVE, Node.BELOW, *FACES}))
+    return claims
+
+
+class SharedLeaf(NamedTuple):
+    """A leaf of a tree of shared variables.
+
+    Attributes:
+        lower, upper: (m,) ends of its box.
+        bounds: (K,) of the limbs; all infinite for an infeasible leaf, which claims nothing of any limb.
+        g: (K, m) and
+        Q: (K, m, m) symmetric, of their tilts; 0 for infinite bounds.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    bounds: FloatArray
+    g: FloatArray
+    Q: FloatArray
+
+
+def leaf_bytes(bounds: FloatArray, g: FloatArray, Q: FloatArray) -> bytes:
+    """Return the node of a bounded leaf, from the arrays of :class:`SharedLeaf`."""
+    rows, columns = np.triu_indices(g.shape[1])
+    parts = [bytes([Node.BOUNDED])]
+    for k, bound in enumerate(bounds.tolist()):
+        parts.append(struct.pack("<d", bound))
+        if np.isfinite(bound):
+            parts.append(np.concatenate([g[k], Q[k, rows, columns]]).astype("<f8").tobytes())
+    return b"".join(parts)
+
+
+def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -> list[SharedLeaf]:
+    """Return the leaves of a tree of shared variables, whose boxes cover that with ends (m,).
+
+    Raises:
+        ProofError: the bytes are no such tree.
+    """
+    reader = TreeReader(tree, 1)
+    leaves: list[SharedLeaf] = []
+
+    def leaf(kind: int, _: int, low: FloatArray, high: FloatArray) -> None:
+        if kind == Node.INFEASIBLE:
+            m = len(low)
+            leaves.append(SharedLeaf(low, high, np.full(limbs, np.inf), np.zeros((limbs, m)), np.zeros((limbs, m, m))))
+        elif kind == Node.BOUNDED:
+            leaves.append(_read_leaf(reader, limbs, low, high))
+        else:
+            raise ProofError(f"the tree holds {kind} where a node of shared variables must stand")
+
+    reader.walk(lower, upper, leaf, frozenset({Node.HALF}))
+    reader.finish()
+    return leaves
+
+
+def _read_leaf(reader: TreeReader, K: int, lower: FloatArray, upper: FloatArray) -> SharedLeaf:
+    """Return the bounded leaf whose numbers come next.
+
+    Raises:
+        ProofError: a number is NaN or infinite where it must not be.
+    """
+    m = len(lower)
+    rows, columns = np.triu_indices(m)
+    bounds, g, Q = np.zeros(K), np.zeros((K, m)), np.zeros((K, m, m))
+    for k in range(K):
+        bounds[k] = reader.number()
+        if np.isfinite(bounds[k]):
+            numbers = np.frombuffer(reader.read(8 * (m + rows.size)), dtype="<f8")
+            g[k], Q[k, rows, columns], Q[k, columns, rows] = numbers[:m], numbers[m:], numbers[m:]
+    is_empty = bool((bounds == -np.inf).any())
+    known = np.isinf(bounds) if is_empty else np.isfinite(bounds)
+    if not (known.all() and np.isfinite(g).all() and np.isfinite(Q).all()):
+        raise ProofError("a leaf of the tree has a bound or a tilt that is no number")
+    return SharedLeaf(lower, upper, bounds, g, Q)

@@ -29,7 +29,6 @@ from ..statement.posed_layout import extreme_program
 from .numbers.extremes import Extreme, slack_of
 from .robot.box_layout import box_layout
 from .robot.pose_box import PoseBox
-from .tolerance.layouts import machine_layout
 from .tolerance.machines import Machines
 from .verdict import Outcome
 
@@ -137,7 +136,7 @@ class Homes:
     def _built(self) -> _HomePoses:
         if self.machines is None:
             raise TypeError("no machines are meant")
-        layout = machine_layout(self.case, self.machines.built, self.machines.family)
+        layout = self.machines.symbols.layout
         return _HomePoses(layout, claims_of(layout, self._quantities))
 
     def is_singular(self, y: FloatArray, centres: CentreErrors | None, *, constraints: bool) -> bool:

@@ -38,7 +38,7 @@ class Scale:
     pose: PoseNumbers | None
 
 
-@one_call()
+@one_call
 def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | None = None) -> Scale:
     """Return the largest factor of a case's workspace for which J is regular and every limit holds, to 1 %.
 

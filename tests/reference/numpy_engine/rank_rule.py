@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.enclosure.forms import Encloser, Enclosures, forms_of
+from screwsynth.nlp.proof.enclosure.forms import Encloser, Enclosures, Forms, forms_of
 from screwsynth.nlp.proof.workspace.ranks.krawczyk import ROUNDING
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest, Tested
 
@@ -28,5 +28,5 @@ class NumpyRankTest(RankTest):
         terms[:, :, squares] *= 0.5
         middle, off = c + terms[:, :, squares].sum(axis=2), 0.0 if change is None else change.T
         rest = (r + off) * (1 + ROUNDING) + ROUNDING * (np.abs(c) + np.abs(terms).sum(axis=2))
-        tested = self._of_entries(middle, terms, rest, terms.shape[2])
+        tested = self.examine(Forms(middle, terms, rest), terms.shape[2])
         return tested._replace(shares=tested.shares[:, :n])

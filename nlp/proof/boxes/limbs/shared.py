@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models.arrays import first_largest
-from ...checker.limbs.sharedtree import leaf_bytes
-from ...checker.tree import Node, node_bytes
+from ...checker.tree import Node, leaf_bytes, node_bytes
 from ..engine import Engine, LimbModels
 from ..optimum import LEAST_WIDTHS, reason_without_bound
 from ..rows import SMALL, WHOLE, Boxes, some

@@ -61,9 +61,9 @@ class Minimum:
     """The smallest value of a function over the workspace.
 
     Attributes:
-        bound: proven: no pose has a smaller value.
-        value: at ``y``.
-        y: (6,) the best pose known.
+        bound: proven: no pose, and no machine that is meant, has a smaller value.
+        value: the smallest value known; infinite without one.
+        at: coordinates of the point that has it.
         boxes, open: number of boxes examined, and of boxes left.
         seconds: wall time.
         reason: for stopping before the gap was met; else empty.
@@ -71,7 +71,7 @@ class Minimum:
 
     bound: float
     value: float
-    y: FloatArray
+    at: FloatArray
     boxes: int
     open: int
     seconds: float
@@ -100,16 +100,11 @@ def prove_minimum(
         time_limit: seconds after which the search stops with the bound reached.
         recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
     """
-    effort = Effort()
-    rule = _OracleRule(oracle, box, Goal(gap, limit, slack), recorder)
-    lower, upper = box.lower[None], box.upper[None]
-    root = Boxes(lower, upper, np.array([math.inf]), rule.split(lower, upper, oracle.bounds(lower, upper)), ())
-    search = Search(rule, root, whole=box.upper - box.lower, least=(0.0, 0.0), order=Order.LARGEST)
     with one_search(time_limit):
-        reason = effort.run(search, rule.ending(search))
-    value, y = rule.best
-    least = min(-search.bound, value)
-    return Minimum(least, value, y, search.boxes, search.left, effort.seconds, reason)
+        rule = _OracleRule(oracle, box, Goal(gap, limit, slack), recorder)
+        lower, upper = box.lower[None], box.upper[None]
+        root = Boxes(lower, upper, np.array([math.inf]), rule.split(lower, upper, oracle.bounds(lower, upper)), ())
+        return searched(rule, root, box.upper - box.lower, (0.0, 0.0))
 
 
 class Goal(NamedTuple):
@@ -174,6 +169,24 @@ class SmallestValue(Rule[Columns]):
         return reason
 
 
+def searched(
+    rule: SmallestValue[Columns], root: Boxes[Columns], whole: FloatArray, least: tuple[float, float]
+) -> Minimum:
+    """Return the smallest value that a rule finds from a root, the boxes with the smallest bounds first.
+
+    Args:
+        rule: the rule.
+        root: one box.
+        whole: (n,) its widths.
+        least: parts of them below which a box is not bisected, and is put last.
+    """
+    effort = Effort()
+    search = Search(rule, root, whole=whole, least=least, order=Order.LARGEST)
+    reason = effort.run(search, rule.ending(search))
+    value, at = rule.best
+    return Minimum(min(-search.bound, value), value, at, search.boxes, search.left, effort.seconds, reason)
+
+
 class _OracleRule(SmallestValue[tuple[()]]):
     """Rule of a function of the pose."""
 
@@ -204,7 +217,7 @@ class _OracleRule(SmallestValue[tuple[()]]):
         found = self._oracle.bounds(lower, upper)
         centres = self._box.clipped(0.5 * lower + 0.5 * upper)
         values = self._oracle.values(centres)
-        if len(values) and is_smaller(float(np.nanmin(values)), self.best.value):
+        if len(values) and is_smaller(float(np.fmin.reduce(values)), self.best.value):
             best = first_smallest(values)
             self.best = Value(float(values[best]), centres[best])
         bound = np.fmin(-found.lower, boxes.bound[kept])
@@ -218,7 +231,7 @@ def is_smaller(value: float, known: float) -> bool:
 
 def first_smallest(values: FloatArray) -> int:
     """Return the place of the first of the smallest values (K,), up to rounding; NaN are left out."""
-    least = float(np.nanmin(values))
+    least = float(np.fmin.reduce(values))
     return int(np.argmax(values <= least + _TIE * abs(least)))
 
 

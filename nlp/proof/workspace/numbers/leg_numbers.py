@@ -50,7 +50,7 @@ def own_searches(
         legs: its joint centres.
         box: the poses.
         gap: allowed distance of a bound from the best value known, as a part of it.
-        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of the legs alone.
+        shortest: no leg of any machine is shorter over the workspace; used with a tolerance of the legs alone.
         paper: records the searches for a proof.
     """
 
@@ -60,7 +60,7 @@ def own_searches(
 
     def with_errors(oracle: SingularValues | Clearance, found: Minimum, extreme: Extreme) -> Extreme:
         """Return an extreme with the errors of the machine that reaches it."""
-        return replace(extreme, errors=oracle.errors(found.y)) if legs.tolerance else extreme
+        return replace(extreme, errors=oracle.errors(found.at)) if legs.tolerance else extreme
 
     for limit in case.limits:
         if isinstance(limit, SmallestSingularValue):
@@ -122,7 +122,7 @@ def from_minimum(
         limit=sign * limit,
         bound=sign * found.bound,
         reached=sign * found.value,
-        pose=box.pose(found.y),
+        pose=box.pose(found.at),
         outcome=outcome,
         boxes=found.boxes,
         seconds=found.seconds,
@@ -161,9 +161,10 @@ def pose_errors(
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
     whole = with_rest(first, eps, shortest, reach) if all(map(math.isfinite, first)) else PoseErrors(math.inf, math.inf)
     for k, (name, dimension) in enumerate(names):
-        y, bound = found[k].y, whole[k]
+        y, bound = found[k].at, whole[k]
         # To first order both signs give the same error.
-        reached = max(displaced(legs, box, y, sign * eps * searches[k].worst(y))[k] for sign in (-1.0, 1.0))
+        both = [displaced(legs, box, y, sign * eps * searches[k].worst(y)) for sign in (-1.0, 1.0)]
+        reached = max((each[k] for each in both if each is not None), default=math.nan)
         is_proved = math.isfinite(bound) and not found[k].reason
         reason = found[k].reason or "the errors are too large for a bound of their terms of second order"
         yield Extreme(
@@ -174,7 +175,7 @@ def pose_errors(
             limit=None,
             bound=bound,
             reached=reached,
-            pose=box.pose(y),
+            pose=None if math.isnan(reached) else box.pose(y),
             outcome=Outcome.PROVED if is_proved else Outcome.OPEN,
             boxes=found[k].boxes,
             seconds=found[k].seconds,

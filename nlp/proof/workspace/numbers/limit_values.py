@@ -21,8 +21,8 @@ from ....errors import UncoveredError
 from ...enclosure.forms import Encloser, Forms
 from ...enclosure.tape import compile_tape
 from ...statement.claims import claims_of
-from ..ranks.krawczyk import ROUNDING, Relation, relation_of
-from ..ranks.loop_boxes import Cells
+from ..ranks.krawczyk import ROUNDING, Coordinates, Relation, relation_of, with_relation
+from ..ranks.loop_boxes import LoopBoxes
 from ..robot.box_layout import box_layout
 from ..robot.posed_robot import Problem
 
@@ -66,7 +66,7 @@ class LimitValues:
     """
 
     def __init__(self, case: Case, closed: ClosedForm, problem: Problem) -> None:
-        self._independent, self._dependent = list(problem.independent), list(problem.dependent)
+        self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
         layout = box_layout(replace(case, model=closed.model), problem.box, problem.free)
         # The variables of the layout are those of the problem, in its order.
         given = [problem.z, SX(ca.DM(layout.table.values))]
@@ -99,29 +99,24 @@ class LimitValues:
         self._encloser = Encloser(problem.z, entries)
         self._function = ca.Function("numbers", [problem.z], [ca.densify(numbers)])
 
-    def enclosed(self, cells: Cells) -> Enclosed:
+    def enclosed(self, boxes: LoopBoxes) -> Enclosed:
         """Return ranges over boxes (B,) whose dependent coordinates are known."""
-        k, reaches = len(self._dependent), self._reaches
-        forms = self._encloser(cells.lower.T, cells.upper.T)
-        relation = relation_of(forms.part(slice(0, k)), self._independent, self._dependent, [])
-        reach = self._ranges(forms.part(slice(k, k + reaches)), relation)
-        return Enclosed(relation, reach, self._ranges(forms.part(slice(k + reaches, -1)), relation))
+        k, reaches = len(self._of.dependent), self._reaches
+        forms = self._encloser(boxes.lower.T, boxes.upper.T)
+        relation = relation_of(forms.part(slice(0, k)), self._of)
+        found = with_relation(forms.part(slice(k, -1)), relation, self._of)
+        return Enclosed(relation, _ranges(found.part(slice(0, reaches))), _ranges(found.part(slice(reaches, None))))
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the numbers (K, P) at points (P, n); not finite where a limb does not reach."""
         with np.errstate(all="ignore"):
             return np.asarray(self._function(z.T).full().reshape(len(self.claims), len(z)))
 
-    def _ranges(self, forms: Forms, relation: Relation) -> Ranges:
-        """Return the ranges of expressions."""
-        own, others = forms.a[:, :, self._dependent], forms.a[:, :, self._independent]
-        size = np.abs(own)
-        with np.errstate(all="ignore"):
-            middle = forms.c + (own @ relation.off[:, :, None])[:, :, 0]
-            slopes = others - own @ relation.T
-            rest = forms.r + (size @ relation.rho[:, :, None])[:, :, 0]
-            terms = np.abs(forms.c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
-            half = (np.abs(slopes).sum(axis=2) + rest) * (1 + ROUNDING) + ROUNDING * terms
-            lower, upper = middle - half, middle + half
-        known = np.isfinite(lower) & np.isfinite(upper)
-        return Ranges(np.where(known, lower, -np.inf), np.where(known, upper, np.inf), slopes)
+
+def _ranges(forms: Forms) -> Ranges:
+    """Return the ranges of expressions."""
+    with np.errstate(all="ignore"):
+        half = (np.abs(forms.a).sum(axis=2) + forms.r) * (1 + ROUNDING) + ROUNDING * np.abs(forms.c)
+        lower, upper = forms.c - half, forms.c + half
+    known = np.isfinite(lower) & np.isfinite(upper)
+    return Ranges(np.where(known, lower, -np.inf), np.where(known, upper, np.inf), forms.a)

@@ -21,7 +21,7 @@ from ....interruption import one_search
 from ...boxes.rows import Boxes, joined, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
-from ..ranks.loop_boxes import Cells, Examiner, are_between
+from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
 from ..ranks.rank_rule import RankTest
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -100,13 +100,13 @@ class _LimitsRule(LoopRule):
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes on which a number is not decided."""
         found = self.examined(boxes)
-        known = found.cells.is_known
+        known = found.boxes.is_known
         shares, is_left, rows = found.shares.copy(), np.ones(len(known), dtype=bool), np.flatnonzero(known)
         if rows.size:
-            cells = some(found.cells, rows)
-            enclosed = self._values.enclosed(cells)
+            own = some(found.boxes, rows)
+            enclosed = self._values.enclosed(own)
             upper = enclosed.numbers.upper
-            self._add_points(cells, enclosed)
+            self._add_points(own, enclosed)
             is_open = upper > self._least
             is_left[rows] = is_open.any(axis=1)
             closed = ~is_left[rows]
@@ -136,15 +136,15 @@ class _LimitsRule(LoopRule):
             beyond = best + self._gap * size
         return np.asarray(np.where(best > self._values.limit, beyond, self._values.limit))
 
-    def _add_points(self, cells: Cells, enclosed: Enclosed) -> None:
+    def _add_points(self, boxes: LoopBoxes, enclosed: Enclosed) -> None:
         """Try the middles of boxes, and for each number the end of the box with the largest bound."""
         upper, slopes = enclosed.numbers.upper, np.nan_to_num(enclosed.numbers.slopes)
         best = np.argmax(upper, axis=0)
-        rows = np.concatenate([np.arange(len(cells.lower)), best])
+        rows = np.concatenate([np.arange(len(boxes.lower)), best])
         own = slopes[best, np.arange(len(best))]
         own = np.where(np.abs(own) > _FLAT * np.abs(own).max(axis=1, keepdims=True, initial=0.0), own, 0.0)
-        ends = np.concatenate([np.zeros((len(cells.lower), len(self._independent))), np.sign(own)])
-        z, half = cells.centre[rows], 0.5 * (cells.upper - cells.lower)[rows]
+        ends = np.concatenate([np.zeros((len(boxes.lower), len(self._independent))), np.sign(own)])
+        z, half = boxes.centre[rows], 0.5 * (boxes.upper - boxes.lower)[rows]
         z[:, self._independent] += half[:, self._independent] * ends
         off, T, _, _ = (each[rows] for each in enclosed.relation)
         z[:, self._dependent] += half[:, self._dependent] * (off - (T @ ends[:, :, None])[:, :, 0])
@@ -153,7 +153,7 @@ class _LimitsRule(LoopRule):
         own = [k for k in self._independent if k < count]
         z[:, own] = inside[:, own]
         z = self._examiner.loops.all_closed(z.T, self._dependent).T
-        z[~are_between(z, some(cells, rows), self._dependent)] = np.nan
+        z[~are_between(z, some(boxes, rows), self._dependent)] = np.nan
         numbers = self._values.values(z)
         y = self._problem.pose_of(np.nan_to_num(z))
         held = np.array([self._problem.box.holds(each) for each in y]) & np.isfinite(z).all(axis=1)

@@ -39,6 +39,8 @@ _ERRORS = CORNERS[:32].T
 _STEPS = 200
 #: Steps of Newton's method for a pose whose errors are small.
 _NEWTON = 8
+#: Part of the longest leg by which lengths may differ from those that are wanted: rounding.
+_CLOSED = 1e-10
 
 
 class WorstError:
@@ -114,8 +116,10 @@ def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> P
     return PoseErrors(math.inf, math.inf)
 
 
-def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> PoseErrors:
+def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> PoseErrors | None:
     """Return the errors of the pose of a machine whose legs are longer by given lengths, by Newton's method.
+
+    None where it finds no pose with these lengths, as about a singular one.
 
     Args:
         legs: joint centres.
@@ -126,14 +130,21 @@ def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> Po
     pose = box.pose(y)
     wanted = np.linalg.norm(pose.position + legs.platform @ pose.rotation.T - legs.base, axis=1) + errors
     position, rotation = np.array(pose.position), np.array(pose.rotation)
-    for _ in range(_NEWTON):
+    for k in range(_NEWTON + 1):
         arm = legs.platform @ rotation.T
         span = position + arm - legs.base
         lengths = np.linalg.norm(span, axis=1)
+        if k == _NEWTON:
+            break
         unit = span / lengths[:, None]
-        step = np.linalg.solve(np.hstack([unit, np.cross(arm, unit)]), wanted - lengths)
+        try:
+            step = np.linalg.solve(np.hstack([unit, np.cross(arm, unit)]), wanted - lengths)
+        except np.linalg.LinAlgError:
+            return None
         position = position + step[:3]
         rotation = _turned(step[3:]) @ rotation
+    if not np.abs(lengths - wanted).max() <= _CLOSED * wanted.max():
+        return None
     turned = rotation @ pose.rotation.T
     sine = np.linalg.norm([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
     angle = math.atan2(float(sine), (float(np.trace(turned)) - 1) / 2)

@@ -1,8 +1,14 @@
-"""Boxes of a robot that cover a workspace: the whole of it, boxes contracted to its poses, and how joints follow."""
+"""Boxes of a robot that cover a workspace: the whole of it, boxes contracted to its poses, and how joints follow.
+
+Each pose of a box has one closed point between the ends of its dependent coordinates, which moves continuously with the
+pose. Two boxes with a pose in common have one assembly of the robot's joints where the closed point of the one at that
+pose is that of the other. All boxes have one where each is reached from the first.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import itertools
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,9 +16,8 @@ from .....models.arrays import first_largest
 from ...boxes.rows import Boxes, bisected, joined, some
 from ...boxes.search import Rule
 from ..robot.posed_robot import Problem
-from .connected import is_connected
-from .krawczyk import Relation
-from .loop_boxes import Cells, Examined, Examiner
+from .krawczyk import Relation, no_relation
+from .loop_boxes import Examined, Examiner, LoopBoxes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,16 +26,17 @@ if TYPE_CHECKING:
 
 #: Reason for which nothing is claimed although every box is closed.
 APART = "the assemblies in two neighbouring boxes are not proved to be the same"
+#: Number of boxes beyond which pairs of them are too many, and number of pairs that are compared at once.
+_MOST, _PAIRS = 6000, 512
 
 
-def whole_workspace(problem: Problem) -> Cells:
+def whole_workspace(problem: Problem) -> LoopBoxes:
     """Return the whole workspace as one box; its dependent coordinates are not known."""
-    box, n, free = problem.box, len(problem.start), list(problem.free)
-    lower, upper = np.full((1, n), np.nan), np.full((1, n), np.nan)
-    lower[0, : len(free)], upper[0, : len(free)] = box.lower[free], box.upper[free]
-    dependent = list(problem.dependent)
-    lower[0, dependent] = upper[0, dependent] = np.nan
-    return Cells(lower, upper, problem.start[None].copy(), np.full(1, not dependent))
+    box, n, free, dependent = problem.box, len(problem.start), list(problem.free), list(problem.dependent)
+    ends = np.full((2, n), np.nan)
+    ends[:, : len(free)] = box.lower[free], box.upper[free]
+    ends[:, dependent] = np.nan
+    return LoopBoxes(ends[:1], ends[1:], problem.start[None].copy(), np.full(1, not dependent))
 
 
 def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.intp]:
@@ -52,20 +58,20 @@ class Contracted(NamedTuple):
     """Boxes contracted to a workspace.
 
     Attributes:
-        cells: (B,) boxes.
+        boxes: (B,) boxes.
         kept: (B,) whether they hold poses of the workspace.
         beyond: (B,) whether a number of the pose that follows from others is outside of its range.
     """
 
-    cells: Cells
+    boxes: LoopBoxes
     kept: NDArray[np.bool_]
     beyond: NDArray[np.bool_]
 
 
-def contracted_cells(problem: Problem, cells: Cells) -> Contracted:
+def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> Contracted:
     """Return boxes contracted to the workspace."""
     box, free = problem.box, list(problem.free)
-    ends = [problem.pose_of(each) for each in (cells.lower, cells.upper)]
+    ends = [problem.pose_of(each) for each in (boxes.lower, boxes.upper)]
     # Numbers of the pose that are not known yet may be any of the workspace.
     lower = np.where(np.isnan(ends[0]), box.lower, ends[0])
     upper = np.where(np.isnan(ends[1]), box.upper, ends[1])
@@ -73,17 +79,30 @@ def contracted_cells(problem: Problem, cells: Cells) -> Contracted:
     found = box.contracted(lower, upper)
     own = [j for j in problem.independent if j < len(free)]
     columns = [free[j] for j in own]
-    new_lower, new_upper = cells.lower.copy(), cells.upper.copy()
+    new_lower, new_upper = boxes.lower.copy(), boxes.upper.copy()
     new_lower[:, own], new_upper[:, own] = found.lower[:, columns], found.upper[:, columns]
-    return Contracted(cells._replace(lower=new_lower, upper=new_upper), ~(beyond | found.outside), beyond)
+    return Contracted(boxes._replace(lower=new_lower, upper=new_upper), ~(beyond | found.outside), beyond)
+
+
+def in_workspace(problem: Problem, boxes: LoopBoxes) -> LoopBoxes:
+    """Return the boxes that hold poses of the workspace, contracted to them."""
+    found = contracted_boxes(problem, boxes)
+    return some(found.boxes, found.kept)
 
 
 class Followed(NamedTuple):
-    """Columns of boxes of a robot: those of :class:`.loop_boxes.Cells` beside their ends, and the relation."""
+    """Columns of boxes of a robot.
+
+    Attributes:
+        near, is_known: those of :class:`.loop_boxes.LoopBoxes`.
+        relation: of the dependent coordinates.
+        more: further columns (B, ...) of a rule, as a tuple.
+    """
 
     near: FloatArray
     is_known: NDArray[np.bool_]
     relation: Relation
+    more: Any = ()
 
 
 class LoopRule(Rule[Followed]):
@@ -103,55 +122,96 @@ class LoopRule(Rule[Followed]):
         self.whole: FloatArray = np.zeros(len(problem.start))
         self.whole[self._independent] = (self._start.upper - self._start.lower)[0, self._independent]
         # The boxes in which dependent coordinates became known.
-        self._roots: list[Cells] = []
+        self._roots: list[LoopBoxes] = []
 
     @property
     def root(self) -> Boxes[Followed]:
         """The whole workspace."""
-        k, f = len(self._problem.dependent), len(self._independent)
-        none = Relation(np.zeros((1, k)), np.zeros((1, k, f)), np.zeros((1, k)), np.zeros((1, k, 0)))
         lower, upper, near, is_known = self._start
-        return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), Followed(near, is_known, none))
+        columns = Followed(near, is_known, no_relation(1, self._examiner.of))
+        return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), columns)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes, with their dependent coordinates."""
-        parts, count = bisected(boxes), len(boxes.split)
-        sides = np.zeros(parts.lower.shape)
-        sides[np.arange(2 * count), parts.split] = np.repeat([-1.0, 1.0], count)
-        cells = Cells(parts.lower, parts.upper, parts.more.near, parts.more.is_known)
-        found = self._examiner.narrowed(cells, parts.more.relation, sides[:, self._independent])
+        """Return the parts of boxes, with their dependent coordinates."""
+        parts = self.parts(boxes)
+        shape = (len(parts.split) // max(len(boxes.split), 1), 1)
+        sides = 1.0 * (parts.lower > np.tile(boxes.lower, shape)) - 1.0 * (parts.upper < np.tile(boxes.upper, shape))
+        found = self._examiner.narrowed(loop_boxes_of(parts), parts.more.relation, sides[:, self._independent])
         return parts._replace(lower=found.lower, upper=found.upper)
+
+    def parts(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
+        """Return the halves of boxes, all lower ones first."""
+        return bisected(boxes)
 
     def examined(self, boxes: Boxes[Followed]) -> Examined:
         """Return the results for the boxes that hold poses of the workspace."""
-        cells = self._contracted(Cells(boxes.lower, boxes.upper, boxes.more.near, boxes.more.is_known))
-        found = self._examiner.examine(cells)
-        new = np.flatnonzero(found.cells.is_known & ~cells.is_known)
+        inside = self._contracted(loop_boxes_of(boxes))
+        found = self._examiner.examine(inside)
+        new = np.flatnonzero(found.boxes.is_known & ~inside.is_known)
         if new.size:
-            self._roots.append(some(found.cells, new))
+            self._roots.append(some(found.boxes, new))
         return found
 
-    def _contracted(self, cells: Cells) -> Cells:
+    def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
         """Return boxes contracted to the workspace."""
-        return in_workspace(self._problem, cells)
+        return in_workspace(self._problem, boxes)
 
     def boxes_of(self, found: Examined, bound: FloatArray, split: NDArray[np.intp]) -> Boxes[Followed]:
         """Return examined boxes, with bounds (B,) and places (B,) among the independent coordinates to bisect."""
-        lower, upper, near, is_known = found.cells
+        lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
         return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation))
 
     def widths(self, found: Examined) -> FloatArray:
         """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""
         own, whole = self._independent, self.whole[self._independent]
-        return (found.cells.upper - found.cells.lower)[:, own] / np.where(whole > 0, whole, np.inf)
+        return (found.boxes.upper - found.boxes.lower)[:, own] / np.where(whole > 0, whole, np.inf)
 
     def is_one_assembly(self) -> bool:
         """Return whether the boxes surely belong to one assembly."""
-        return not self._roots or is_connected(self._examiner, joined(self._roots), self._independent)
+        if not self._roots:
+            return True
+        roots = joined(self._roots)
+        count = len(roots.lower)
+        if count > _MOST:
+            return False
+        lower, upper = roots.lower[:, self._independent], roots.upper[:, self._independent]
+        touching = [
+            np.flatnonzero((lower[k + 1 :] <= upper[k]).all(axis=1) & (upper[k + 1 :] >= lower[k]).all(axis=1)) + k + 1
+            for k in range(count)
+        ]
+        pairs = np.stack([np.repeat(np.arange(count), [len(each) for each in touching]), np.concatenate(touching)])
+        return bool(one_assembly(self._examiner, roots, pairs.T, np.arange(count) == 0).all())
 
 
-def in_workspace(problem: Problem, cells: Cells) -> Cells:
-    """Return the boxes that hold poses of the workspace, contracted to them."""
-    found = contracted_cells(problem, cells)
-    return some(found.cells, found.kept)
+def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:
+    """Return the boxes of a search without their bounds."""
+    return LoopBoxes(boxes.lower, boxes.upper, boxes.more.near, boxes.more.is_known)
+
+
+def one_assembly(
+    examiner: Examiner, boxes: LoopBoxes, pairs: NDArray[np.intp], is_reached: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return for each box (B,) whether its closed points surely belong to the assembly of some boxes.
+
+    Args:
+        examiner: of the robot.
+        boxes: with known dependent coordinates where they are in pairs.
+        pairs: (P, 2) boxes that touch.
+        is_reached: (B,) those boxes.
+    """
+    is_reached, tried = is_reached.copy(), np.zeros(len(pairs), dtype=bool)
+    while True:
+        # Pairs of a box that is reached and one that is not: the first of each that is left is tried.
+        which = np.flatnonzero((is_reached[pairs[:, 0]] != is_reached[pairs[:, 1]]) & ~tried)
+        if not which.size:
+            return is_reached
+        turned = is_reached[pairs[which, 1]]
+        one = np.where(turned, pairs[which, 1], pairs[which, 0])
+        new = np.where(turned, pairs[which, 0], pairs[which, 1])
+        _, order = np.unique(new, return_index=True)
+        for begin, end in itertools.pairwise([*range(0, len(order), _PAIRS), len(order)]):
+            part = order[begin:end]
+            tried[which[part]] = True
+            tied = examiner.tied(some(boxes, one[part]), some(boxes, new[part]))
+            is_reached[new[part[tied]]] = True

@@ -34,6 +34,14 @@ _TINY = 1e-300
 _POWERS = 12
 
 
+class Coordinates(NamedTuple):
+    """Indices of coordinates: those that are free, those that follow, and errors of joint centres."""
+
+    independent: list[int]
+    dependent: list[int]
+    errors: list[int]
+
+
 class Relation(NamedTuple):
     """Dependent coordinates over B boxes, in parts of their half widths.
 
@@ -66,28 +74,40 @@ def by_centres(slopes: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((parts * parts).sum(axis=-1) + _TINY).sum(axis=-1) * (1 + ROUNDING))
 
 
-def relation_of(equations: Forms, independent: list[int], dependent: list[int], errors: list[int]) -> Relation:
-    """Return the relation that k equations over boxes give.
+def no_relation(count: int, of: Coordinates) -> Relation:
+    """Return the relation over boxes of which nothing is known."""
+    f, k, e = map(len, of)
+    nothing = np.zeros((count, k)), np.zeros((count, k, f)), np.full((count, k), np.inf), np.zeros((count, k, e))
+    return Relation(*nothing)
 
-    Args:
-        equations: their forms.
-        independent: indices of the coordinates that are free.
-        dependent: indices of those that follow.
-        errors: indices of errors of joint centres.
-    """
-    A = equations.a[:, :, dependent]
-    other, own = equations.a[:, :, independent], equations.a[:, :, errors]
+
+def relation_of(equations: Forms, of: Coordinates) -> Relation:
+    """Return the relation that the forms of k equations over boxes give."""
+    A = equations.a[:, :, of.dependent]
+    other, own = equations.a[:, :, of.independent], equations.a[:, :, of.errors]
     Y = inverses(A)
     size = np.abs(Y)
     with np.errstate(all="ignore"):
         T, E = Y @ other, Y @ own
         off = -(Y @ equations.c[:, :, None])[:, :, 0]
-        defect = np.abs(Y @ A - np.eye(len(dependent))).sum(axis=2) + ROUNDING * (size @ np.abs(A)).sum(axis=2)
+        defect = np.abs(Y @ A - np.eye(len(of.dependent))).sum(axis=2) + ROUNDING * (size @ np.abs(A)).sum(axis=2)
         terms = np.abs(equations.c) + np.abs(other).sum(axis=2) + np.abs(own).sum(axis=2)
         rho = ((size @ equations.r[:, :, None])[:, :, 0] + defect) * (1 + ROUNDING)
         rho += ROUNDING * (size @ terms[:, :, None])[:, :, 0]
     rho = np.where(np.isfinite(rho), rho, np.inf)
     return Relation(np.nan_to_num(off), np.nan_to_num(T), rho, np.nan_to_num(E))
+
+
+def with_relation(forms: Forms, relation: Relation, of: Coordinates) -> Forms:
+    """Return forms of the independent coordinates, then the errors, with the relation in the place of the others."""
+    own, others = forms.a[:, :, of.dependent], forms.a[:, :, [*of.independent, *of.errors]]
+    size = np.abs(own)
+    with np.errstate(all="ignore"):
+        middle = forms.c + (own @ relation.off[:, :, None])[:, :, 0]
+        slopes = others - own @ np.concatenate([relation.T, relation.E], axis=2)
+        rest = forms.r + (size @ relation.rho[:, :, None])[:, :, 0]
+        terms = np.abs(forms.c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
+        return Forms(middle, slopes, rest * (1 + ROUNDING) + ROUNDING * terms)
 
 
 def are_contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:

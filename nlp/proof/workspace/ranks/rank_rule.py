@@ -23,7 +23,7 @@ from casadi import SX
 from .....models import FloatArray
 from ...enclosure.forms import Encloser, Forms
 from ..robot.motion_matrix import RankMatrix
-from .krawczyk import ROUNDING, Relation, are_contractions, by_centres
+from .krawczyk import ROUNDING, are_contractions, by_centres
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,15 +50,21 @@ class RankTest:
     """The test of a matrix.
 
     Args:
-        matrix: the matrix; all that is not constant is an entry of ``entries``.
+        matrix: the matrix.
         z: (n, 1) symbols of the coordinates.
         start: (n,) a closed point, at which rows and columns are scaled.
+
+    Attributes:
+        entries: (E, 1) what is not constant.
+        sign: of the determinant of a square matrix at the start; 0 for other matrices.
     """
 
     def __init__(self, matrix: RankMatrix, z: SX, start: FloatArray) -> None:
         self.nullity = matrix.nullity
         whole = matrix.matrix
         values = ca.Function("start", [z], [ca.densify(whole)])(start).full()
+        is_square = values.shape[0] == values.shape[1] and not matrix.nullity
+        self.sign = int(np.linalg.slogdet(values)[0]) if is_square else 0
         sizes = np.linalg.norm(values, axis=1)
         # A power of two, so that scaling rounds nothing.
         self._scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
@@ -103,60 +109,23 @@ class RankTest:
         encloser.module.rank(n, encloser.tape.head, self._head, found, count, change)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
 
-    def examine(
-        self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
-    ) -> Tested:
-        """Return the verdict on boxes.
-
-        Args:
-            forms: of the entries.
-            relation: of the dependent coordinates.
-            independent: indices of the coordinates that are free.
-            dependent: indices of those that follow.
-            errors: indices of errors of joint centres.
-        """
-        c, a, r = forms
-        own, others = a[:, :, dependent], a[:, :, [*independent, *errors]]
-        size = np.abs(own)
-        with np.errstate(all="ignore"):
-            middle = c + (own @ relation.off[:, :, None])[:, :, 0]
-            slope = others - own @ np.concatenate([relation.T, relation.E], axis=2)
-            rest = r + (size @ relation.rho[:, :, None])[:, :, 0]
-            terms = np.abs(c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
-            rest = rest * (1 + ROUNDING) + ROUNDING * terms
-        return self._of_entries(middle, slope, rest, len(independent))
-
-    def _of_entries(self, middle: FloatArray, slope: FloatArray, rest: FloatArray, f: int) -> Tested:
-        """Return the verdict on boxes.
-
-        Args:
-            middle: (B, E) of the entries.
-            slope: (B, E, f + e) terms, those of errors last.
-            rest: (B, E).
-            f: number of terms that are not those of errors.
-        """
-        count = len(middle)
-        M0 = np.broadcast_to(self._constant, (count, *self._constant.shape)).copy()
+    def examine(self, forms: Forms, f: int) -> Tested:
+        """Return the verdict on boxes from forms of first order of the entries, whose first f terms are no errors."""
+        (middle, slope, rest), (rows, columns) = forms, self._at
+        scale = self._scale[rows]
+        M0 = np.broadcast_to(self._constant, (len(middle), *self._constant.shape)).copy()
         R = np.zeros_like(M0)
-        at, scale = self._at, self._scale[self._at[0]]
-        M0[:, at[0], at[1]] += middle * scale
-        R[:, at[0], at[1]] = rest * scale
-        M = np.zeros((count, slope.shape[2], *self._constant.shape))
-        M[:, :, at[0], at[1]] = (slope * scale[:, None]).transpose(0, 2, 1)
+        M0[:, rows, columns] += middle * scale
+        R[:, rows, columns] = rest * scale
+        M = np.zeros((len(middle), slope.shape[2], *self._constant.shape))
+        M[:, :, rows, columns] = (slope * scale[:, None]).transpose(0, 2, 1)
         known = np.asarray(np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
         known &= np.isfinite(M).all(axis=(1, 2, 3))
         M0[~known], M[~known] = 0.0, 0.0
         return self._judged(M0, M, np.where(known[:, None, None], R, np.inf), f)
 
     def _judged(self, M0: FloatArray, M: FloatArray, R: FloatArray, f: int) -> Tested:
-        """Return the verdict on boxes.
-
-        Args:
-            M0: (B, m, c) middles.
-            M: (B, f + e, m, c) linear parts, those of errors last.
-            R: (B, m, c) rests.
-            f: number of independent coordinates.
-        """
+        """Return the verdict on boxes from middles (B, m, c), linear parts (B, f + e, m, c), and rests."""
         columns = M0.shape[2]
         _, values, right = np.linalg.svd(M0, full_matrices=True)
         rank = columns - self.nullity

@@ -18,11 +18,10 @@ from ..regular.signs import SignRefuter
 from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
-from ..robot.tolerance_model import Family, built_model, family_of
+from ..robot.tolerance_model import Family
 from ..tolerance.singular_machine import SingularMachine
 from ..verdict import Outcome, Regularity
-from .refuters import NewtonRefuter, Refuter, singular_at
-from .search import RankProgress, prove_rank
+from .search import NewtonRefuter, RankProgress, Refuter, prove_rank, singular_at
 from .singular_pose import SingularPose
 
 if TYPE_CHECKING:
@@ -59,7 +58,7 @@ def prove_ranks(
     """
     box = homes.box
     try:
-        family = _family(model, homes, legs)
+        family = None if homes.machines is None else homes.machines.family
         problem = build_problem(homes.case, model, box) if family is None else family.problem
         prove = partial(prove_rank, problem, family=family, progress=progress)
         shown = partial(_is_shown, problem, family, homes)
@@ -79,16 +78,6 @@ def prove_ranks(
         return Ranks(not_judged(box, str(error)), None)
     is_shown = partial(shown, constraints=False)
     return Ranks(_after_newton(regular, problem, problem.locked, None if legs else family, is_shown), constraints)
-
-
-def _family(model: Model, homes: Homes, legs: Legs | None) -> Family | None:
-    """Return the machines that are meant; None for the design alone."""
-    if homes.machines is not None:
-        return homes.machines.family
-    if legs is None or not legs.tolerance:
-        return None
-    problem = build_problem(homes.case, model, homes.box)
-    return family_of(homes.case, built_model(homes.case.model), problem, legs.tolerance)
 
 
 def _is_shown(problem: Problem, family: Family | None, homes: Homes, z: FloatArray, *, constraints: bool) -> bool:

@@ -61,6 +61,8 @@ def inverse_over(rows: LegRows, lower: FloatArray, upper: FloatArray) -> Inverse
         # |(I + C (J - J0))^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.
         known = np.isfinite(B).all(axis=(1, 2))
         whole = np.where(known[:, None, None], np.eye(LEGS) - B, np.eye(LEGS))
+        known &= np.abs(np.linalg.det(whole)) > 0
+        whole = np.where(known[:, None, None], whole, np.eye(LEGS))
         X = np.linalg.solve(whole, np.where(known[:, None, None], size_of_C, 0.0)) * (1 + 1e-6)
         is_bound = known & (X >= 0).all(axis=(1, 2)) & (size_of_C <= X - B @ X).all(axis=(1, 2))
         further = (second + B @ B) @ X

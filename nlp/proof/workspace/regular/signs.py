@@ -18,7 +18,7 @@ from .....models import FloatArray, frozen_array
 from ...statement.machine import INSIDE, JointErrors, Legs
 from ..ranks.krawczyk import inverses
 from ..ranks.loop_boxes import Examined
-from ..ranks.refuters import Singular
+from ..ranks.search import Singular
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
 from .exact import determinant_sign, singular_between
@@ -51,7 +51,7 @@ class SignRefuter:
 
     def look(self, found: Examined, boxes: int) -> Singular | None:  # noqa: ARG002 - every block is looked at
         """Return a singular pose from random ones, from this block of boxes and from earlier ones."""
-        box, y = self._box, self._problem.pose_of(found.cells.centre)
+        box, y = self._box, self._problem.pose_of(found.boxes.centre)
         if not self._is_sampled:
             self._is_sampled = True
             points = self._near_singular()

@@ -72,7 +72,7 @@ class PosedModel:
         every: all equations of loops, and signs that must be positive.
         signs: (s, 1) numbers that are positive in home's assembly.
         limbs: rows, members and actuators.
-        jacobian: (rows, 6) J.
+        jacobian: (rows, 6) J, couples times the characteristic length of the case.
         turned: the limbs with ``inverse * s R`` as the rotation.
         inverse: (1, 1) symbol of ``1 / s``.
         scale: (1, 1) ``s``.
@@ -155,7 +155,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         every=ca.vertcat(SX(0, 1), *scaled),
         signs=signs,
         limbs=limbs,
-        jacobian=jacobian(limbs.wrenches, SX(1), limbs.members),
+        jacobian=jacobian(limbs.wrenches, SX(case.characteristic_length), limbs.members),
         turned=turned,
         inverse=inverse,
         scale=scale,

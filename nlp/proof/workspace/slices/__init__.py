@@ -1,5 +1,1 @@
-"""Slices through a workspace.
-
-The modules import each other in this order: ``regions``, ``limitcells`` (limits on boxes), ``firstviolated``;
-``anylimits``, ``assemblies`` and ``anyslice`` (any robot); ``slices`` (planes covered by boxes).
-"""
+"""Slices through a workspace: ``slice_limits`` (limits over boxes), then ``slices`` (planes covered by boxes)."""

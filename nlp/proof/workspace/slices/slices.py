@@ -1,46 +1,63 @@
 """Slices of a box of poses: where J is proved to be regular, where it is beyond a singular pose, and where limits hold.
 
-A slice has two coordinates of the box; the others stay at the middle. The slice is covered by boxes of its own, so
-that what it shows is proved for the poses of the slice alone. It is wider than the workspace, to show what comes next.
-Where several limits are violated, a box has the one that is violated first on the straight way from the middle.
+A slice has two coordinates of the box; the others stay at the middle, or follow from these two. The slice is covered by
+boxes of its own, so that what it shows is proved for the poses of the slice alone. It is wider than the workspace, to
+show what comes next. Where several limits are violated, a box has the one that is violated first on the straight way
+from the middle. Loops without a closed form are followed from the middle.
 """
 
 from __future__ import annotations
 
+import enum
 import itertools
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .....models import FloatArray, frozen_array
+from .....models.joints.closedform import closed_form
 from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind
-from ....errors import CaseError
-from ...boxes.rows import WHOLE, Boxes, joined, some
-from ...boxes.search import Verdicts
-from ...statement.machine import Legs, legs_of, workspace_of_case
-from ..ranks.loop_boxes import Cells, Examined, Examiner
+from ....errors import CaseError, UncoveredError
+from ...boxes.rows import Boxes, bisected, joined, some
+from ...boxes.search import Order, Search, Verdicts
+from ...statement.machine import workspace_of_case
+from ..ranks.covering import Followed, LoopRule, loop_boxes_of, one_assembly
+from ..ranks.loop_boxes import Examiner, LoopBoxes
 from ..ranks.rank_rule import RankTest
 from ..robot.pose_box import PoseBox, pose_box, scaled
-from ..robot.posed_robot import build_problem
+from ..robot.posed_robot import NotJudgedError, build_problem
 from ..scale import largest_factor
-from .anyslice import AnySlices, Covered
-from .firstviolated import POINTS, FirstViolated, grid_points
-from .limitcells import LimitCells, SliceLimit
-from .regions import Cover, CoverRule, Region, cover_of, index_of
+from .slice_limits import POINTS, UNDECIDED, FirstViolated, SliceLimit, SliceLimits
 
-#: Boxes that are examined at once.
-_BLOCK = 4096
 #: Factor by which a slice is wider than the workspace.
 _WIDER = 3.0
+#: Smallest boxes to each side of a slice.
+_SIDE = 256
 #: Names of the coordinates of a pose, by the kind of its rotations.
 _NAMES = {
     TurnKind.ANY_AXIS: ("p_x", "p_y", "p_z", "rotation about x", "rotation about y", "rotation about z"),
     TurnKind.AXIS: ("p_x", "p_y", "p_z", "angle", "", ""),
     TurnKind.ROLL_PITCH_YAW: ("p_x", "p_y", "p_z", "roll", "pitch", "yaw"),
 }
+
+
+class Region(enum.Enum):
+    """Verdict on a box of a slice."""
+
+    REGULAR = "proved regular"
+    BEYOND = "regular, with a singular pose on the way from the middle"
+    OTHER_SIGN = "regular, with the other sign of the determinant"
+    OPEN = "open: too close to a singular pose"
+    UNREACHED = "out of reach, proved"
+    UNKNOWN = "open: reach or closed loops are not proved"
+
+
+#: Order of the regions in arrays.
+_REGIONS = tuple(Region)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,64 +101,73 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
             robot whose loops are not closed in the middle of the workspace.
     """
     case = replace(case, joint_centre_tolerance=None)
-    workspace, legs = workspace_of_case(case), legs_of(case)
-    box = pose_box(workspace)
-    wide = pose_box(scaled(workspace, min(_WIDER, largest_factor(workspace))))
+    workspace = workspace_of_case(case)
     # A slice shows the square around the ball of rotations.
-    wide = replace(wide, ball=np.inf)
-    others = AnySlices(case, box) if legs is None else None
-    free = wide.free if others is None else others.free
-    turning, moving = [k for k in free if k > 2], [k for k in free if k < 3]
+    wide = replace(pose_box(scaled(workspace, min(_WIDER, largest_factor(workspace)))), ball=np.inf)
+    robot = _Robot(case, pose_box(workspace))
+    turning, moving = [k for k in robot.free if k > 2], [k for k in robot.free if k < 3]
     pairs = [*itertools.combinations(moving, 2), *itertools.combinations(turning, 2)]
     if not pairs:
         pairs = [(k, each) for k in moving for each in turning]
     if not pairs:
         fault = "has no slices: they need two numbers of the pose, given as { min, max }, that the robot can choose"
         raise CaseError("workspace", fault, source=case.source)
-    return tuple(_slice(case, legs, others, box, wide, pair) for pair in pairs)
+    limit = next((each for each in case.limits if isinstance(each, Actuator)), None)
+    # No single pose keeps or violates these limits.
+    over_poses = tuple(
+        f"actuator.{name}" for name in ("stroke_max", "dead_length") if getattr(limit, name, None) is not None
+    )
+    return tuple(_slice(robot, wide, pair, over_poses) for pair in pairs)
 
 
-def _of_legs(case: Case, legs: Legs, wide: PoseBox, chosen: list[int]) -> Covered:
-    """Return the cover of a slice of six straight legs."""
-    middle = 0.5 * (wide.lower + wide.upper)
-    lower, upper = middle.copy(), middle.copy()
-    lower[chosen], upper[chosen] = wide.lower[chosen], wide.upper[chosen]
-    whole = replace(wide, lower=frozen_array(lower, (6,)), upper=frozen_array(upper, (6,)))
-    limits = LimitCells(case, legs, whole, chosen)
+class _Robot:
+    """A robot of which slices are drawn.
 
-    def violated() -> NDArray[np.bool_]:
-        """Return whether each limit is violated at the points of the grid, (M, N, N)."""
-        points = np.repeat(middle[None], POINTS**2, axis=0)
-        points[:, chosen] = grid_points(lower[chosen], upper[chosen]).reshape(-1, 2)
-        return limits.violated(points).reshape(-1, POINTS, POINTS)
+    Args:
+        case: with fixed dimensions.
+        box: its workspace.
 
-    first = FirstViolated(violated, len(limits.limits), lower[chosen], upper[chosen])
-    problem = build_problem(case, case.model, wide)
-    examiner = Examiner(problem, RankTest(problem.locked, problem.z, problem.start))
-    cover = _LegsRule(examiner, limits, first, whole, chosen).result
-    return Covered(cover, limits.limits, limits.uncovered)
+    Attributes:
+        problem: the robot over the workspace.
+        limits: its limits.
+        examiners: of its ranks.
+        sign: of the determinant in the middle; 0 for a matrix that is not square.
+        other: region of regular boxes with another sign. Where all limbs reach all poses, a singular pose is between.
+        free: indices of those numbers of the pose, among the six of a box, that the robot can choose.
+
+    Raises:
+        CaseError: the loops are not closed in the middle of the workspace, or have an operation without a rule.
+    """
+
+    def __init__(self, case: Case, box: PoseBox) -> None:
+        closed = closed_form(case.model)
+        try:
+            self.problem = problem = build_problem(case, closed.model, box)
+            self.limits = SliceLimits(case, closed, problem)
+            matrices = [problem.locked, *([] if problem.unactuated is None else [problem.unactuated])]
+            tests = [RankTest(each, problem.z, problem.start) for each in matrices]
+            self.examiners = [Examiner(problem, each) for each in tests]
+        except (NotJudgedError, UncoveredError) as error:
+            raise CaseError("workspace", f"has no slices: {error}", source=case.source) from None
+        self.sign = tests[0].sign
+        self.other = Region.OTHER_SIGN if problem.dependent or closed.reaches else Region.BEYOND
+        self.free = tuple(problem.free[k] for k in problem.independent)
 
 
-def _slice(
-    case: Case, legs: Legs | None, others: AnySlices | None, box: PoseBox, wide: PoseBox, pair: tuple[int, int]
-) -> Slice:
+def _slice(robot: _Robot, wide: PoseBox, pair: tuple[int, int], over_poses: tuple[str, ...]) -> Slice:
     """Return the slice of two coordinates."""
-    chosen = list(pair)
-    if others is not None:
-        cover, limits, uncovered = others.cover(wide, chosen)
-    elif legs is not None:
-        cover, limits, uncovered = _of_legs(case, legs, wide, chosen)
-    else:
-        raise TypeError("a robot is six straight legs, or another")
+    chosen, box = list(pair), robot.problem.box
+    rule = _SliceRule(robot, chosen, wide.lower[chosen], wide.upper[chosen])
+    parts, region, binding = rule.cover()
     ends = np.array([[each.lower[chosen], each.upper[chosen]] for each in (box, wide)])
     are_angles = (pair[0] > 2, pair[1] > 2)
-    parts = cover.boxes
     for k, is_angle in enumerate(are_angles):
         if is_angle:
             ends[:, :, k] = 2 * np.arctan(ends[:, :, k])
             parts[:, [k, k + 2]] = 2 * np.arctan(parts[:, [k, k + 2]])
     names = _NAMES[box.kind]
     is_ball = box.kind is TurnKind.ANY_AXIS and all(are_angles)
+    binding.flags.writeable = False
     return Slice(
         names=(names[pair[0]], names[pair[1]]),
         are_angles=are_angles,
@@ -149,60 +175,164 @@ def _slice(
         workspace=frozen_array(ends[0], (2, 2)),
         whole=frozen_array(ends[1], (2, 2)),
         boxes=frozen_array(parts, parts.shape),
-        regions=cover.regions,
-        limits=limits,
-        binding=cover.binding,
-        left_out=(*uncovered, *_over_poses(case)),
+        regions=tuple(_REGIONS[k] for k in region.tolist()),
+        limits=robot.limits.limits,
+        binding=binding,
+        left_out=(*robot.limits.uncovered, *over_poses),
     )
 
 
-def _over_poses(case: Case) -> tuple[str, ...]:
-    """Return the keys of limits that no single pose keeps or violates."""
-    limit = next((each for each in case.limits if isinstance(each, Actuator)), None)
-    if limit is None:
-        return ()
-    return tuple(f"actuator.{name}" for name in ("stroke_max", "dead_length") if getattr(limit, name) is not None)
+class _SliceRule(LoopRule):
+    """Rule of ranks, reach and limits over the boxes of a slice, which are bisected along both of its coordinates.
 
+    Boxes carry the states of claims, whether all ranks are proved, and the sign of the determinant where they are.
 
-#: States (B, K) of the parts of limits.
-_States = NDArray[np.int8]
+    Args:
+        robot: the robot.
+        chosen: the coordinates of the slice, among the six of a pose.
+        lower, upper: (2,) its ends.
+    """
 
+    def __init__(self, robot: _Robot, chosen: list[int], lower: FloatArray, upper: FloatArray) -> None:
+        problem = robot.problem
+        super().__init__(problem, robot.examiners[0])
+        # Boxes without loops are examined in C: many at once.
+        self.block = 512 if problem.dependent else 4096
+        self._robot, self._limits, self._dependent = robot, robot.limits, list(problem.dependent)
+        self._places = [problem.free.index(k) for k in chosen]
+        self._lower, self._upper = lower, upper
+        self._grid = self._closed_grid()
+        self._first = FirstViolated(robot.limits, self._grid, lower, upper)
+        for end, value in zip(self._start[:2], (lower, upper), strict=True):
+            end[:, self._independent] = problem.start[self._independent]
+            end[:, self._places] = value
+        self._done: list[tuple[LoopBoxes, NDArray[np.int8], NDArray[np.int16]]] = []
 
-class _LegsRule(CoverRule[_States]):
-    """Rule of ranks and limits of six straight legs."""
+    def cover(self) -> tuple[FloatArray, NDArray[np.int8], NDArray[np.int16]]:
+        """Return boxes (B, 4) that cover the slice, and the indices of their regions and limits."""
+        root = self.root
+        more = self._limits.unknown, np.zeros(1, dtype=bool), np.zeros(1, dtype=np.int32)
+        root = root._replace(more=root.more._replace(more=more))
+        search = Search(self, root, whole=np.nan_to_num((root.upper - root.lower)[0]), least=(0, 0), order=Order.NEWEST)
+        while search.is_open:
+            search.step(-math.inf)
+        boxes, region, binding = joined(self._done)
+        if self._dependent:
+            is_one = self._is_of_middle(boxes)
+            region[~is_one], binding[~is_one] = _REGIONS.index(Region.UNKNOWN), UNDECIDED
+        return np.hstack([boxes.lower[:, self._places], boxes.upper[:, self._places]]), region, binding
 
-    block = _BLOCK
+    def parts(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
+        """Return the quarters of boxes."""
+        halves = bisected(boxes)
+        return bisected(halves._replace(split=np.full(len(halves.split), self._places[1])))
 
-    def __init__(
-        self, examiner: Examiner, limits: LimitCells, first: FirstViolated, whole: PoseBox, chosen: list[int]
-    ) -> None:
-        super().__init__(chosen, whole.lower[chosen], whole.upper[chosen])
-        self._examiner, self._limits, self._first = examiner, limits, first
-        middle = 0.5 * (whole.lower + whole.upper)[None]
-        self._sign = self._ranks(middle, middle).signs[0]
-        self._done: list[tuple[FloatArray, FloatArray, NDArray[np.int8], NDArray[np.int16]]] = []
-        ends = whole.lower[None], whole.upper[None]
-        self.cover(Boxes(*ends, np.zeros(1), np.array([WHOLE]), limits.unknown.T))
-
-    def _ranks(self, lower: FloatArray, upper: FloatArray) -> Examined:
-        """Return the ranks over boxes (B, 6)."""
-        free = list(self._examiner.problem.free)
-        low, high = lower[:, free], upper[:, free]
-        return self._examiner.examine(Cells(low, high, 0.5 * (low + high), np.ones(len(low), dtype=bool)))
-
-    def examine(self, boxes: Boxes[_States]) -> Verdicts[_States]:
+    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes that are not decided."""
-        found = self._ranks(boxes.lower, boxes.upper)
-        known = self._limits.examine(boxes.more.T, boxes.lower, boxes.upper)
-        low, high, small = self.ends(boxes.lower, boxes.upper)
-        limit, is_same = self._first.of(self._limits.states(known), low, high)
-        region = np.where(found.signs == self._sign, index_of(Region.REGULAR), index_of(Region.BEYOND))
-        region = np.where(found.is_regular, region, index_of(Region.OPEN)).astype(np.int8)
-        done = (found.is_regular & is_same) | small
-        self._done.append(some((low, high, region, limit), done))
-        return self.open(boxes._replace(more=known.T), done)
+        low, high = boxes.lower[:, self._places], boxes.upper[:, self._places]
+        known, has_ranks, signs = (each.copy() for each in boxes.more.more)
+        inside, is_empty = loop_boxes_of(boxes), np.zeros(len(signs), dtype=bool)
+        if self._dependent:
+            inside, is_empty = self._with_near(inside, low, high)
+        inside = self._with_ranks(inside, has_ranks, signs)
+        relation, states = some(boxes.more.relation, np.arange(len(signs))), known
+        rows = np.flatnonzero(inside.is_known)
+        if rows.size:
+            own = some(relation, rows)
+            states[rows] = self._limits.examine(some(inside, rows), own, known[rows])
+            for whole, part in zip(relation, own, strict=True):
+                whole[rows] = part
+        reached, unreached = self._limits.reached(states)
+        reached &= inside.is_known
+        is_regular = has_ranks & reached
+        binding, is_same = self._first.of(self._limits.of_limits(states), low, high)
+        same_sign = np.where(
+            signs == self._robot.sign, _REGIONS.index(Region.REGULAR), _REGIONS.index(self._robot.other)
+        )
+        region = np.where(reached, _REGIONS.index(Region.OPEN), _REGIONS.index(Region.UNKNOWN))
+        region = np.where(is_regular, same_sign, region)
+        region[unreached] = _REGIONS.index(Region.UNREACHED)
+        binding[~reached] = UNDECIDED
+        is_small = (high - low <= (self._upper - self._lower) / _SIDE).all(axis=1)
+        done = (is_regular & is_same) | unreached | is_small | (is_empty & ~inside.is_known)
+        self._done.append(some((inside, region.astype(np.int8), binding), done))
+        columns = Followed(inside.near, inside.is_known, relation, (states, has_ranks, signs))
+        split = np.full(len(done), self._places[0])
+        left = some(Boxes(inside.lower, inside.upper, boxes.bound, split, columns), ~done)
+        return Verdicts(left, -math.inf, len(done))
 
-    @property
-    def result(self) -> Cover:
-        """The boxes that cover the slice."""
-        return cover_of(*joined(self._done))
+    def _with_ranks(self, boxes: LoopBoxes, is_regular: NDArray[np.bool_], signs: NDArray[np.int32]) -> LoopBoxes:
+        """Return boxes with dependent coordinates where they are known; set whether ranks are proved, and signs."""
+        boxes = some(boxes, np.arange(len(is_regular)))
+        rows = np.flatnonzero(~is_regular)
+        for k, examiner in enumerate(self._robot.examiners):
+            if not rows.size:
+                break
+            found = examiner.examine(some(boxes, rows))
+            for whole, part in zip(boxes, found.boxes, strict=True):
+                whole[rows] = part
+            if not k:
+                signs[rows] = found.signs
+            is_regular[rows] = found.is_regular
+            rows = rows[found.is_regular]
+        return boxes
+
+    def _with_near(self, boxes: LoopBoxes, low: FloatArray, high: FloatArray) -> tuple[LoopBoxes, NDArray[np.bool_]]:
+        """Return boxes with closed loops of the nearest point of the grid, and whether none of their parts is tried.
+
+        The loops of the grid are those of the middle, followed without a jump; they may be closed nowhere in a box.
+        """
+        at = np.rint(self._in_grid(0.5 * (low + high))).astype(np.intp)
+        closed = self._grid[at[:, 0], at[:, 1]]
+        use = ~boxes.is_known & np.isfinite(closed).all(axis=1)
+        total = np.zeros((POINTS + 1, POINTS + 1))
+        total[1:, 1:] = np.isfinite(self._grid).all(axis=-1).cumsum(axis=0).cumsum(axis=1)
+        begin = np.clip(np.floor(self._in_grid(low)), 0, POINTS - 1).astype(np.intp)
+        end = np.clip(np.ceil(self._in_grid(high)), 0, POINTS - 1).astype(np.intp) + 1
+        count = total[end[:, 0], end[:, 1]] - total[begin[:, 0], end[:, 1]]
+        count += total[begin[:, 0], begin[:, 1]] - total[end[:, 0], begin[:, 1]]
+        return boxes._replace(near=np.where(use[:, None], closed, boxes.near)), ~boxes.is_known & ~(count > 0)
+
+    def _in_grid(self, points: FloatArray) -> FloatArray:
+        """Return points (B, 2) of the slice as fractional indices of the grid."""
+        return (points - self._lower) / (self._upper - self._lower) * (POINTS - 1)
+
+    def _closed_grid(self) -> FloatArray:
+        """Return closed loops (N, N, n) at the points of the grid, followed from the middle; NaN where they end."""
+        start, dependent = self._problem.start, self._dependent
+        grid = np.broadcast_to(start, (POINTS, POINTS, len(start))).copy()
+        axes = [np.linspace(low, high, POINTS) for low, high in zip(self._lower, self._upper, strict=True)]
+        grid[:, :, self._places] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        if not dependent:
+            return grid
+        middle = POINTS // 2
+        away = np.stack(np.meshgrid(*[np.arange(POINTS) - middle] * 2, indexing="ij"), axis=-1)
+        ring = np.abs(away).max(axis=-1)
+        for r in range(middle + 1):
+            at = np.argwhere(ring == r)
+            back = at - np.sign(away[at[:, 0], at[:, 1]]) * (np.abs(away[at[:, 0], at[:, 1]]) == r) * (r > 0)
+            z = grid[at[:, 0], at[:, 1]]
+            z[:, dependent] = grid[back[:, 0], back[:, 1]][:, dependent]
+            known = np.asarray(np.isfinite(z).all(axis=1))
+            z[known] = self._examiner.loops.all_closed(z[known].T, dependent).T
+            grid[at[:, 0], at[:, 1]] = np.where(known[:, None], z, np.nan)
+        return grid
+
+    def _is_of_middle(self, boxes: LoopBoxes) -> NDArray[np.bool_]:
+        """Return for each box (B,) of the cover whether its closed points surely belong to the assembly of the middle.
+
+        Boxes that touch are found on the grid of the smallest ones.
+        """
+        low, high = (
+            np.rint((each[:, self._places] - self._lower) / (self._upper - self._lower) * _SIDE).astype(np.intp)
+            for each in (boxes.lower, boxes.upper)
+        )
+        owner = np.empty((_SIDE, _SIDE), dtype=np.int64)
+        for k, (begin, end) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
+            owner[begin[0] : end[0], begin[1] : end[1]] = k
+        pairs = [(owner[1:].ravel(), owner[:-1].ravel()), (owner[:, 1:].ravel(), owner[:, :-1].ravel())]
+        both = np.unique(np.sort(np.concatenate([np.stack(each, axis=1) for each in pairs]), axis=1), axis=0)
+        both = both[(both[:, 0] != both[:, 1]) & boxes.is_known[both].all(axis=1)]
+        with np.errstate(invalid="ignore"):
+            holds = ((boxes.lower <= self._problem.start) & (boxes.upper >= self._problem.start)).all(axis=1)
+        return one_assembly(self._examiner, boxes, both, boxes.is_known & holds)

@@ -12,20 +12,19 @@ first; errors never are. Values are those of machines whose errors are along the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....interruption import one_search
 from ...boxes.rows import Boxes, some
-from ...boxes.search import Effort, Order, Search, Verdicts
+from ...boxes.search import Verdicts
 from ...enclosure.forms import Forms
-from ..numbers.bound_search import Goal, SmallestValue, Value
+from ..numbers.bound_search import Goal, Minimum, SmallestValue, Value, searched
 from ..ranks.covering import APART, Followed, LoopRule
-from ..ranks.krawczyk import ROUNDING, Relation, by_centres
+from ..ranks.krawczyk import ROUNDING, by_centres
 from ..ranks.loop_boxes import Examiner
 from ..ranks.rank_rule import Tested
 from ..robot.tolerance_model import Family
@@ -47,45 +46,18 @@ class _Bound:
     def __init__(self, expression: SX) -> None:
         self.entries: SX = expression
 
-    def examine(
-        self, forms: Forms, relation: Relation, independent: list[int], dependent: list[int], errors: list[int]
-    ) -> Tested:
+    def examine(self, forms: Forms, f: int) -> Tested:
         """Return the lower bounds of boxes as their smallest values; none is regular."""
         c, a, r = (each[:, 0] for each in forms)
-        own, size = a[:, dependent], np.abs(a[:, dependent])
+        by_pose = a[:, :f]
         with np.errstate(all="ignore"):
-            by_pose = a[:, independent] - (own[:, None] @ relation.T)[:, 0]
-            by_error = a[:, errors] - (own[:, None] @ relation.E)[:, 0]
-            rest = r + (size * relation.rho).sum(axis=1)
-            whole = np.abs(by_pose).sum(axis=1) + by_centres(by_error) + rest
-            terms = np.abs(c) + np.abs(a).sum(axis=1) + (size * relation.reach).sum(axis=1) + whole
-            lower = c + (own * relation.off).sum(axis=1) - whole - 2 * ROUNDING * terms
+            whole = np.abs(by_pose).sum(axis=1) + by_centres(a[:, f:]) + r
+            lower = c - whole - 2 * ROUNDING * (np.abs(c) + whole)
         known = np.isfinite(lower)
         # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
-        shares = np.abs(by_pose) + rest[:, None] / max(by_pose.shape[1], 1)
+        shares = np.abs(by_pose) + r[:, None] / max(f, 1)
         none = np.zeros(len(c), dtype=np.int32)
         return Tested(none.astype(bool), np.nan_to_num(shares), np.where(known, lower, -np.inf), none)
-
-
-@dataclass(frozen=True, eq=False)
-class MachineMinimum:
-    """The smallest value of a number over all machines and poses.
-
-    Attributes:
-        bound: proven: no machine has a smaller value at a pose.
-        value: at ``z``; NaN without a machine.
-        z: (n + 3 m,) coordinates of the pose, and errors, of the machine with the smallest value known; None without.
-        boxes: number of boxes examined.
-        seconds: wall time.
-        reason: for stopping before the gap was met; else empty.
-    """
-
-    bound: float
-    value: float
-    z: FloatArray | None
-    boxes: int
-    seconds: float
-    reason: str
 
 
 def smallest_of_machines(
@@ -96,7 +68,7 @@ def smallest_of_machines(
     limit: float | None = None,
     slack: float = 0.0,
     time_limit: float | None = None,
-) -> MachineMinimum:
+) -> Minimum:
     """Prove the smallest value of an expression over all machines and poses.
 
     Args:
@@ -110,23 +82,12 @@ def smallest_of_machines(
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    effort = Effort()
     with one_search(time_limit):
         rule = _MachineRule(family, expression, Goal(gap, limit, slack, is_relative=True))
-        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.LARGEST)
-        reason = effort.run(search, rule.ending(search))
-    bound, (value, z) = -search.bound, rule.best
-    bound = min(bound, value)
-    if math.isfinite(bound) and not rule.is_one_assembly():
-        bound, reason = -math.inf, APART
-    return MachineMinimum(
-        bound=bound if math.isfinite(bound) else -math.inf,
-        value=value if math.isfinite(value) else math.nan,
-        z=z if math.isfinite(value) else None,
-        boxes=search.boxes,
-        seconds=effort.seconds,
-        reason=reason,
-    )
+        found = searched(rule, rule.root, rule.whole, _LEAST_WIDTHS)
+    if not math.isfinite(found.bound):
+        return replace(found, bound=-math.inf)
+    return found if rule.is_one_assembly() else replace(found, bound=-math.inf, reason=APART)
 
 
 class _MachineRule(LoopRule, SmallestValue[Followed]):
@@ -142,15 +103,15 @@ class _MachineRule(LoopRule, SmallestValue[Followed]):
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return bounds of boxes, and take note of small values in them."""
         found = self.examined(boxes)
-        known = np.flatnonzero(found.cells.is_known & np.isfinite(found.smallest))
+        known = np.flatnonzero(found.boxes.is_known & np.isfinite(found.smallest))
         if known.size:
             order = np.argsort(found.smallest[known])[:_TRIED]
-            best = self._points.smallest_in(some(found.cells, known[order]))
+            best = self._points.smallest_in(some(found.boxes, known[order]))
             if best is not None and best.value < self.best.value:
                 self.best = best
         width = self.widths(found)
         score = found.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
         split = first_largest(np.where(width > 0, score, -1.0))
         # Nothing is known of a box in which dependent coordinates are not.
-        bound = np.where(found.cells.is_known, -found.smallest, np.inf)
+        bound = np.where(found.boxes.is_known, -found.smallest, np.inf)
         return self.verdicts(self.boxes_of(found, bound, split))

@@ -10,7 +10,7 @@ from .....models import FloatArray
 from ...statement.machine import INSIDE
 from ..numbers.bound_search import Value
 from ..ranks.krawczyk import inverses
-from ..ranks.loop_boxes import Cells, are_between
+from ..ranks.loop_boxes import LoopBoxes, are_between
 from ..robot.tolerance_model import Family
 
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
@@ -56,14 +56,14 @@ class MachinePoints:
             found[:, D] = 0.0
         return found
 
-    def smallest_in(self, cells: Cells) -> Value | None:
+    def smallest_in(self, boxes: LoopBoxes) -> Value | None:
         """Return the smallest value at few points of boxes; None where no loops close in them.
 
         The errors are along the gradient at the middle of a box, with the pose there or in the corner that the gradient
         points to.
         """
         best: Value | None = None
-        centre = cells.centre
+        centre = boxes.centre
         with np.errstate(all="ignore"):
             z = self.closed(np.hstack([centre, np.zeros((len(centre), self._family.errors.numel()))]))
             slopes = self.slopes(z)
@@ -72,9 +72,9 @@ class MachinePoints:
                 moved = z.copy()
                 moved[:, self._count :] = errors
                 if moves_pose:
-                    moved = self._at_corner(moved, slopes, cells)
+                    moved = self._at_corner(moved, slopes, boxes)
                 moved = self.closed(moved)
-                values = np.where(self._are_inside(moved, cells), self.values(moved), np.nan)
+                values = np.where(self._are_inside(moved, boxes), self.values(moved), np.nan)
                 if np.isfinite(values).any():
                     k = int(np.nanargmin(values))
                     if best is None or values[k] < best.value:
@@ -88,13 +88,13 @@ class MachinePoints:
         unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > _FLAT * _sizes(sizes))
         return np.asarray((-INSIDE * self._family.tolerance * unit).reshape(slopes.shape))
 
-    def _at_corner(self, z: FloatArray, slopes: FloatArray, cells: Cells) -> FloatArray:
+    def _at_corner(self, z: FloatArray, slopes: FloatArray, boxes: LoopBoxes) -> FloatArray:
         """Return points with the pose in the corner of a box that the derivatives point to."""
         own, count, problem = self._independent, len(self._free), self._family.problem
         z = z.copy()
-        change = slopes[:, own] * (cells.upper - cells.lower)[:, own]
+        change = slopes[:, own] * (boxes.upper - boxes.lower)[:, own]
         # A slope that is rounding error points to the upper end.
-        z[:, own] = np.where(change > _FLAT * _sizes(change), cells.lower[:, own], cells.upper[:, own])
+        z[:, own] = np.where(change > _FLAT * _sizes(change), boxes.lower[:, own], boxes.upper[:, own])
         # Ends of rotations are rounded outwards, and are no poses of the workspace.
         box = problem.box
         room = np.where(box.upper > box.lower, _INSIDE * np.maximum(np.abs(box.lower), np.abs(box.upper)), 0.0)
@@ -104,10 +104,10 @@ class MachinePoints:
         z[:, of_pose] = clipped[:, of_pose]
         return z
 
-    def _are_inside(self, z: FloatArray, cells: Cells) -> FloatArray:
+    def _are_inside(self, z: FloatArray, boxes: LoopBoxes) -> FloatArray:
         """Return whether points are in the workspace, with closed loops in the assembly of their boxes."""
         D, problem = self._dependent, self._family.problem
-        own = are_between(z, cells, D)
+        own = are_between(z, boxes, D)
         return np.array(
             [bool(good) and problem.box.holds(problem.pose_of(each)) for good, each in zip(own, z, strict=True)]
         )

@@ -24,7 +24,7 @@ from ...boxes.rows import WHOLE, Boxes
 from ...boxes.search import Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser
 from ..ranks.covering import in_workspace, whole_workspace
-from ..ranks.loop_boxes import Cells
+from ..ranks.loop_boxes import LoopBoxes
 from ..robot.tolerance_model import Family
 
 if TYPE_CHECKING:
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 _BLOCK, _MOST = 128, 4096
 #: The bound is good enough at this part of the first-order change, or this near to its size at the middle of a box.
 _SHARE, _NEAR = 0.02, 1.2
-#: Part of itself by which a bound moves outwards: its own rounding.
-_OUTWARDS = 1 + 1e-9
+#: Part of itself by which a bound moves outwards: its own rounding, and room for the check of a proof.
+_OUTWARDS = 1.02
 #: Operations whose derivatives jump: second derivatives say nothing of the change there.
 _KINKS = (ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX, ca.OP_LE, ca.OP_LT, ca.OP_IF_ELSE_ZERO)
 
@@ -108,7 +108,7 @@ class _ChangeRule(Rule[FloatArray]):
     def examine(self, boxes: Boxes[FloatArray]) -> Verdicts[FloatArray]:
         """Return bounds of boxes."""
         known = np.ones(len(boxes.split), dtype=bool)
-        now = in_workspace(self._family.problem, Cells(boxes.lower, boxes.upper, boxes.lower, known))
+        now = in_workspace(self._family.problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
         errors = np.full((len(now.lower), self._errors), self._family.tolerance)
         forms = self._encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
         factor = 0.5 * self._family.tolerance**2 * _OUTWARDS

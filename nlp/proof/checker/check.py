@@ -1,0 +1,178 @@
+"""Check of a proof about a program, without trust in who made it.
+
+The boxes of the tree start from the program's own bounds, so that the leaves cover them by construction. Every leaf
+and every face is a *claim* about one box, and the check shows each claim again with the polynomials of
+:mod:`screwsynth.nlp.proof.checker.polynomials`; it bisects the box where their balls are too large. It uses neither
+the arithmetic of the search nor its multipliers. Search and check share the case's expressions, and CasADi's
+derivatives of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....models import FloatArray
+from ...program.nlp import Nlp
+from ..statement.limb_separation import separate
+from ..statement.piecewise_derivatives import refuse_jumps
+from ..statement.standard_form import StandardForm, standard_form
+from .bisection import show
+from .optimum import Claims, rule_of
+from .polymodels import Tilts
+from .premises import fingerprint, is_same_program
+from .proof_file import Proof, ProofError
+from .tree import FACES, Claim, Node, SharedLeaf, TreeReader, read_claims, read_shared
+
+#: Rounding of sums of a few numbers, in parts of their sizes: many times the largest possible.
+_SUMS = 1e-13
+#: Callback with the number of claims checked, and of those to be checked.
+CheckProgress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class VerifiedProof:
+    """A proof that holds.
+
+    Attributes:
+        leaves: number of leaves and faces of the tree.
+        pieces: number of boxes that were evaluated to show them.
+        bound: upper bound of the maximised value over the feasible part of the root; -inf without a feasible point.
+    """
+
+    leaves: int
+    pieces: int
+    bound: float
+
+
+def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -> VerifiedProof:
+    """Check a proof, by showing each of its claims again.
+
+    Args:
+        proof: the proof.
+        nlp: the program that it is about, built from the case.
+        progress: called after each group of boxes.
+
+    Raises:
+        ProofError: the proof is for another program, its bytes are no tree, or a claim could not be shown.
+    """
+    if not is_same_program(fingerprint(nlp), proof.graph):
+        raise ProofError("the proof is for other expressions or bounds than this case's")
+    form = standard_form(nlp)
+    refuse_jumps(form.expressions, form.x)
+    bound = -np.inf if proof.bound is None else proof.bound
+    kinds = {bytes([Node.LIMBS]): _of_limbs, bytes([Node.SHARED]): _of_shared_limbs}
+    read = kinds.get(proof.tree[:1], _of_tree)
+    leaves, every = read(proof.tree, form, bound)
+    shown, count, pieces = 0, sum(each.bounds.size for each in every), 0
+
+    def done(more: int) -> None:
+        nonlocal shown
+        shown += more
+        if progress is not None:
+            progress(shown, count - shown)
+
+    for each in every:
+        pieces += show(rule_of(each), each.lower, each.upper, done)
+    return VerifiedProof(leaves, pieces, bound)
+
+
+def _of_tree(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
+    """Return the number of claims of a tree of a whole box, and the claims."""
+    reader = TreeReader(tree)
+    claims = read_claims(reader, form)
+    reader.finish()
+    return len(claims), _grouped(claims, form, bound)
+
+
+def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
+    """Return the number of claims of the trees of limbs that share no variable, and the claims.
+
+    Raises:
+        ProofError: the bytes are no tree, or the bounds of limbs do not add up.
+    """
+    separation = separate(form)
+    if separation is None or separation.shared:
+        raise ProofError("the tree is one of limbs without shared variables, which the case does not have")
+    reader = TreeReader(tree, 1)
+    parts = [(limb.form, reader.number(), read_claims(reader, limb.form)) for limb in separation.limbs]
+    reader.finish()
+    empty = [part for part in parts if part[1] == -np.inf]
+    if not empty:
+        bounds = [*(each for _, each, _ in parts), separation.constant]
+        size = sum(map(abs, bounds))
+        if not (math.isfinite(size) and math.fsum(bounds) + _SUMS * size <= bound):
+            raise ProofError("the bounds of the limbs are more than the proven one together")
+    parts = empty or parts
+    every = [each for limb, least, claims in parts for each in _grouped(claims, limb, least)]
+    return sum(len(claims) for _, _, claims in parts), every
+
+
+def _grouped(claims: list[Claim], form: StandardForm, bound: float) -> list[Claims]:
+    """Return the claims of a tree by kind and index.
+
+    Raises:
+        ProofError: a box collapses on a face that is not the form's.
+    """
+    groups: dict[tuple[Node, int], list[Claim]] = {}
+    for claim in claims:
+        groups.setdefault((claim.kind, claim.index), []).append(claim)
+    every = []
+    for (kind, i), group in groups.items():
+        lower, upper = _stacked([(each.lower, each.upper) for each in group], form.n)
+        ends, whole = (upper, form.upper) if kind == Node.FACE_UPPER else (lower, form.lower)
+        if kind in FACES and (ends[i] != whole[i]).any():
+            raise ProofError(f"a box is collapsed on a face of {form.names[i]} that is not the case's")
+        every.append(Claims(form, kind, i, lower, upper, np.full(len(group), bound)))
+    return every
+
+
+def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
+    """Return the number of leaves of a tree of limbs that share variables, and its claims.
+
+    Raises:
+        ProofError: the bytes are no tree.
+    """
+    separation = separate(form)
+    if separation is None or separation.common is None:
+        raise ProofError("the tree is one of limbs that share variables, which the case does not have")
+    common, limbs = separation.common, [limb.form for limb in separation.limbs]
+    leaves = read_shared(tree, common.lower, common.upper, len(limbs))
+    # The sums first: they are quick, and without them the limbs' bounds show nothing.
+    every = [_of_sum([each for each in leaves if each.bounds.min() > -np.inf], common, len(limbs), bound)]
+    for k, limb in enumerate(limbs):
+        claimed = [each for each in leaves if each.bounds[k] < np.inf]
+        lower, upper = _stacked([(each.lower, each.upper) for each in claimed], common.n)
+        own = [np.repeat(ends[common.n :, None], len(claimed), axis=1) for ends in (limb.lower, limb.upper)]
+        lower, upper = np.concatenate([lower, own[0]]), np.concatenate([upper, own[1]])
+        bounds = np.array([each.bounds[k] for each in claimed])
+        every.append(Claims(limb, Node.BOUNDED, 0, lower, upper, bounds, _tilts(k, claimed, common.n)))
+    return len(leaves), [each for each in every if each.bounds.size]
+
+
+def _of_sum(leaves: Sequence[SharedLeaf], common: StandardForm, K: int, bound: float) -> Claims:
+    """Return the claims about the part with shared variables alone: minus the K limbs' tilts are its own tilts."""
+    lower, upper = _stacked([(each.lower, each.upper) for each in leaves], common.n)
+    parts = [_tilts(k, leaves, common.n) for k in range(K)]
+    tilts = Tilts.over(lower, upper, *(-np.sum([getattr(each, name) for each in parts], axis=0) for name in "gQ"))
+    bounds = np.array([each.bounds for each in leaves]).reshape(-1, K)
+    # The tilts' sums are rounded, and so is this one.
+    sizes = abs(bound) + np.abs(bounds).sum(axis=1) + np.sum([each.sizes() for each in parts], axis=0)
+    left = bound - bounds.sum(axis=1) - _SUMS * sizes
+    return Claims(common, Node.BOUNDED, 0, lower, upper, left, tilts)
+
+
+def _stacked(boxes: Sequence[tuple[FloatArray, FloatArray]], n: int) -> tuple[FloatArray, FloatArray]:
+    """Return the ends (n, L) of boxes."""
+    lower = np.array([low for low, _ in boxes]).reshape(-1, n).T
+    return lower, np.array([high for _, high in boxes]).reshape(-1, n).T
+
+
+def _tilts(k: int, leaves: Sequence[SharedLeaf], m: int) -> Tilts:
+    """Return the tilts of limb number k over the leaves' boxes."""
+    g = np.array([each.g[k] for each in leaves]).reshape(-1, m).T
+    Q = np.moveaxis(np.array([each.Q[k] for each in leaves]).reshape(-1, m, m), 0, 2)
+    return Tilts.over(*_stacked([(each.lower, each.upper) for each in leaves], m), g, Q)

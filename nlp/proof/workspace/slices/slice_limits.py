@@ -1,0 +1,290 @@
+"""Reach and limits over the boxes of a slice: each kept, or violated, at every pose of a box, or open.
+
+Reach and limits on expressions are decided by the ranges of :mod:`..numbers.limit_values`, those on the clearance of
+legs by its bound from below and by how far the legs move within the box. A limit on singular values is proved to be
+kept by its bound; it counts as violated where it is so at the corners and at the middle of the box, which is no proof.
+"""
+
+from __future__ import annotations
+
+import enum
+import itertools
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .....models import Dimension, FloatArray
+from .....models.joints.closedform import ClosedForm
+from ....case.case import Case
+from ....case.limits.clearance import LegClearance
+from ....case.limits.singular_values import ConditionNumber, SmallestSingularValue
+from ...boxes.rows import some
+from ...statement.machine import legs_of
+from ..numbers.clearance import Clearance
+from ..numbers.limit_values import ON_LIMIT, LimitValues
+from ..numbers.singular import SingularValues
+from ..numbers.spectrum import Spectrum
+from ..ranks.krawczyk import Relation
+from ..ranks.loop_boxes import LoopBoxes
+from ..robot.posed_robot import Problem
+
+#: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
+KEPT, UNDECIDED = -1, -2
+#: Points to each side of a slice, and on each way from its middle, at which limits are tried for the first violated.
+POINTS, _STEPS = 65, 96
+
+
+class LimitState(enum.IntEnum):
+    """A limit over a box."""
+
+    KEPT = 0
+    OPEN = 1
+    VIOLATED = 2
+
+
+@dataclass(frozen=True, eq=False)
+class SliceLimit:
+    """A limit of a slice.
+
+    Attributes:
+        key: dotted key, below ``limits``, in the case.
+        limit: the limit, radians for angles.
+        dimension: of the limit.
+        is_enclosed: whether boxes where it is violated are proved so, and not by samples.
+    """
+
+    key: str
+    limit: float
+    dimension: Dimension
+    is_enclosed: bool
+
+
+class SliceLimits:
+    """Reach of limbs, and limits of a case, over boxes.
+
+    Both have *claims*, such as that about the distance of one pair of legs: first those about reach, then those about
+    limits on expressions, then others.
+
+    Args:
+        case: with fixed dimensions.
+        closed: its robot without unknowns in closed form.
+        problem: this robot over the workspace.
+
+    Raises:
+        UncoveredError: a loop equation, or the reach of a limb, holds an operation without a rule.
+    """
+
+    def __init__(self, case: Case, closed: ClosedForm, problem: Problem) -> None:
+        self._problem, self._values = problem, LimitValues(case, closed, problem)
+        self._reaches, legs = len(closed.reaches), legs_of(case)
+        limits: dict[str, SliceLimit] = {}
+        for claim in self._values.claims:
+            limit = claim.reading.from_value(claim.limit or 0.0)
+            limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
+        uncovered = dict.fromkeys(self._values.uncovered)
+        self._others: list[_Apart | _Sampled] = []
+        for each in case.limits:
+            if isinstance(each, LegClearance):
+                key, value, dimension = "leg_clearance.min", each.min, Dimension.LENGTH
+            elif isinstance(each, SmallestSingularValue):
+                key, value, dimension = "smallest_singular_value.min", each.min, Dimension.NUMBER
+            elif isinstance(each, ConditionNumber):
+                key, value, dimension = "condition_number.max", each.max, Dimension.NUMBER
+            else:
+                continue
+            if legs is None and (isinstance(each, LegClearance) or problem.dependent):
+                uncovered[key] = None
+                continue
+            limits[key] = SliceLimit(key, value, dimension, is_enclosed=isinstance(each, LegClearance))
+            if isinstance(each, LegClearance):
+                if legs is not None:
+                    pairs = itertools.combinations(range(len(legs.base)), 2)
+                    self._others += [_Apart(key, Clearance(legs, problem.box, *pair), value) for pair in pairs]
+                continue
+            is_condition = isinstance(each, ConditionNumber)
+            oracle = (
+                Spectrum(problem, each.length, is_condition=is_condition)
+                if legs is None
+                else SingularValues(legs, problem.box, each.length, is_condition=is_condition)
+            )
+            self._others.append(_Sampled(key, oracle, -value if is_condition else value))
+        places = {key: k for k, key in enumerate(limits)}
+        self._places = [places[each.key] for each in (*self._values.claims, *self._others)]
+        #: Keys of limits that are not decided on boxes.
+        self.uncovered = tuple(uncovered)
+        #: The limits, one for each key.
+        self.limits = tuple(limits.values())
+
+    @property
+    def unknown(self) -> NDArray[np.int8]:
+        """(1, K) states of the claims before anything is known."""
+        return np.full((1, self._reaches + len(self._places)), LimitState.OPEN, dtype=np.int8)
+
+    def examine(self, boxes: LoopBoxes, relation: Relation, known: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Return the states (B, K) of the claims over boxes whose dependent coordinates are known.
+
+        Args:
+            boxes: (B,) boxes.
+            relation: of the dependent coordinates, to which it is set.
+            known: (B, K) states over larger boxes.
+        """
+        states, enclosed = known.copy(), self._reaches + len(self._values.claims)
+        is_open = states == LimitState.OPEN
+        rows = np.flatnonzero(is_open[:, :enclosed].any(axis=1) | bool(self._problem.dependent))
+        if rows.size:
+            found = self._values.enclosed(some(boxes, rows))
+            for whole, part in zip(relation, found.relation, strict=True):
+                whole[rows] = part
+            limit = self._values.limit
+            kept = np.hstack([found.reach.lower >= 0, found.numbers.upper <= limit])
+            violated = np.hstack([found.reach.upper < 0, found.numbers.lower > limit])
+            states[rows, :enclosed] = np.where(
+                is_open[rows, :enclosed], _states_of(kept, violated), states[rows, :enclosed]
+            )
+        for k, claim in enumerate(self._others, enclosed):
+            rows = np.flatnonzero(is_open[:, k])
+            if rows.size:
+                states[rows, k] = claim.states(
+                    *(self._problem.pose_of(each[rows]) for each in (boxes.lower, boxes.upper))
+                )
+        return states
+
+    def reached(self, states: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return whether all limbs reach every pose of each box, and whether one reaches none, from claims (B, K)."""
+        own = states[:, : self._reaches]
+        return np.asarray((own == LimitState.KEPT).all(axis=1)), np.asarray((own == LimitState.VIOLATED).any(axis=1))
+
+    def of_limits(self, states: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Return the states (M, B) of the limits, each the worst of its claims (B, K)."""
+        found = np.full((len(self.limits), len(states)), LimitState.KEPT, dtype=np.int8)
+        np.maximum.at(found, self._places, states[:, self._reaches :].T)
+        return found
+
+    def violated(self, z: FloatArray) -> NDArray[np.bool_]:
+        """Return whether each limit is violated at points (P, n) with closed loops: (M, P); not where it is NaN."""
+        found, y = np.zeros((len(self.limits), len(z)), dtype=np.bool_), self._problem.pose_of(z)
+        with np.errstate(all="ignore"):
+            claims = [*(self._values.values(z) > self._values.limit[:, None]), *(e.violated(y) for e in self._others)]
+        for place, claim in zip(self._places, claims, strict=True):
+            found[place] |= claim
+        return found
+
+
+def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
+    """Return states from whether claims are proved to be kept, or violated."""
+    return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
+
+
+class _Apart:
+    """The clearance of a pair of legs."""
+
+    def __init__(self, key: str, pair: Clearance, limit: float) -> None:
+        self.key, self._pair, self._limit = key, pair, limit - ON_LIMIT * abs(limit)
+
+    def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
+        """Return the states (B,) over boxes (B, 6)."""
+        bounds = self._pair.bounds(lower, upper)
+        # Each of the two legs moves by at most the sum of the shares from its place at the middle of the box.
+        most = self._pair.values(0.5 * lower + 0.5 * upper) + 2 * bounds.shares.sum(axis=1)
+        return _states_of(bounds.lower >= self._limit, most < self._limit)
+
+    def violated(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return whether it is violated at points (P, 6): (P,)."""
+        return np.asarray(self._pair.values(points) < self._limit)
+
+
+class _Sampled:
+    """A function that is bounded from below only; violated where it is so at the corners and the middle of a box."""
+
+    def __init__(self, key: str, oracle: SingularValues | Spectrum, limit: float) -> None:
+        self.key, self._oracle, self._limit = key, oracle, limit - ON_LIMIT * abs(limit)
+
+    def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
+        """Return the states (B,) over boxes (B, 6)."""
+        kept = self._oracle.bounds(lower, upper).lower >= self._limit
+        free = np.flatnonzero((upper > lower).any(axis=0))
+        violated = self.violated(0.5 * lower + 0.5 * upper)
+        for sides in itertools.product((False, True), repeat=len(free)):
+            corner = lower.copy()
+            for k, is_upper in zip(free, sides, strict=True):
+                corner[:, k] = upper[:, k] if is_upper else lower[:, k]
+            violated &= self.violated(corner)
+        return _states_of(kept, violated)
+
+    def violated(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return whether it is violated at points (P, 6): (P,)."""
+        return np.asarray(self._oracle.values(points) < self._limit)
+
+
+class Binding(NamedTuple):
+    """Limits of B boxes.
+
+    Attributes:
+        limit: (B,) ``KEPT``, ``UNDECIDED`` or the index of the limit that is violated first.
+        is_same: (B,) whether it is that of the whole box.
+    """
+
+    limit: NDArray[np.int16]
+    is_same: NDArray[np.bool_]
+
+
+class FirstViolated:
+    """The limit that is violated first on the straight way from the middle of a slice.
+
+    The limit's violation in a box is that of its enclosure; which of several comes first is taken from points.
+
+    Args:
+        limits: the limits.
+        grid: (N, N, n) closed loops at the points of the slice's grid.
+        lower: (2,) lower ends of the slice.
+        upper: (2,) upper ends of the slice.
+    """
+
+    def __init__(self, limits: SliceLimits, grid: FloatArray, lower: FloatArray, upper: FloatArray) -> None:
+        self._limits, self._grid, self._lower, self._upper = limits, grid, lower, upper
+
+    @cached_property
+    def _violated(self) -> NDArray[np.bool_]:
+        """Whether each limit is violated at points of the grid, (M, N, N)."""
+        return self._limits.violated(self._grid.reshape(POINTS**2, -1)).reshape(-1, POINTS, POINTS)
+
+    def of(self, states: NDArray[np.int8], lower: FloatArray, upper: FloatArray) -> Binding:
+        """Return the limit of each box.
+
+        Args:
+            states: (M, B) of the limits over the boxes.
+            lower: (B, 2) lower ends of the boxes.
+            upper: (B, 2) upper ends of the boxes.
+        """
+        violated = states == LimitState.VIOLATED
+        limit = np.where((states == LimitState.OPEN).any(axis=0), UNDECIDED, KEPT).astype(np.int16)
+        is_same = limit == KEPT
+        rows = np.flatnonzero(violated.any(axis=0))
+        if not rows.size:
+            return Binding(limit, is_same)
+        limit[rows] = np.argmax(violated[:, rows], axis=0)
+        # Another limit that is open may be violated first in a part of the box.
+        is_same[rows] = (states[:, rows] == LimitState.KEPT).sum(axis=0) == len(states) - 1
+        several = rows[~is_same[rows]]
+        if several.size:
+            low, high = lower[several], upper[several]
+            limit[several] = self._first(violated[:, several], 0.5 * (low + high))
+            corners = [np.column_stack([x[:, 0], y[:, 1]]) for x in (low, high) for y in (low, high)]
+            candidates = states[:, several] != LimitState.KEPT
+            around = [self._first(candidates, corner) for corner in corners]
+            is_same[several] = np.all([each == limit[several] for each in around], axis=0)
+        return Binding(limit, is_same)
+
+    def _first(self, candidates: NDArray[np.bool_], ends: FloatArray) -> NDArray[np.int16]:
+        """Return which of the candidates (M, C) is violated first on the way to each end (C, 2)."""
+        middle = 0.5 * (self._lower + self._upper)
+        way = middle + np.linspace(0.0, 1.0, _STEPS)[:, None, None] * (ends - middle)
+        place = np.rint((way - self._lower) / (self._upper - self._lower) * (POINTS - 1)).astype(np.intp)
+        on_way = self._violated[:, place[..., 0], place[..., 1]] & candidates[:, None]
+        # One that is violated at no point of the way comes last.
+        begins = np.where(on_way.any(axis=1), np.argmax(on_way, axis=1), _STEPS)
+        begins = np.where(candidates, begins, _STEPS + 1)
+        return np.asarray(np.argmin(begins, axis=0), dtype=np.int16)
