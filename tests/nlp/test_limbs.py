@@ -14,9 +14,8 @@ from screwsynth.nlp import Case, formulate, load_case, solve
 from screwsynth.nlp.proof.boxes.engine import Engine, LimbModels
 from screwsynth.nlp.proof.boxes.incumbent import Incumbent
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
-from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
-from screwsynth.nlp.proof.boxes.limbs.cuts import LeftOwn
-from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb
+from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, OwnBoxes, bound_limb
+from screwsynth.nlp.proof.boxes.limbs.shared import LeftOwn
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
