@@ -23,7 +23,7 @@ from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
-from screwsynth.nlp.proof.enclosure.quadratic_models import QuadraticModel
+from screwsynth.nlp.proof.enclosure.forms import QuadraticModel
 from screwsynth.nlp.proof.statement.limb_separation import separate
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import UncoveredError
 from ..enclosure.engine import kernel
-from ..enclosure.quadratic_models import QuadraticModel
+from ..enclosure.forms import QuadraticModel
 from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows, tangent_rows
 from ..enclosure.tape import Tape, compile_tape
 from ..statement.piecewise_derivatives import refuse_jumps
@@ -101,13 +101,6 @@ class LimbModels:
     stops_down: NDArray[np.bool_]
     high: FloatArray
     value: FloatArray
-
-    def part(self, which: slice) -> LimbModels:
-        """Return the results of some boxes."""
-        L = QuadraticModel(**{name: values[..., which] for name, values in vars(self.L).items()})
-        return LimbModels(
-            **{**{name: values[..., which] for name, values in vars(self).items() if name != "L"}, "L": L}
-        )
 
 
 class Engine:

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp.proof.enclosure import quadratic_models
-from screwsynth.nlp.proof.enclosure.forms import Enclosures
-from screwsynth.nlp.proof.enclosure.quadratic_models import Ends
+from screwsynth.nlp.proof.enclosure.forms import Enclosures, Ends
 
 from .intervals import TINY, ULP
 

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...enclosure.forms import TINY, ULP
-from ...enclosure.quadratic_models import QuadraticModel
+from ...enclosure.forms import TINY, ULP, QuadraticModel
 from ..engine import LimbModels
 
 if TYPE_CHECKING:

@@ -102,13 +102,6 @@ class LeftOwn(NamedTuple):
     along: NDArray[np.intp]
 
 
-class _ExaminedLimb(NamedTuple):
-    """Models of a limb, and its bounds."""
-
-    models: LimbModels
-    bound: LimbBound
-
-
 class SharedColumns(NamedTuple):
     """Columns of shared boxes: lists of each limb's own boxes, and the best point (B, d) of its own variables known."""
 
@@ -227,7 +220,7 @@ class SharedRule(Rule[SharedColumns]):
     def _examine(self, boxes: SharedBoxes, below: float) -> SharedSums:
         """Return bounds of shared boxes, and their parts in which the sum can exceed a value."""
         found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
-        models, parts = [each.models for each in found], [each.bound for each in found]
+        models, parts = (list(each) for each in zip(*found, strict=True))
         common = self._common.common_models(boxes.lower, boxes.upper, tilts_of(parts), below)
         bound = common.L.bound()
         known = common.defined & np.all([np.isfinite(part.best) for part in parts], axis=0)
@@ -236,7 +229,7 @@ class SharedRule(Rule[SharedColumns]):
         emptied = np.any([part.best == -np.inf for part in parts], axis=0)
         return SharedSums(models, parts, common, sums, bound, common.is_possible & ~emptied)
 
-    def _examine_limb(self, k: int, boxes: SharedBoxes) -> _ExaminedLimb:
+    def _examine_limb(self, k: int, boxes: SharedBoxes) -> tuple[LimbModels, LimbBound]:
         """Return models and bounds of a limb over shared boxes and its own boxes."""
         engine, opposite, own, good = self._engines[k], self._opposites[k], boxes.own[k], boxes.good[k]
         # NumPy's warnings are switched off for each thread by itself.
@@ -249,7 +242,7 @@ class SharedRule(Rule[SharedColumns]):
             lower = np.concatenate([boxes.lower[:, own.of], own.lower])
             upper = np.concatenate([boxes.upper[:, own.of], own.upper])
             models = engine.limb_models(lower, upper, least[own.of])
-            return _ExaminedLimb(models, bound_limb(models, at_good, fall, own, self._m))
+            return models, bound_limb(models, at_good, fall, own, self._m)
 
     def _cut_limb(self, k: int, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> LeftOwn:
         """Return a limb's own boxes that are left."""

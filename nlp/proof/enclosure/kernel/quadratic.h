@@ -88,7 +88,7 @@ static void choose_multipliers(Box *x, const int *equation, int first, const dou
             x->weights[r] = r == 0;
 }
 
-/* One variable's part of a model, from the parts of a gradient's form: quadratic_models.py's _integrate. */
+/* One variable's part of a model, from the parts of a gradient's form: quadratic_models.py's integral. */
 static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s)
 {
     double margin = 64 * ULP * (fabs(*b) + across + q - p + s) + TINY;
