@@ -62,6 +62,10 @@ class AffineMatrix(NamedTuple):
         moved = self.A[:, :, part].transpose(0, 2, 3, 1) @ corners.T
         return np.asarray((self.M[:, part, :, None] + moved).transpose(0, 1, 3, 2))
 
+    def size_at_centre(self) -> FloatArray:
+        """Return the spectral norms (B,) at the centres: computed numbers, 0 where they are not known."""
+        return np.asarray(np.linalg.norm(np.where(np.isfinite(self.M), self.M, 0.0), 2, axis=(1, 2)))
+
     def size_is_at_most(self, most: FloatArray) -> NDArray[np.bool_]:
         """Return whether the spectral norm is shown to be at most numbers (B,)."""
         rest = self.E + PRODUCT * (np.abs(self.M) + np.abs(self.A).sum(axis=1))
@@ -100,8 +104,8 @@ class _LegClaim:
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
-        forms, _ = self._forms(lower[:, self._free], upper[:, self._free])
-        of_rows, of_sizes, of_unit = (Forms(*(each[:, part] for each in forms)) for part in _PARTS)
+        values = self._forms(lower[:, self._free], upper[:, self._free])
+        of_rows, of_sizes, of_unit = (values.forms(part) for part in _PARTS)
         with np.errstate(all="ignore"):
             inverse, known, shares = _inverse(_affine(of_rows), of_sizes)
             holds, own, is_wrong = self._judged(inverse, shares, _affine(of_unit))
@@ -170,12 +174,12 @@ class SingularClaim(_LegClaim):
         self, inverse: AffineMatrix, shares: FloatArray, J: AffineMatrix
     ) -> tuple[NDArray[np.bool_], FloatArray, NDArray[np.bool_]]:
         """Show the claim from the sizes of P, and for the condition number those of J."""
-        low = 1 / np.linalg.norm(np.nan_to_num(inverse.M, nan=np.inf), 2, axis=(1, 2))
+        low = 1 / inverse.size_at_centre()
         shares = np.abs(inverse.A).sum(axis=(2, 3)) + shares * inverse.E.sum(axis=(1, 2))[:, None]
         if not self._is_condition:
             least = np.full(len(low), (self._bound + self._change) * (1 + 4 * UNIT))
             return inverse.size_is_at_most((1 - 4 * UNIT) / least), shares, low < least * (1 - _WRONG)
-        high = np.linalg.norm(np.nan_to_num(J.M), 2, axis=(1, 2))
+        high = J.size_at_centre()
         # The smallest singular value changes more: most of the room between the two is left to it.
         least = (high + self._change) / self._bound
         t = least * np.sqrt(np.sqrt((low - self._change) / least))
@@ -272,7 +276,7 @@ class ClearanceClaim:
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
-        (c, a, r), _ = self._forms(lower[:, self._free], upper[:, self._free])
+        c, a, r = self._forms(lower[:, self._free], upper[:, self._free]).forms()
         gaps = (c[:, :9] / c[:, 9:]).reshape(-1, 3, 3)
         n = _between(self._feet, gaps[:, 0], gaps[:, 1])
         size = np.sqrt((n * n).sum(axis=1))
