@@ -31,6 +31,7 @@ from screwsynth.nlp.proof.checker.workspace.forms import are_positive, contracti
 from screwsynth.nlp.proof.checker.workspace.leg_claims import (
     ClearanceClaim,
     ErrorClaim,
+    LegInverse,
     SingularClaim,
     whole_errors,
 )
