@@ -29,9 +29,7 @@ from ..case.limits.limit import PosedRobot
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..proof.statement.machine import workspace_of_case
-from ..proof.workspace.robot.closed_loops import Loops
-from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box
-from ..proof.workspace.robot.posed_model import rotation_of
+from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of
 from ..proof.workspace.robot.posed_robot import NotJudgedError, Problem, build_problem
 from .tighter import TIGHTER, tightened
 
@@ -239,7 +237,7 @@ def _closed_at(problem: Problem, y: FloatArray) -> FloatArray | None:
     target[: len(problem.free)] = y[list(problem.free)]
     if not dependent:
         return target
-    loops = Loops(problem.z, problem.equations, problem.equations, SX(0, 1), problem.size)
+    loops = problem.loops
     begin = z[independent]
     for part in np.linspace(0, 1, _WAY + 1)[1:]:
         z[independent] = begin + part * (target[independent] - begin)

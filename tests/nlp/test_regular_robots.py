@@ -112,6 +112,17 @@ def test_no_box_is_regular_in_which_a_closed_point_is_not(name: str) -> None:
         assert not any(wrong for _, wrong in counted)
 
 
+@pytest.mark.parametrize(("name", "part", "degrees", "most"), [("3-rrs", 0.02, 5, 123), ("delta", 0.1, 10, 647)])
+def test_boxes_are_not_divided_before_the_widths_of_joints_settle(
+    name: str, part: float, degrees: float, most: int
+) -> None:
+    # With three attempts to find these widths there were 511 and 3,029 boxes.
+    problem = problem_of(name, part, degrees)
+    found = prove_rank(problem, problem.locked)
+    assert found.outcome is Outcome.PROVED
+    assert found.boxes <= most
+
+
 def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     judged = rank.RankTest._judged
 

@@ -36,7 +36,7 @@ from ....errors import UncoveredError
 from ....program.layout import Layout
 from ...statement.claims import Claim
 from ...statement.machine import LEGS, Legs
-from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
+from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, is_smooth, machine_layout
 from ..fractions import determinant_sign
 from ..proof_file import ProofError
 from .forms import UP, FormArithmetic
@@ -45,13 +45,6 @@ from .pose_boxes import COORDINATES, Attempt, PoseRoot
 
 #: Indices after a component, and before it, of a vector.
 _AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
-
-#: Operations with continuous second derivatives wherever these have values: of others they say nothing of a change.
-_SMOOTH = (
-    *(ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_ASSIGN, ca.OP_NEG, ca.OP_TWICE, ca.OP_SQ, ca.OP_SQRT, ca.OP_INV),
-    *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ATAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_EXP, ca.OP_LOG, ca.OP_ADD, ca.OP_SUB),
-    *(ca.OP_MUL, ca.OP_DIV, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_ATAN2, ca.OP_HYPOT),
-)
 
 
 class Machines:
@@ -150,8 +143,7 @@ class SecondOrderClaim:
         self._free, self._bound, self._tolerance = list(free), bound, symbols.tolerance
         pose, errors = SX.sym("pose", len(free)), SX.sym("errors", symbols.errors.numel())
         number = symbols.of(expression, errors, pose)
-        function = ca.Function("number", [pose, errors], [number])
-        if any(function.instruction_id(k) not in _SMOOTH for k in range(function.n_instructions())):
+        if not is_smooth(number):
             raise UncoveredError("a number whose derivatives jump")
         second = ca.hessian(number, errors)[0]
         rows, columns = (np.array(each, dtype=int) for each in second.sparsity().get_triplet())

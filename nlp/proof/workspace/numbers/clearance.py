@@ -18,8 +18,7 @@ from casadi import SX
 from .....models import FloatArray
 from ...enclosure.forms import Encloser, SecondForms
 from ...statement.machine import LEGS, JointErrors, Legs
-from ..robot.pose_box import PoseBox
-from ..robot.posed_model import polynomial_rotation
+from ..robot.pose_box import PoseBox, polynomial_rotation
 from ..tolerance.leg_errors import along
 from .bound_search import Bounds
 

@@ -54,22 +54,13 @@ def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.in
     return first_largest(score)
 
 
-class Contracted(NamedTuple):
-    """Boxes contracted to a workspace.
+def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return boxes contracted to the workspace.
 
-    Attributes:
-        boxes: (B,) boxes.
-        kept: (B,) whether they hold poses of the workspace.
-        beyond: (B,) whether a number of the pose that follows from others is outside of its range.
+    Returns:
+        (B,) the boxes; whether each holds poses of the workspace; whether a number of the pose that follows from others
+        is outside of its range.
     """
-
-    boxes: LoopBoxes
-    kept: NDArray[np.bool_]
-    beyond: NDArray[np.bool_]
-
-
-def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> Contracted:
-    """Return boxes contracted to the workspace."""
     box, free = problem.box, list(problem.free)
     ends = [problem.pose_of(each) for each in (boxes.lower, boxes.upper)]
     # Numbers of the pose that are not known yet may be any of the workspace.
@@ -81,13 +72,13 @@ def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> Contracted:
     columns = [free[j] for j in own]
     new_lower, new_upper = boxes.lower.copy(), boxes.upper.copy()
     new_lower[:, own], new_upper[:, own] = found.lower[:, columns], found.upper[:, columns]
-    return Contracted(boxes._replace(lower=new_lower, upper=new_upper), ~(beyond | found.outside), beyond)
+    return boxes._replace(lower=new_lower, upper=new_upper), ~(beyond | found.outside), beyond
 
 
 def in_workspace(problem: Problem, boxes: LoopBoxes) -> LoopBoxes:
     """Return the boxes that hold poses of the workspace, contracted to them."""
-    found = contracted_boxes(problem, boxes)
-    return some(found.boxes, found.kept)
+    found, kept, _ = contracted_boxes(problem, boxes)
+    return some(found, kept)
 
 
 class Followed(NamedTuple):

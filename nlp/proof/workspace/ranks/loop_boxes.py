@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
 
 from .....models import FloatArray
+from ...boxes.engine import MOST_VARIABLES
 from ...boxes.rows import some
-from ...boxes.tapes import MOST_VARIABLES
 from ...enclosure.forms import Encloser, Forms
-from ..robot.closed_loops import Loops
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
 from .entry_change import EntryChange, is_polynomial
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
 #: and later ones, from the relation that was found with the guess before.
 _WIDER, _AGAIN = 1.1, 1.05
 #: Attempts to find widths of dependent coordinates in which they surely stay.
-_ATTEMPTS = 3
+_ATTEMPTS = 8
 #: Smallest half width of a dependent coordinate, in parts of its size: more than rounding.
 _LEAST = 1e-10
 #: Largest one: beyond it, the box of the pose is divided first.
@@ -140,7 +139,7 @@ class Examiner:
         if self.second is None:
             _ = self._encloser  # refuses an operation without a rule at once
         self._machines = None if family is None else family.loops
-        self.loops = Loops(problem.z, problem.equations, problem.equations, ca.SX(0, 1), problem.size)
+        self.loops = problem.loops
 
     @cached_property
     def _encloser(self) -> Encloser:
@@ -172,6 +171,7 @@ class Examiner:
             return Examined(boxes, relation, *self._rank.examine_second(self.second, *ends, change))
         lower, upper, near, known = some(boxes, np.arange(B))
         tested = Tested(np.zeros(B, dtype=bool), np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=np.int32))
+        columns: tuple[NDArray[Any], ...] = (*relation, *tested)
         new = np.flatnonzero(~known)
         if new.size:
             tested.shares[new] = self._guess(new, lower, upper, near)
@@ -191,7 +191,7 @@ class Examiner:
                 continue
             entries = with_relation(forms.part(slice(k + k * k, -1)), own, self.of)
             found = self._test.examine(entries, f)
-            for whole, part in zip((*relation, *tested), (*own, *found), strict=True):
+            for whole, part in zip(columns, (*own, *found), strict=True):
                 whole[rows] = part
         for j in self.of.dependent:
             lower[~known, j] = upper[~known, j] = np.nan

@@ -39,6 +39,8 @@ _SMALL, _MOST = 0.1, 24
 _FIRST = 64
 #: Part of the value before at which it tries again.
 _SMALLER = 0.6
+#: Random poses from which Newton's method looks for a singular one, and number of the worst that are tried.
+_POSES, _TRIED, _SEED = 2048, 8, 0
 #: How a singular pose of Newton's method is known.
 BY_NEWTON = "found singular to 1e-10 by Newton's method"
 
@@ -118,6 +120,21 @@ class NewtonRefuter:
             return None
         self._due = 2 * boxes
         return self._if_shown(self._machine.search(self._middle(found.boxes, order[0])))
+
+    def from_random(self) -> Singular | None:
+        """Return a singular pose near random ones, from those with the smallest singular values."""
+        points = self._problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(self._problem.free)]
+        values = np.array([self._newton.smallest(each) for each in points])
+        worst = [points[k] for k in np.argsort(values)[:_TRIED] if np.isfinite(values[k])]
+        searches: list[Callable[[FloatArray], FloatArray | None]] = [self._newton.search]
+        if self._machine is not None:
+            searches.append(self._machine.search)
+        for search in searches:
+            for point in worst:
+                shown = self._if_shown(search(point))
+                if shown is not None:
+                    return shown
+        return None
 
     def _if_shown(self, z: FloatArray | None) -> Singular | None:
         """Return a singular pose if it is one in home's assembly: Newton's method may end in another one."""
@@ -264,12 +281,12 @@ class _RankRule(LoopRule):
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
         """Return boxes contracted to the workspace, and record where they lead."""
-        found = contracted_boxes(self._problem, boxes)
+        found, kept, beyond = contracted_boxes(self._problem, boxes)
         if self._recorder is not None:
-            before, after = (self._ends(each.lower, each.upper) for each in (boxes, found.boxes))
-            self._recorder.contractions(before, after, ~found.kept)
-            self._recorder.lacks_boxes |= bool(found.beyond.any())
-        return some(found.boxes, found.kept)
+            before, after = (self._ends(each.lower, each.upper) for each in (boxes, found))
+            self._recorder.contractions(before, after, ~kept)
+            self._recorder.lacks_boxes |= bool(beyond.any())
+        return some(found, kept)
 
     def _ends(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""

@@ -15,8 +15,7 @@ from casadi import SX
 from .....models import FloatArray
 from ...enclosure.forms import Encloser, Forms
 from ...statement.machine import Legs
-from ..robot.pose_box import PoseBox
-from ..robot.posed_model import polynomial_rotation
+from ..robot.pose_box import PoseBox, polynomial_rotation
 
 
 class LegRows:

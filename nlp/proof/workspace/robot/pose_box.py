@@ -15,7 +15,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+import casadi as ca
 import numpy as np
+from casadi import SX
 
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from ....case.pose import Free, Value
@@ -216,3 +218,40 @@ def _tangent(angle: float, outwards: float) -> float:
     """Return the tangent of half an angle, moved up or down by more than its rounding error."""
     value = math.tan(angle / 2)
     return value + outwards * _TANGENT * abs(value)
+
+
+def rotation_of(box: PoseBox, turn: SX) -> SX:
+    """Return the rotation (3, 3) with coordinates (3, 1) of a box."""
+    if box.kind is TurnKind.ROLL_PITCH_YAW:
+        about = [_turn(k, turn[k]) for k in range(3)]
+        return about[2] @ about[1] @ about[0]
+    r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
+    scaled = 2 / (1 + ca.sumsqr(r)) * r
+    return SX.eye(3) + ca.skew(scaled) + ca.skew(scaled) @ ca.skew(r)
+
+
+def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
+    """Return ``s R`` (3, 3) and ``s`` (1, 1), polynomials of the coordinates (3, 1) of a rotation R, ``s > 0``."""
+    if box.kind is TurnKind.ROLL_PITCH_YAW:
+        turned, scale = SX.eye(3), SX(1)
+        for k in range(3):
+            one = 1 + turn[k] ** 2
+            i, j = (k + 1) % 3, (k + 2) % 3
+            single = SX.eye(3) * one
+            single[i, i] = single[j, j] = 1 - turn[k] ** 2
+            single[j, i], single[i, j] = 2 * turn[k], -2 * turn[k]
+            turned, scale = single @ turned, one * scale
+        return turned, scale
+    r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
+    square = ca.sumsqr(r)
+    return (1 - square) * SX.eye(3) + 2 * (r @ r.T) + 2 * ca.skew(r), 1 + square
+
+
+def _turn(about: int, tangent: SX) -> SX:
+    """Return the rotation about a coordinate axis by an angle, from the tangent of its half."""
+    i, j = (about + 1) % 3, (about + 2) % 3
+    factor = 2 / (1 + tangent * tangent)
+    matrix = SX.eye(3)
+    matrix[i, i] = matrix[j, j] = factor - 1
+    matrix[j, i], matrix[i, j] = factor * tangent, -factor * tangent
+    return matrix

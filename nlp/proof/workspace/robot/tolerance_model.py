@@ -20,8 +20,7 @@ from ...statement.machine import INSIDE, CentreErrors
 from ...statement.tolerance import BuiltModel
 from .closed_loops import Loops
 from .motion_matrix import RankMatrix, free_matrix
-from .posed_model import PosedModel, posed_model
-from .posed_robot import NotJudgedError, Problem, about_platform, locked_rows
+from .posed_robot import NotJudgedError, PosedModel, Problem, posed_model
 
 #: Errors at which equations that were left out are tested, as a part of the robot's length, and number of tests.
 _OFF, _TESTS = 1e-2, 4
@@ -132,9 +131,9 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
         equations=posed.closure[list(problem.needed)] if problem.needed else SX(0, 1),
         every=posed.every,
         signs=posed.signs,
-        locked=locked_rows(posed, problem.columns, problem.rows, problem.length),
+        locked=posed.locked_rows(problem.columns, problem.rows, problem.length),
         unactuated=unactuated,
-        jacobian=about_platform(posed.jacobian, limbs.position, problem.length),
+        jacobian=posed.jacobian(problem.length),
     )
     _check_freedoms(family, posed)
     return family

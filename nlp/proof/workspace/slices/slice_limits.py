@@ -11,7 +11,6 @@ import enum
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -219,18 +218,6 @@ class _Sampled:
         return np.asarray(self._oracle.values(points) < self._limit)
 
 
-class Binding(NamedTuple):
-    """Limits of B boxes.
-
-    Attributes:
-        limit: (B,) ``KEPT``, ``UNDECIDED`` or the index of the limit that is violated first.
-        is_same: (B,) whether it is that of the whole box.
-    """
-
-    limit: NDArray[np.int16]
-    is_same: NDArray[np.bool_]
-
-
 class FirstViolated:
     """The limit that is violated first on the straight way from the middle of a slice.
 
@@ -251,8 +238,10 @@ class FirstViolated:
         """Whether each limit is violated at points of the grid, (M, N, N)."""
         return self._limits.violated(self._grid.reshape(POINTS**2, -1)).reshape(-1, POINTS, POINTS)
 
-    def of(self, states: NDArray[np.int8], lower: FloatArray, upper: FloatArray) -> Binding:
-        """Return the limit of each box.
+    def of(
+        self, states: NDArray[np.int8], lower: FloatArray, upper: FloatArray
+    ) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
+        """Return the limit of each box, ``KEPT``, ``UNDECIDED`` or an index, and whether it is that of the whole box.
 
         Args:
             states: (M, B) of the limits over the boxes.
@@ -264,7 +253,7 @@ class FirstViolated:
         is_same = limit == KEPT
         rows = np.flatnonzero(violated.any(axis=0))
         if not rows.size:
-            return Binding(limit, is_same)
+            return limit, is_same
         limit[rows] = np.argmax(violated[:, rows], axis=0)
         # Another limit that is open may be violated first in a part of the box.
         is_same[rows] = (states[:, rows] == LimitState.KEPT).sum(axis=0) == len(states) - 1
@@ -276,7 +265,7 @@ class FirstViolated:
             candidates = states[:, several] != LimitState.KEPT
             around = [self._first(candidates, corner) for corner in corners]
             is_same[several] = np.all([each == limit[several] for each in around], axis=0)
-        return Binding(limit, is_same)
+        return limit, is_same
 
     def _first(self, candidates: NDArray[np.bool_], ends: FloatArray) -> NDArray[np.int16]:
         """Return which of the candidates (M, C) is violated first on the way to each end (C, 2)."""
