@@ -14,7 +14,7 @@ from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import Motions, PosedRobot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
@@ -97,13 +97,13 @@ def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -
     """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
     rng, y, nothing = np.random.default_rng(1), SX.sym("y"), SX(0, 1)
     lists: tuple[tuple[()], ...] = ((),) * 5
-    robot = PosedRobot(y, (0,), np.zeros(6), np.ones(1), 1.0, SX(3, 1), SX(1), *lists, nothing, nothing, nothing)
+    robot = PosedRobot(y, 0, (0,), np.zeros(6), np.ones(1), 1.0, SX(3, 1), SX(1), *lists, nothing, nothing, nothing)
     assembly, at = Assembly(robot, nothing, np.zeros(1)), np.zeros((1, 6))
 
     def shown(block: np.ndarray) -> int:
         M = np.eye(6)
         M[4:, 4:] = block
-        return RankClaim(robot, Motions(SX(ca.DM(size * M)), 0), assembly)._signs_at(at)[0]
+        return RankClaim(robot, SX(ca.DM(size * M)), 0, assembly)._signs_at(at)[0]
 
     row, factor = rng.normal(size=(4000, 2)), rng.normal(size=4000)
     blocks = np.stack([row, factor[:, None] * row], axis=1)

@@ -13,8 +13,7 @@ from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
-from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
-from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb, first_largest_of_lists
+from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, OwnBoxes, bound_limb, first_largest_of_lists
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
