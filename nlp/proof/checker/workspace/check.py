@@ -197,9 +197,8 @@ class _Checker:
 
     def _check_rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank."""
-        if self._tolerance and self._legs is None:
-            raise ProofError("ranks of machines are covered for six straight legs alone")
-        claim = rank_claim(self._case, self._model, self._root, each.name, self._tolerance)
+        built = None if self._machines is None or self._legs is not None else self._machines.symbols.built
+        claim = rank_claim(self._case, self._model, self._root, each.name, self._tolerance, built)
         self._show(claim, given.tree)
         claim.finish()
         return CheckedClaim(each.name, each.sense)

@@ -174,7 +174,7 @@ def dependent_coordinates(points: LoopPoints, robot: PosedRobot, start: FloatArr
     Raises:
         ProofError: the equations leave an unknown free, or are singular at the start.
     """
-    poses, n = len(robot.free), len(start)
+    poses, n = len(robot.free), len(start) - robot.errors
     unknowns = list(range(poses, n))
     if count < len(unknowns):
         raise ProofError("the loops leave a passive joint free")

@@ -48,7 +48,8 @@ class PosedRobot:
     """A robot with its dimensions over a workspace.
 
     Attributes:
-        z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns.
+        z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns, then errors.
+        errors: number of components of errors of joint centres, which are the last coordinates.
         free: indices of these coordinates among the six.
         middle: (6,) the middle of the workspace: the values of the others.
         size: (n,) by which coordinates are comparable: half ranges, and sizes of the unknowns.
@@ -66,6 +67,7 @@ class PosedRobot:
     """
 
     z: SX
+    errors: int
     free: tuple[int, ...]
     middle: FloatArray
     size: FloatArray
@@ -91,13 +93,14 @@ class PosedRobot:
         return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
 
 
-def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
+def posed_robot(case: Case, model: Model, root: PoseRoot, errors: int = 0) -> PosedRobot:
     """Return a robot over a workspace.
 
     Args:
         case: with fixed dimensions.
         model: its robot, some of whose unknowns may have been replaced by expressions.
         root: the box of coordinates.
+        errors: number of components of errors of joint centres, the last parameters of the robot.
     """
     middle = 0.5 * root.lower + 0.5 * root.upper
     free = tuple(np.flatnonzero(root.upper > root.lower).tolist())
@@ -106,7 +109,10 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     position, inverse = ca.vertcat(*y[:3]), SX.sym("inverse")
     turned, scale = turned_rotation(root, y[3:])
     values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    numbers = Substitution(ca.vertcat(SX(0, 1), *values), ca.vertcat(SX(0, 1), *unknowns), turned / scale, position)
+    off = SX.sym("errors", errors)
+    numbers = Substitution(
+        ca.vertcat(SX(0, 1), *values, off), ca.vertcat(SX(0, 1), *unknowns), turned / scale, position
+    )
     symbols = Substitution.identity(model).all
     about = [row.moment - ca.cross(model.pose.position, row.force) for row in model.wrenches]
     vectors = [ca.vertcat(row.force, moment) for row, moment in zip(model.wrenches, about, strict=True)]
@@ -126,7 +132,8 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     following = iter(ca.Function("robot", symbols, outputs).call(numbers.all))
     ranges = (0.5 * (root.upper - root.lower))[list(free)]
     robot = PosedRobot(
-        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
+        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns, off),
+        errors=errors,
         free=free,
         middle=middle,
         size=ranges,
@@ -144,7 +151,8 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
         signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
     )
-    return replace(robot, size=np.concatenate([ranges, [float(next(following)) for _ in model.unknowns]]))
+    sizes = [float(next(following)) for _ in model.unknowns]
+    return replace(robot, size=np.concatenate([ranges, sizes, np.full(errors, case.joint_centre_tolerance or 0.0)]))
 
 
 def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
