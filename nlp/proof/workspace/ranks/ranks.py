@@ -11,12 +11,12 @@ from ....errors import UncoveredError
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ...statement.machine import Legs
 from ..home_poses import Homes
-from ..regular.signs import SignRefuter
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..robot.tolerance_model import Family
 from ..verdict import Outcome, Regularity
 from .search import NewtonRefuter, RankProgress, prove_rank, singular_at
+from .signs import SignRefuter
 
 if TYPE_CHECKING:
     from ..proof_record import PaperRecord
