@@ -15,7 +15,7 @@ from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import Motions, PosedRobot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
@@ -108,7 +108,7 @@ def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -
     def shown(block: np.ndarray) -> int:
         M = np.eye(6)
         M[4:, 4:] = block
-        return RankClaim(robot, Motions(SX(ca.DM(size * M)), 0), assembly)._signs_at(at)[0]
+        return RankClaim(robot, SX(ca.DM(size * M)), 0, assembly)._signs_at(at)[0]
 
     row, factor = rng.normal(size=(4000, 2)), rng.normal(size=4000)
     blocks = np.stack([row, factor[:, None] * row], axis=1)

@@ -26,7 +26,7 @@ from ..fractions import sign_of_determinant
 from ..proof_file import ProofError
 from .closed_loops import Assembly, Enclosed, needed_equations, start_of
 from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
-from .motion_matrix import Motions, PosedRobot, free_motions, locked_motions, posed_robot
+from .motion_matrix import PosedRobot, motion_matrix, posed_robot
 from .pose_boxes import Attempt, PoseRoot
 from .tolerance import change_of_rows
 
@@ -67,10 +67,10 @@ def rank_claim(
         start = np.concatenate([start, np.zeros(robot.errors)])
     try:
         assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
-        motions = free_motions(model, robot, start) if name == CONSTRAINTS else locked_motions(model, robot, start)
+        matrix, freedoms = motion_matrix(model, robot, start, is_locked=name != CONSTRAINTS)
         if built is not None:
             _refuse_other_freedoms(robot, assembly)
-        return RankClaim(robot, motions, assembly, tolerance)
+        return RankClaim(robot, matrix, freedoms, assembly, tolerance)
     except UncoveredError as error:
         raise ProofError(f"the check has no rule for {error}") from None
 
@@ -103,7 +103,8 @@ class RankClaim:
 
     Args:
         robot: the robot.
-        motions: the matrix.
+        matrix: (m, c) sparse, m not below c less the freedoms.
+        freedoms: dimensions of its null space that are claimed to be all.
         assembly: its closed loops.
         tolerance: largest error of each joint centre, of six straight legs or in the robot's coordinates.
 
@@ -111,21 +112,21 @@ class RankClaim:
         UncoveredError: an entry holds an operation without a rule.
     """
 
-    def __init__(self, robot: PosedRobot, motions: Motions, assembly: Assembly, tolerance: float = 0.0) -> None:
-        self._freedoms, self._assembly, self._tolerance = motions.freedoms, assembly, tolerance
-        self._length = robot.length
+    def __init__(
+        self, robot: PosedRobot, matrix: SX, freedoms: int, assembly: Assembly, tolerance: float = 0.0
+    ) -> None:
+        self._freedoms, self._assembly, self._tolerance, self._length = freedoms, assembly, tolerance, robot.length
         # Independent coordinates as those of poses.
         self._errors = robot.errors
         self._free = [robot.free[j] for j in assembly.independent if j < len(robot.free)]
-        whole = motions.matrix
-        self._constant = np.zeros(whole.shape)
+        self._constant = np.zeros(matrix.shape)
         places, entries = [], []
-        for k, place in enumerate(zip(*whole.sparsity().get_triplet(), strict=True)):
-            if whole.nz[k].is_constant():
-                self._constant[place] = float(whole.nz[k])
+        for k, place in enumerate(zip(*matrix.sparsity().get_triplet(), strict=True)):
+            if matrix.nz[k].is_constant():
+                self._constant[place] = float(matrix.nz[k])
             else:
                 places.append(place)
-                entries.append(whole.nz[k])
+                entries.append(matrix.nz[k])
         self._at = tuple(np.array(places, dtype=int).reshape(-1, 2).T)
         # The errors of joint centres change rows of legs by a part of these.
         of_rows = bool(tolerance) and not robot.errors
@@ -216,7 +217,8 @@ class RankClaim:
 
     def _matrices(self, closed: Enclosed) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the forms of the matrix: (B, m, c) middles, (B, m, c) rests, and (B, f, m, c) of each coordinate."""
-        (c, a, r), ends = self._entries(closed.lower, closed.upper, self._count)
+        values = self._entries(closed.lower, closed.upper)
+        c, a, r = values.forms(slice(0, self._count))
         dependent, slopes = a[:, :, self._assembly.dependent], a[:, :, self._assembly.independent]
         size = np.abs(dependent)
         with np.errstate(all="ignore"):
@@ -232,7 +234,7 @@ class RankClaim:
         M[:, rows, columns], E[:, rows, columns] = middle, rest
         A[:, :, rows, columns] = slopes.transpose(0, 2, 1)
         if self._tolerance and not self._errors:
-            most = np.abs(ends).max(axis=0)
+            most = np.abs(values.ends(slice(self._count, None))).max(axis=0).T
             legs = most[:, 1:].reshape(len(c), -1, 2, 3)
             E += change_of_rows(most[:, 0], legs[:, :, 0], legs[:, :, 1], self._tolerance, self._length)
         return M, E, A
