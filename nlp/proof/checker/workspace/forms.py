@@ -13,7 +13,8 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import FloatArray
-from ..polynomials import UNIT, Polynomial, PolynomialArithmetic, places
+from ..arithmetic import PolynomialArithmetic
+from ..polynomials import UNIT, Polynomial, places
 
 #: Part of itself by which a sum of nonnegative products moves outwards: more than the rounding of fewer than 400 terms.
 UP = 1 + 1024 * UNIT
