@@ -30,8 +30,8 @@ from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
-from screwsynth.nlp.proof.workspace.tolerance import first_order_change as firstorder
 from screwsynth.nlp.proof.workspace.tolerance import machine_number
+from screwsynth.nlp.proof.workspace.tolerance import machines as tolerance
 from screwsynth.nlp.proof.workspace.tolerance.machines import Machines, Proving, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
@@ -268,7 +268,7 @@ def ratios(name: str, gap: float = 1e-4, only: tuple[str, ...] | None = None) ->
     names = robot.names if only is None else only
     bounds = wanted(found, names, gap)
     box = found.family.problem.box
-    poses = np.array([firstorder.coordinates_of(box, each.pose) for each in bounds if each.pose is not None])
+    poses = np.array([box.coordinates(each.pose) for each in bounds if each.pose is not None])
     built, exact = samples(robot, box, found.family.tolerance, poses)
     result = {}
     for each in bounds:
@@ -296,7 +296,7 @@ def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
 
 def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
     spread = machine_number.by_centres
-    monkeypatch.setattr(firstorder, "_OUTWARDS", 0.8)
+    monkeypatch.setattr(tolerance, "_OUTWARDS", 0.8)
     monkeypatch.setattr(machine_number, "by_centres", lambda slopes: 0.8 * spread(slopes))
     for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
         assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
@@ -369,7 +369,7 @@ def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
     errors = found.centres.vectors
     assert np.linalg.norm(errors, axis=1).max() <= 1e-3
     assert found.centres.names == ("1:1", "1:3", "2:1", "2:3", "3:1", "3:3")
-    y = firstorder.coordinates_of(pose_box(workspace_of_case(case)), found.pose)
+    y = pose_box(workspace_of_case(case)).coordinates(found.pose)
     y[3:] = 2 * np.arctan(y[3:])
     value = robot.values(y[None], errors[None])[0, 0]
     assert value > largest

@@ -25,6 +25,7 @@ from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
+from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
@@ -35,8 +36,9 @@ from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, 
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, built_model, family_of
-from screwsynth.nlp.proof.workspace.tolerance.legs.claims import built_claims
+from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, family_of
+from screwsynth.nlp.proof.workspace.tolerance.leg_errors import of_legs
+from screwsynth.nlp.proof.workspace.tolerance.machines import Proving, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
@@ -191,24 +193,18 @@ def machines(case: Case) -> Machines:
 
 
 def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case, machines: Machines) -> None:
-    workspace, robot = workspace_of_case(case), legs(case)
-    layout = posed_layout(case, workspace)
-    # No leg is shorter than 20 in: the platform is at least 19 in above the base.
-    claims = built_claims(layout, workspace, robot, claims_of(layout, ["base_joint_angle"]), 15.0)
-    assert machines.length.min() > 15
-    picked = [each for each in claims if " 1-" in each.name or " 2+" in each.name or " " not in each.name]
-    sampled, seen = dict(numbers(case, robot, machines)), set()
-    for each in (prove_extreme(layout, claim, legs=robot, gap=1e-3) for claim in picked):
-        if each.name.startswith("actuator.dead_length"):
-            continue
+    sampled, seen = dict(numbers(case, legs(case), machines)), set()
+    every = machines_of(case, case.model, pose_box(workspace_of_case(case)))
+    picked = [name for name in sampled if " 1-" in name or " 2+" in name or " " not in name]
+    for each in machine_extremes(every, ["base_joint_angle"], Proving(1e-3, 1), with_objective=True, only=picked):
         seen.add((each.name.partition(" ")[0], each.key == ""))
         assert beyond(each, sampled[each.name]) <= 0, each.name
         # Proven bounds are near: a hundredth of the largest number of the exact machine, with the gap.
         assert beyond(each, sampled[each.name]) > -0.03 * np.abs(sampled[each.name]).max(), each.name
         # The errors that come with a value are those of a machine within the tolerance which has that value.
-        assert each.errors is not None
+        assert each.centres is not None
         assert each.pose is not None
-        assert max(np.linalg.norm(part, axis=1).max() for part in each.errors) <= TOLERANCE
+        assert max(np.linalg.norm(part, axis=1).max() for part in of_legs(each.centres)) <= TOLERANCE
         assert beyond(each, np.array([each.reached])) <= 1e-9 * abs(each.reached), each.name
     assert len(seen) == 10
     determinants = np.linalg.det(machines.J)

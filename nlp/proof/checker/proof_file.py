@@ -217,7 +217,9 @@ class _ClaimTable:
 
     name: str
     sense: str
-    reason: Literal["program", "regular", "singular", "boxes", "lengths", "one machine", "singular machine"]
+    reason: Literal[
+        "program", "regular", "singular", "boxes", "lengths", "one machine", "singular machine", "second order"
+    ]
     bound: float | None
     graph: str
     sides: tuple[tuple[float, ...], ...]

@@ -20,7 +20,6 @@ from ...program.layout import Layout
 
 if TYPE_CHECKING:
     from ...case.case import Case
-    from .tolerance_bound import Worst
 
 #: Names of the claims that J, and that the constraint wrenches alone, have full rank.
 REGULAR, CONSTRAINTS = "regular", "constraints regular"
@@ -45,8 +44,6 @@ class Claim:
         limit: largest or smallest value allowed of the expression; None where the number has no limit.
         leg, task: index of the leg whose length, or of the task whose F, the number is; None for another.
         quantity: name of the measure of the robot that the number is; empty for another.
-        worst: how far the number goes over all machines within a tolerance; None where the exact machine is meant, or a
-            number that errors of joint centres do not change.
         uncovered: reason for a claim about the exact machine where others are meant; else empty.
     """
 
@@ -59,13 +56,7 @@ class Claim:
     leg: int | None = None
     task: int | None = None
     quantity: str = ""
-    worst: Worst | None = None
     uncovered: str = ""
-
-
-def exact_length_name(leg: str) -> str:
-    """Return the name of the shortest length of a leg of the exact machine, on which bounds of other machines rest."""
-    return f"exact leg_length limb {leg}"
 
 
 def one_machine_name(claim: str) -> str:

@@ -95,16 +95,19 @@ def legs_of(case: Case) -> Legs | None:
 
     Their tolerance is the case's.
     """
-    model = case.model
-    if not has_straight_legs(model):
+    if not has_straight_legs(case.model):
         return None
+    base, platform = leg_joints(case)
+    return Legs(base, platform, case.joint_centre_tolerance or 0.0)
+
+
+def leg_joints(case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return the joint centres (L, 3) of the L legs of a robot with fixed dimensions, on base and platform, length."""
+    model = case.model
     symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
     parts = [value for name in case.parameters for value in case.components(name)]
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
     outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
     base, platform = ca.Function("legs", [symbols], outputs).call([values])
-    return Legs(
-        frozen_array(np.array(base).T, (LEGS, 3)),
-        frozen_array(np.array(platform).T, (LEGS, 3)),
-        case.joint_centre_tolerance or 0.0,
-    )
+    shape = len(model.legs), 3
+    return frozen_array(np.array(base).T, shape), frozen_array(np.array(platform).T, shape)

@@ -3,33 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from ....models.joints.closedform import ClosedForm, closed_form
 from ...case.case import Case
+from ...case.task import Sense
 from ...case.workspace import Workspace
-from ...interruption import one_call, within
+from ...interruption import is_requested, one_call, within
 from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
 from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
+from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
 from .numbers.asked_values import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
 from .numbers.leg_numbers import own_searches, pose_errors
 from .numbers.loop_limits import loop_extremes
 from .numbers.robot_limits import limited_spectrum
-from .numbers.strokes import with_strokes
+from .numbers.strokes import Refine, with_strokes
 from .ranks.ranks import Ranks, not_judged, prove_ranks
 from .ranks.search import RankProgress
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError
-from .tolerance.legs.limits import as_built, refined
-from .tolerance.machines import Machines, Proving, machine_extremes, machines_of, shown_extremes
+from .tolerance.leg_errors import of_legs
+from .tolerance.machines import Machines, Proving, machine_extreme, machine_extremes, machines_of, shown_extremes
 from .verdict import Outcome, Regularity
 
 if TYPE_CHECKING:
@@ -130,7 +132,7 @@ def judge_workspace(
     with within(time_limit, _PART):
         box, legs = pose_box(workspace), legs_of(case)
         closed = closed_form(case.model)
-        machines, unknown = _machines(case, closed, box, legs)
+        machines, unknown = _machines(case, closed, box)
         homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
         ranks = (
             Ranks(not_judged(box, unknown), None)
@@ -148,9 +150,9 @@ def judge_workspace(
         return replace(judged, extremes=tuple(homes.shown(each) for each in found))
 
 
-def _machines(case: Case, closed: ClosedForm, box: PoseBox, legs: Legs | None) -> tuple[Machines | None, str]:
-    """Return the machines that are meant, or why they are not judged: None and no reason for the design or legs."""
-    if legs is not None or not case.joint_centre_tolerance:
+def _machines(case: Case, closed: ClosedForm, box: PoseBox) -> tuple[Machines | None, str]:
+    """Return the machines that are meant, or why they are not judged: None and no reason for the design alone."""
+    if not case.joint_centre_tolerance:
         return None, ""
     try:
         return machines_of(case, closed.model, box), ""
@@ -168,7 +170,7 @@ class _Numbers:
         closed: its robot without unknowns in closed form.
         legs: joint centres; None for a robot that is not six straight legs.
         gap, jobs, progress, paper: as in :func:`judge_workspace`.
-        machines: every machine within the tolerance, of a robot without legs; None where none are judged.
+        machines: every machine within the tolerance; None where the design is judged, or none.
         unknown: reason why the machines that are meant are not judged; else empty.
     """
 
@@ -200,18 +202,40 @@ class _Numbers:
         case, box, legs = self.case, pose_box(self.workspace), self.legs
         names = [name for name in quantities if name not in SPECTRAL]
         family = None if self.machines is None else self.machines.family
-        spectral = partial(
-            spectral_extremes,
+        if self.machines is not None:
+            proving = Proving(self.gap, self.jobs, self.progress, self.paper)
+            extremes = machine_extremes(self.machines, names, proving, with_objective=with_objective)
+            yield from _add(found, extremes if legs is None else map(_of_legs, extremes))
+            refine: Refine = partial(_refined_machines, self.machines, proving)
+        else:
+            refine = yield from self._add_design(found, names, with_objective=with_objective)
+        lengths = [each for each in found if each.name.startswith("leg_length limb ") and each.sense is Sense.MIN]
+        shortest = min((each.bound for each in lengths), default=0.0)
+        if legs is not None:
+            before = len(found)
+            found[:] = with_strokes(case, legs, found, refine)
+            yield from found[before:]
+            others = own_searches(case, legs, box, gap=self.gap, shortest=shortest, paper=self.paper)
+            yield from _add(found, others)
+        spectra = spectral_extremes(
+            *(case, self.closed.model, box, quantities),
+            gap=self.gap,
+            shortest=shortest,
             family=family,
             unknown=self.unknown,
-            gap=self.gap,
             paper=self.paper,
         )
-        if self.machines is not None:
-            proving = Proving(self.gap, self.jobs, self.progress)
-            yield from _add(found, machine_extremes(self.machines, names, proving, with_objective=with_objective))
-            yield from self._add_others(found, spectral(case, self.closed.model, box, quantities))
-            return
+        yield from self._add_others(found, spectra)
+        eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
+        if legs is not None and with_objective and eps > 0:
+            exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
+            yield from _add(found, pose_errors(legs, box, eps, exact, paper=self.paper))
+
+    def _add_design(
+        self, found: list[Extreme], names: Sequence[str], *, with_objective: bool
+    ) -> Generator[Extreme, None, Refine]:
+        """Add the extremes of the design, yield each, and return the function that proves its lengths more finely."""
+        case, box = self.case, pose_box(self.workspace)
         layout = posed_layout(case, self.workspace)
         claims, is_reached = claims_of(layout, names, with_objective=with_objective), True
         if self.closed.reaches:
@@ -225,9 +249,8 @@ class _Numbers:
                 claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
         claims = [replace(each, uncovered=self.unknown) for each in claims]
-        shortest, claims = as_built(layout, self.workspace, legs, claims, partial(prove, paper=self.paper))
         decided: list[Extreme] = []
-        if legs is None and not case.joint_centre_tolerance:
+        if self.legs is None and not case.joint_centre_tolerance:
             decided = [
                 each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
             ]
@@ -235,20 +258,7 @@ class _Numbers:
                 proving = Proving(self.gap, self.jobs)
                 decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
         yield from self._add_proved(found, layout, claims, decided)
-        if legs is not None:
-            again = partial(prove, paper=self.paper, again=True)
-            refine = partial(refined, layout, legs, shortest, claims, again, self.paper)
-            before = len(found)
-            found[:] = with_strokes(case, legs, found, refine)
-            yield from found[before:]
-            others = own_searches(case, legs, box, gap=self.gap, shortest=shortest, paper=self.paper)
-            yield from _add(found, others)
-        yield from self._add_others(found, spectral(case, self.closed.model, box, quantities, shortest=shortest))
-        eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
-        if legs is not None and with_objective and eps > 0:
-            least = min((each.bound for each in found if each.name.startswith("leg_length limb ")), default=-math.inf)
-            shortest = least + 2 * legs.tolerance if least > 0 else -math.inf  # of the exact machine
-            yield from _add(found, pose_errors(legs, box, eps, shortest, paper=self.paper))
+        return partial(_refined, partial(prove, paper=self.paper, again=True), claims)
 
     def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Extreme]:
         """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
@@ -261,7 +271,7 @@ class _Numbers:
 
     def _prove(self, layout: Layout) -> Callable[..., Extreme]:
         """Return the function that proves a claim to a gap."""
-        return partial(prove_extreme, layout, jobs=self.jobs, legs=self.legs)
+        return partial(prove_extreme, layout, jobs=self.jobs)
 
     def _add_proved(
         self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()
@@ -279,6 +289,40 @@ class _Numbers:
                     self.paper.elsewhere.add((claim.name, claim.sense.value))
                 own = own or again
             yield from _add(found, [own])
+
+
+def _of_legs(each: Extreme) -> Extreme:
+    """Return an extreme with the errors of its machine as those of six straight legs."""
+    return replace(each, errors=None if each.centres is None else of_legs(each.centres), centres=None)
+
+
+def _refined(
+    prove: Callable[..., Extreme],
+    claims: Sequence[Claim],
+    leg: int,
+    sense: Sense,
+    gap: float,
+    about: Directions | None,  # noqa: ARG001 - the design is one machine at all poses
+) -> Extreme | None:
+    """Return a length of a leg, proved more finely; None where the work is requested to stop."""
+    claim = next(each for each in claims if each.leg == leg and each.sense is sense)
+    return None if is_requested() else prove(claim, gap=gap)
+
+
+def _refined_machines(
+    machines: Machines, proving: Proving, leg: int, sense: Sense, gap: float, about: Directions | None
+) -> Extreme | None:
+    """Return the same of all machines, less the part of their errors in these directions, which no pose changes."""
+    claims = (
+        machines.symbols.claims(())[1]
+        if about is None
+        else [length_of_one_machine(machines.symbols, leg, sense, about)]
+    )
+    if about is not None and proving.paper is not None:
+        proving.paper.directions[claims[0].name] = about
+    prove = partial(machine_extreme, machines, again=True)
+    found = _refined(lambda claim, *, gap: prove(claim, proving._replace(gap=gap)), claims, leg, sense, gap, about)
+    return None if found is None else _of_legs(found)
 
 
 def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:

@@ -11,10 +11,10 @@ from ..certificate.certificate import CertificateStatus
 from ..checker.tree import Node
 
 if TYPE_CHECKING:
-    from ....models import FloatArray
     from ...program.nlp import Nlp
     from ..certificate.certificate import Certificate
     from ..statement.claims import Claim
+    from ..statement.tolerance import Directions
 
 #: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
 _FOLDED = 1e-12
@@ -44,15 +44,16 @@ class PaperRecord:
         boxes: of searches of their own, by name.
         firsts: bounds of the errors of the pose to first order, for legs that are one unit off, by name.
         elsewhere: names and senses of limits that are proved in home's assembly, and not in every one as on paper.
-        directions: fixed directions (3,) of a leg, in the world frame and in the platform frame, by the name of lengths
-            of one machine.
+        rests: bounds of terms of second order by which numbers of machines are bounded, by their name and sense.
+        directions: fixed directions of a leg, by the name of lengths of one machine.
     """
 
     programs: dict[tuple[str, str], ProgramRecord] = field(default_factory=dict)
     boxes: dict[str, TreeRecord] = field(default_factory=dict)
     firsts: dict[str, float] = field(default_factory=dict)
     elsewhere: set[tuple[str, str]] = field(default_factory=set)
-    directions: dict[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    rests: dict[tuple[str, str], float] = field(default_factory=dict)
+    directions: dict[str, Directions] = field(default_factory=dict)
 
     def own(self, name: str) -> TreeRecord:
         """Return the record of a search of its own."""

@@ -11,8 +11,9 @@ from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
 from ..checker.workspace.anyrobot.robotclaims import RobotClaims, robot_claims
 from ..checker.workspace.expected import ERRORS, ExpectedClaim, expected_claims
-from ..statement.claims import REACH, asked_name, exact_length_name, one_machine_name
+from ..statement.claims import REACH, asked_name, one_machine_name
 from ..statement.machine import Legs, legs_of
+from ..statement.tolerance import second_order_name
 from .proof_record import PaperRecord
 from .singular_sides import singular_sides
 from .verdict import Outcome, Regularity
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
+#: Kinds of claims about ranks.
+_RANKS = ("regular", "constraints")
+#: Kinds of claims that rest on the shortest lengths of legs where machines are meant.
+_OF_ROWS = ("singular value", "condition")
 #: Reason of claims about machines within a tolerance that are not six straight legs.
 _AS_BUILT = "it is about every machine within the tolerance of joint centres, which proofs cover for six straight legs"
 #: Reason of claims of kinds that the checker does not know.
@@ -58,16 +63,17 @@ def paper_of(
     unproved = []
     expected = expected_claims(judged.case, robot.layout, legs, quantities, leg_error, robot.more)
     for each in expected:
-        if judged.case.joint_centre_tolerance and legs is None:
+        if judged.case.joint_centre_tolerance and (robot.machines is None or (each.kind in _RANKS and legs is None)):
             unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
             continue
         if each.kind == "number" and each.layout is None and not is_reached:
             unproved.append(Unproved(each.name, each.sense, _NO_REACH))
             continue
         extremes = first if each.kind == "number" else last
-        is_rank = each.kind in ("regular", "constraints")
+        is_rank = each.kind in _RANKS
         found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
-        if each.kind == "error" and not _has_lengths(judged, record, proved):
+        is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind in _OF_ROWS)
+        if is_of_lengths and not _has_lengths(judged, proved):
             found = _NO_LENGTHS
         if isinstance(found, ProofClaim):
             proved[each.key] = found
@@ -91,7 +97,7 @@ def paper_of(
         claims=tuple(proved.values()),
         unproved=tuple(unproved),
         tolerance=judged.case.joint_centre_tolerance or 0.0,
-        lemmas=tuple(_lemmas(judged, record, proved)),
+        lemmas=tuple(_lemmas(record, proved)),
     )
 
 
@@ -106,23 +112,23 @@ def _key(judged: Judgement, each: Extreme) -> tuple[str, str]:
     return asked_name(judged.case, each.name) if spectral else each.name, each.sense.value
 
 
-def _lemmas(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> Iterator[ProofClaim]:
+def _lemmas(record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> Iterator[ProofClaim]:
     """Yield the claims that those about every machine rest on."""
-    keys = [(exact_length_name(leg.name), "min") for leg in judged.case.model.legs]
     machines = [name for (name, _), each in proved.items() if each.reason == "one machine"]
-    keys += [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
+    keys = [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
     for key in keys:
         program = record.programs.get(key)
         if program is not None and program.tree is not None:
             yield ProofClaim(*key, "program", program.bound, fingerprint(program.nlp), program.tree)
+    for name, sense in [key for key, each in proved.items() if each.reason == "program"] + keys:
+        rest = record.rests.get((second_order_name(name), sense))
+        if rest is not None:
+            yield ProofClaim(second_order_name(name), sense, "second order", rest)
 
 
-def _has_lengths(judged: Judgement, record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> bool:
-    """Return whether the shortest lengths of the exact machine's legs have proofs."""
-    names = [leg.name for leg in judged.case.model.legs]
-    if judged.case.joint_centre_tolerance:
-        return all((exact_length_name(name), "min") in record.programs for name in names)
-    return all((f"leg_length limb {name}", "min") in proved for name in names)
+def _has_lengths(judged: Judgement, proved: dict[tuple[str, str], ProofClaim]) -> bool:
+    """Return whether the shortest lengths of the legs have proofs."""
+    return all((f"leg_length limb {leg.name}", "min") in proved for leg in judged.case.model.legs)
 
 
 class _Robot(NamedTuple):
@@ -188,7 +194,7 @@ def _number(
     if each.kind in ("stroke", "dead length"):
         directions = record.directions.get(one_machine_name(each.name))
         if directions is not None:
-            sides = tuple(tuple(each.tolist()) for each in directions)
+            sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
             return ProofClaim(each.name, each.sense, "one machine", found.bound, sides=sides)
         leg = each.name.partition(" ")[2].removeprefix("limb ")
         missing = any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max"))

@@ -8,7 +8,7 @@ balls and slopes (:mod:`.ballslopes`), and signs of determinants with fractions.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,17 +17,19 @@ from casadi import SX
 from .....models import Dimension
 from ....case.case import Case
 from ....case.task import Sense
-from ....errors import ScrewsynthError
+from ....errors import ScrewsynthError, UncoveredError
 from ....program.layout import Layout
+from ...statement.claims import REACH, Claim
 from ...statement.machine import check_leg_error, legs_of, workspace_of_case
 from ...statement.posed_layout import extreme_program
+from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
 from ..check import check_proof
 from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
+from ..tree import Node
 from .anyrobot.rankofrobot import rank_claim
 from .anyrobot.robotclaims import robot_claims
 from .anyrobot.signchange import show_sign_change
 from .ballrows import Joints
-from .built.built import Built
 from .clearanceclaim import ClearanceClaim
 from .comparing import hold_premises, keep_limit
 from .errorclaim import ErrorClaim, whole_errors
@@ -36,10 +38,13 @@ from .pieces import BoxClaim, show
 from .poseroot import COORDINATES, PoseRoot, pose_root
 from .rankclaim import RankClaim
 from .singularclaim import SingularClaim
+from .tolerance import Machines, change_of_jacobian, refuse_unless_singular
 from .tree import read_leaves
 
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
+#: The tree of one leaf.
+_WHOLE = bytes([Node.BOUNDED])
 #: Reason that each kind of claim must have.
 _REASONS = {
     "regular": ("regular", "singular", "singular machine"),
@@ -151,8 +156,6 @@ class _Checker:
         workspace = workspace_of_case(case)
         self._case, self._proof, self._legs = case, proof, legs_of(case)
         hold_premises(case, workspace, self._legs, leg_error, proof)
-        if self._legs is None and case.joint_centre_tolerance and proof.claims:
-            raise ProofError("claims about every machine within a tolerance have no proof for this robot")
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         self._layout: Layout = robot.layout
         self._model = robot.model
@@ -168,14 +171,8 @@ class _Checker:
             raise
         except ScrewsynthError as error:
             raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
-        self._built = self._built_machines()
-
-    def _built_machines(self) -> Built | None:
-        """Return all machines within the tolerance; None for the exact one."""
-        if self._legs is None or not self._tolerance:
-            return None
-        lemmas = {(each.name, each.sense): each for each in self._proof.lemmas}
-        return Built(self._layout, self._root, self._legs, lemmas, self._bound_of)
+        self._machines = robot.machines
+        self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
 
     def check(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check one claim.
@@ -185,8 +182,8 @@ class _Checker:
         """
         if given.reason not in _REASONS.get(each.kind, ("boxes",)):
             raise ProofError(f"'{given.reason}' is no reason of this claim")
-        if self._tolerance and self._built is None:
-            raise ProofError("errors of joint centres are covered for six straight legs alone")
+        if self._tolerance and self._machines is None:
+            raise ProofError("errors of joint centres take freedoms from this robot")
         if each.kind in ("regular", "constraints"):
             return self._check_rank(each, given)
         if given.bound is None or not math.isfinite(given.bound):
@@ -207,7 +204,9 @@ class _Checker:
             claim = ClearanceClaim(self._root, self._joints, (each.legs[0], each.legs[1]), least)
         else:
             is_condition = each.kind == "condition"
-            change = 0.0 if self._built is None else self._built.change(self._joints, each.length)
+            change = 0.0
+            if self._tolerance:
+                change = change_of_jacobian(self._joints, self._tolerance, each.length, self._shortest())
             claim = SingularClaim(
                 self._root, self._joints, each.length, bound, is_condition=is_condition, change=change
             )
@@ -239,6 +238,8 @@ class _Checker:
         if given.reason == "singular machine":
             return self._check_machine(each, given)
         if self._legs is None:
+            if self._tolerance:
+                raise ProofError("ranks of machines are covered for six straight legs alone")
             robot = rank_claim(self._case, self._model, self._root, each.name)
             self._show(robot, given.tree)
             robot.finish()
@@ -264,9 +265,9 @@ class _Checker:
 
     def _check_machine(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check that a machine within the tolerance is singular at a pose of the workspace."""
-        if self._built is None:
+        if self._legs is None or not self._tolerance:
             raise ProofError("the claim is about the exact machine")
-        self._built.refuse_unless_singular(self._root, given.sides)
+        refuse_unless_singular(self._root, self._legs, given.sides)
         return CheckedClaim(each.name, each.sense, is_refuted=True, by_machine=True)
 
     def _bound_of(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout | None = None) -> float:
@@ -284,22 +285,41 @@ class _Checker:
         claim = each.claim
         if claim is None:
             raise ProofError("the claim has no number")
-        layout = each.layout or self._layout
-        read = claim.reading.from_value
-        if self._built is None:
-            bound = value = self._bound_of(claim.expression, claim.sense, given, layout)
-            shown = read(bound)
+        if self._machines is None:
+            bound = self._bound_of(claim.expression, claim.sense, given, each.layout or self._layout)
         else:
-            number = self._built.number(claim)
-            bound = self._bound_of(number.expression, claim.sense, given, layout)
-            shown, value = self._built.shown(claim, number, bound)
-        keep_limit(each, value)
+            bound = self._bound_of_machines(self._machines, claim, given)
+        keep_limit(each, bound)
         self._bounds[each.key] = bound
+        read = claim.reading.from_value
         limit = None if claim.limit is None else read(claim.limit)
-        return CheckedClaim(each.name, each.sense, claim.reading.dimension, shown, limit)
+        return CheckedClaim(each.name, each.sense, claim.reading.dimension, read(bound), limit)
+
+    def _bound_of_machines(self, machines: Machines, claim: Claim, given: ProofClaim) -> float:
+        """Return the bound of a number over all machines that a tree of ``certify``, and a lemma, prove.
+
+        Raises:
+            ProofError: the lemma is missing, one of them could not be shown, or a limb has no proof of its reach.
+        """
+        reaches = [each for each in self.expected if each.claim is not None and each.claim.key == REACH]
+        if claim.key != REACH and any(each.key not in self._bounds for each in reaches):
+            raise ProofError("the reach of limbs of every machine has no proof")
+        if not machines.varies(claim):
+            return self._bound_of(machines.number(claim, 0.0), claim.sense, given, machines.design)
+        lemma = self._lemmas.get((second_order_name(claim.name), claim.sense.value))
+        if lemma is None or lemma.bound is None or not math.isfinite(lemma.bound):
+            raise ProofError("the terms of second order have no bound")
+        bound = self._bound_of(machines.number(claim, lemma.bound), claim.sense, given, machines.design)
+        try:
+            self._show(machines.second_order(claim, lemma.bound), _WHOLE)
+        except UncoveredError as error:
+            raise ProofError(f"the check has no rule for {error}") from None
+        except ProofError as error:
+            raise ProofError(f"{lemma.name}: {error}") from None
+        return bound
 
     def _length(self, leg: str, sense: str) -> float:
-        """Return the proven shortest or longest length of a leg of the exact machine.
+        """Return the proven shortest or longest length of a leg, of all machines that are meant.
 
         Raises:
             ProofError: there is no proof of it.
@@ -310,21 +330,58 @@ class _Checker:
         outwards = _ROUNDING if sense == Sense.MAX.value else -_ROUNDING
         return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
 
+    def _shortest(self) -> float:
+        """Return a length than which no leg of the machines that are meant is shorter.
+
+        Raises:
+            ProofError: there is no proof of it.
+        """
+        return min(self._length(leg.name, "min") for leg in self._case.model.legs)
+
     def _check_stroke(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check a limit on a telescoping leg from the lengths of the leg."""
         leg, is_stroke = each.legs[0], each.kind == "stroke"
         if given.reason == "one machine":
-            if self._built is None:
-                raise ProofError("the claim is about the exact machine")
-            bound = self._built.stroke(each.name, leg, each.sense, (1.0, -1.0) if is_stroke else (-1.0, 2.0), given)
+            weights = {Sense.MAX: 1.0, Sense.MIN: -1.0} if is_stroke else {Sense.MAX: -1.0, Sense.MIN: 2.0}
+            bound = self._lengths_of_one_machine(each, leg, weights, given)
         else:
             name = self._case.model.legs[leg].name
-            short = self._length(name, "min") - 2 * self._tolerance
-            long = self._length(name, "max") + 2 * self._tolerance
+            short, long = self._length(name, "min"), self._length(name, "max")
             off = 8 * _ROUNDING * long
             bound = long - short + off if is_stroke else 2 * short - long - off
         keep_limit(each, bound)
         return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
+
+    def _lengths_of_one_machine(
+        self, each: ExpectedClaim, leg: int, weights: Mapping[Sense, float], given: ProofClaim
+    ) -> float:
+        """Return the bound of a number made from the lengths of a leg at two poses, whose errors are the same.
+
+        Args:
+            each: the claim.
+            leg: index of the leg.
+            weights: of the longest and of the shortest length.
+            given: the claim with the directions c_b and c_p.
+
+        Raises:
+            ProofError: the directions or the lengths are missing, or a length could not be shown.
+        """
+        if self._machines is None:
+            raise ProofError("the claim is about the exact machine")
+        sides = [np.array(side, dtype=float) for side in given.sides]
+        if len(sides) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in sides):
+            raise ProofError("the claim has no two directions")
+        parts = []
+        for sense, weight in weights.items():
+            claim = length_of_one_machine(self._machines.symbols, leg, sense, Directions(each.name, *sides))
+            lemma = self._lemmas.get((claim.name, sense.value))
+            if lemma is None:
+                raise ProofError("the lengths of the leg of one machine have no proof")
+            parts.append(weight * self._bound_of_machines(self._machines, claim, lemma))
+        # The part of the errors that is the same at both poses, of as many lengths as are left.
+        left = abs(sum(weights.values())) * self._tolerance * sum(float(np.linalg.norm(side)) for side in sides)
+        off = left + 16 * _ROUNDING * (abs(parts[0]) + abs(parts[1]) + left)
+        return sum(parts) + (off if each.sense == Sense.MAX.value else -off)
 
     def _check_error(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check an error of the pose: its part of first order by a tree, the whole from both parts and the lengths."""
@@ -335,8 +392,8 @@ class _Checker:
         is_rotation = each.name == ERRORS[1]
         most = rotation if is_rotation else position
         self._show(ErrorClaim(self._root, self._joints, most, is_rotation=is_rotation), given.tree)
-        lengths = (self._length(leg.name, "min") for leg in self._case.model.legs)
-        shortest = min(lengths) if self._built is None else self._built.shortest
+        # That of the design.
+        shortest = (self._shortest() + 2 * self._tolerance) * (1 - _ROUNDING)
         reach = float(np.linalg.norm(self._joints.platform, axis=1).max()) * (1 + _ROUNDING)
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
         if not math.isfinite(whole):

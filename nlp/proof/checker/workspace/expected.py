@@ -13,7 +13,6 @@ from ....case.limits.singular_values import ConditionNumber, SmallestSingularVal
 from ....program.layout import Layout
 from ...statement.claims import REGULAR, SPECTRAL, Claim, asked_name, asked_spectra, claims_of
 from ...statement.machine import Legs
-from .built.statement import with_further
 
 #: Names of the errors of the pose: of its position and of its rotation.
 ERRORS = ("position error", "rotation error")
@@ -67,7 +66,7 @@ def expected_claims(
 
     Args:
         case: the case.
-        layout: the case as symbols of the pose.
+        layout: the case as symbols of the pose, and of errors of joint centres.
         legs: its joint centres; None for a robot that is not six straight legs.
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
@@ -78,7 +77,6 @@ def expected_claims(
     """
     found = [ExpectedClaim(REGULAR, "", "regular"), *more]
     claims = claims_of(layout, [name for name in quantities if name not in SPECTRAL])
-    claims = with_further(layout, claims) if legs is not None and legs.tolerance else claims
     found += [ExpectedClaim(each.name, each.sense.value, "number", each.limit, each) for each in claims]
     if legs is None:
         return found

@@ -19,10 +19,10 @@ from ..fractions import determinant_sign
 from ..proof_file import ProofError
 from .ballrows import Joints, ball_rows
 from .ballslopes import UNIT, UP, BallSlopes
-from .built.changes import change_of_rows
 from .pieces import Attempt
 from .poseroot import PoseRoot
 from .positive import contraction, inverses
+from .tolerance import change_of_rows
 
 #: Rounding of a product of matrices (6, 6), in parts of the product of sizes.
 PRODUCT = 16 * UNIT

@@ -56,7 +56,7 @@ def spectral_extremes(
         box: the poses.
         names: measures that are asked for, of which the others are left out.
         gap: allowed distance of a bound from the best value known, as a part of it.
-        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of its legs alone.
+        shortest: no leg of any machine is shorter over the workspace; used with a tolerance of its legs alone.
         family: all machines that are meant of a robot that is not six straight legs; None for the design alone.
         unknown: reason why the machines that are meant are not judged; else empty.
         paper: records the searches for a proof.

@@ -19,7 +19,7 @@ from .....models import FloatArray
 from ...enclosure.forms import Encloser, SecondForms
 from ...statement.machine import LEGS, JointErrors, Legs
 from ..robot.pose_box import PoseBox, polynomial_rotation
-from ..tolerance.legs.worst import along
+from ..tolerance.leg_errors import along
 from .bound_search import Bounds
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
@@ -57,7 +57,7 @@ class Clearance:
         """Return the errors of the machine whose legs are nearest at a point (6,)."""
         moved, between = np.zeros((LEGS, 3)), self._between(y[None])
         moved[list(self._pair)] = np.array([[-1.0], [1.0]]) * between
-        errors = along(self._legs, self._box.pose(y), moved, moved)
+        errors = along(self._legs, self._box.pose(y).rotation, moved, moved)
         # Legs that the whole errors would move through each other touch with a part of them.
         part = min(1.0, float(np.linalg.norm(between)) / self._nearer) if self._nearer else 1.0
         return JointErrors(part * errors.base, part * errors.platform)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,7 +24,7 @@ from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
-from ...statement.machine import CentreErrors, JointErrors, Legs
+from ...statement.machine import CentreErrors, JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome
@@ -31,6 +32,8 @@ from ..verdict import Outcome
 if TYPE_CHECKING:
     from ..proof_record import PaperRecord
 
+#: Returns the errors of the machine that is worst at a pose, to first order, and its number as people read it.
+WorstMachine = Callable[[PoseNumbers], tuple[CentreErrors, float]]
 #: Gap of a bound as a part of the value, where none is asked for.
 GAP = 1e-3
 #: Finest gap that is tried where a limit lies between a bound and the best value known: that of rounding.
@@ -94,7 +97,7 @@ def prove_extreme(
     gap: float = GAP,
     time_limit: float | None = None,
     jobs: int | None = None,
-    legs: Legs | None = None,
+    machine: WorstMachine | None = None,
     paper: PaperRecord | None = None,
     again: bool = False,
 ) -> Extreme:
@@ -108,25 +111,24 @@ def prove_extreme(
         gap: allowed distance of the bound from the best value known, as a part of it.
         time_limit: seconds after which the search stops with the bound reached.
         jobs: threads.
-        legs: joint centres with their tolerance, for a claim about every machine within it.
+        machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
         paper: records the search for a proof.
         again: whether the record takes the place of an earlier one of the same number.
     """
     if is_requested():
-        return _extreme(claim, _Found(reason=why_stopped()), legs)
-    expression = claim.expression if claim.worst is None or claim.worst.expression is None else claim.worst.expression
-    nlp = extreme_program(layout, expression, claim.sense)
-    if not varies(layout, [expression])[0]:
+        return _extreme(claim, _Found(reason=why_stopped()), machine)
+    nlp = extreme_program(layout, claim.expression, claim.sense)
+    if not varies(layout, [claim.expression])[0]:
         value = nlp.evaluate(nlp.start).F
         if paper is not None:
             paper.constant(claim, nlp, value)
-        return _extreme(claim, _Found(value, value, _pose(nlp, nlp.start), is_met=True), legs)
+        return _extreme(claim, _Found(value, value, _pose(nlp, nlp.start), is_met=True), machine)
     record = None if paper is None else _Record(paper, again)
     try:
         with one_search(time_limit):
-            return _extreme(claim, _search(nlp, claim, gap, jobs, record), legs)
+            return _extreme(claim, _search(nlp, claim, gap, jobs, record), machine)
     except UncoveredError as error:
-        return _extreme(claim, _Found(reason=str(error)), legs)
+        return _extreme(claim, _Found(reason=str(error)), machine)
 
 
 class _Record(NamedTuple):
@@ -196,28 +198,12 @@ def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
     if claim.limit is None or found.status is not CertificateStatus.PROVED:
         return None
     sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    limit = _limit_of_search(claim)
-    slack = slack_of(limit)
-    room = sign * (limit - found.incumbent) + slack / 2
-    if not (room > 0 and sign * (found.bound - limit) > slack):
+    slack = slack_of(claim.limit)
+    room = sign * (claim.limit - found.incumbent) + slack / 2
+    if not (room > 0 and sign * (found.bound - claim.limit) > slack):
         return None
     finer = _SHARE * room / max(abs(found.incumbent), _NEAR_ZERO * nlp.objective_size)
     return finer if finer >= _FINEST else None
-
-
-def _limit_of_search(claim: Claim) -> float:
-    """Return the limit of a claim's expression, which may leave an allowance for errors of joint centres."""
-    if claim.limit is None:
-        raise TypeError("the claim has a limit")
-    if claim.worst is None or not claim.worst.allowance:
-        return claim.limit
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    return _program_value(claim, claim.reading.from_value(claim.limit) - sign * claim.worst.allowance)
-
-
-def _program_value(claim: Claim, number: float) -> float:
-    """Return the program's value of a number as people read it."""
-    return float(claim.reading.to_value(SX(number)))
 
 
 def slack_of(limit: float) -> float:
@@ -228,24 +214,16 @@ def slack_of(limit: float) -> float:
     return _ON_LIMIT * abs(limit)
 
 
-def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
+def _extreme(claim: Claim, found: _Found, machine: WorstMachine | None) -> Extreme:
     """Return the extreme of a claim from numbers of its expression."""
     sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
     bound, reached, pose = found.bound, found.reached, found.pose
     shown_bound = read(bound) if math.isfinite(bound) else sign * math.inf
     shown_reached = read(reached) if math.isfinite(reached) else math.nan
-    errors, centres, worst = None, None, claim.worst
-    if worst is not None and (legs is not None or worst.machine is not None):
-        if math.isfinite(bound):
-            shown_bound = min(max(shown_bound + sign * worst.allowance, worst.least), worst.most)
-            bound = _program_value(claim, shown_bound)
-        if pose is not None:
-            if worst.machine is not None:
-                centres, shown_reached = worst.machine(pose)
-            elif legs is not None and worst.errors is not None and worst.value is not None:
-                errors = worst.errors(pose)
-                shown_reached = worst.value(errors.applied(legs), pose)
-            reached = _program_value(claim, shown_reached)
+    centres = None
+    if machine is not None and pose is not None:
+        centres, shown_reached = machine(pose)
+        reached = float(claim.reading.to_value(SX(shown_reached)))
     outcome, reason = Outcome.PROVED if found.is_met else Outcome.OPEN, found.reason
     if claim.limit is not None:
         slack = slack_of(claim.limit)
@@ -272,7 +250,6 @@ def _extreme(claim: Claim, found: _Found, legs: Legs | None) -> Extreme:
         boxes=found.boxes,
         seconds=found.seconds,
         reason="" if outcome is not Outcome.OPEN else reason,
-        errors=errors,
         centres=centres,
     )
 

@@ -50,7 +50,7 @@ def own_searches(
         legs: its joint centres.
         box: the poses.
         gap: allowed distance of a bound from the best value known, as a part of it.
-        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance of the legs alone.
+        shortest: no leg of any machine is shorter over the workspace; used with a tolerance of the legs alone.
         paper: records the searches for a proof.
     """
 

@@ -21,9 +21,10 @@ from ....errors import UncoveredError
 from ...enclosure.forms import Encloser, Forms
 from ...enclosure.tape import compile_tape
 from ...statement.claims import claims_of
+from ...statement.tolerance import coordinate_layout
 from ..ranks.krawczyk import ROUNDING, Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.box_layout import box_layout
+from ..robot.pose_box import pose_coordinates
 from ..robot.posed_robot import Problem
 
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding, as in the proofs.
@@ -67,7 +68,7 @@ class LimitValues:
 
     def __init__(self, case: Case, closed: ClosedForm, problem: Problem) -> None:
         self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
-        layout = box_layout(replace(case, model=closed.model), problem.box, problem.free)
+        layout = coordinate_layout(replace(case, model=closed.model), pose_coordinates(problem.box))
         # The variables of the layout are those of the problem, in its order.
         given = [problem.z, SX(ca.DM(layout.table.values))]
         own = [layout.table.variables_vector, layout.table.arguments_vector]

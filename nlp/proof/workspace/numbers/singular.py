@@ -7,8 +7,8 @@ is bounded likewise: over a box every entry is ``c + a.e + [-r, r]`` with ``|e_i
 :mod:`..regular.rows` divided by the length of their force. The Frobenius norm of a rest bounds what it adds.
 
 Errors of joint centres up to t change J by a matrix whose Frobenius norm bounds the change of every singular value
-(H. Weyl). With l the shortest length of a leg, the unit force of a leg changes by at most ``h = 2 t / (l - 2 t)``, and
-its moment about the platform's origin by ``|a| h + t``.
+(H. Weyl). With l the shortest length of a leg of any machine, the unit force of a leg changes by at most
+``h = 2 t / l``, and its moment about the platform's origin by ``|a| h + t``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ...statement.machine import JointErrors, Legs
 from ..regular.inverse import CORNERS, Inverse, inverse_over
 from ..regular.rows import LegRows, rows_at
 from ..robot.pose_box import PoseBox
-from ..tolerance.legs.singular_values import change_of_rows, worst_rows
+from ..tolerance.leg_errors import change_of_rows, worst_rows
 from .bound_search import Bounds
 
 #: Part of its size by which a computed eigenvalue is moved outwards: rounding of products and of LAPACK.
@@ -55,7 +55,7 @@ class SingularValues:
         box: the poses.
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
-        shortest: no leg of the exact machine is shorter over the workspace; used with a tolerance alone.
+        shortest: no leg of any machine is shorter over the workspace; used with a tolerance alone.
     """
 
     def __init__(self, legs: Legs, box: PoseBox, length: float, *, is_condition: bool, shortest: float = 0.0) -> None:
@@ -68,12 +68,13 @@ class SingularValues:
         """Return the values (K,) at points (K, 6)."""
         with np.errstate(all="ignore"):
             if self._change:
-                return self._of(worst_rows(self._built, self._box, points, self._length, self._is_condition).rows)
+                return self._of(worst_rows(self._built, self._box, points, self._length, self._is_condition)[0])
             return self._of(rows_at(self._legs, self._box, points))
 
     def errors(self, y: FloatArray) -> JointErrors:
         """Return the errors of the machine that is worst at a point (6,) to first order."""
-        return worst_rows(self._built, self._box, y[None], self._length, self._is_condition).errors(0)
+        _, base, platform = worst_rows(self._built, self._box, y[None], self._length, self._is_condition)
+        return JointErrors(base[0], platform[0])
 
     def _of(self, rows: FloatArray) -> FloatArray:
         """Return the values (K,) of rows (K, 6, 6) of any length."""

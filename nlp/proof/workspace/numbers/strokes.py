@@ -9,12 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .....models import Dimension
+from .....models import Dimension, FloatArray
 from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.task import Sense
 from ...statement.machine import LEGS, Legs
-from ..tolerance.legs.worst import Directions, along, spans
+from ...statement.tolerance import Directions
+from ..robot.pose_box import PoseNumbers
+from ..tolerance.leg_errors import along, spans
 from ..verdict import Outcome
 from .extremes import Extreme, slack_of
 
@@ -95,12 +97,12 @@ def _of_one_machine(
     poses = [each.pose for each in ends if each.pose is not None]
     if not legs.tolerance or extreme.outcome is not Outcome.OPEN or len(poses) < 2:
         return extreme
-    at = [spans(legs, pose).n[i] for pose in poses]
+    at = [_directions(legs, pose)[i] for pose in poses]
     turned = [n @ pose.rotation for n, pose in zip(at, poses, strict=True)]
-    about = Directions(0.5 * (at[0] + at[1]), 0.5 * (turned[0] + turned[1]), extreme.name)
+    about = Directions(extreme.name, 0.5 * (at[0] + at[1]), 0.5 * (turned[0] + turned[1]))
     sign = 1.0 if kind.sense is Sense.MAX else -1.0
     # What does not cancel: nothing in a stroke.
-    left = abs(kind.long + kind.short) * legs.tolerance * sum(float(np.linalg.norm(each)) for each in about[:2])
+    left = abs(kind.long + kind.short) * legs.tolerance * sum(float(np.linalg.norm(each)) for each in about[1:])
     for gap in _GAPS:
         short, long = (refine(i, sense, gap, about) for sense in (Sense.MIN, Sense.MAX))
         if short is None or long is None:
@@ -111,6 +113,12 @@ def _of_one_machine(
         if sign * (extreme.bound - kind.limit) <= slack_of(kind.limit):
             return replace(extreme, outcome=Outcome.PROVED, reason="")
     return extreme
+
+
+def _directions(legs: Legs, pose: PoseNumbers) -> FloatArray:
+    """Return the unit directions (6, 3) of the legs at a pose."""
+    d = spans(legs, pose)
+    return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
 
 
 def _finer_gap(kind: _Kind, extreme: Extreme, short: Extreme, long: Extreme) -> float | None:
@@ -140,14 +148,14 @@ def _of_lengths(name: str, kind: _Kind, legs: Legs, i: int, short: Extreme, long
     reached, errors = kind.long * long.reached + kind.short * short.reached, None
     if legs.tolerance and short.pose is not None and long.pose is not None:
         # One machine has both lengths: its errors are along the change of the number, to first order.
-        at = [spans(legs, pose).n for pose in (long.pose, short.pose)]
+        at = [_directions(legs, pose) for pose in (long.pose, short.pose)]
         turned = [n @ pose.rotation for n, pose in zip(at, (long.pose, short.pose), strict=True)]
         base, platform = np.zeros((LEGS, 3)), np.zeros((LEGS, 3))
         base[i] = -sign * (kind.long * at[0][i] + kind.short * at[1][i])
         platform[i] = sign * (kind.long * turned[0][i] + kind.short * turned[1][i])
-        errors = along(legs, replace(long.pose, rotation=np.eye(3)), base, platform)
+        errors = along(legs, np.eye(3), base, platform)
         machine = errors.applied(legs)
-        lengths = [float(spans(machine, pose).l[i]) for pose in (long.pose, short.pose)]
+        lengths = [float(np.linalg.norm(spans(machine, pose)[i])) for pose in (long.pose, short.pose)]
         reached = kind.long * lengths[0] + kind.short * lengths[1]
     slack, outcome = slack_of(kind.limit), Outcome.OPEN
     if sign * (reached - kind.limit) > slack:

@@ -14,7 +14,7 @@ from ..home_poses import Homes
 from ..regular.signs import SignRefuter
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
-from ..robot.tolerance_model import Family, built_model, family_of
+from ..robot.tolerance_model import Family
 from ..verdict import Outcome, Regularity
 from .search import NewtonRefuter, RankProgress, prove_rank, singular_at
 
@@ -47,7 +47,7 @@ def prove_ranks(
         paper: records the searches for a proof.
     """
     try:
-        family = _family(model, homes, legs)
+        family = None if homes.machines is None else homes.machines.family
         problem = build_problem(homes.case, model, homes.box) if family is None else family.problem
         found = []
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
@@ -55,27 +55,17 @@ def prove_ranks(
                 continue
             recorder = None if paper is None or (legs is None and family is not None) else paper.own(name)
             is_shown = partial(_is_shown, problem, family, homes, constraints=name == CONSTRAINTS)
-            newton = NewtonRefuter(problem, matrix, None if legs else family, is_shown)
-            refuter = newton if legs is None else SignRefuter(legs, problem)
+            newton = partial(NewtonRefuter, problem, matrix, None if legs else family, is_shown)
+            refuter = newton() if legs is None else SignRefuter(legs, problem)
             verdict = prove_rank(problem, matrix, family=family, progress=progress, recorder=recorder, refuter=refuter)
             if name == REGULAR and verdict.outcome is Outcome.OPEN and not problem.dependent:
-                at = newton.from_random()
+                at = newton().from_random()
                 if at is not None:
                     verdict = replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, centres=at.centres)
             found.append(verdict)
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(homes.box, str(error)), None)
     return Ranks(found[0], found[1] if len(found) > 1 else None)
-
-
-def _family(model: Model, homes: Homes, legs: Legs | None) -> Family | None:
-    """Return the machines that are meant; None for the design alone."""
-    if homes.machines is not None:
-        return homes.machines.family
-    if legs is None or not legs.tolerance:
-        return None
-    problem = build_problem(homes.case, model, homes.box)
-    return family_of(homes.case, built_model(homes.case.model), problem, legs.tolerance)
 
 
 def _is_shown(problem: Problem, family: Family | None, homes: Homes, z: FloatArray, *, constraints: bool) -> bool:

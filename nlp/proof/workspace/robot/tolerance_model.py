@@ -8,19 +8,16 @@ changes it by at most the vector's length times the tolerance.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Model, frozen_array
-from .....models.displaced import DisplacedRobot, displaced_legs
-from .....models.joints import RobotError
-from .....models.joints.closedform import Reach, closed_form
+from .....models import FloatArray, frozen_array
 from .....models.member import scaled_twists
 from ....case.case import Case
 from ...statement.machine import INSIDE, CentreErrors
+from ...statement.tolerance import BuiltModel
 from .closed_loops import Loops
 from .motion_matrix import RankMatrix, free_matrix
 from .posed_robot import NotJudgedError, PosedModel, Problem, posed_model
@@ -34,20 +31,6 @@ _CLOSED = 1e-9
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
 _SEED = 0
-
-
-class BuiltModel(NamedTuple):
-    """A robot with errors of its joint centres.
-
-    Attributes:
-        model: without unknowns in closed form; the errors are its last parameters.
-        names: of the centres.
-        reaches: edges of the reach of limbs with errors.
-    """
-
-    model: Model
-    names: tuple[str, ...]
-    reaches: tuple[Reach, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,48 +103,6 @@ class Family:
     def loops(self) -> Loops:
         """Equations as functions of all coordinates."""
         return Loops(self.coordinates, self.equations, self.every, self.signs, self.size)
-
-
-def built_model(model: Model) -> BuiltModel:
-    """Return a robot with errors of its joint centres.
-
-    Args:
-        model: the robot.
-
-    Raises:
-        NotJudgedError: its joint centres are not known, or it cannot be put together with errors.
-    """
-    exact = closed_form(model).model
-    try:
-        displaced = _displaced(model)
-    except RobotError as error:
-        raise NotJudgedError(f"the robot cannot be put together with errors of its joint centres: {error}") from None
-    closed = closed_form(displaced.model)
-    built = closed.model
-    unknowns = [[item.name for item in each.unknowns] for each in (exact, built)]
-    members = [[(item.rank, item.screws.shape, item.is_pinned) for item in each.members] for each in (exact, built)]
-    rows = [[item.label for item in each.wrenches] for each in (exact, built)]
-    equations = [[item.name for item in each.closure] for each in (exact, built)]
-    if any(one != other for one, other in (unknowns, members, rows, equations)) or exact.generic != built.generic:
-        raise NotJudgedError("errors of joint centres take freedoms from the robot: its limbs or loops change")
-    return BuiltModel(built, tuple(each.name for each in displaced.centres), closed.reaches)
-
-
-def _displaced(model: Model) -> DisplacedRobot:
-    """Return a robot with errors of its joint centres as parameters.
-
-    Raises:
-        RobotError: it cannot be put together with them.
-        NotJudgedError: its joint centres are not known.
-    """
-    if model.structure:
-        # Only robots given joint by joint need the language of robot files.
-        from .....models.joints.centres import displaced_robot  # noqa: PLC0415
-
-        return displaced_robot(model)
-    if not model.built or model.members or model.unknowns:
-        raise NotJudgedError("the joint centres of this robot are not known")
-    return displaced_legs(model)
 
 
 def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float) -> Family:

@@ -1,16 +1,28 @@
-"""All claims about every machine within a tolerance of joint centres, for any robot."""
+"""All claims about every machine within a tolerance of joint centres, for any robot.
+
+With the derivatives g_j by the error of centre j, a number g of a machine within the tolerance t is at most
+
+    g + t sum_j |g_j| + rest
+
+at each pose, and at least ``g - t sum_j |g_j| - rest``. The rest bounds terms of second order over the workspace. So
+the number of all machines is an expression of the pose, which the search of ``certify`` bounds. Where coordinates
+follow from others, or a number has kinks, boxes of poses are searched for all machines.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
-from .....models import Dimension, Model, Substitution
+from .....models import FloatArray, Model
+from .....models.joints import RobotError
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.limits.constraint import Reading
@@ -18,44 +30,69 @@ from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
-from ...statement.claims import REACH, Claim, claims_of
+from ...statement.claims import Claim
+from ...statement.machine import INSIDE, CentreErrors
+from ...statement.tolerance import (
+    BuiltModel,
+    MachineLayout,
+    built_model,
+    design_layout,
+    machine_layout,
+    second_order_name,
+)
 from ..numbers.bound_search import Minimum
 from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
-from ..robot.pose_box import PoseBox
+from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, build_problem
-from ..robot.tolerance_model import BuiltModel, Family, built_model, family_of
+from ..robot.tolerance_model import Family, family_of
 from ..verdict import Outcome
-from .first_order_change import Place, worst_number
-from .layouts import box_layout, in_family, machine_layout
 from .machine_number import smallest_of_machines
-from .second_order_change import is_smooth
+from .second_order_change import is_smooth, second_order_change
+
+if TYPE_CHECKING:
+    from ..proof_record import PaperRecord
 
 #: Reason for numbers of a robot that does not have all poses.
 _OUT_OF_REACH = "not every machine within the tolerance is proved to reach every pose"
+#: Part of itself by which a bound of a change moves outwards: its own rounding.
+_OUTWARDS = 1 + 1e-12
+#: Poses from whose first-order changes the size is taken beside which terms of second order are small.
+_POSES = 32
+_SEED = 0
 
 
-class Machines(NamedTuple):
+class Proving(NamedTuple):
+    """How claims are proved: gap, threads, a function of the progress, and the record for a proof on paper."""
+
+    gap: float
+    jobs: int | None
+    progress: Callable[[str, int, int], None] | None = None
+    paper: PaperRecord | None = None
+
+
+class Machines:
     """Every machine within a tolerance.
 
-    Attributes:
+    Args:
         case: with fixed dimensions.
         model: its robot, without unknowns in closed form.
         built: the robot with errors of its joint centres.
         family: the machines over the workspace.
     """
 
-    case: Case
-    model: Model
-    built: BuiltModel
-    family: Family
+    def __init__(self, case: Case, model: Model, built: BuiltModel, family: Family) -> None:
+        self.case, self.model, self.built, self.family = case, model, built, family
+        self._at = pose_coordinates(family.problem.box)
+        self.symbols: MachineLayout = machine_layout(case, built, family.tolerance, self._at)
 
+    @cached_property
+    def design(self) -> Layout:
+        """The design as symbols of the pose."""
+        return design_layout(self.case, self.model, self._at)
 
-class Proving(NamedTuple):
-    """How claims are proved: gap, threads, and a function of the progress."""
-
-    gap: float
-    jobs: int | None
-    progress: Callable[[str, int, int], None] | None = None
+    def number(self, expression: SX) -> SX:
+        """Return an expression of the symbols of machines in the coordinates of their family."""
+        return self.symbols.of(expression, self.family.errors, self.family.problem.z)
 
 
 def machines_of(case: Case, model: Model, box: PoseBox) -> Machines:
@@ -69,7 +106,10 @@ def machines_of(case: Case, model: Model, box: PoseBox) -> Machines:
     Raises:
         NotJudgedError: the machines are not known, or do not have the freedoms of the design.
     """
-    built = built_model(case.model)
+    try:
+        built = built_model(case.model)
+    except RobotError as error:
+        raise NotJudgedError(str(error)) from None
     problem = build_problem(case, model, box)
     return Machines(case, model, built, family_of(case, built, problem, case.joint_centre_tolerance or 0.0))
 
@@ -94,24 +134,17 @@ def machine_extremes(
     Raises:
         InputError: the robot has no measure of a name.
     """
-    case, family = machines.case, machines.family
-    layout = machine_layout(case, machines.built, family)
-    claims = claims_of(layout, quantities, with_objective=with_objective)
-    reaches = _reach_claims(machines, layout)
+    reaches, claims = machines.symbols.claims(quantities, with_objective=with_objective)
     if only is not None:
-        claims, reaches = ([each for each in some if each.name in only] for some in (claims, reaches))
-    exact = None
-    if not family.problem.dependent:
-        exact = box_layout(replace(case, model=machines.model), family.problem.box)
+        reaches, claims = ([each for each in some if each.name in only] for some in (reaches, claims))
     reached = True
     for done, claim in enumerate([*reaches, *claims]):
         if proving.progress is not None:
             proving.progress(claim.name, done, len(reaches) + len(claims))
-        number = in_family(layout, family, claim.expression)
         if done >= len(reaches) and not reached:
             yield not_bounded(claim, _OUT_OF_REACH)
             continue
-        found = _extreme(machines, exact, claim, number, proving)
+        found = machine_extreme(machines, claim, proving)
         reached = reached and (done >= len(reaches) or found.outcome is Outcome.PROVED)
         yield found
 
@@ -144,10 +177,9 @@ def shown_extremes(
     except NotJudgedError:
         return
     machines = Machines(case, closed.model, built, family)
-    layout = machine_layout(case, built, family)
-    for claim in claims_of(layout, quantities, with_objective=with_objective):
+    for claim in machines.symbols.claims(quantities, with_objective=with_objective)[1]:
         if claim.limit is None:
-            yield _extreme(machines, None, claim, in_family(layout, family, claim.expression), proving)
+            yield machine_extreme(machines, claim, proving)
 
 
 def not_bounded(claim: Claim, reason: str) -> Extreme:
@@ -158,38 +190,21 @@ def not_bounded(claim: Claim, reason: str) -> Extreme:
     return Extreme(claim.name, claim.sense, claim.reading.dimension, claim.key, limit, *nothing)
 
 
-def _reach_claims(machines: Machines, layout: Layout) -> list[Claim]:
-    """Return the claims that the limbs of every machine reach every pose."""
-    built = machines.built.model
-    robot, own = layout.robots[0], Substitution.identity(built)
-    unknowns = ca.vertcat(
-        SX(0, 1), *[layout.table.variables_vector[k] for each in layout.places.unknowns for k in each]
-    )
-    given = Substitution(robot.parameters, unknowns, robot.rotation, robot.position)
-    reaches = machines.built.reaches
-    values = ca.Function("reach", own.all, [each.value for each in reaches]).call(given.all)
-    reading = Reading(Dimension.NUMBER)
-    return [
-        Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, REACH, 0.0)
-        for each, value in zip(reaches, values, strict=True)
-    ]
-
-
-def _extreme(machines: Machines, exact: Layout | None, claim: Claim, number: SX, proving: Proving) -> Extreme:
+def machine_extreme(machines: Machines, claim: Claim, proving: Proving, *, again: bool = False) -> Extreme:
     """Return the extreme of one number over all machines.
 
     Args:
         machines: the machines.
-        exact: the design as symbols of the pose; None where coordinates follow from others.
-        claim: the number.
-        number: (1, 1) in the coordinates of the family.
+        claim: the number, in their symbols.
         proving: how it is proved.
+        again: whether the record takes the place of an earlier one of the same number.
     """
     if is_requested():
         return not_bounded(claim, why_stopped())
+    number = machines.number(claim.expression)
     try:
-        if exact is not None and is_smooth(machines.family, number):
-            found = _by_first_order(machines, exact, claim, number, proving)
+        if not machines.family.problem.dependent and is_smooth(machines.family, number):
+            found = _by_first_order(machines, claim, number, proving, again=again)
             if found is not None:
                 return found
         return _by_search(machines, claim, number, proving)
@@ -197,27 +212,66 @@ def _extreme(machines: Machines, exact: Layout | None, claim: Claim, number: SX,
         return not_bounded(claim, str(error))
 
 
-def _by_first_order(machines: Machines, exact: Layout, claim: Claim, number: SX, proving: Proving) -> Extreme | None:
+def _by_first_order(machines: Machines, claim: Claim, number: SX, proving: Proving, *, again: bool) -> Extreme | None:
     """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    family, sign = machines.family, 1.0 if claim.sense is Sense.MAX else -1.0
-    coordinates = exact.table.variables_vector
-    worst = None
+    family, pose = machines.family, machines.design.table.variables_vector
+    sign = 1.0 if claim.sense is Sense.MAX else -1.0
+    machine, whole, symbols = None, claim.expression, machines.symbols
     if any(ca.which_depends(number, family.errors, 1, True)):
-        worst = worst_number(Place(family, coordinates), number, claim.reading, sign)
-        if worst is None:
+        single = _Machine(family, number, claim.reading, sign)
+        poses = family.problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(family.problem.free)]
+        rest = second_order_change(family, number, max((single.first_order_change(z) for z in poses), default=0.0))
+        if not math.isfinite(rest):
             return None
-    function = ca.Function("number", [family.problem.z, family.errors], [number])
-    design = function.call([coordinates, SX.zeros(family.errors.numel())])[0]
+        gradient = ca.densify(ca.gradient(whole, symbols.errors))
+        sizes = enumerate(symbols.near_zero(whole, machines.design).tolist())
+        change = sum((ca.norm_2(ca.vertcat(gradient[3 * j : 3 * j + 3], size)) for j, size in sizes), SX(0))
+        whole, machine = whole + sign * (family.tolerance * change * _OUTWARDS + rest), single.worst
+        if proving.paper is not None:
+            proving.paper.rests[second_order_name(claim.name), claim.sense.value] = rest
+    own = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
     return prove_extreme(
-        exact,
-        replace(claim, expression=design, worst=worst),
-        gap=proving.gap,
-        jobs=proving.jobs,
+        machines.design, own, gap=proving.gap, jobs=proving.jobs, machine=machine, paper=proving.paper, again=again
     )
+
+
+class _Machine:
+    """A number of single machines.
+
+    Args:
+        family: the machines, none of whose coordinates follows from others.
+        number: (1, 1) in their coordinates, smooth.
+        reading: how it reads.
+        sign: 1 where the largest value is meant, -1 where the smallest one is.
+    """
+
+    def __init__(self, family: Family, number: SX, reading: Reading, sign: float) -> None:
+        self._family, self._reading, self._sign = family, reading, sign
+        slopes = ca.densify(ca.gradient(number, family.errors))
+        self._function = ca.Function("number", [family.coordinates], [number, slopes])
+
+    def first_order_change(self, z: FloatArray) -> float:
+        """Return the first-order change at a pose (n,), of derivatives that are defined."""
+        slopes = self._slopes(z)
+        return self._family.tolerance * float(np.nan_to_num(np.linalg.norm(slopes, axis=1)).sum())
+
+    def worst(self, pose: PoseNumbers) -> tuple[CentreErrors, float]:
+        """Return the errors that are worst at a pose to first order, and the number, as people read it, with them."""
+        family = self._family
+        z = family.problem.box.coordinates(pose)[list(family.problem.free)]
+        slopes = self._slopes(z)
+        sizes = np.linalg.norm(slopes, axis=1, keepdims=True)
+        unit = np.divide(slopes, sizes, out=np.zeros_like(slopes), where=sizes > 0)
+        whole = np.concatenate([z, (self._sign * INSIDE * family.tolerance * unit).ravel()])
+        return family.errors_of(whole), self._reading.from_value(float(self._function(whole)[0]))
+
+    def _slopes(self, z: FloatArray) -> FloatArray:
+        """Return the derivatives (m, 3) by the errors of the design at a pose (n,)."""
+        return np.array(self._function(self._family.exact(z))[1].full().reshape(-1, 3))
 
 
 def _by_search(machines: Machines, claim: Claim, number: SX, proving: Proving) -> Extreme:
@@ -228,13 +282,8 @@ def _by_search(machines: Machines, claim: Claim, number: SX, proving: Proving) -
     """
     sign = 1.0 if claim.sense is Sense.MAX else -1.0
     slack = 0.0 if claim.limit is None else slack_of(claim.limit)
-    found = smallest_of_machines(
-        machines.family,
-        -sign * number,
-        gap=proving.gap,
-        limit=None if claim.limit is None else -sign * claim.limit,
-        slack=slack,
-    )
+    limit = None if claim.limit is None else -sign * claim.limit
+    found = smallest_of_machines(machines.family, -sign * number, gap=proving.gap, limit=limit, slack=slack)
     return _of_minimum(machines.family, claim, found, slack)
 
 

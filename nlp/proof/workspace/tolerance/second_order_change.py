@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 _BLOCK, _MOST = 128, 4096
 #: The bound is good enough at this part of the first-order change, or this near to its size at the middle of a box.
 _SHARE, _NEAR = 0.02, 1.2
-#: Part of itself by which a bound moves outwards: its own rounding.
-_OUTWARDS = 1 + 1e-9
+#: Part of itself by which a bound moves outwards: its own rounding, and room for the check of a proof.
+_OUTWARDS = 1.02
 #: Operations whose derivatives jump: second derivatives say nothing of the change there.
 _KINKS = (ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX, ca.OP_LE, ca.OP_LT, ca.OP_IF_ELSE_ZERO)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -72,7 +73,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     given = Substitution(
         ca.vertcat(SX(0, 1), *values),
         ca.vertcat(SX(0, 1), *unknowns),
-        _rotation(root, y[3:]),
+        rotation_matrix(root, y[3:]),
         position,
     )
     outputs = [
@@ -106,7 +107,7 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     return replace(robot, size=np.concatenate([robot.size, np.array(sizes)]))
 
 
-def _rotation(root: PoseRoot, turn: list[SX]) -> SX:
+def rotation_matrix(root: PoseRoot, turn: Sequence[SX]) -> SX:
     """Return the rotation (3, 3) with three coordinates: the matrix of a quaternion, divided by its squared size."""
     if root.kind is TurnKind.ROLL_PITCH_YAW:
         roll, pitch, yaw = (_of_quaternion(t * SX.eye(3)[:, k]) for k, t in enumerate(turn))

@@ -1,7 +1,7 @@
-"""Change of the singular values of J by errors of joint centres, and the machine that is worst to first order.
+"""Errors of the joint centres of six straight legs: worst machines of strokes and clearances, and the change of J.
 
-With ``s = u . J v`` a singular value, u and v its vectors, the row of a leg with unit force n and moment ``R a x n``
-about the platform's origin, divided by L, changes s by
+With ``s = u . J v`` a singular value of J, u and v its vectors, the row of a leg with unit force n and moment
+``R a x n`` about the platform's origin, divided by L, changes s by
 
     u_i (q - n n.q).(f - e) / l + u_i f.(n x v_m) / L,      q = v_f + v_m x R a / L,
 
@@ -11,16 +11,35 @@ for errors e of the base joint and f of the platform joint, turned into the worl
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from ......models import FloatArray
-from ....statement.machine import INSIDE, JointErrors, Legs
-from ...robot.pose_box import PoseBox
+from .....models import FloatArray
+from ...statement.machine import INSIDE, LEGS, CentreErrors, JointErrors, Legs
+from ..robot.pose_box import PoseBox, PoseNumbers
 
 #: Part of itself by which the bound moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
+
+
+def of_legs(errors: CentreErrors) -> JointErrors:
+    """Return the errors of a machine as those of its legs: of their joints on the base, and on the platform."""
+    each = errors.vectors.reshape(LEGS, 2, 3)
+    return JointErrors(each[:, 0], each[:, 1])
+
+
+def spans(legs: Legs, pose: PoseNumbers) -> FloatArray:
+    """Return the vectors (6, 3) from the base joints to the platform joints at a pose, in the world frame."""
+    return np.asarray(pose.position + legs.platform @ pose.rotation.T - legs.base)
+
+
+def along(legs: Legs, rotation: FloatArray, base: FloatArray, platform: FloatArray) -> JointErrors:
+    """Return errors as large as the tolerance along vectors (6, 3) in the world frame, none for a vector of zero."""
+    base, platform = (
+        legs.tolerance * INSIDE * each / np.maximum(np.linalg.norm(each, axis=1, keepdims=True), np.finfo(float).tiny)
+        for each in (base, platform)
+    )
+    return JointErrors(base, platform @ rotation)
 
 
 def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
@@ -29,7 +48,7 @@ def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
     Args:
         legs: joint centres.
         length: by which moments are divided.
-        shortest: no leg of the exact machine is shorter.
+        shortest: no leg of any of the machines is shorter.
 
     Returns:
         0 without a tolerance; infinite where the errors may take up a whole leg.
@@ -37,31 +56,16 @@ def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
     t = legs.tolerance
     if not t:
         return 0.0
-    if not shortest > 2 * t:
+    if not shortest > 0:
         return math.inf
-    turned = 2 * t / (shortest - 2 * t)
+    turned = 2 * t / shortest
     moments = (np.linalg.norm(legs.platform, axis=1) * turned + t) / length
     return float(np.sqrt((turned**2 + moments**2).sum())) * _OUTWARDS
 
 
-class WorstRows(NamedTuple):
-    """The machines that are worst at K poses.
-
-    Attributes:
-        rows: (K, 6, 6) force and moment of their legs, of any length.
-        base, platform: (K, 6, 3) errors, each in its own frame.
-    """
-
-    rows: FloatArray
-    base: FloatArray
-    platform: FloatArray
-
-    def errors(self, k: int) -> JointErrors:
-        """Return the errors of one machine."""
-        return JointErrors(self.base[k], self.platform[k])
-
-
-def worst_rows(legs: Legs, box: PoseBox, points: FloatArray, length: float, is_condition: bool) -> WorstRows:
+def worst_rows(
+    legs: Legs, box: PoseBox, points: FloatArray, length: float, is_condition: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the machines within the legs' tolerance that are worst at poses (K, 6).
 
     Args:
@@ -70,6 +74,10 @@ def worst_rows(legs: Legs, box: PoseBox, points: FloatArray, length: float, is_c
         points: in its coordinates.
         length: by which moments are divided.
         is_condition: whether the condition number is meant, or the smallest singular value.
+
+    Returns:
+        (K, 6, 6) force and moment of their legs, of any length; (K, 6, 3) errors of base and of platform joints, each
+        in its own frame.
     """
     turn = box.rotations(points)
     arm = np.einsum("kij,lj->kli", turn, legs.platform)
@@ -93,4 +101,4 @@ def worst_rows(legs: Legs, box: PoseBox, points: FloatArray, length: float, is_c
     )
     moved = arm + platform
     d = points[:, None, :3] + moved - legs.base - base
-    return WorstRows(np.concatenate([d, np.cross(moved, d)], axis=2), base, np.einsum("kji,klj->kli", turn, platform))
+    return np.concatenate([d, np.cross(moved, d)], axis=2), base, np.einsum("kji,klj->kli", turn, platform)
