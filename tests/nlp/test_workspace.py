@@ -25,7 +25,7 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle, prove_mi
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.pose_error import WorstError
 from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
-from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.regular.rows import LegRows
 from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled

@@ -26,8 +26,7 @@ from .numbers.leg_numbers import own_searches, pose_errors
 from .numbers.loop_limits import loop_extremes
 from .numbers.robot_limits import limited_spectrum
 from .numbers.strokes import Refine, with_strokes
-from .ranks.ranks import Ranks, not_judged, prove_ranks
-from .ranks.search import RankProgress
+from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError
 from .tolerance.leg_errors import of_legs

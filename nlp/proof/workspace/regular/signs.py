@@ -18,7 +18,7 @@ from .....models import FloatArray, frozen_array
 from ...statement.machine import INSIDE, JointErrors, Legs
 from ..ranks.krawczyk import inverses
 from ..ranks.loop_boxes import Examined
-from ..ranks.search import Singular
+from ..ranks.singular_pose import Singular
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
 from .exact import determinant_sign, singular_between
