@@ -54,7 +54,7 @@ def campaign(examine: Callable[[int], Row]) -> None:
         began = time.perf_counter()
         try:
             row = examine(seed)
-        except Exception:  # noqa: BLE001 - a campaign goes on
+        except Exception:
             row = {"counts": {"errors": 1}, "faults": [traceback.format_exc(limit=-6)]}
         row |= {"seed": seed, "seconds": round(time.perf_counter() - began, 2)}
         rows.append(row)
@@ -67,6 +67,7 @@ def campaign(examine: Callable[[int], Row]) -> None:
     counts: Counter[str] = Counter()
     for row in rows:
         counts.update(row["counts"])
-    print(f"{len(rows)} seeds in {sum(row['seconds'] for row in rows):.0f} s, faults: {sum(len(row['faults']) for row in rows)}")
+    faults, seconds = sum(len(row["faults"]) for row in rows), sum(row["seconds"] for row in rows)
+    print(f"{len(rows)} seeds in {seconds:.0f} s, faults: {faults}")
     for name, number in sorted(counts.items()):
         print(f"  {name}: {number}")

@@ -1,4 +1,4 @@
-"""Straight legs between joint centres, in NumPy from a case's tables alone: numbers of many poses and machines at once."""
+"""Straight legs between joint centres, in NumPy from a case's tables: numbers of many poses and machines at once."""
 
 from __future__ import annotations
 
@@ -43,7 +43,9 @@ class Box:
         self.unit = 1.0 if tables.get("units", {}).get("angle") == "rad" else np.pi / 180
         self.position = np.array([ends(each) for each in tables["workspace"]["position"]])
         rotation = tables["workspace"].get("rotation", {"axis": [0, 0, 1], "angle": 0})
-        self.kind = "ball" if "axis" not in rotation and "angle" in rotation else "axis" if "axis" in rotation else "rpy"
+        self.kind = (
+            "ball" if "axis" not in rotation and "angle" in rotation else "axis" if "axis" in rotation else "rpy"
+        )
         self.axis = np.array(rotation.get("axis", [0, 0, 1]), float)
         if self.kind == "rpy":
             self.angles = np.array([ends(rotation.get(name, 0.0)) for name in ("roll", "pitch", "yaw")]) * self.unit
@@ -80,7 +82,11 @@ class Box:
         if ((p < self.position[:, 0] - 1e-9 * size) | (p > self.position[:, 1] + 1e-9 * size)).any():
             return False
         if self.kind == "rpy":
-            yaw, pitch, roll = np.arctan2(R[1, 0], R[0, 0]), np.arcsin(-np.clip(R[2, 0], -1, 1)), np.arctan2(R[2, 1], R[2, 2])
+            yaw, pitch, roll = (
+                np.arctan2(R[1, 0], R[0, 0]),
+                np.arcsin(-np.clip(R[2, 0], -1, 1)),
+                np.arctan2(R[2, 1], R[2, 2]),
+            )
             found = np.array([roll, pitch, yaw])
             return bool(((found > self.angles[:, 0] - 1e-7) & (found < self.angles[:, 1] + 1e-7)).all())
         v = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
@@ -146,9 +152,10 @@ class Legs:
         self.tasks = {each.get("name", "task 1"): twist_of(each) for each in tables["task"]}
         self.limits = tables.get("limits", {})
         self.parameters = given
-        self.home = self.limits.get("home")
 
-    def values(self, poses: Poses, base_errors: Array | float = 0.0, platform_errors: Array | float = 0.0) -> dict[str, Array]:
+    def values(
+        self, poses: Poses, base_errors: Array | float = 0.0, platform_errors: Array | float = 0.0
+    ) -> dict[str, Array]:
         """Return numbers (N,) by the names that results give them; angles are radians."""
         p, R = poses
         a = self.platform + np.zeros((len(p), 1, 1)) + platform_errors
@@ -164,14 +171,23 @@ class Legs:
             limit = self.limits.get(f"{plate}_joint_angle", 0)
             own = (a, b) if self.first is not None else (self.platform, self.base)
             axis = self.mounting(plate, limit.get("about", "normal") if isinstance(limit, dict) else "normal", *own)
-            axes = np.broadcast_to(axis, n.shape) if plate == "base" else np.einsum("nij,nkj->nki", R, np.broadcast_to(axis, n.shape))
-            for key, those in (("", axes), ("of", np.broadcast_to(Z, n.shape) if plate == "base" else np.broadcast_to(R[:, None, :, 2], n.shape))):
+            axes = (
+                np.broadcast_to(axis, n.shape)
+                if plate == "base"
+                else np.einsum("nij,nkj->nki", R, np.broadcast_to(axis, n.shape))
+            )
+            for key, those in (
+                ("", axes),
+                ("of", np.broadcast_to(Z, n.shape) if plate == "base" else np.broadcast_to(R[:, None, :, 2], n.shape)),
+            ):
                 angle = np.arctan2(np.linalg.norm(np.cross(those, n), axis=2), (those * n).sum(2))
                 for k, name in enumerate(self.names):
                     found[f"{key}{plate}_joint_angle limb {name}"] = angle[:, k]
             centres = a if plate == "platform" else b
             for i, j in itertools.combinations(range(len(self.names)), 2):
-                found[f"joint_spacing {plate} joints {self.names[i]} and {self.names[j]}"] = np.linalg.norm(centres[:, i] - centres[:, j], axis=1)
+                found[f"joint_spacing {plate} joints {self.names[i]} and {self.names[j]}"] = np.linalg.norm(
+                    centres[:, i] - centres[:, j], axis=1
+                )
             radii = np.linalg.norm(centres[:, :, :2], axis=2)
             for k, name in enumerate(self.names):
                 found[f"footprint {plate} joint {name}"] = radii[:, k]
@@ -188,7 +204,10 @@ class Legs:
                 found[f"rate_share limb {name}{words[1]}"] = own / F
                 found[f"actuator_rate actuator {name}{words[1]}"] = abs(rates[:, k])
         for key in ("condition_number", "smallest_singular_value"):
-            for name, size in ((key, self.limits.get(key, {}).get("length", self.length)), (f"{key} with the characteristic length", self.length)):
+            for name, size in (
+                (key, self.limits.get(key, {}).get("length", self.length)),
+                (f"{key} with the characteristic length", self.length),
+            ):
                 scaled = J_platform.copy()
                 scaled[:, :, 3:] /= size
                 s = np.linalg.svd(scaled, compute_uv=False)
@@ -207,22 +226,30 @@ class Legs:
             found[f"custom: {relation}"] = value + np.zeros(len(p))
         return found
 
-    def clearance(self, name: str, poses: Poses, base_errors: Array | float = 0.0, platform_errors: Array | float = 0.0) -> Array:
+    def clearance(
+        self, name: str, poses: Poses, base_errors: Array | float = 0.0, platform_errors: Array | float = 0.0
+    ) -> Array:
         """Return the distance of two legs as segments, by the least of the ends' and of the inner points'."""
         one, other = (self.names.index(each) for each in name.removeprefix("leg_clearance limbs ").split(" and "))
-        a = np.einsum("nij,nkj->nki", poses.R, self.platform + np.zeros((len(poses.p), 1, 1)) + platform_errors) + poses.p[:, None]
+        a = (
+            np.einsum("nij,nkj->nki", poses.R, self.platform + np.zeros((len(poses.p), 1, 1)) + platform_errors)
+            + poses.p[:, None]
+        )
         b = self.base + np.zeros_like(a) + base_errors
         return segment_distance(b[:, one], a[:, one], b[:, other], a[:, other])
 
     def mounting(self, plate: str, about: Any, platform: Array, base: Array) -> Array:  # noqa: ANN401
-        """Return mounting axes ([N,] m, 3) in the frame of a plate: from home, along the legs of the design for six legs,
-        and of the machine for another robot."""
+        """Return mounting axes ([N,] m, 3) in the frame of a plate.
+
+        From home, they are along the legs of the design of six legs, and of the machine of another robot.
+        """
         if about == "normal":
             return np.broadcast_to(Z, self.base.shape)
         if about == "home":
-            home = self.home
-            assert home is not None
-            R = turned(np.array(home.get("axis", [0, 0, 1.0]), float)[None], np.array([home.get("angle", 0.0) * self.unit]))[0]
+            home = self.limits["home"]
+            R = turned(
+                np.array(home.get("axis", [0, 0, 1.0]), float)[None], np.array([home.get("angle", 0.0) * self.unit])
+            )[0]
             d = np.array(home["position"], float) + platform @ R.T - base
             d /= np.linalg.norm(d, axis=-1, keepdims=True)
             return d if plate == "base" else d @ R

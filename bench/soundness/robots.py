@@ -1,8 +1,8 @@
-"""Robots of the gallery from their files alone, in NumPy: joints moved by exponentials, loops closed by Newton's method.
+"""Robots of the gallery from their files, in NumPy: joints moved by exponentials, loops closed by Newton's method.
 
 Every joint is one or more turns or slides about axes at home; a limb is a trunk and branches, each from the base to the
-platform. Poses and joints of many machines are computed at once: those of a pose that a robot cannot have are projected to
-one that it can. Ranks are those of velocities, as in docs/formulation.md, and F that of projectors.
+platform. Poses and joints of many machines are computed at once: a pose that a robot cannot have is projected to one
+that it can. Ranks are those of velocities, as in docs/formulation.md, and F that of projectors.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Turn(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """The turns from the base to the platform, the limb, and the member's centre: a turn that carries it, and its point."""
+    """The turns from base to platform, the limb, and the member's centre: a turn that carries it, and its point."""
 
     turns: list[Turn]
     limb: int
@@ -77,7 +77,10 @@ class Robot:
         for table in tables["limb"]:
             repeat = table.get("repeat", {"angles": [0]})
             angles = repeat.get("angles") or [360 / repeat["count"] * k for k in range(repeat["count"])]
-            axis, through = np.array(repeat.get("axis", [0, 0, 1.0]), float), np.array(repeat.get("through", [0, 0, 0.0]), float)
+            axis, through = (
+                np.array(repeat.get("axis", [0, 0, 1.0]), float),
+                np.array(repeat.get("through", [0, 0, 0.0]), float),
+            )
             for angle in angles:
                 limb += 1
                 R = turned(axis[None], np.array([np.radians(angle)]))[0]
@@ -139,7 +142,7 @@ class Robot:
             if one.slides or other.slides or one.coordinate == other.coordinate:
                 continue
             p, q = self.points[one.centre], self.points[other.centre]
-            t, rest, rank, _ = np.linalg.lstsq(np.stack([one.axis, -other.axis], 1), q - p, rcond=1e-9)
+            t, _, rank, _ = np.linalg.lstsq(np.stack([one.axis, -other.axis], 1), q - p, rcond=1e-9)
             at = p + t[0] * one.axis
             if rank == 2 and np.linalg.norm(at - q - t[1] * other.axis) < 1e-9:
                 if one.centre == other.centre:
@@ -150,7 +153,7 @@ class Robot:
         return passive[-1], turns[passive[-1]].centre
 
     def moved(self, q: Array, points: Array) -> tuple[Array, Array, Array]:
-        """Return displacements (N, chains, 4, 4), screws (N, chains, 6, count) as (v at origin, omega), centres (N, chains, 3)."""
+        """Return displacements (N, chains, 4, 4), screws (N, chains, 6, count), and centres (N, chains, 3)."""
         n, m = len(q), len(self.chains)
         T = np.tile(np.eye(4), (n, m, 1, 1))
         S, centres = np.zeros((n, m, 6, self.count)), np.zeros((n, m, 3))
@@ -201,7 +204,10 @@ def close(robot: Robot, path: list[Poses], points: Array, weight: float = 1e-3) 
             D[:, :3, :3], D[:, :3, 3] = R, p - np.einsum("nij,j->ni", R, robot.home)
             # The twist from each chain's end to the platform, about the world's origin, to first order.
             Q = D[:, None, :3, :3] @ np.swapaxes(T[:, :, :3, :3], 2, 3)
-            omega = np.stack([Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]], -1) / 2
+            omega = (
+                np.stack([Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]], -1)
+                / 2
+            )
             v = D[:, None, :3, 3] - np.einsum("ncij,ncj->nci", Q, T[:, :, :3, 3])
             r = np.concatenate([v / size, omega], 2).reshape(n, -1)
             if k > 1 and np.abs(r[good]).max(initial=0) < 1e-13:
@@ -212,7 +218,12 @@ def close(robot: Robot, path: list[Poses], points: Array, weight: float = 1e-3) 
             motion[:, 0, 3:, 3:] = np.eye(3)
             # a rotation of the platform about its own origin moves the point at the world's origin
             motion[:, 0, :3, 3:] = cross_matrix(p) / size
-            M = np.concatenate([-np.broadcast_to(motion, (n, len(robot.chains), 6, 6)), A], 3).reshape(n, -1, 6 + robot.count) * scale
+            M = (
+                np.concatenate([-np.broadcast_to(motion, (n, len(robot.chains), 6, 6)), A], 3).reshape(
+                    n, -1, 6 + robot.count
+                )
+                * scale
+            )
             G = M @ np.swapaxes(M, 1, 2)
             G += 1e-11 * np.trace(G, axis1=1, axis2=2)[:, None, None] * np.eye(G.shape[1])
             step = np.einsum("nij,ni->nj", M, np.linalg.solve(G, r[:, :, None])[:, :, 0]) * scale
@@ -233,7 +244,7 @@ def cross_matrix(p: Array) -> Array:
 
 
 def numbers(robot: Robot, poses: Poses, q: Array, points: Array, chi: Array) -> dict[str, Array]:
-    """Return F and its shares, and singular values of motions with actuators locked and free, in parts of the robot's size."""
+    """Return F, its shares, and singular values of motions with actuators locked and free, by the robot's size."""
     n, m = len(q), len(robot.chains)
     _, S, centres = robot.moved(q, points)
     size = float(np.abs(robot.points_array).max())
@@ -257,7 +268,10 @@ def numbers(robot: Robot, poses: Poses, q: Array, points: Array, chi: Array) -> 
     for c, chain in enumerate(robot.chains):
         own = np.array([k for k in sorted({each.coordinate for each in chain.turns}) if k not in robot.actuated], int)
         at = centres[:, c]
-        T = np.concatenate([S[:, c, :3][:, :, own] + np.cross(S[:, c, 3:][:, :, own], at[:, :, None], axis=1), S[:, c, 3:][:, :, own]], 1)
+        T = np.concatenate(
+            [S[:, c, :3][:, :, own] + np.cross(S[:, c, 3:][:, :, own], at[:, :, None], axis=1), S[:, c, 3:][:, :, own]],
+            1,
+        )
         x = np.concatenate([chi[3:] + np.cross(chi[:3], at), np.broadcast_to(chi[:3], (n, 3))], 1)
         U, s, _ = np.linalg.svd(T, full_matrices=False)
         U = U * (s > 1e-9 * s[:, :1])[:, None]

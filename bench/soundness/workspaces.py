@@ -1,4 +1,4 @@
-"""Random workspaces of straight legs: every proved claim attacked by samples and descents, every refuting pose evaluated.
+"""Random workspaces of straight legs: proved claims attacked by samples and descents, refuting poses evaluated.
 
     python bench/soundness/workspaces.py COUNT FIRST [JOURNAL]
 
@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 from campaign import Row, campaign, command
-from cases import limited_legs, random_legs, text_of
-from legs import Array, Box, Legs, Poses, pose_of, turned
+from legs import Array, Box, Legs, pose_of, turned
+from randomcases import limited_legs, random_legs, text_of
 
 POSES, DESCENTS, ROUNDING = 2048, 10, 1e-9
 
@@ -62,8 +62,17 @@ class Machines:
         u, errors, at = u[best], errors[best], at[best]
         width = 0.2
         for _ in range(28):
-            v = np.clip(np.repeat(u, 8, 0) + width * self.rng.normal(size=(8 * len(u), u.shape[1])) * (self.rng.random((8 * len(u), u.shape[1])) < 0.6), 0, 1)
-            e = self.within(np.repeat(errors, 8, 0) + 2 * width * self.t * self.rng.normal(size=(8 * len(u), *errors.shape[1:])))
+            v = np.clip(
+                np.repeat(u, 8, 0)
+                + width
+                * self.rng.normal(size=(8 * len(u), u.shape[1]))
+                * (self.rng.random((8 * len(u), u.shape[1])) < 0.6),
+                0,
+                1,
+            )
+            e = self.within(
+                np.repeat(errors, 8, 0) + 2 * width * self.t * self.rng.normal(size=(8 * len(u), *errors.shape[1:]))
+            )
             values = sign * self.values(v, e, name)[name]
             u, errors, at = np.concatenate([u, v]), np.concatenate([errors, e]), np.concatenate([at, values])
             best = np.argsort(-at)[:8]
@@ -73,7 +82,7 @@ class Machines:
 
 
 def value_name(extreme: dict[str, Any]) -> str:
-    """Return the name of a result's number in :meth:`Legs.values`: measured from the plates' normals without a limit."""
+    """Return the name of a result's number in :meth:`Legs.values`: without a limit angles are from plates' normals."""
     name = extreme["name"]
     return f"of{name}" if re.match("(base|platform)_joint_angle", name) and "key" not in extreme else name
 
@@ -81,7 +90,7 @@ def value_name(extreme: dict[str, Any]) -> str:
 def strokes(machines: Machines, name: str, u: Array, errors: Array, lengths: Array) -> float:
     """Return the worst stroke, or least room for a dead length, of machines made for two poses of the leg."""
     legs = machines.legs
-    k = legs.names.index(name.split()[-1])
+    k = legs.names.index(name.rsplit(maxsplit=1)[-1])
     worst = np.inf if "dead_length" in name else -np.inf
     for low, high in ((np.argmin(lengths), np.argmax(lengths)), *machines.rng.integers(len(u), size=(4, 2))):
         both = np.stack([u[low], u[high]])
@@ -123,21 +132,26 @@ def pose_errors(machines: Machines, leg_error: float, u: Array) -> tuple[float, 
     for _ in range(12):
         arms = np.einsum("nij,nkj->nki", Q, legs.platform + errors[:, 1])
         d = q[:, None] + arms - legs.base - errors[:, 0]
-        l = np.linalg.norm(d, axis=2)
-        n = d / l[:, :, None]
-        step = np.linalg.solve(np.concatenate([n, np.cross(arms, n)], 2), (target - l)[:, :, None])[:, :, 0]
+        now = np.linalg.norm(d, axis=2)
+        n = d / now[:, :, None]
+        step = np.linalg.solve(np.concatenate([n, np.cross(arms, n)], 2), (target - now)[:, :, None])[:, :, 0]
         q = q + step[:, :3]
         Q = turned(step[:, 3:], np.linalg.norm(step[:, 3:], axis=1)) @ Q
-    good = (abs(target - l).max(1) < 1e-9 * l.max()) & (np.linalg.norm(step, axis=1) < 1e-8)
+    good = (abs(target - now).max(1) < 1e-9 * now.max()) & (np.linalg.norm(step, axis=1) < 1e-8)
     D = np.swapaxes(R, 1, 2) @ Q
-    turn = np.linalg.norm(np.stack([D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]], 1), axis=1) / 2
-    near = good & (np.linalg.norm(q - p, axis=1) < 0.2 * l.min())
+    turn = (
+        np.linalg.norm(np.stack([D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]], 1), axis=1)
+        / 2
+    )
+    near = good & (np.linalg.norm(q - p, axis=1) < 0.2 * now.min())
     if not near.any():
         return 0.0, 0.0
     return float(np.linalg.norm(q - p, axis=1)[near].max()), float(np.arcsin(np.minimum(turn, 1))[near].max())
 
 
-def judge_legs(tables: dict[str, Any], result: dict[str, Any], rng: np.random.Generator, leg_error: float) -> tuple[Counter[str], list[str]]:
+def judge_legs(
+    tables: dict[str, Any], result: dict[str, Any], rng: np.random.Generator, leg_error: float
+) -> tuple[Counter[str], list[str]]:
     """Attack the claims of a result about straight legs."""
     machines, counts, faults = Machines(tables, rng), Counter[str](), []
     legs, box, robot = machines.legs, machines.box, tables["robot"]["model"]
@@ -187,7 +201,13 @@ def judge_legs(tables: dict[str, Any], result: dict[str, Any], rng: np.random.Ge
         counts[f"{robot}: {kind} {each['outcome']}"] += 1
         scale = box.unit if each["unit"] in ("deg", "rad") else 1.0
         bound = None if each["bound"] is None else each["bound"] * scale
-        if name in ("position error", "rotation error", "leg_clearance.min", "actuator.stroke_max", "actuator.dead_length"):
+        if name in (
+            "position error",
+            "rotation error",
+            "leg_clearance.min",
+            "actuator.stroke_max",
+            "actuator.dead_length",
+        ):
             continue
         if name.startswith("actuator."):
             found = strokes(machines, name, u, errors, sampled[f"leg_length limb {name.split()[-1]}"])
@@ -206,13 +226,22 @@ def judge_legs(tables: dict[str, Any], result: dict[str, Any], rng: np.random.Ge
         if each["pose"] is not None and not name.startswith("actuator."):
             own = machine_of(each)
             poses = pose_of(each["pose"], box.unit)
-            there = legs.clearance(name, poses, own[:, 0], own[:, 1]) if "clearance" in name else legs.values(poses, own[:, 0], own[:, 1])[value_name(each)]
+            there = (
+                legs.clearance(name, poses, own[:, 0], own[:, 1])
+                if "clearance" in name
+                else legs.values(poses, own[:, 0], own[:, 1])[value_name(each)]
+            )
             off = abs(there[0] - each["reached"] * scale)
             if off > 1e-6 * (abs(there[0]) + (1e-2 if scale != 1 else 0)) + 1e-7 * reach or not box.has(each["pose"]):
-                faults.append(f"{name} {each['sense']}: reached {each['reached'] * scale:.12g}, and {there[0]:.12g} there, inside: {box.has(each['pose'])}")
+                said = f"{name} {each['sense']}: reached {each['reached'] * scale:.12g}"
+                faults.append(f"{said}, and {there[0]:.12g} there, inside: {box.has(each['pose'])}")
         if each["outcome"] == "refuted" and not sign * (each["reached"] - each["limit"]) > 0:
             faults.append(f"{name} {each['sense']}: refuted by {each['reached']}, with the limit {each['limit']}")
-        if each["outcome"] == "proved" and "limit" in each and sign * (found - each["limit"] * scale) > 2 * ROUNDING * abs(each["limit"] * scale) + 1e-14:
+        if (
+            each["outcome"] == "proved"
+            and "limit" in each
+            and sign * (found - each["limit"] * scale) > 2 * ROUNDING * abs(each["limit"] * scale) + 1e-14
+        ):
             faults.append(f"{name} {each['sense']}: proved within {each['limit'] * scale:.12g}, sampled {found:.12g}")
     near.sort()
     for _, k in near[: DESCENTS // 2] + [near[j] for j in rng.permutation(len(near))[: DESCENTS // 2]]:
@@ -221,7 +250,9 @@ def judge_legs(tables: dict[str, Any], result: dict[str, Any], rng: np.random.Ge
         value, _, _ = machines.descend(value_name(each), sign, u[:512], errors[:512])
         counts["descents"] += 1
         if value - sign * each["bound"] * scale > ROUNDING * (abs(value) + (1e-3 if scale != 1 else 0.0)) + 1e-14:
-            faults.append(f"{each['name']} {each['sense']}: bound {each['bound'] * scale:.12g}, descent {sign * value:.12g}")
+            faults.append(
+                f"{each['name']} {each['sense']}: bound {each['bound'] * scale:.12g}, descent {sign * value:.12g}"
+            )
     bounds = {each["name"]: each for each in result["extremes"] if each["name"] in ("position error", "rotation error")}
     if bounds and all(each["bound"] is not None for each in bounds.values()):
         found = pose_errors(machines, leg_error, u[:512])
@@ -240,7 +271,7 @@ def examine(seed: int) -> Row:
     with tempfile.TemporaryDirectory() as folder:
         case, out = Path(folder) / "case.toml", Path(folder) / "result.json"
         case.write_text(text_of(tables), encoding="utf-8")
-        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([3, 6])), "--jobs", "1"]
+        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([8, 15])), "--jobs", "1"]
         if tables["robot"]["model"] != "three-upu" and rng.random() < 0.25:
             leg_error = float(np.abs(Legs(tables).platform).max() * rng.choice([1e-4, 1e-3]))
             words += ["--leg-error", repr(leg_error)]
@@ -249,7 +280,10 @@ def examine(seed: int) -> Row:
                 words += ["--of-quantity", name]
         code, _, err = command("workspace", str(case), *words, "--json", str(out))
         if not out.exists():
-            return {"counts": {f"refused: {err.strip()[-60:]}" if code == 2 else "failed": 1}, "faults": [] if code == 2 else [err]}
+            return {
+                "counts": {f"refused: {err.strip()[-60:]}" if code == 2 else "failed": 1},
+                "faults": [] if code == 2 else [err],
+            }
         result = json.loads(out.read_text(encoding="utf-8"))
     counts, faults = judge_legs(tables, result, rng, leg_error)
     return {"counts": counts, "faults": faults}

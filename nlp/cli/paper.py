@@ -74,7 +74,7 @@ def verify_paper(proof: WorkspaceProof, case: Case, leg_error: float) -> None:
     from ..proof.checker.premises import exact
     from ..proof.checker.proof_file import ProofError
     from ..proof.checker.workspace.check import check_workspace_proof
-    from ..proof.checker.workspace.expected import ERRORS
+    from ..proof.checker.workspace.statement import ERRORS
 
     try:
         checked = check_workspace_proof(proof, case, leg_error=leg_error)

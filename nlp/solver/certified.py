@@ -13,7 +13,7 @@ from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
 from ..program.formulation import formulate_each
-from ..proof.boxes.tapes import search_tape
+from ..proof.boxes.engine import search_tape
 from ..proof.boxes.tree import TreeRecord
 from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
 from ..proof.certificate.certificate import Certificate, CertificateStatus

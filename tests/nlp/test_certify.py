@@ -17,13 +17,10 @@ from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_table
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
-from screwsynth.nlp.proof.boxes.engines import Engine
-from screwsynth.nlp.proof.boxes.examination import Examination, Verdict
-from screwsynth.nlp.proof.boxes.tapes import search_tape
+from screwsynth.nlp.proof.boxes.engine import Engine, Examination, Verdict, search_tape
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure.quadratic_models import _MULTIPLIER_ROUNDS
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.results.evidence import certificate_data
 from screwsynth.nlp.results.jsondata import json_data
@@ -356,7 +353,7 @@ def test_rules_use_every_constant_of_the_kernel_alike() -> None:
         "WORTH": bounding._WORTH,
         "LINEAR": first_pass.LINEAR,
         "ROOT_SLACK": quadratic_models._ROOT_SLACK,
-        "MULTIPLIER_ROUNDS": _MULTIPLIER_ROUNDS,
+        "MULTIPLIER_ROUNDS": quadratic_models._MULTIPLIER_ROUNDS,
         "TANGENT_ROUNDS": quadratic_models._TANGENT_ROUNDS,
         "SWEEPS": tangent_bounds._SWEEPS,
     }

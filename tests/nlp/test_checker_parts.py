@@ -14,10 +14,9 @@ from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
 from screwsynth.nlp.proof.checker.tree import Node
-from screwsynth.nlp.proof.checker.workspace.anyrobot.assembly import Assembly
-from screwsynth.nlp.proof.checker.workspace.anyrobot.motionclaim import MotionClaim
-from screwsynth.nlp.proof.checker.workspace.anyrobot.motions import Motions
-from screwsynth.nlp.proof.checker.workspace.anyrobot.posedrobot import PosedRobot
+from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import Motions, PosedRobot
+from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 
@@ -101,14 +100,15 @@ def sign_of(block: np.ndarray) -> int:
 @pytest.mark.parametrize("size", [2.0**-40, 1.0, 2.0**40])
 def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -> None:
     """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
-    rng, y, nothing, more = np.random.default_rng(1), SX.sym("y"), SX(0, 1), (np.zeros(6), np.ones(1))
-    robot = PosedRobot(y, (0,), *more, nothing, nothing, nothing, (), (), (), (), SX(3, 1), 1.0)
+    rng, y, nothing = np.random.default_rng(1), SX.sym("y"), SX(0, 1)
+    lists: tuple[tuple[()], ...] = ((),) * 5
+    robot = PosedRobot(y, (0,), np.zeros(6), np.ones(1), 1.0, SX(3, 1), SX(1), *lists, nothing, nothing, nothing)
     assembly, at = Assembly(robot, nothing, np.zeros(1)), np.zeros((1, 6))
 
     def shown(block: np.ndarray) -> int:
         M = np.eye(6)
         M[4:, 4:] = block
-        return MotionClaim(robot, Motions(SX(ca.DM(size * M)), 0), assembly).signs_at(at)[0]
+        return RankClaim(robot, Motions(SX(ca.DM(size * M)), 0), assembly)._signs_at(at)[0]
 
     row, factor = rng.normal(size=(4000, 2)), rng.normal(size=4000)
     blocks = np.stack([row, factor[:, None] * row], axis=1)

@@ -8,18 +8,14 @@ import pytest
 from casadi import SX
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.case.pose import Free
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.bisection import Shown
 from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
 from screwsynth.nlp.proof.checker.polymodels import Tilts
 from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.tree import Node
-from screwsynth.nlp.proof.checker.workspace.ballrows import Joints, ball_rows
-from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
 from screwsynth.nlp.proof.checker.workspace.tolerance import change_of_jacobian, change_of_rows
+from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm
-from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -42,12 +38,12 @@ def test_the_change_of_the_jacobian_is_nearly_reached(seed: int, length: float) 
 
     nothing = np.zeros((6, 3))
     reached = np.linalg.norm(jacobian(-t * across, t * across) - jacobian(nothing, nothing))
-    bound = change_of_jacobian(Joints(base, platform), t, length, leg - 2 * t)
+    bound = change_of_jacobian(Legs(base, platform), t, length, leg - 2 * t)
     assert reached <= bound <= 1.001 * reached
 
 
 def test_errors_that_take_up_a_leg_have_no_bound() -> None:
-    joints = Joints(np.zeros((6, 3)), np.ones((6, 3)))
+    joints = Legs(np.zeros((6, 3)), np.ones((6, 3)))
     assert change_of_jacobian(joints, 1.0, 1.0, 0.0) == np.inf
     assert change_of_jacobian(joints, 1.0, 1.0, 0.1) < np.inf
 
@@ -55,12 +51,9 @@ def test_errors_that_take_up_a_leg_have_no_bound() -> None:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_the_change_of_the_rows_is_nearly_reached(seed: int) -> None:
     rng, t = np.random.default_rng(seed), 1e-4
-    joints = Joints(rng.uniform(-10, 10, (6, 3)), rng.uniform(-5, 5, (6, 3)))
-    space = Workspace((Free(-3.0, 3.0), Free(-3.0, 3.0), Free(9.0, 15.0)), Turns(TurnKind.ANY_AXIS, (Free(-0.4, 0.4),)))
-    y = pose_box(space).random(1, rng)
-    found = ball_rows(pose_root(space), joints, y, y)
-    change = change_of_rows(found, joints, t)[0]
-    s, u, span = found.scale.c[0], found.arm.c[0], y[0, :3] - joints.base
+    base, platform = rng.uniform(-10, 10, (6, 3)), rng.uniform(-5, 5, (6, 3))
+    s, u, span = 1.3, 1.3 * platform, rng.uniform((-3, -3, 9), (3, 3, 15)) - base
+    change = change_of_rows(np.array([s]), np.abs(span)[None], np.abs(u)[None], t)[0]
     for k in range(3):
         # f x d has the component f.(d x e_k), and u x e the component e.(e_k x u).
         axis = np.eye(3)[k]
@@ -70,11 +63,8 @@ def test_the_change_of_the_rows_is_nearly_reached(seed: int) -> None:
         assert (change[:, 3 + k] <= 1.001 * np.abs(moment[:, k])).all()
     assert (change[:, :3] >= 2 * s * t).all()
     assert (change[:, :3] <= 1.001 * 2 * s * t).all()
-    # Over a box it is that of the worst pose.
-    half = np.array([0.5, 0.5, 0.5, 0.02, 0.02, 0.02])
-    whole = change_of_rows(ball_rows(pose_root(space), joints, y - half, y + half), joints, t)[0]
-    points = y + half * np.round(rng.uniform(-1, 1, (64, 6)))
-    assert (change_of_rows(ball_rows(pose_root(space), joints, points, points), joints, t) <= whole).all()
+    other = change_of_rows(np.array([s]), np.abs(span)[None], np.abs(u)[None], t, 2.0)[0]
+    np.testing.assert_allclose(other * [1, 1, 1, 2, 2, 2], change, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

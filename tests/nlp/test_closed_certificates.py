@@ -14,8 +14,7 @@ from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations, linearise
 from screwsynth.nlp.evidence.state import loops_are_closed
-from screwsynth.nlp.proof.boxes.engines import Engine
-from screwsynth.nlp.proof.boxes.examination import Verdict
+from screwsynth.nlp.proof.boxes.engine import Engine, Verdict
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof

@@ -12,7 +12,7 @@ from random_graphs import N, random_boxes, random_function
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.errors import UncoveredError
-from screwsynth.nlp.proof.boxes.tapes import search_tape
+from screwsynth.nlp.proof.boxes.engine import search_tape
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
 from screwsynth.nlp.proof.enclosure.forms import Enclosures, enclose, midpoints
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape, compile_tape

@@ -11,12 +11,11 @@ from numpy_engine.bounding import NumpyEngine
 from numpy_engine.limb_models import NumpyLimbEngine
 
 from screwsynth.nlp import Case, formulate, load_case, solve
-from screwsynth.nlp.proof.boxes.engines import Engine
+from screwsynth.nlp.proof.boxes.engine import Engine, LimbModels
 from screwsynth.nlp.proof.boxes.incumbent import Incumbent
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
 from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
 from screwsynth.nlp.proof.boxes.limbs.cuts import LeftOwn
-from screwsynth.nlp.proof.boxes.limbs.models import LimbModels
 from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
@@ -27,7 +26,7 @@ from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 from screwsynth.nlp.proof.enclosure.quadratic_models import QuadraticModel
 from screwsynth.nlp.proof.statement.limb_separation import separate
-from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
+from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
 
 @pytest.mark.parametrize(
@@ -176,6 +175,38 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     assert (above[~kept] <= (values(s, np.repeat(good[:, :, None], points, axis=2)) - tilt)[of][~kept] + slack).all()
 
 
+def test_the_common_part_with_tilts_is_bounded_and_contracted() -> None:
+    """phi_0 + best + t at random points of random boxes; points that are cut off reach less, or keep no condition."""
+    _, found = separated(poses(2))
+    assert found.common is not None
+    x, rng, B, points = found.common.x, np.random.default_rng(4), 60, 300
+    m, whole = x.numel(), (found.common.upper - found.common.lower)[:, None]
+    first = Condition("sum", ca.sum1(x) - float(np.sum(found.common.lower + 0.4 * whole.ravel())), is_equation=False)
+    form = replace(found.common, functions=(ca.sin(x[0]) + 0.3 * x[0] * x[m - 1],), conditions=(first,), signs=())
+    size = whole * 10.0 ** rng.uniform(-3, -0.1, (m, B))
+    low = form.lower[:, None] + rng.random((m, B)) * (whole - size)
+    g, Q, best = rng.normal(size=(m, B)), rng.normal(size=(m, m, B)), rng.normal(size=B)
+    Q = 0.1 * (Q + Q.transpose(1, 0, 2))
+    tilts = np.concatenate([[best, np.abs(best), np.zeros(B)], g, Q.reshape(m * m, B)])
+    e = rng.uniform(-1, 1, (m, B, points))
+    s = low[:, :, None] + 0.5 * size[:, :, None] * (1 + e)
+    given = ca.Function("f", [x], [form.functions[0], first.expression]).map(B * points)(s.reshape(m, -1))
+    value, condition = (each.full().reshape(B, points) for each in given)
+    value += best[:, None] + np.einsum("ib,ibp->bp", g, e) + 0.5 * np.einsum("ijb,ibp,jbp->bp", Q, e, e)
+    feasible, level = condition <= 0, float(np.quantile(value, 0.7))
+    models = Engine(form, 1, m).common_models(low, low + size, tilts, level)
+    slack = 1e-12 * np.abs(value).max()
+    assert (np.where(feasible, value, -np.inf).max(axis=1) <= models.L.bound() + slack).all()
+    inside = ((s >= models.lower[:, :, None]) & (s <= models.upper[:, :, None])).all(axis=0) & models.is_possible[
+        :, None
+    ]
+    assert not (~inside & feasible & (value >= level)).any()
+    assert (~inside).any(axis=1).sum() > B // 4
+    assert (
+        models.L.bound() < np.where(feasible, value, -np.inf).max(axis=1) + 0.2 * np.ptp(value, axis=1)
+    ).sum() > B // 4
+
+
 def both_searches(seed: int) -> tuple[float, float]:
     """Bound by limbs without an incumbent, and the best of some starts, both to be maximised."""
     solution = solve(poses(seed), starts=4)
@@ -245,7 +276,7 @@ def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
     boxes = sharedsearch.view(search.state.left[0])
     for bound in (np.inf, 1.0):
         with np.errstate(all="ignore"):
-            sums = rule._examine(replace(boxes, bound=np.array([bound])))
+            sums = rule._examine(replace(boxes, bound=np.array([bound])), -np.inf)
             lists = [
                 sharedsearch.cut_own(*each, sums.sums, 0.9 * sums.sums[0])
                 for each in zip(boxes.good, sums.models, sums.parts, boxes.own, strict=True)

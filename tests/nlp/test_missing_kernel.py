@@ -9,7 +9,7 @@ import pytest
 
 from screwsynth.nlp import InputError, certify, formulate, load_case
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.proof.boxes.engines import Engine
+from screwsynth.nlp.proof.boxes.engine import Engine
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.scale import largest_scale

@@ -160,3 +160,19 @@ def test_a_proof_whose_cuts_are_within_rounding_of_loop_equations_is_accepted() 
     assert proof.bound is not None
     with pytest.raises(ProofError, match="could not be shown"):
         check_proof(replace(proof, bound=certified.solution.F * (1 - 1e-6)), nlp)
+
+
+def test_squared_quotients_stay_in_their_polynomials() -> None:
+    """Narrow boxes, where rounding is most of the ball, and wide ones, where terms of third order are."""
+    rng, counts = np.random.default_rng(6), np.zeros(4, dtype=int)
+    for _ in range(12):
+        x = ca.SX.sym("x", N)
+        A, B = (ca.DM(rng.normal(size=(N, N))) for _ in range(2))
+        over = ca.sumsqr(ca.mtimes(A, x)) + ca.sin(x[0]) + 2
+        bent = ca.bilin(B, x, x) + ca.sin(x[1]) + float(rng.normal())
+        function = ca.Function("f", [x], [bent**2 / over, (bent / ca.exp(x[2])) ** 2 / over])
+        centre = rng.normal(size=(N, 30))
+        width = 10.0 ** rng.uniform(-12, 0, size=(1, 30)) * (rng.random((N, 30)) > 0.15)
+        counts += violations(function, centre - width, centre + width, rng)
+    assert counts[:3].tolist() == [0, 0, 0]
+    assert counts[3] > 500

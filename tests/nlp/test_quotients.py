@@ -12,8 +12,7 @@ from numpy_engine.limb_models import NumpyLimbEngine
 from numpy_engine.quadratic_models import GradientModel
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.proof.boxes.engines import Engine
-from screwsynth.nlp.proof.boxes.tapes import search_tape
+from screwsynth.nlp.proof.boxes.engine import Engine, search_tape
 from screwsynth.nlp.proof.enclosure.forms import midpoints
 from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows
 from screwsynth.nlp.proof.statement.limb_separation import terms_of

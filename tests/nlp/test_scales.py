@@ -12,8 +12,7 @@ from numpy_engine.limb_models import NumpyLimbEngine
 from numpy_engine.second_order import enclose_second, monomials
 
 from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.proof.boxes.engines import Engine
-from screwsynth.nlp.proof.boxes.examination import Verdict
+from screwsynth.nlp.proof.boxes.engine import Engine, Verdict
 from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic, middles, places
 from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
 from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of, midpoints

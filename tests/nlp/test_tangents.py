@@ -12,9 +12,7 @@ from numpy_engine.second_order import Forms, enclose_second, monomials
 from numpy_engine.tangent_bounds import tangent_forms
 
 from screwsynth.nlp import Search, Sense, formulate, load_case, solve_program
-from screwsynth.nlp.proof.boxes.engines import Engine
-from screwsynth.nlp.proof.boxes.examination import Verdict
-from screwsynth.nlp.proof.boxes.tapes import value_tape
+from screwsynth.nlp.proof.boxes.engine import Engine, Verdict, value_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.forms import midpoints

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy_engine.first_order import enclose
+from numpy_engine.quadratic_models import multipliers
 from numpy_engine.second_order import enclose_second
 
 from screwsynth.models import Dimension, Model, robot_function
@@ -27,7 +28,6 @@ from screwsynth.nlp.front.programs import program_of
 from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.enclosure.quadratic_models import multipliers
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.proof.workspace.judge import judge_workspace

@@ -24,6 +24,7 @@ from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.statement.tolerance import is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
@@ -479,3 +480,10 @@ def test_a_page_says_where_the_worst_pose_is_that_of_another_machine(
     assert code == 2
     assert words in err
     assert not drawn.exists()
+
+
+def test_derivatives_bound_no_number_that_jumps() -> None:
+    """The angle of a vector jumps by a turn, where its derivatives are smooth, unless its sine is a length."""
+    x = ca.SX.sym("x", 2)
+    assert is_smooth(ca.atan2(ca.norm_2(x), x[0]) / x[1])
+    assert not any(map(is_smooth, (ca.atan2(x[0], x[1]), ca.fabs(x[0]), ca.fmax(x[0], x[1]), ca.floor(x[0]))))

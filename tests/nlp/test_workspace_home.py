@@ -20,10 +20,10 @@ from screwsynth.nlp.evidence.state import RobotState
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.checker.proof_file import ProofError, WorkspaceProof, read_proof
-from screwsynth.nlp.proof.checker.workspace.anyrobot.looppoints import start_of
-from screwsynth.nlp.proof.checker.workspace.anyrobot.posedrobot import posed_robot
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
-from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import posed_robot
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace

@@ -9,8 +9,8 @@ import pytest
 from screwsynth.models import FloatArray, robot
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.proof.checker.workspace.anyrobot.rankofrobot import rank_claim
-from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
+from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.statement.claims import REGULAR
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank

@@ -26,17 +26,18 @@ from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.checker.fractions import determinant_sign, tangent_ends
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
-from screwsynth.nlp.proof.checker.workspace import ballrows, check
-from screwsynth.nlp.proof.checker.workspace.ballslopes import BallSlopes, coordinates
-from screwsynth.nlp.proof.checker.workspace.clearanceclaim import ClearanceClaim
-from screwsynth.nlp.proof.checker.workspace.errorclaim import ErrorClaim, whole_errors
-from screwsynth.nlp.proof.checker.workspace.inverserows import inverse_rows
-from screwsynth.nlp.proof.checker.workspace.pieces import BoxClaim, show
-from screwsynth.nlp.proof.checker.workspace.poseroot import PoseRoot, pose_root
-from screwsynth.nlp.proof.checker.workspace.positive import are_positive, contraction
-from screwsynth.nlp.proof.checker.workspace.rankclaim import RankClaim
-from screwsynth.nlp.proof.checker.workspace.singularclaim import SingularClaim
-from screwsynth.nlp.proof.checker.workspace.tree import Leaves, read_leaves
+from screwsynth.nlp.proof.checker.workspace import check
+from screwsynth.nlp.proof.checker.workspace.forms import are_positive, contraction
+from screwsynth.nlp.proof.checker.workspace.leg_claims import (
+    AffineMatrix,
+    ClearanceClaim,
+    ErrorClaim,
+    SingularClaim,
+    whole_errors,
+)
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot, posed_robot
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot, pose_root, show_on_leaves
+from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
@@ -217,8 +218,8 @@ def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:
     """40 degrees about any axis: singular. So is every tree that claims otherwise."""
     root = pose_root(turned(TurnKind.ANY_AXIS, 40))
     for tree in (bytes([Node.BOUNDED]), node_bytes(Node.CUT, 0, value=0.5) + bytes([Node.BOUNDED] * 2)):
-        with pytest.raises(ProofError, match="opposite signs"):
-            show(rank(root, robot), root, read_leaves(tree, root.lower, root.upper))
+        with pytest.raises(ProofError, match="could not be shown"):
+            show_on_leaves(rank(root, robot), root, tree)
 
 
 def six_legs(robot: Legs) -> Case:
@@ -229,7 +230,11 @@ def six_legs(robot: Legs) -> Case:
 
 
 def rank(root: PoseRoot, robot: Legs) -> RankClaim:
-    return RankClaim(root, ballrows.Joints(*robot[:2]))
+    return rank_claim(six_legs(robot), HEXAPOD, root, "regular")
+
+
+def posed(root: PoseRoot, robot: Legs) -> PosedRobot:
+    return posed_robot(six_legs(robot), HEXAPOD, root)
 
 
 def test_a_refuted_workspace_carries_two_poses() -> None:
@@ -309,36 +314,40 @@ def test_random_machines_are_accepted() -> None:
         if found.outcome is not Outcome.PROVED:
             continue
         root = pose_root(workspace)
-        show(rank(root, machine), root, read_leaves(record.tree(with_open=True), root.lower, root.upper))
+        show_on_leaves(rank(root, machine), root, record.tree(with_open=True))
         accepted += 1
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))
-def test_balls_with_slopes_hold_exact_rows(robot: Legs, kind: TurnKind) -> None:
+def test_forms_hold_exact_rows(robot: Legs, kind: TurnKind) -> None:
     rng = np.random.default_rng(7)
     workspace = turned(kind, 50)
     root = pose_root(workspace)
     lower, upper = random_boxes(root, 12, 0.3, rng)
     lower[6:], upper[6:] = lower[6:], lower[6:] + (upper[6:] - lower[6:]) * 1e-13
-    rows = ballrows.ball_rows(root, ballrows.Joints(*robot[:2]), lower, upper).rows
-    y = coordinates(lower, upper)
+    claim = rank(root, robot)
+    M, E, A = claim._matrices(claim._closed(lower, upper))
+    free, length = list(np.flatnonzero(root.upper > root.lower)), six_legs(robot).characteristic_length
     rounded, bent = 0, 0
     for k in range(12):
         e = rng.uniform(-1, 1, 6) if k % 2 else np.sign(rng.normal(size=6))
-        step = [Fraction(float(h)) * Fraction(float(each)) for h, each in zip(y.h[k], e, strict=True)]
-        centre = [Fraction(float(each)) for each in y.c[k]]
-        exact = exact_rows(robot, kind, workspace, [a + b for a, b in zip(centre, step, strict=True)])
-        at_centre = exact_rows(robot, kind, workspace, centre)
+        y = 0.5 * (lower[k] + upper[k]) + 0.5 * (upper[k] - lower[k]) * e
+        y = np.clip(y, lower[k], upper[k])
+        exact = exact_rows(robot, kind, workspace, [Fraction(float(each)) for each in y])
         for i, j in np.ndindex(6, 6):
-            off = abs(at_centre[i][j] - Fraction(float(rows.c[k, i, j])))
-            assert off <= Fraction(float(rows.ce[k, i, j]))
-            rounded += off > 0
-            moved = exact[i][j] - at_centre[i][j]
-            middle = sum(Fraction(float(s)) * d for s, d in zip(rows.s[k, i, j], step, strict=True))
-            radius = sum(Fraction(float(s)) * abs(d) for s, d in zip(rows.se[k, i, j], step, strict=True))
-            assert abs(moved - middle) <= radius
-            bent += abs(moved - middle) > radius / 4
-    # Without rounding, or with slopes a quarter as wide, the balls would not hold the rows: the test can fail.
+            number = exact[i][j] if j < 3 else exact[i][j] / Fraction(length)
+            middle = Fraction(float(M[k, i, j]))
+            for a, end, low, high in zip(A[k, :, i, j], y[free], lower[k, free], upper[k, free], strict=True):
+                middle += (
+                    Fraction(float(a))
+                    * (2 * Fraction(float(end)) - Fraction(low) - Fraction(high))
+                    / Fraction(high - low)
+                )
+            off = float(abs(number - middle))
+            assert off <= E[k, i, j]
+            rounded += k >= 6 and off > 0
+            bent += k < 6 and off > 0.25 * E[k, i, j]
+    # Without rounding, or with rests a quarter as wide, the forms would not hold the rows: the test can fail.
     assert rounded
     assert bent
 
@@ -368,20 +377,6 @@ def exact_rows(robot: Legs, kind: TurnKind, workspace: Workspace, y: list[Fracti
         moment = [u[1] * d[2] - u[2] * d[1], u[2] * d[0] - u[0] * d[2], u[0] * d[1] - u[1] * d[0]]
         rows.append([*(scale * each + part for each, part in zip(d, u, strict=True)), *moment])
     return rows
-
-
-def test_roots_hold_their_values() -> None:
-    rng = np.random.default_rng(2)
-    lower = rng.uniform(0.5, 2.0, (50, 6))
-    upper = lower + rng.uniform(0, 0.5, (50, 6))
-    y = coordinates(lower, upper)
-    root: BallSlopes = (y * y)[:, :1].root()
-    for share in (0.0, 0.3, 1.0):
-        at = lower + share * (upper - lower)
-        moved = at[:, 0] - y.c[:, 0]
-        middle, radius = root.s[:, 0, 0] * moved, root.se[:, 0, 0] * np.abs(moved)
-        assert (np.abs(at[:, 0] - root.c[:, 0] - middle) <= radius + root.ce[:, 0] + 1e-15).all()
-    assert np.isnan((y * y - y)[:, :1].plus(np.array([-2.0])).root().s).any()
 
 
 def test_tangents_lie_between_fractions() -> None:
@@ -419,7 +414,7 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
     """Boxes against the values of the search's oracles at samples, which the check does not use."""
     rng = np.random.default_rng(4)
     workspace = turned(kind, 20)
-    root, box, joints = pose_root(workspace), pose_box(workspace), ballrows.Joints(*robot[:2])
+    root, box = pose_root(workspace), pose_box(workspace)
     lower, upper = random_boxes(root, 120, 0.03, rng)
     points = lower + rng.uniform(0, 1, (30, 120, 6)).round(1) * (upper - lower)
     flat = points.reshape(-1, 6)
@@ -429,11 +424,12 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
         (WorstError(robot, box, is_rotation=False), -1.0, 2.0),
         (Clearance(robot, box, 0, 2), 1.0, 15.0),
     ]
+    legs = posed(root, robot)
     claims: list[BoxClaim] = [
-        SingularClaim(root, joints, 11.5, 0.9, is_condition=False),
-        SingularClaim(root, joints, 11.5, 2.0, is_condition=True),
-        ErrorClaim(root, joints, 2.0, is_rotation=False),
-        ClearanceClaim(root, joints, (0, 2), 15.0),
+        SingularClaim(legs, 11.5, 0.9, is_condition=False),
+        SingularClaim(legs, 11.5, 2.0, is_condition=True),
+        ErrorClaim(legs, 2.0, is_rotation=False),
+        ClearanceClaim(legs, (0, 2), 15.0),
     ]
     for (oracle, sign, bound), each in zip(oracles, claims, strict=True):
         least = oracle.values(flat).reshape(30, 120).min(axis=0)
@@ -447,20 +443,31 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
 
 def test_inverses_hold_those_at_samples(robot: Legs) -> None:
     rng = np.random.default_rng(8)
-    workspace = turned(TurnKind.ANY_AXIS, 20)
-    root, joints = pose_root(workspace), ballrows.Joints(*robot[:2])
+    root = pose_root(turned(TurnKind.ANY_AXIS, 20))
     lower, upper = random_boxes(root, 60, 0.1, rng)
-    found = inverse_rows(ballrows.ball_rows(root, joints, lower, upper).rows)
-    assert found.known.mean() > 0.5
+    seen: list[AffineMatrix] = []
+
+    class Kept(ErrorClaim):
+        """The claim that keeps the inverses of J over boxes."""
+
+        def _judged(self, inverse: AffineMatrix, *_: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            seen.append(inverse)
+            return np.ones(60, dtype=bool), np.zeros((60, 6)), np.zeros(60, dtype=bool)
+
+    claim = Kept(posed(root, robot), 1.0, is_rotation=False)
+    known = claim.attempt(lower, upper).holds
+    (P, T, rest), length = seen[0], posed(root, robot).length
+    assert known.mean() > 0.5
     tight = 0
     for _ in range(10):
         e = np.round(rng.uniform(-1, 1, (60, 6)))
         y = 0.5 * (lower + upper) + 0.5 * (upper - lower) * e
-        rows = ballrows.ball_rows(root, joints, y, y).rows.c
+        rows = np.array([exact_rows(robot, TurnKind.ANY_AXIS, turned(TurnKind.ANY_AXIS, 20), list(each)) for each in y])
+        rows = rows.astype(float) / [1, 1, 1, length, length, length]
         exact = np.linalg.inv(rows / np.linalg.norm(rows[:, :, :3], axis=2, keepdims=True))
-        off = np.abs(exact - found.P0 - np.einsum("bijk,bk->bij", found.T, e))
-        assert (off <= found.rest + 1e-12)[found.known].all()
-        tight += int((off > 0.05 * found.rest)[found.known].any())
+        off = np.abs(exact - P - np.einsum("bkij,bk->bij", T, e))
+        assert (off <= rest + 1e-12)[known].all()
+        tight += int((off > 0.05 * rest)[known].any())
     assert tight
 
 
@@ -473,8 +480,9 @@ def test_matrices_and_errors_of_second_order() -> None:
     assert 50 < (least > 0).sum() < 250
     B = rng.uniform(0, 0.3, (300, 6, 6))
     radius = np.abs(np.linalg.eigvals(B)).max(axis=1)
-    assert (contraction(B).holds == (radius < 1)).mean() > 0.95
-    assert not contraction(B).holds[radius >= 1].any()
+    holds, _ = contraction(B)
+    assert (holds == (radius < 1)).mean() > 0.95
+    assert not holds[radius >= 1].any()
     first = PoseErrors(0.02, 0.003)
     ours = whole_errors(2.5, 0.375, 0.008, 20.0, 11.5)
     assert ours == pytest.approx(tuple(with_rest(first, 0.008, 20.0, 11.5)), rel=1e-5)
@@ -507,8 +515,8 @@ def test_the_check_loads_nothing_of_the_search() -> None:
 def test_leaves_that_are_no_boxes_of_the_workspace_count_for_nothing(robot: Legs) -> None:
     root = pose_root(turned(TurnKind.ANY_AXIS, 20))
     far = np.concatenate([root.lower[:3], 0.9 * root.upper[3:]])
-    leaves = Leaves(far[None], np.maximum(far, root.upper)[None], np.array([True]))
-    assert show(rank(root, robot), root, leaves) == 0
+    whole = replace(root, lower=far, upper=np.maximum(far, root.upper))
+    assert show_on_leaves(rank(root, robot), whole, bytes([Node.OUTSIDE])) == (1, 0)
 
 
 @pytest.mark.slow

@@ -23,18 +23,11 @@ from screwsynth.nlp.proof.checker.proof_file import (
     read_proof,
     workspace_numbers,
 )
-from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
-from screwsynth.nlp.proof.checker.workspace import pieces
-from screwsynth.nlp.proof.checker.workspace.anyrobot import motionclaim
-from screwsynth.nlp.proof.checker.workspace.anyrobot.connected import Pieces, refuse_apart
-from screwsynth.nlp.proof.checker.workspace.anyrobot.interval import balls, half_widths
-from screwsynth.nlp.proof.checker.workspace.anyrobot.rankofrobot import rank_claim
-from screwsynth.nlp.proof.checker.workspace.anyrobot.robotclaims import robot_claims
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
-from screwsynth.nlp.proof.checker.workspace.pieces import show
-from screwsynth.nlp.proof.checker.workspace.poseroot import pose_root
-from screwsynth.nlp.proof.checker.workspace.tree import read_leaves
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, pose_root, show_on_leaves
+from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
+from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
@@ -211,11 +204,12 @@ def test_closed_loops_are_where_they_are_shown_to_be(name: str) -> None:
     z = assembly.points.moved(found.near, at, own, D)[known][:, D]
     low, high = found.lower[known][:, D], found.upper[known][:, D]
     assert ((low < z) & (z < high)).all()
-    moved = z - 0.5 * (low + high) - found.off[known]
-    moved += (found.T[known] @ (at - 0.5 * (lower + upper))[known][:, :, None])[:, :, 0]
-    assert (np.abs(moved) <= found.rho[known] + 1e-9).all()
+    moved = (z - 0.5 * (low + high)) / (0.5 * (high - low)) - found.off[known]
+    moved += (found.T[known] @ ((at - 0.5 * (lower + upper)) / (0.5 * (upper - lower)))[known][:, :, None])[:, :, 0]
+    room = 1e-9 / (high - low)
+    assert (np.abs(moved) <= found.rho[known] + room).all()
     # Without the rest the relation would be wrong: the test can fail.
-    assert (np.abs(moved) > 0.1 * found.rho[known] + 1e-9).any()
+    assert (np.abs(moved) > 0.1 * found.rho[known] + room).any()
 
 
 def test_robots_with_loops_are_on_paper() -> None:
@@ -230,20 +224,20 @@ def test_robots_with_loops_are_on_paper() -> None:
 
 
 def test_boxes_with_another_assembly_do_not_belong_together() -> None:
-    case = gallery_case("3-rps", 0.05, 10)
+    case = gallery_case("3-rps", 0.03, 6)
     assert case.workspace is not None
     root = pose_root(case.workspace)
     shown = rank_claim(case, closed_form(case.model).model, root, "regular")
     tree = node_bytes(Node.CUT, 2, value=0.5 * (root.lower[2] + root.upper[2])) + bytes([Node.BOUNDED] * 2)
-    show(shown, root, read_leaves(tree, root.lower, root.upper))
+    show_on_leaves(shown, root, tree)
     shown.finish()
     (whole,) = shown._shown
-    refuse_apart(shown._assembly, whole)
+    shown._assembly.refuse_apart(whole)
     lower, upper = whole.lower.copy(), whole.upper.copy()
     D = shown._assembly.dependent
     lower[0, D], upper[0, D] = lower[0, D] + 0.5, upper[0, D] + 0.5
     with pytest.raises(ProofError, match="same assembly"):
-        refuse_apart(shown._assembly, Pieces(lower, upper, whole.near))
+        shown._assembly.refuse_apart(replace(whole, lower=lower, upper=upper))
 
 
 def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
@@ -252,30 +246,27 @@ def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
     _, proof = reachy
     case = reachy_case(one_motor(reachy_text(1.0)))
     assert case.workspace is not None
-    monkeypatch.setattr(pieces._PoseRule, "most_pieces", 100)
+    monkeypatch.setattr(_PoseRule, "most_pieces", 100)
     other = replace(changed(proof, "regular"), workspace=workspace_numbers(case.workspace))
     # All claims about limits are named, and none is proved.
     assert "could not be shown" in rejected(other, case)
 
 
-def test_balls_hold_the_entries_and_could_be_no_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
-    entries: list[ca.Function] = []
-    monkeypatch.setattr(motionclaim, "SlopeArithmetic", lambda given: entries.append(given) or SlopeArithmetic(given))
+def test_forms_hold_the_entries_and_could_be_no_smaller() -> None:
     case = gallery_case("6-rus", 0.1, 20)
     assert case.workspace is not None
     root = pose_root(case.workspace)
-    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
+    entries = rank_claim(case, closed_form(case.model).model, root, "regular")._entries
     rng = np.random.default_rng(3)
     lower, upper = boxes_about(0.5 * (root.lower + root.upper), 0.5 * (root.upper - root.lower), rng)
-    h = half_widths(lower.T, upper.T)
-    c, e, s = balls(shown._entries(lower.T, upper.T), h)
-    centre, off = 0.5 * (lower + upper), h * rng.choice([-1.0, 1.0], h.shape) * (1 - 1e-9)
-    values = entries[-1](ca.DM((centre + off).T)).full().T
-    missed = np.abs(values - c - np.einsum("brn,bn->br", s, off))
-    known = np.isfinite(e).all(axis=1)
+    (c, a, r), _ = entries(lower, upper)
+    e = rng.choice([-1.0, 1.0], lower.shape) * (1 - 1e-9)
+    values = entries.function(ca.DM((0.5 * (lower + upper) + 0.5 * (upper - lower) * e).T)).full().T
+    missed = np.abs(values - c - np.einsum("brn,bn->br", a, e))
+    known = np.isfinite(r).all(axis=1)
     assert known.mean() > 0.8
-    assert (missed <= e + 1e-12 * (1 + np.abs(values)))[known].all()
-    assert (missed > 0.05 * e + 1e-12)[known].any()
+    assert (missed <= r + 1e-12 * (1 + np.abs(values)))[known].all()
+    assert (missed > 0.05 * r + 1e-12)[known].any()
 
 
 def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:

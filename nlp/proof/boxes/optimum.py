@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from ....models import FloatArray
 from ..checker.tree import Node, node_bytes
 from ..statement.standard_form import StandardForm
-from .engines import Engine
-from .examination import COLLAPSED, Examination, Verdict
+from .engine import COLLAPSED, Engine, Examination, Verdict
 from .incumbent import PointKeeper
 from .rows import SMALL, WHOLE, Boxes
 from .search import Order, Rule, Search, Verdicts

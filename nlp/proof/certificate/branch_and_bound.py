@@ -21,7 +21,7 @@ from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
 from ...interruption import one_search, reason_of, reason_to_stop
 from ...program.nlp import Nlp
-from ..boxes.engines import Engine
+from ..boxes.engine import Engine
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search

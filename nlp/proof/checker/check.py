@@ -25,7 +25,7 @@ from .optimum import Claims, rule_of
 from .polymodels import Tilts
 from .premises import fingerprint, is_same_program
 from .proof_file import Proof, ProofError
-from .tree import FACES, Claim, Node, SharedLeaf, TreeReader, read_claims, read_shared
+from .tree import FACES, Box, Node, SharedLeaf, TreeReader, read_claims, read_shared
 
 #: Rounding of sums of a few numbers, in parts of their sizes: many times the largest possible.
 _SUMS = 1e-13
@@ -85,7 +85,7 @@ def _of_tree(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[C
     reader = TreeReader(tree)
     claims = read_claims(reader, form)
     reader.finish()
-    return len(claims), _grouped(claims, form, bound)
+    return _claims_of(claims, form, bound)
 
 
 def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
@@ -107,27 +107,24 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[
         if not (math.isfinite(size) and math.fsum(bounds) + _SUMS * size <= bound):
             raise ProofError("the bounds of the limbs are more than the proven one together")
     parts = empty or parts
-    every = [each for limb, least, claims in parts for each in _grouped(claims, limb, least)]
-    return sum(len(claims) for _, _, claims in parts), every
+    read = [_claims_of(boxes, limb, least) for limb, least, boxes in parts]
+    return sum(leaves for leaves, _ in read), [each for _, some in read for each in some]
 
 
-def _grouped(claims: list[Claim], form: StandardForm, bound: float) -> list[Claims]:
-    """Return the claims of a tree by kind and index.
+def _claims_of(boxes: dict[tuple[Node, int], list[Box]], form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
+    """Return the number of the boxes of a tree, and the claims about them.
 
     Raises:
         ProofError: a box collapses on a face that is not the form's.
     """
-    groups: dict[tuple[Node, int], list[Claim]] = {}
-    for claim in claims:
-        groups.setdefault((claim.kind, claim.index), []).append(claim)
     every = []
-    for (kind, i), group in groups.items():
-        lower, upper = _stacked([(each.lower, each.upper) for each in group], form.n)
+    for (kind, i), some in boxes.items():
+        lower, upper = _stacked(some, form.n)
         ends, whole = (upper, form.upper) if kind == Node.FACE_UPPER else (lower, form.lower)
         if kind in FACES and (ends[i] != whole[i]).any():
             raise ProofError(f"a box is collapsed on a face of {form.names[i]} that is not the case's")
-        every.append(Claims(form, kind, i, lower, upper, np.full(len(group), bound)))
-    return every
+        every.append(Claims(form, kind, i, lower, upper, np.full(len(some), bound)))
+    return sum(map(len, boxes.values())), every
 
 
 def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
@@ -165,7 +162,7 @@ def _of_sum(leaves: Sequence[SharedLeaf], common: StandardForm, K: int, bound: f
     return Claims(common, Node.BOUNDED, 0, lower, upper, left, tilts)
 
 
-def _stacked(boxes: Sequence[tuple[FloatArray, FloatArray]], n: int) -> tuple[FloatArray, FloatArray]:
+def _stacked(boxes: Sequence[Box], n: int) -> tuple[FloatArray, FloatArray]:
     """Return the ends (n, L) of boxes."""
     lower = np.array([low for low, _ in boxes]).reshape(-1, n).T
     return lower, np.array([high for _, high in boxes]).reshape(-1, n).T

@@ -54,17 +54,7 @@ def determinant_sign(
         platform: (6, 3) those on the platform.
         y: (6,) coordinates of the pose.
     """
-    return _sign(exact_rows(kind, axis, base, platform, y))
-
-
-def exact_rows(
-    kind: TurnKind,
-    axis: Sequence[float],
-    base: Sequence[Sequence[float]],
-    platform: Sequence[Sequence[float]],
-    y: Sequence[float],
-) -> list[list[Fraction]]:
-    """Return the scaled rows (6, 6) at a pose; arguments are those of :func:`determinant_sign`."""
+    # Each row is scaled by the square of the quaternion's size.
     position = [Fraction(each) for each in y[:3]]
     turn = _scaled_rotation(_quaternion(kind, axis, [Fraction(each) for each in y[3:]]))
     scale = turn[3][0]
@@ -76,7 +66,7 @@ def exact_rows(
         # The moment of s (p - b) + u about the platform's origin is u x s (p - b): times s once too often.
         moment = [(arm[i - 2] * span[i - 1] - arm[i - 1] * span[i - 2]) / scale for i in range(3)]
         rows.append([*(each + part for each, part in zip(span, arm, strict=True)), *moment])
-    return rows
+    return sign_of_determinant(rows)
 
 
 def _quaternion(kind: TurnKind, axis: Sequence[float], turn: Sequence[Fraction]) -> _Quaternion:
@@ -103,14 +93,9 @@ def _scaled_rotation(q: _Quaternion) -> list[list[Fraction]]:
     ]
 
 
-def sign_of_determinant(matrix: Sequence[Sequence[float]]) -> int:
-    """Return the sign of the determinant of a square matrix of doubles."""
-    return _sign([[Fraction(each) for each in row] for row in matrix])
-
-
-def _sign(rows: list[list[Fraction]]) -> int:
-    """Return the sign of a determinant, by elimination."""
-    rows, sign = [list(row) for row in rows], 1
+def sign_of_determinant(matrix: Sequence[Sequence[float | Fraction]]) -> int:
+    """Return the sign of the determinant of a square matrix of doubles or fractions, by elimination."""
+    rows, sign = [[Fraction(each) for each in row] for row in matrix], 1
     for k in range(len(rows)):
         pivot = next((i for i in range(k, len(rows)) if rows[i][k]), None)
         if pivot is None:

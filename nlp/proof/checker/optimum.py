@@ -165,11 +165,14 @@ class BoundRule(FormRule):
                 few = model.select(rest)
                 shown.cut(which, reaching_part(few, bound[which], lower[:, which], upper[:, which]))
             self._cut_by_conditions(shown, which, forms, lower, upper)
-            self._collapse(shown, which, forms)
+            if self._slopes.stops:
+                self._collapse(shown, which, forms)
         return shown
 
     def _collapse(self, shown: Shown, which: NDArray[np.intp], forms: Forms) -> None:
         """Leave only the faces of some pieces, with their forms, along own variables in which the limb rises."""
+        left = np.flatnonzero((shown.lower[:, which] <= shown.upper[:, which]).all(axis=0))
+        which, forms = which[left], forms.select(left)
         low, high = shown.lower[:, which], shown.upper[:, which]
         slopes, nothing = self._gradient(low, high), self._slopes.nothing
         for i in self._slopes.stops:

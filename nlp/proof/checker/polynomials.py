@@ -144,22 +144,6 @@ def middles(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArra
     return centre, np.where(radius > 0, np.nextafter(radius, np.inf), 0.0)
 
 
-class Taylor(NamedTuple):
-    """A function ``f(c + Y) = f(c) + f'(c) Y + curve Y^2 +- third |Y|^3`` over a range, (N,) each.
-
-    Attributes:
-        value, slope, curve: ``f(c)``, ``f'(c)`` and half of ``f''(c)``.
-        third: bound of the rest in parts of ``|Y|^3``.
-        error: error of value, slope and curve beyond that of arithmetic.
-    """
-
-    value: FloatArray
-    slope: FloatArray
-    curve: FloatArray
-    third: FloatArray
-    error: FloatArray
-
-
 def settled(on: tuple[int, ...], P: FloatArray, s: FloatArray, V: Ends) -> Polynomial:
     """Return a value, its range intersected with that of its polynomial; undefined unless that is finite."""
     at = places(len(on))
@@ -313,20 +297,36 @@ class _Boxes(Composed[Polynomial]):
         s = s + size * (N.s + error + _QUOTIENT * (2 * N.size + size * D.size)) + _TINY * (1 + far + reach + rest)
         return settled(on, P, s, ends.mul(square, inverse))
 
-    def taylor(self, u: Polynomial, terms: Taylor, V: Ends) -> Polynomial:
-        """Return ``f(c + Y)``, Y without its constant, ``f = f(c) + f'(c) Y + curve Y^2 +- third |Y|^3``."""
+    def taylor(
+        self,
+        u: Polynomial,
+        V: Ends,
+        terms: tuple[FloatArray, FloatArray, FloatArray],
+        third: FloatArray | float,
+        error: FloatArray | float,
+    ) -> Polynomial:
+        """Return ``f(c + Y) = f(c) + f'(c) Y + curve Y^2 +- third |Y|^3``, Y being u without its constant c.
+
+        Args:
+            u: the value.
+            V: range of ``f(u)``.
+            terms: ``f(c)``, ``f'(c)`` and ``curve``, half of ``f''(c)``, (N,) each.
+            third: bound of the rest in parts of ``|Y|^3``.
+            error: error of the three terms beyond that of arithmetic.
+        """
+        value, slope, curve = terms
         at, moved = places(len(u.on)), u.rad + u.curved
         reach = np.fmin(moved + u.s, np.maximum(u.V[1] - u.P[0], u.P[0] - u.V[0]))
-        P = terms.slope * u.P
-        P[0] = terms.value
-        _add_square(P, u.P[at.linear], at, terms.curve)
-        steep, bent = np.abs(terms.slope), np.abs(terms.curve)
+        P = slope * u.P
+        P[0] = value
+        _add_square(P, u.P[at.linear], at, curve)
+        steep, bent = np.abs(slope), np.abs(curve)
         s = steep * u.s + bent * ((2 * u.rad + u.curved) * u.curved + (2 * moved + u.s) * u.s)
-        s = s + terms.third * (reach * reach * reach)
+        s = s + third * (reach * reach * reach)
         far = moved + u.s
         # Underflow takes less than _TINY from each power of what moved.
-        s = s + (terms.error + _TINY * (1 + bent + terms.third)) * (1 + far + far * far)
-        s = s + _TAYLOR * (np.abs(terms.value) + steep * u.size + bent * (u.size * u.size))
+        s = s + (error + _TINY * (1 + bent + third)) * (1 + far + far * far)
+        s = s + _TAYLOR * (np.abs(value) + steep * u.size + bent * (u.size * u.size))
         return settled(u.on, P, s, V)
 
     def sqrt(self, u: Polynomial) -> Polynomial:
@@ -334,44 +334,37 @@ class _Boxes(Composed[Polynomial]):
 
         ``S = sqrt(c + Y) = r + Y / 2r - Y^2 / 8r^3 + Y^3 (S + 3r) / (8 r^3 (S + r)^3)`` with ``r = sqrt(c)``.
         """
-        V = ends.sqrt(u.V)
-        root = np.sqrt(u.P[0])
+        V, root = ends.sqrt(u.V), np.sqrt(u.P[0])
         slope = 0.5 / root
         curve = -0.25 * slope / u.P[0]
         third = (V[0] + 3 * root) / (V[0] + root) ** 3 * -curve * (1 + 1e-13)
-        none = 0.0 * V[0]
-        return self.taylor(u, Taylor(root, slope, curve, third, none), V)
+        return self.taylor(u, V, (root, slope, curve), third, 0.0)
 
     def sin(self, u: Polynomial) -> Polynomial:
         sine, cosine = np.sin(u.P[0]), np.cos(u.P[0])
-        sixth = np.full_like(sine, 1 / 6 + 1e-15)
-        terms = Taylor(sine, cosine, -0.5 * sine, sixth, np.full_like(sine, ends.LIBRARY))
-        return self.taylor(u, terms, ends.wave(u.V, np.sin))
+        return self.taylor(u, ends.wave(u.V, np.sin), (sine, cosine, -0.5 * sine), 1 / 6 + 1e-15, ends.LIBRARY)
 
     def cos(self, u: Polynomial) -> Polynomial:
         sine, cosine = np.sin(u.P[0]), np.cos(u.P[0])
-        sixth = np.full_like(sine, 1 / 6 + 1e-15)
-        terms = Taylor(cosine, -sine, -0.5 * cosine, sixth, np.full_like(sine, ends.LIBRARY))
-        return self.taylor(u, terms, ends.wave(u.V, np.cos))
+        return self.taylor(u, ends.wave(u.V, np.cos), (cosine, -sine, -0.5 * cosine), 1 / 6 + 1e-15, ends.LIBRARY)
 
     def exp(self, u: Polynomial) -> Polynomial:
         V, value = ends.exp(u.V), np.exp(u.P[0])
         third = np.maximum(V[1], value) * (1 / 6 + 1e-13)
-        return self.taylor(u, Taylor(value, value, 0.5 * value, third, 2 * ends.LIBRARY * value), V)
+        return self.taylor(u, V, (value, value, 0.5 * value), third, 2 * ends.LIBRARY * value)
 
     def log(self, u: Polynomial) -> Polynomial:
-        V, c = ends.log(u.V), u.P[0]
+        c = u.P[0]
         low = np.minimum(np.where(u.V[0] > 0, u.V[0], np.nan), c)
         value, slope = np.log(c), 1 / c
-        error = ends.LIBRARY * (1 + np.abs(value))
-        return self.taylor(u, Taylor(value, slope, -0.5 * slope * slope, (1 / 3 + 1e-13) / low**3, error), V)
+        third, error = (1 / 3 + 1e-13) / low**3, ends.LIBRARY * (1 + np.abs(value))
+        return self.taylor(u, ends.log(u.V), (value, slope, -0.5 * slope * slope), third, error)
 
     def atan(self, u: Polynomial) -> Polynomial:
         """Return the arc tangent; its third derivative is at most 2 in size."""
         value, slope = np.arctan(u.P[0]), 1 / (1 + u.P[0] * u.P[0])
-        third = np.full_like(value, 1 / 3 + 1e-15)
-        terms = Taylor(value, slope, -u.P[0] * slope * slope, third, np.full_like(value, ends.LIBRARY))
-        return self.taylor(u, terms, ends.atan(u.V))
+        terms = value, slope, -u.P[0] * slope * slope
+        return self.taylor(u, ends.atan(u.V), terms, 1 / 3 + 1e-15, ends.LIBRARY)
 
     def ramp(self, u: Polynomial) -> Polynomial:
         """Return max(u, 0): with any number k from 0 to 1 it exceeds k u by 0 to max(-k lo, (1 - k) hi)."""

@@ -36,7 +36,6 @@ from __future__ import annotations
 import enum
 import struct
 from collections.abc import Callable, Set
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -70,6 +69,8 @@ class Node(enum.IntEnum):
 #: Kinds whose node has the faces of a box.
 FACES = (Node.FACE_UPPER, Node.FACE_LOWER)
 
+#: Ends (n,) of a box.
+Box = tuple["FloatArray", "FloatArray"]
 #: Callback with a leaf's (or face's) kind, variable (-1 for a leaf), and the ends (n,) of its box.
 Leaf = Callable[[int, int, "FloatArray", "FloatArray"], None]
 
@@ -79,9 +80,7 @@ def node_bytes(kind: Node, *indices: int, value: float | None = None) -> bytes:
     return bytes([kind, *indices]) + (b"" if value is None else _VALUE.pack(value))
 
 
-def halves(
-    lower: FloatArray, upper: FloatArray, i: int, value: float | None = None
-) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
+def halves(lower: FloatArray, upper: FloatArray, i: int, value: float | None = None) -> tuple[Box, Box]:
     """Return the ends of both parts of a box with ends (n,), cut along variable i at a value or in the middle."""
     at = 0.5 * lower[i] + 0.5 * upper[i] if value is None else value
     return (lower, with_end(upper, i, at)), (with_end(lower, i, at), upper)
@@ -169,9 +168,7 @@ class TreeReader:
             else:
                 waiting += self._cut(kind, i, (low, high), leaf)
 
-    def _cut(
-        self, kind: int, i: int, box: tuple[FloatArray, FloatArray], leaf: Leaf
-    ) -> list[tuple[FloatArray, FloatArray]]:
+    def _cut(self, kind: int, i: int, box: Box, leaf: Leaf) -> list[Box]:
         """Read a cut: one part is a leaf, and the other, if it is not empty, is returned."""
         value = self.number()
         if not np.isfinite(value):
@@ -185,29 +182,13 @@ class TreeReader:
         return [below] if value >= box[0][i] else []
 
 
-@dataclass(frozen=True, eq=False)
-class Claim:
-    """The claim of a leaf or of a face about its box.
-
-    Attributes:
-        kind: kind of the node.
-        index: of the condition or variable; 0 where the kind has none.
-        lower, upper: (n,) ends of the box.
-    """
-
-    kind: Node
-    index: int
-    lower: FloatArray
-    upper: FloatArray
-
-
-def read_claims(reader: TreeReader, form: StandardForm) -> list[Claim]:
-    """Read the claims of a tree; their boxes cover the form's.
+def read_claims(reader: TreeReader, form: StandardForm) -> dict[tuple[Node, int], list[Box]]:
+    """Read the claims of a tree: their boxes, which cover the form's, by kind of node and condition or variable (or 0).
 
     Raises:
         ProofError: the bytes are no tree.
     """
-    claims: list[Claim] = []
+    claims: dict[tuple[Node, int], list[Box]] = {}
     conditions = range(len(form.functions), len(form.functions) + len(form.conditions))
 
     def leaf(kind: int, i: int, lower: FloatArray, upper: FloatArray) -> None:
@@ -218,7 +199,7 @@ def read_claims(reader: TreeReader, form: StandardForm) -> list[Claim]:
             index = reader.index(range(form.n), "variable")
         elif kind not in (Node.BOUNDED, *FACES) or (kind in FACES) != (i >= 0):
             raise ProofError(f"the tree holds {kind} where a reason must stand")
-        claims.append(Claim(Node(kind), index, lower, upper))
+        claims.setdefault((Node(kind), index), []).append((lower, upper))
 
     reader.walk(form.lower, form.upper, leaf, frozenset({Node.HALF, Node.ABOVE, Node.BELOW, *FACES}))
     return claims

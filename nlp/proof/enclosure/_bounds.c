@@ -102,16 +102,17 @@ static PyObject *finish_call(Borrowed *all, double *memory)
 
 static PyObject *examine(PyObject *module, PyObject *args)
 {
-    PyObject *tape, *values, *objective, *equation, *depends, *low, *high, *whose, *squared, *arrays, *models = NULL, *least = NULL;
+    PyObject *tape, *values, *objective, *equation, *depends, *low, *high, *whose, *squared, *arrays, *models = NULL;
+    PyObject *least = Py_None, *tilts = Py_None;
     Form form = {0};
     Report report = {0};
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiOOOOOO!OOO)O!nnnd|iOO", &form.n, &form.functions, &equation, &depends, &low, &high,
+    if (!PyArg_ParseTuple(args, "(iiOOOOOO!OOO)O!nnnd|iOOO", &form.n, &form.functions, &equation, &depends, &low, &high,
                           &whose, &PyTuple_Type, &tape, &values, &objective, &squared, &PyTuple_Type, &arrays, &report.B,
-                          &begin, &finish, &threshold, &report.shared, &models, &least))
+                          &begin, &finish, &threshold, &report.shared, &models, &least, &tilts))
         return NULL;
     int good = form.n > 0 && form.functions > 0 && report.shared >= 0 && report.shared <= form.n && read_tape(&all, tape, &form.tape);
     good = good && borrow_indices(&all, whose, &form.whose, &form.quotients);
@@ -130,7 +131,8 @@ static PyObject *examine(PyObject *module, PyObject *args)
     good = good && borrow(&all, low, (Array)READ(form.low, n)) && borrow(&all, high, (Array)READ(form.high, n));
     good = good && borrow_all(&all, arrays, results, COUNT(results));
     good = good && (!models || borrow(&all, models, (Array)WRITE(report.models, rows_of_models(form.n, report.shared) * B)));
-    good = good && (!least || borrow(&all, least, (Array)READ(report.least, B)));
+    good = good && (least == Py_None || borrow(&all, least, (Array)READ(report.least, B)));
+    good = good && (tilts == Py_None || (models && report.shared == n && borrow(&all, tilts, (Array)READ(report.tilts, (3 + n + n * n) * B))));
     report.shared = models ? report.shared : 0;
     good = good && form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && finish <= B;
     for (int k = 0; good && k < form.quotients; k++)
@@ -254,12 +256,12 @@ static PyMethodDef methods[] = {
      "a has the coefficients of pairs of variables too."},
     {"examine", examine, METH_VARARGS,
      "examine((n, functions, equation, depends, low, high, whose, tape, values, objective, squared), arrays, B,\n"
-     "        begin, finish, threshold, shared=0, models=None, least=None)\n\n"
+     "        begin, finish, threshold, shared=0, models=None, least=None, tilts=None)\n\n"
      "Examine the boxes begin <= i < finish of B; a tape is (code, constants, length, registers, results).\n"
      "values is the tape of the expressions without their gradients and the rows for tangents to squares, whose functions\n"
      "are in squared, or None; objective that of the functions and\n"
      "their gradients where conditions are evaluated only if needed, or None.\n"
-     "With models the first variables are shared with other limbs."},
+     "With models the first variables are shared with other limbs, whose tilts the part without variables of its own gets."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -34,6 +34,12 @@ from .posed_layout import at_one_pose
 
 #: Part of a derivative below which its size is smoothed, and place of the pose in its ranges at which it is taken.
 _PART, _PLACE = 0.03, 0.75
+#: Operations that are smooth wherever their derivatives have values.
+_SMOOTH = (
+    *(ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_ASSIGN, ca.OP_NEG, ca.OP_TWICE, ca.OP_SQ, ca.OP_SQRT, ca.OP_INV),
+    *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ATAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_EXP, ca.OP_LOG, ca.OP_ADD, ca.OP_SUB),
+    *(ca.OP_MUL, ca.OP_DIV, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_HYPOT),
+)
 
 
 class BuiltModel(NamedTuple):
@@ -233,6 +239,21 @@ def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
     """
     free = replace(model, closure=(), loops=(), distances=(), signs=())
     return coordinate_layout(replace(case, model=free), at)
+
+
+def is_smooth(number: SX) -> bool:
+    """Return whether derivatives of an expression (1, 1) bound its change: it has smooth operations alone.
+
+    The angle of a vector jumps by a turn, where its derivatives are smooth, unless its sine is a length.
+    """
+    function, last = ca.Function("number", ca.symvar(number), [number]), dict[int, int]()
+    for k in range(function.n_instructions()):
+        op, places = function.instruction_id(k), function.instruction_input(k)
+        if op not in _SMOOTH and not (op == ca.OP_ATAN2 and last[places[0]] == ca.OP_SQRT):
+            return False
+        if op != ca.OP_OUTPUT:
+            last[function.instruction_output(k)[0]] = op
+    return True
 
 
 def second_order_name(claim: str) -> str:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
-from ..checker.workspace.anyrobot.robotclaims import RobotClaims, robot_claims
-from ..checker.workspace.expected import ERRORS, ExpectedClaim, expected_claims
+from ..checker.workspace.statement import ERRORS, ExpectedClaim, RobotClaims, expected_claims, robot_claims
 from ..statement.claims import REACH, asked_name, one_machine_name
 from ..statement.machine import Legs, legs_of
 from ..statement.tolerance import second_order_name
@@ -61,7 +60,7 @@ def paper_of(
     first = dict(zip(reversed(keys), reversed(judged.extremes), strict=True))
     proved: dict[tuple[str, str], ProofClaim] = {}
     unproved = []
-    expected = expected_claims(judged.case, robot.layout, legs, quantities, leg_error, robot.more)
+    expected = expected_claims(judged.case, robot, quantities, leg_error)
     for each in expected:
         if judged.case.joint_centre_tolerance and (robot.machines is None or (each.kind in _RANKS and legs is None)):
             unproved.append(Unproved(each.name, each.sense, _AS_BUILT))

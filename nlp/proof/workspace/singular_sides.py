@@ -8,9 +8,8 @@ from ....models import FloatArray, Model
 from ...case.case import Case
 from ...case.workspace import Workspace
 from ..checker.proof_file import ProofError
-from ..checker.workspace.anyrobot.rankofrobot import rank_claim
-from ..checker.workspace.anyrobot.signchange import show_sign_change
-from ..checker.workspace.poseroot import pose_root
+from ..checker.workspace.pose_boxes import pose_root
+from ..checker.workspace.ranks import rank_claim
 from ..statement.claims import REGULAR
 
 #: Distances from the singular pose, in parts of the workspace, and number of poses that are tried at each.
@@ -45,7 +44,7 @@ def singular_sides(
         values = np.nan_to_num(np.linalg.det(claim.values_at(points)))
         one, other = points[values.argmin()], points[values.argmax()]
         try:
-            show_sign_change(claim, root, one, other)
+            claim.show_sign_change(root, one, other)
         except ProofError:
             continue
         return one, other

@@ -13,17 +13,24 @@ from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
 from screwsynth.models.arrays import first_largest
-from screwsynth.nlp.proof.boxes.examination import COLLAPSED, UNMOVED, Examination, Verdict
-from screwsynth.nlp.proof.boxes.tapes import objective_tape, search_tape, value_tape, without_conditions
+from screwsynth.nlp.proof.boxes.engine import (
+    COLLAPSED,
+    UNMOVED,
+    Examination,
+    Verdict,
+    objective_tape,
+    search_tape,
+    value_tape,
+    without_conditions,
+)
 from screwsynth.nlp.proof.enclosure.forms import Midpoints, midpoints
-from screwsynth.nlp.proof.enclosure.quadratic_models import affine_ends_reaching, gradient_model, multipliers, ranges
 from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows, tangent_rows
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 from .first_order import enclose
 from .first_pass import LINEAR, Cuts, FirstPass, first_pass
 from .intervals import ULP
-from .quadratic_models import GradientModel, QuadraticModel
+from .quadratic_models import GradientModel, QuadraticModel, affine_ends_reaching, gradient_model, multipliers, ranges
 from .squared_quotients import with_quotients
 
 #: Part of a side below which a contraction is not worth its leaf in a proof.
@@ -197,7 +204,7 @@ class NumpyEngine:
         The ends of gradients that are not scaled are for points whose values are at least ``least`` (B,).
         """
         rows = gradient_model(enclose(self._tape, lower, upper), radius)
-        return with_quotients(GradientModel(**vars(rows)), self._quotients, len(self.equation), radius, least)
+        return with_quotients(rows, self._quotients, len(self.equation), radius, least)
 
     def multipliers(self, model: GradientModel, high: FloatArray, first: int = 0) -> FloatArray:
         """Return weights (R, B) of the Lagrangian: see :func:`.quadratic_models.multipliers`."""

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.boxes.examination import UNMOVED, Verdict
-from screwsynth.nlp.proof.enclosure.quadratic_models import Ends, multipliers
+from screwsynth.nlp.proof.boxes.engine import UNMOVED, Verdict
+from screwsynth.nlp.proof.enclosure.quadratic_models import Ends
 from screwsynth.nlp.proof.enclosure.tape import Tape
 
 from .intervals import TINY, ULP
-from .quadratic_models import QuadraticModel
+from .quadratic_models import QuadraticModel, multipliers
 from .second_order import Forms, enclose_second, monomials
 from .tangent_bounds import tangent_forms
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.boxes.examination import Verdict
-from screwsynth.nlp.proof.boxes.limbs.models import LimbModels
+from screwsynth.nlp.proof.boxes.engine import LimbModels, Verdict
 from screwsynth.nlp.proof.enclosure.forms import midpoints
-from screwsynth.nlp.proof.enclosure.quadratic_models import ranges
 
 from .bounding import NumpyEngine
+from .quadratic_models import ranges
 
 
 class NumpyLimbEngine:

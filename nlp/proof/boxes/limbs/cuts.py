@@ -9,9 +9,8 @@ import numpy as np
 
 from .....models.arrays import first_largest
 from ...enclosure.forms import ULP, midpoints
-from ...enclosure.quadratic_models import Ends, GradientModel, QuadraticModel, affine_ends_reaching
+from ..engine import LimbModels
 from .boxes import OwnBoxes, SharedBoxes
-from .models import LimbModels
 from .sums import LimbBound, first_largest_of_lists
 
 if TYPE_CHECKING:
@@ -37,22 +36,18 @@ class SharedSums:
     Attributes:
         models: of each limb.
         parts: bounds of each limb.
-        common: enclosures of the part with shared variables alone.
-        M: (B) models of the common part with all tilts and bests.
+        common: models of the part with shared variables alone, with all tilts and bests, and what is left of the boxes.
         sums: (B,) upper bounds from these models: the limbs' bests, and the most that the common part adds to them.
         bound: (B,) upper bounds: the lesser of these and of those that the boxes had before.
         is_possible: (B,) whether the common conditions can hold and every limb has a box left.
-        binding: (R, B) whether a common condition may bind.
     """
 
     models: list[LimbModels]
     parts: list[LimbBound]
-    common: GradientModel
-    M: QuadraticModel
+    common: LimbModels
     sums: FloatArray
     bound: FloatArray
     is_possible: NDArray[np.bool_]
-    binding: NDArray[np.bool_]
 
 
 class Left(NamedTuple):
@@ -81,61 +76,23 @@ class LeftOwn(NamedTuple):
     along: NDArray[np.intp]
 
 
-def contract_shared(form: StandardForm, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> Left:
-    """Return what is left of shared boxes where the sum can exceed a threshold and each common condition can hold."""
-    centre, radius = midpoints(boxes.lower, boxes.upper)
-    ends = [sums.M.ends_reaching(threshold)]
-    for r, is_equation in enumerate(form.is_equation):
-        if r == 0:
-            continue
-        for sign in (1.0, -1.0) if is_equation else (-1.0,):
-            ends.append(affine_ends_reaching(sums.common.value, r, sign, 0.0))
-            ends.append(sums.common.expression_model(r, sign).ends_reaching(0.0))
-    return _moved(boxes.lower, boxes.upper, centre, radius, ends, np.isfinite(sums.bound))
-
-
-def _moved(
-    lower: FloatArray,
-    upper: FloatArray,
-    centre: FloatArray,
-    radius: FloatArray,
-    ends: list[Ends],
-    usable: NDArray[np.bool_],
-) -> Left:
-    """Return boxes with ends moved to the tightest of some, in parts of the radius, where that gains enough."""
-    margin = (np.abs(centre) + radius) * (4 * ULP)
-    low = centre + radius * np.max([each.low for each in ends], axis=0) - margin
-    high = centre + radius * np.min([each.high for each in ends], axis=0) + margin
-    worth = _WORTH * (upper - lower)
-    new_lower = np.where(usable & (low - lower > worth), low, lower)
-    new_upper = np.where(usable & (upper - high > worth), high, upper)
-    alive = np.asarray((new_lower <= new_upper).all(axis=0))
-    return Left(np.where(alive, new_lower, lower), np.where(alive, new_upper, upper), alive)
-
-
 def collapse_monotone(form: StandardForm, boxes: SharedBoxes, sums: SharedSums, left: Left) -> Left:
     """Return shared boxes collapsed on faces of the whole box, or dropped, where the sum rises along a variable.
 
     The argument is that of the search of whole boxes: no condition may stop a point, of the common part or of a limb.
     """
     lower, upper, alive = left.lower.copy(), left.upper.copy(), left.alive.copy()
+    parts = [*zip(sums.models, [own.starts for own in boxes.own], strict=True), (sums.common, np.arange(boxes.count))]
     for i in range(form.n):
         for side in (1, -1):
             slope, size = np.zeros(boxes.count), np.zeros(boxes.count)
             stopped = np.zeros(boxes.count, dtype=bool)
-            for found, own in zip(sums.models, boxes.own, strict=True):
+            for found, starts in parts:
                 each = found.slope_lo[i] if side > 0 else -found.slope_hi[i]
-                least = np.minimum.reduceat(np.where(found.is_possible, each, np.inf), own.starts)
+                least = np.minimum.reduceat(np.where(found.is_possible, each, np.inf), starts)
                 slope, size = slope + least, size + np.abs(least)
                 stops = found.is_possible & (found.stops_up[i] if side > 0 else found.stops_down[i])
-                stopped |= np.logical_or.reduceat(stops, own.starts)
-            g_lo, g_hi = sums.common.gradient_lo[:, i], sums.common.gradient_hi[:, i]
-            own_slope = g_lo[0] if side > 0 else -g_hi[0]
-            slope, size = slope + own_slope, size + np.abs(own_slope)
-            for r in range(1, len(g_lo)):
-                if form.dependence[r][i]:
-                    falls = (g_hi[r] < 0) if side > 0 else (g_lo[r] > 0)
-                    stopped |= sums.binding[r] & ~(falls & (not form.is_equation[r]))
+                stopped |= np.logical_or.reduceat(stops, starts)
             rises = (slope - _SUM * size > 0) & ~stopped & alive & (boxes.upper[i] > boxes.lower[i])
             whole = form.upper[i] if side > 0 else form.lower[i]
             at_face = rises & ((upper[i] if side > 0 else lower[i]) == whole)
@@ -171,10 +128,16 @@ def cut_own(
     keep = (part.bounds > -np.inf) & ~(part.bounds < level[own.of])
     ends = part.L.ends_reaching(level[own.of])
     centre, radius = midpoints(own.lower, own.upper)
-    own_ends = [Ends(ends.low[m:], ends.high[m:])]
-    moved = _moved(found.lower[m:], found.upper[m:], centre, radius, own_ends, found.defined)
-    keep &= moved.alive
-    lower, upper = moved.lower, moved.upper
+    margin = (np.abs(centre) + radius) * (4 * ULP)
+    low = centre + radius * ends.low[m:] - margin
+    high = centre + radius * ends.high[m:] + margin
+    old_lower, old_upper = found.lower[m:], found.upper[m:]
+    worth = _WORTH * (old_upper - old_lower)
+    lower = np.where(found.defined & (low - old_lower > worth), low, old_lower)
+    upper = np.where(found.defined & (old_upper - high > worth), high, old_upper)
+    alive = (lower <= upper).all(axis=0)
+    keep &= alive
+    lower, upper = np.where(alive, lower, old_lower), np.where(alive, upper, old_upper)
     width = np.where(own.upper > own.lower, own.upper - own.lower, 1.0)
     change = LINEAR * np.abs(part.L.b[m:]) + np.abs(part.L.H[m:]).sum(axis=1) + part.L.w[m:]
     change = np.where(upper > lower, change * (upper - lower) / width, 0.0)

@@ -15,7 +15,7 @@ import numpy as np
 from .....models import FloatArray
 from ...statement.limb_separation import Limb, Separation
 from ...statement.standard_form import StandardForm
-from ..engines import Engine
+from ..engine import Engine
 from ..incumbent import Incumbent
 from ..optimum import optimum_search
 from ..symmetry import grouped

@@ -11,24 +11,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .....models.arrays import first_largest
 from ...checker.tree import Node, leaf_bytes, node_bytes
-from ...enclosure.quadratic_models import ranges
-from ..engines import Engine
+from ..engine import Engine, LimbModels
 from ..optimum import LEAST_WIDTHS, reason_without_bound
 from ..rows import SMALL, WHOLE, Boxes, some
 from ..search import Order, Rule, Search, Verdicts
 from ..threads import Threads
 from ..tree import TreeRecord, halves_of, keys_of
 from .boxes import OwnBoxes, SharedBoxes
-from .common import CommonPart
-from .cuts import LINEAR, LeftOwn, SharedSums, collapse_monotone, contract_shared, cut_own
-from .models import LimbModels
-from .sums import LimbBound, bound_limb, first_largest_of_lists, with_tilts
+from .cuts import LINEAR, Left, LeftOwn, SharedSums, collapse_monotone, cut_own
+from .sums import LimbBound, bound_limb, first_largest_of_lists, tilts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -116,7 +114,6 @@ class SharedRule(Rule[SharedColumns]):
             raise ValueError("the limbs share no variable")
         self._form, self._separation, self._incumbent = form, separation, incumbent
         self.common_form = separation.common
-        self._common = CommonPart(separation.common)
         self._m, self._turn = len(separation.shared), 0
         # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
         self._threads = Threads(jobs)
@@ -125,6 +122,11 @@ class SharedRule(Rule[SharedColumns]):
         self._recorder = recorder
         if recorder is not None:
             recorder.begin = bytes([Node.SHARED])
+
+    @cached_property
+    def _common(self) -> Engine:
+        """The part with shared variables alone."""
+        return Engine(self.common_form, 1, self._m)
 
     def fault(self, small: Sequence[Boxes[SharedColumns]]) -> str:
         """Return the reason for stopping at boxes without a finite bound; empty without any."""
@@ -145,9 +147,11 @@ class SharedRule(Rule[SharedColumns]):
         current, before = view(boxes), self._incumbent.value
         self._turn += 1
         with np.errstate(all="ignore"):
-            sums = self._examine(current)
+            # A proof has no cuts of shared boxes, and no own boxes dropped for the sake of the other limbs.
+            below = self.target if self._recorder is None else -math.inf
+            sums = self._examine(current, below)
             self._improve(current, sums)
-            left, alive, emptied = self._branch(current, sums, self.target)
+            left, alive, emptied = self._branch(current, sums, below)
         # What contraction or dropping of own boxes excluded may reach the threshold.
         examined, reasons = sum(own.of.size + own.count for own in current.own), (sums, alive, emptied)
         return Verdicts(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
@@ -166,23 +170,17 @@ class SharedRule(Rule[SharedColumns]):
         for k, i, parts in zip(np.flatnonzero(alive)[cut].tolist(), split[cut].tolist(), halves, strict=True):
             self._recorder.add(keys[k], node_bytes(Node.HALF, i), *parts)
 
-    def _examine(self, boxes: SharedBoxes) -> SharedSums:
-        """Return bounds of shared boxes."""
+    def _examine(self, boxes: SharedBoxes, below: float) -> SharedSums:
+        """Return bounds of shared boxes, and their parts in which the sum can exceed a value."""
         found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
         models, parts = [each.models for each in found], [each.bound for each in found]
-        common = self._common.model(boxes.lower, boxes.upper)
-        low, high = ranges(common)
-        impossible, binding = self._common.states(low, high)
-        tilted = common.b.copy()
-        for part in parts:
-            tilted[0] += part.tilt.g
-        M = with_tilts(common.sum_model(self._common.multipliers(tilted, common.s, high)), parts)
-        bound = M.bound()
-        known = np.isfinite(common.value.s[0]) & np.all([np.isfinite(part.best) for part in parts], axis=0)
+        common = self._common.common_models(boxes.lower, boxes.upper, tilts_of(parts), below)
+        bound = common.L.bound()
+        known = common.defined & np.all([np.isfinite(part.best) for part in parts], axis=0)
         sums = np.where(known & ~np.isnan(bound), bound, np.inf)
         bound = np.fmin(sums, boxes.bound)
         emptied = np.any([part.best == -np.inf for part in parts], axis=0)
-        return SharedSums(models, parts, common, M, sums, bound, ~(impossible.any(axis=0) | emptied), binding)
+        return SharedSums(models, parts, common, sums, bound, common.is_possible & ~emptied)
 
     def _examine_limb(self, k: int, boxes: SharedBoxes) -> _ExaminedLimb:
         """Return models and bounds of a limb over shared boxes and its own boxes."""
@@ -207,9 +205,7 @@ class SharedRule(Rule[SharedColumns]):
 
     def _improve(self, boxes: SharedBoxes, sums: SharedSums) -> None:
         """Improve the incumbent from the best centre, and now and then from the box with the largest bound."""
-        J = 1
-        error = sums.common.value.c + sums.common.value.s
-        values = np.where((error[J:] <= 0).all(axis=0), sums.common.value.c[0] - sums.common.value.s[0], -np.inf)
+        values = sums.common.value
         places = [first_largest_of_lists(each.value, own) for each, own in zip(sums.models, boxes.own, strict=True)]
         for each, place in zip(sums.models, places, strict=True):
             values = values + each.value[place]
@@ -230,7 +226,7 @@ class SharedRule(Rule[SharedColumns]):
         return point
 
     def _branch(
-        self, boxes: SharedBoxes, sums: SharedSums, threshold: float
+        self, boxes: SharedBoxes, sums: SharedSums, below: float
     ) -> tuple[Boxes[SharedColumns], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drop and contract boxes, and refine the lists of those that are not to be bisected.
 
@@ -238,26 +234,24 @@ class SharedRule(Rule[SharedColumns]):
             The parts that are left, of which boxes (B,), and whether each limb (K, B) has no box left, which only its
             conditions bring about in a search that is recorded.
         """
-        bounded = sums.bound <= threshold
+        bounded = sums.bound <= self.target
         if self._recorder is not None:
             # An inherited bound says nothing of the numbers of this box, which the proof needs; and a checker with
             # other arithmetic needs room up to the threshold.
-            room = max(threshold - self._incumbent.value, 0.0)
-            bounded = sums.sums <= (threshold - _RESERVE * room if math.isfinite(room) else threshold)
-        limbs = range(len(self._engines))
+            room = max(self.target - self._incumbent.value, 0.0)
+            bounded = sums.sums <= (self.target - _RESERVE * room if math.isfinite(room) else self.target)
+        finite, common = np.isfinite(sums.bound), sums.common
+        left = Left(boxes.lower, boxes.upper, np.ones(boxes.count, dtype=bool))
         if self._recorder is None:
-            left = contract_shared(self.common_form, boxes, sums, threshold)
-            lower, upper, alive = collapse_monotone(self.common_form, boxes, sums, left)
-            below = threshold
-        else:
-            lower, upper, alive = boxes.lower, boxes.upper, np.ones(boxes.count, dtype=bool)
-            below = -math.inf
-        lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, below), limbs)
+            fits = (common.lower <= common.upper).all(axis=0)
+            ends = [np.where(fits & finite, *each) for each in zip((common.lower, common.upper), left[:2], strict=True)]
+            left = collapse_monotone(self.common_form, boxes, sums, Left(ends[0], ends[1], fits | ~finite))
+        lower, upper, alive = left
+        lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, below), range(len(self._engines)))
         sizes = np.array([np.bincount(each.own.of, minlength=boxes.count) for each in lists])
         alive = alive & sums.is_possible & ~bounded & (sizes > 0).all(axis=0)
         whole = (self.common_form.upper - self.common_form.lower)[:, None]
         width = ((upper - lower) / whole).max(axis=0)
-        finite = np.isfinite(sums.bound)
         can_cut = width > np.where(finite, LEAST_WIDTHS[1], LEAST_WIDTHS[0])
         change = self._shared_change(boxes, sums, lower, upper)
         spread = np.array([each.spread for each in lists])
@@ -277,7 +271,7 @@ class SharedRule(Rule[SharedColumns]):
 
     def _shared_change(self, boxes: SharedBoxes, sums: SharedSums, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Return how much (m, B) the bound can change along each shared variable of the part that is left."""
-        m, M = self._m, sums.M
+        m, M = self._m, sums.common.L
         change = LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
         for part in sums.parts:
             change = change + part.L.w[:m, part.top] + np.abs(part.L.H[:m, :, part.top]).sum(axis=1)

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...enclosure.forms import TINY, ULP
 from ...enclosure.quadratic_models import QuadraticModel
-from .models import LimbModels
+from ..engine import LimbModels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -121,13 +121,15 @@ def without_tilt(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:
     return _add(L, Tilt(-tilt.g, -tilt.Q))
 
 
-def with_tilts(L: QuadraticModel, parts: list[LimbBound]) -> QuadraticModel:
-    """Return models over B shared boxes with the tilts of all limbs and the limbs' best values."""
+def tilts_of(parts: list[LimbBound]) -> FloatArray:
+    """Return the sum of the tilts and bests of all limbs over B boxes as :meth:`Engine.common_models` reads it."""
     with np.errstate(all="ignore"):
-        for part in parts:
-            L = _add(L, part.tilt)
-            L = replace(L, middle=L.middle + part.best, rounding=L.rounding + 64 * ULP * np.abs(part.best))
-    return L
+        best = np.array([part.best for part in parts])
+        g, Q = (np.array(each) for each in zip(*[part.tilt for part in parts], strict=True))
+        lost = 64 * ULP * (np.abs(g).sum(axis=(0, 1)) + np.abs(Q).sum(axis=(0, 1, 2)))
+        total = np.where(np.isfinite(best).all(axis=0), best.sum(axis=0), np.inf)
+    sums = g.sum(axis=0), Q.sum(axis=0).reshape(-1, best.shape[1])
+    return np.concatenate([[total, np.abs(best).sum(axis=0), lost], *sums])
 
 
 def _add(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:

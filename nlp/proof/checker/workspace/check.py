@@ -1,8 +1,8 @@
-"""Check of a proof on paper, without trust in who made it.
+"""Check of a proof of a workspace, without trust in who made it.
 
-Everything is built again from the case: the box of poses, the joint centres, the expressions of numbers, and the claims
-that there must be. Trees of ``certify`` are checked by its checker. Every leaf of the other trees is shown again with
-balls and slopes (:mod:`.ballslopes`), and signs of determinants with fractions.
+Everything is built again from the case: the box of poses, the robot, the expressions of numbers, and the claims that
+there must be. Trees of ``certify`` are checked by its checker. Every leaf of the other trees is shown again with affine
+forms (:mod:`.forms`), and signs of determinants with fractions.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from casadi import SX
@@ -20,39 +21,23 @@ from ....case.task import Sense
 from ....errors import ScrewsynthError, UncoveredError
 from ....program.layout import Layout
 from ...statement.claims import REACH, Claim
-from ...statement.machine import check_leg_error, legs_of, workspace_of_case
+from ...statement.machine import Legs, check_leg_error, workspace_of_case
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
 from ..check import check_proof
 from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
 from ..tree import Node
-from .anyrobot.rankofrobot import rank_claim
-from .anyrobot.robotclaims import robot_claims
-from .anyrobot.signchange import show_sign_change
-from .ballrows import Joints
-from .clearanceclaim import ClearanceClaim
-from .comparing import hold_premises, keep_limit
-from .errorclaim import ErrorClaim, whole_errors
-from .expected import ERRORS, ExpectedClaim, expected_claims, leg_error_of
-from .pieces import BoxClaim, show
-from .poseroot import COORDINATES, PoseRoot, pose_root
-from .rankclaim import RankClaim
-from .singularclaim import SingularClaim
+from .leg_claims import ClearanceClaim, ErrorClaim, SingularClaim, whole_errors
+from .motion_matrix import PosedRobot, posed_robot
+from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
+from .ranks import rank_claim
+from .statement import ERRORS, ExpectedClaim, expected_claims, hold_premises, leg_error_of, robot_claims
 from .tolerance import Machines, change_of_jacobian, refuse_unless_singular
-from .tree import read_leaves
 
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
 #: The tree of one leaf.
 _WHOLE = bytes([Node.BOUNDED])
-#: Reason that each kind of claim must have.
-_REASONS = {
-    "regular": ("regular", "singular", "singular machine"),
-    "constraints": ("regular",),
-    "number": ("program",),
-    "stroke": ("lengths", "one machine"),
-    "dead length": ("lengths", "one machine"),
-}
 #: Callback with the name of a claim, the number of claims checked, and of all.
 PaperProgress = Callable[[str, int, int], None]
 
@@ -119,10 +104,9 @@ def check_workspace_proof(
     check_leg_error(case, leg_error)
     checker = _Checker(proof, case, leg_error)
     given = {(each.name, each.sense): each for each in proof.claims}
-    others = [(each.name, each.sense) for each in proof.unproved]
     expected = {each.key: each for each in checker.expected}
     # What a proof does not claim may be more than the claims that have proofs at all.
-    named = [*given, *(key for key in others if key in expected)]
+    named = [*given, *(key for each in proof.unproved if (key := (each.name, each.sense)) in expected)]
     if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
         wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
         name = " ".join(min(wrong)).strip() if wrong else "one of them"
@@ -154,19 +138,16 @@ class _Checker:
 
     def __init__(self, proof: WorkspaceProof, case: Case, leg_error: float) -> None:
         workspace = workspace_of_case(case)
-        self._case, self._proof, self._legs = case, proof, legs_of(case)
-        hold_premises(case, workspace, self._legs, leg_error, proof)
         robot = robot_claims(case, workspace, {each.name for each in proof.claims})
-        self._layout: Layout = robot.layout
-        self._model = robot.model
-        self._root: PoseRoot = pose_root(workspace)
+        hold_premises(case, workspace, robot.legs, leg_error, proof)
         self._tolerance = case.joint_centre_tolerance or 0.0
-        self._eps = leg_error_of(case, leg_error)
-        self.numbers_at = robot.numbers_at
+        self._case, self._proof, self._legs = case, proof, robot.legs
+        self._layout, self._model, self._root = robot.layout, robot.model, pose_root(workspace)
+        self._eps, self.numbers_at = leg_error_of(case, leg_error), robot.numbers_at
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
         try:
-            self.expected = expected_claims(case, self._layout, self._legs, proof.quantities, leg_error, robot.more)
+            self.expected = expected_claims(case, robot, proof.quantities, leg_error)
         except ProofError:
             raise
         except ScrewsynthError as error:
@@ -180,42 +161,36 @@ class _Checker:
         Raises:
             ProofError: it could not be shown.
         """
-        if given.reason not in _REASONS.get(each.kind, ("boxes",)):
+        rules = {
+            ("regular", "regular"): self._check_rank,
+            ("regular", "singular"): self._check_sides,
+            ("regular", "singular machine"): self._check_machine,
+            ("constraints", "regular"): self._check_rank,
+            ("number", "program"): self._check_program,
+            ("stroke", "lengths"): self._check_stroke,
+            ("stroke", "one machine"): self._check_stroke,
+            ("dead length", "lengths"): self._check_stroke,
+            ("dead length", "one machine"): self._check_stroke,
+            ("error", "boxes"): self._check_error,
+            ("clearance", "boxes"): self._check_clearance,
+            ("singular value", "boxes"): self._check_singular,
+            ("condition", "boxes"): self._check_singular,
+        }
+        if (each.kind, given.reason) not in rules:
             raise ProofError(f"'{given.reason}' is no reason of this claim")
         if self._tolerance and self._machines is None:
             raise ProofError("errors of joint centres take freedoms from this robot")
-        if each.kind in ("regular", "constraints"):
-            return self._check_rank(each, given)
-        if given.bound is None or not math.isfinite(given.bound):
+        if each.kind not in ("regular", "constraints") and (given.bound is None or not math.isfinite(given.bound)):
             raise ProofError("the claim has no bound")
-        if each.kind == "number":
-            return self._check_program(each, given)
-        if each.kind in ("stroke", "dead length"):
-            return self._check_stroke(each, given)
-        if each.kind == "error":
-            return self._check_error(each, given)
-        bound = float(given.bound)
-        keep_limit(each, bound)
-        claim: BoxClaim
-        if each.kind == "clearance":
-            # Two legs that are moved towards each other are nearer by twice the tolerance.
-            nearer = 2 * self._tolerance
-            least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
-            claim = ClearanceClaim(self._root, self._joints, (each.legs[0], each.legs[1]), least)
-        else:
-            is_condition = each.kind == "condition"
-            change = 0.0
-            if self._tolerance:
-                change = change_of_jacobian(self._joints, self._tolerance, each.length, self._shortest())
-            claim = SingularClaim(
-                self._root, self._joints, each.length, bound, is_condition=is_condition, change=change
-            )
-        self._show(claim, given.tree)
-        dimension = Dimension.LENGTH if each.kind == "clearance" else Dimension.NUMBER
-        return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
+        return rules[each.kind, given.reason](each, given)
+
+    @cached_property
+    def _robot(self) -> PosedRobot:
+        """The robot as expressions of the pose."""
+        return posed_robot(self._case, self._model, self._root)
 
     @property
-    def _joints(self) -> Joints:
+    def _joints(self) -> Legs:
         """Joint centres of the case's legs.
 
         Raises:
@@ -223,28 +198,21 @@ class _Checker:
         """
         if self._legs is None:
             raise ProofError("the case's robot is not six straight legs")
-        return Joints(np.array(self._legs.base), np.array(self._legs.platform))
+        return self._legs
 
     def _show(self, claim: BoxClaim, tree: bytes) -> None:
         """Show a claim on every leaf of a tree."""
-        leaves = read_leaves(tree, self._root.lower, self._root.upper)
-        self.leaves += len(leaves.lower)
-        self.pieces += show(claim, self._root, leaves)
+        leaves, pieces = show_on_leaves(claim, self._root, tree)
+        self.leaves += leaves
+        self.pieces += pieces
 
     def _check_rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check that J, or the constraint wrenches, keep their rank, or that J does not."""
-        if given.reason == "singular":
-            return self._check_sides(each, given)
-        if given.reason == "singular machine":
-            return self._check_machine(each, given)
-        if self._legs is None:
-            if self._tolerance:
-                raise ProofError("ranks of machines are covered for six straight legs alone")
-            robot = rank_claim(self._case, self._model, self._root, each.name)
-            self._show(robot, given.tree)
-            robot.finish()
-        else:
-            self._show(RankClaim(self._root, self._joints, self._tolerance), given.tree)
+        """Check that J, or the constraint wrenches, keep their rank."""
+        if self._tolerance and self._legs is None:
+            raise ProofError("ranks of machines are covered for six straight legs alone")
+        claim = rank_claim(self._case, self._model, self._root, each.name, self._tolerance)
+        self._show(claim, given.tree)
+        claim.finish()
         return CheckedClaim(each.name, each.sense)
 
     def _check_sides(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
@@ -254,20 +222,14 @@ class _Checker:
             raise ProofError("the claim has no two poses")
         if not all(self._root.holds(side) for side in sides):
             raise ProofError("a pose is not one of the workspace")
-        if self._legs is None:
-            robot = rank_claim(self._case, self._model, self._root, each.name)
-            show_sign_change(robot, self._root, sides[0], sides[1])
-            return CheckedClaim(each.name, each.sense, is_refuted=True)
-        claim = RankClaim(self._root, self._joints)
-        if claim.sign_at(sides[0]) * claim.sign_at(sides[1]) >= 0:
-            raise ProofError("the determinant has not opposite signs at the two poses")
+        rank_claim(self._case, self._model, self._root, each.name).show_sign_change(self._root, *sides)
         return CheckedClaim(each.name, each.sense, is_refuted=True)
 
     def _check_machine(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check that a machine within the tolerance is singular at a pose of the workspace."""
-        if self._legs is None or not self._tolerance:
+        if not self._tolerance:
             raise ProofError("the claim is about the exact machine")
-        refuse_unless_singular(self._root, self._legs, given.sides)
+        refuse_unless_singular(self._root, self._joints, given.sides)
         return CheckedClaim(each.name, each.sense, is_refuted=True, by_machine=True)
 
     def _bound_of(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout | None = None) -> float:
@@ -289,7 +251,7 @@ class _Checker:
             bound = self._bound_of(claim.expression, claim.sense, given, each.layout or self._layout)
         else:
             bound = self._bound_of_machines(self._machines, claim, given)
-        keep_limit(each, bound)
+        each.keep_limit(bound)
         self._bounds[each.key] = bound
         read = claim.reading.from_value
         limit = None if claim.limit is None else read(claim.limit)
@@ -349,8 +311,7 @@ class _Checker:
             short, long = self._length(name, "min"), self._length(name, "max")
             off = 8 * _ROUNDING * long
             bound = long - short + off if is_stroke else 2 * short - long - off
-        keep_limit(each, bound)
-        return CheckedClaim(each.name, each.sense, Dimension.LENGTH, bound, each.limit)
+        return self._limited(each, Dimension.LENGTH, bound)
 
     def _lengths_of_one_machine(
         self, each: ExpectedClaim, leg: int, weights: Mapping[Sense, float], given: ProofClaim
@@ -383,6 +344,27 @@ class _Checker:
         off = left + 16 * _ROUNDING * (abs(parts[0]) + abs(parts[1]) + left)
         return sum(parts) + (off if each.sense == Sense.MAX.value else -off)
 
+    def _check_clearance(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check a distance between two legs, which are nearer by twice the tolerance."""
+        bound, nearer = float(given.bound or 0.0), 2 * self._tolerance
+        least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
+        self._show(ClearanceClaim(self._robot, (each.legs[0], each.legs[1]), least), given.tree)
+        return self._limited(each, Dimension.LENGTH, bound)
+
+    def _check_singular(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check the smallest singular value of J, or its condition number."""
+        bound, is_condition = float(given.bound or 0.0), each.kind == "condition"
+        change = 0.0
+        if self._tolerance:
+            change = change_of_jacobian(self._joints, self._tolerance, each.length, self._shortest())
+        self._show(SingularClaim(self._robot, each.length, bound, is_condition=is_condition, change=change), given.tree)
+        return self._limited(each, Dimension.NUMBER, bound)
+
+    def _limited(self, each: ExpectedClaim, dimension: Dimension, bound: float) -> CheckedClaim:
+        """Return a claim whose bound keeps its limit."""
+        each.keep_limit(bound)
+        return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
+
     def _check_error(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check an error of the pose: its part of first order by a tree, the whole from both parts and the lengths."""
         firsts = {one.name: one.bound for one in self._proof.claims if one.name in ERRORS}
@@ -391,7 +373,7 @@ class _Checker:
             raise ProofError("one of the two errors has no proof")
         is_rotation = each.name == ERRORS[1]
         most = rotation if is_rotation else position
-        self._show(ErrorClaim(self._root, self._joints, most, is_rotation=is_rotation), given.tree)
+        self._show(ErrorClaim(self._robot, most, is_rotation=is_rotation), given.tree)
         # That of the design.
         shortest = (self._shortest() + 2 * self._tolerance) * (1 - _ROUNDING)
         reach = float(np.linalg.norm(self._joints.platform, axis=1).max()) * (1 + _ROUNDING)

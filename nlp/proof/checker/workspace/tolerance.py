@@ -6,7 +6,7 @@ number of a machine within the tolerance t differs from that of the design by at
     t sum_j |g_j| + t^2 / 2 sum_jk |H_jk|
 
 at each pose. The first sum is an expression of the pose. The second is shown to be at most the bound that the proof
-gives, over all poses and errors, in the slopes of the check.
+gives, over all poses and errors, by the check's ranges.
 
 Of six straight legs, with e and f the errors of both joints of a leg in the world frame, the row
 ``(s (p - b) + u, u x (p - b))`` changes by
@@ -36,22 +36,15 @@ from ....errors import UncoveredError
 from ....program.layout import Layout
 from ...statement.claims import Claim
 from ...statement.machine import LEGS, Legs
-from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
+from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, is_smooth, machine_layout
 from ..fractions import determinant_sign
 from ..proof_file import ProofError
-from ..slopes import SlopeArithmetic
-from .anyrobot.posedrobot import rotation_matrix
-from .ballrows import AFTER, BEFORE, BallRows, Joints
-from .ballslopes import UP, BallSlopes
-from .pieces import Attempt
-from .poseroot import COORDINATES, PoseRoot
+from .forms import UP, FormArithmetic
+from .motion_matrix import turned_rotation
+from .pose_boxes import COORDINATES, Attempt, PoseRoot
 
-#: Operations with continuous second derivatives wherever these have values: of others they say nothing of a change.
-_SMOOTH = (
-    *(ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_ASSIGN, ca.OP_NEG, ca.OP_TWICE, ca.OP_SQ, ca.OP_SQRT, ca.OP_INV),
-    *(ca.OP_SIN, ca.OP_COS, ca.OP_TAN, ca.OP_ATAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_EXP, ca.OP_LOG, ca.OP_ADD, ca.OP_SUB),
-    *(ca.OP_MUL, ca.OP_DIV, ca.OP_POW, ca.OP_CONSTPOW, ca.OP_ATAN2, ca.OP_HYPOT),
-)
+#: Indices after a component, and before it, of a vector.
+_AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 class Machines:
@@ -82,7 +75,13 @@ class Machines:
                 values[k] = Free(float(root.lower[k]), float(root.upper[k]))
             elif isinstance(each, Free):
                 values[k] = each.lower
-        self._at = PoseCoordinates(values, lambda turn: rotation_matrix(root, ca.vertsplit(turn)), root.ball)
+
+        def rotation(turn: SX) -> SX:
+            """Return the rotation (3, 3) with coordinates (3, 1)."""
+            turned, scale = turned_rotation(root, ca.vertsplit(turn))
+            return turned / scale
+
+        self._at = PoseCoordinates(values, rotation, root.ball)
         self._case, self.model, self.tolerance = case, model, case.joint_centre_tolerance or 0.0
         self.symbols: MachineLayout = machine_layout(case, built_model(case.model), self.tolerance, self._at)
 
@@ -144,8 +143,7 @@ class SecondOrderClaim:
         self._free, self._bound, self._tolerance = list(free), bound, symbols.tolerance
         pose, errors = SX.sym("pose", len(free)), SX.sym("errors", symbols.errors.numel())
         number = symbols.of(expression, errors, pose)
-        function = ca.Function("number", [pose, errors], [number])
-        if any(function.instruction_id(k) not in _SMOOTH for k in range(function.n_instructions())):
+        if not is_smooth(number):
             raise UncoveredError("a number whose derivatives jump")
         second = ca.hessian(number, errors)[0]
         rows, columns = (np.array(each, dtype=int) for each in second.sparsity().get_triplet())
@@ -155,17 +153,17 @@ class SecondOrderClaim:
         _, self._block = np.unique(rows // 3 * errors.numel() + columns // 3, return_inverse=True)
         self._errors = len(own)
         z = ca.vertcat(pose, errors[own])
-        self._entries = SlopeArithmetic(ca.Function("second", [z], [ca.cse(ca.densify(entries))]))
+        self._entries = FormArithmetic(z, entries)
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
-        errors = np.full((self._errors, len(lower)), self._tolerance)
-        found = self._entries(
-            np.concatenate([lower[:, self._free].T, -errors]), np.concatenate([upper[:, self._free].T, errors])
+        errors = np.full((len(lower), self._errors), self._tolerance)
+        ends = self._entries.ranges(
+            np.concatenate([lower[:, self._free], -errors], axis=1),
+            np.concatenate([upper[:, self._free], errors], axis=1),
         )
         squares = np.zeros((self._block.max(initial=-1) + 1, len(lower)))
-        for block, entry in zip(self._block, found, strict=True):
-            squares[block] += np.maximum(np.abs(entry.V[0]), np.abs(entry.V[1])) ** 2
+        np.add.at(squares, self._block, (np.abs(ends).max(axis=0) ** 2).T)
         whole = 0.5 * self._tolerance**2 * np.sqrt(squares).sum(axis=0) * UP
         return Attempt(np.asarray(whole <= self._bound), np.zeros(lower.shape))
 
@@ -201,23 +199,26 @@ def refuse_unless_singular(root: PoseRoot, legs: Legs, sides: Sequence[Sequence[
         raise ProofError("the determinant has the same sign for both machines")
 
 
-def change_of_rows(found: BallRows, joints: Joints, tolerance: float) -> FloatArray:
-    """Return bounds (B, 6, 6) of the change of the rows, entry by entry, by errors within a tolerance."""
-    s = _most(found.scale)[:, None, None]
-    span, arm = _most(found.position[:, None].plus(-joints.base)), _most(found.arm)
+def change_of_rows(
+    scale: FloatArray, span: FloatArray, arm: FloatArray, tolerance: float, length: float = 1.0
+) -> FloatArray:
+    """Return bounds (B, 6, 6) of the change of the rows, entry by entry, by errors within a tolerance.
+
+    Args:
+        scale: (B,) largest s.
+        span: (B, 6, 3) largest sizes of ``p - b``.
+        arm: (B, 6, 3) largest sizes of ``u``.
+        tolerance: t.
+        length: by which moments are divided.
+    """
+    s = scale[:, None, None]
+    across, along = (np.hypot(each[..., _AFTER], each[..., _BEFORE]) for each in (span, arm))
     # |f x e| is at most t^2, and so is each of its components.
-    moments = s * (np.hypot(span[..., AFTER], span[..., BEFORE]) * UP + tolerance)
-    moments = moments + np.hypot(arm[..., AFTER], arm[..., BEFORE]) * UP
-    forces = np.broadcast_to(2 * s, moments.shape)
-    return np.concatenate([forces, moments], axis=2) * tolerance * UP
+    moments = (s * (across + tolerance) + along) * UP / length
+    return np.concatenate([np.broadcast_to(2 * s, moments.shape), moments], axis=2) * tolerance * UP
 
 
-def _most(numbers: BallSlopes) -> FloatArray:
-    """Return the largest sizes of numbers."""
-    return np.asarray((np.abs(numbers.c) + numbers.spread) * UP)
-
-
-def change_of_jacobian(joints: Joints, tolerance: float, length: float, shortest: float) -> float:
+def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: float) -> float:
     """Return a bound of the Frobenius norm of the change of J, by which every singular value changes at most.
 
     The unit force of a leg changes by at most ``h = 2 t / l``, and its moment by ``|a| h + t``.

@@ -19,6 +19,7 @@ typedef struct {
     int shared;     /* number of the first variables that other limbs have too */
     double *models; /* of the Lagrangian and of the function's gradient, limbs/models.py; NULL without them */
     const double *least; /* (B) points with lesser values do not matter; NULL where all do */
+    const double *tilts; /* of the other limbs, for the part with shared variables alone: add_tilts; NULL without them */
 } Report;
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
@@ -50,6 +51,26 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
                 up |= form->equation[r] == 1 || !(most < 0), down |= form->equation[r] == 1 || !(least > 0);
         }
         *(to += B) = low, *(to += B) = high, *(to += B) = up, *(to += B) = down;
+    }
+}
+
+/* Adds best + g e + 1/2 e'Q e, the sum of the limbs' tilts, to the form of the function: rows of best, of the size of its
+ * terms, of the rounding of each sum of g and Q, and of these. */
+static void add_tilts(Box *x, const Report *report, Py_ssize_t at)
+{
+    Py_ssize_t n = x->n, B = report->B;
+    const double *best = report->tilts + at, *g = best + 3 * B, *Q = g + n * B;
+    x->s[0] += 64 * ULP * (fabs(x->c[0]) + best[B]), x->c[0] += *best;
+    for (int i = 0; i < n; i++, g += B) {
+        double across = 0.0, sizes = fabs(x->gb[i]) + fabs(*g);
+        for (int j = 0; j < n; j++, Q += B) {
+            across += fabs(*Q), sizes += fabs(x->gA[i * n + j]) + fabs(*Q);
+            x->gA[i * n + j] += *Q;
+        }
+        double margin = 64 * ULP * sizes + best[2 * B] + TINY;
+        x->gb[i] += *g, x->gs[i] += margin;
+        x->slope_lo[i] += *g - across - (margin + 64 * ULP * fabs(x->slope_lo[i]));
+        x->slope_hi[i] += *g + across + (margin + 64 * ULP * fabs(x->slope_hi[i]));
     }
 }
 
@@ -90,7 +111,9 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         if (rises || falls)
             return 1;
     }
-    choose_multipliers(x, form->equation, report->shared, x->gs, n);
+    if (report->tilts)
+        add_tilts(x, report, at);
+    choose_multipliers(x, form->equation, report->tilts ? 0 : report->shared, x->gs, n);
     combine(x);
     if (report->models)
         write_model(form, x, report, at, defined);
@@ -131,12 +154,12 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         }
     /* Contraction. */
     for (int r = 0; r < R && defined; r++) {
-        if (r < J || form->equation[r] == 1)
+        if (r < J ? !report->tilts : form->equation[r] == 1)
             reach_expression(x, r, 1.0, r < J ? threshold : 0.0);
         if (r >= J)
             reach_expression(x, r, -1.0, 0.0);
     }
-    if (R > 1 && defined)
+    if ((R > 1 || report->tilts) && defined)
         reach_quadratic(x, 1.0, x->q_middle, x->qb, x->H, x->qw, x->q_rounding, threshold, 0);
     int emptied = -1;
     for (int i = 0; i < n && defined; i++) {
@@ -156,7 +179,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         verdict = EMPTIED, reason = emptied;
     if (impossible >= 0)
         verdict = INFEASIBLE, reason = impossible;
-    if (bound <= threshold)
+    if (bound <= threshold && !report->tilts)
         verdict = BOUNDED, reason = 0;
     /* The variable to bisect next. */
     double most = -1.0;

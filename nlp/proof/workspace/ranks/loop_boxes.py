@@ -10,8 +10,8 @@ import casadi as ca
 import numpy as np
 
 from .....models import FloatArray
+from ...boxes.engine import MOST_VARIABLES
 from ...boxes.rows import some
-from ...boxes.tapes import MOST_VARIABLES
 from ...enclosure.forms import Encloser, Forms
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family

@@ -37,6 +37,7 @@ from ...statement.tolerance import (
     MachineLayout,
     built_model,
     design_layout,
+    is_smooth,
     machine_layout,
     second_order_name,
 )
@@ -47,7 +48,7 @@ from ..robot.posed_robot import NotJudgedError, build_problem
 from ..robot.tolerance_model import Family, family_of
 from ..verdict import Outcome
 from .machine_number import smallest_of_machines
-from .second_order_change import is_smooth, second_order_change
+from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
     from ..proof_record import PaperRecord
@@ -203,7 +204,7 @@ def machine_extreme(machines: Machines, claim: Claim, proving: Proving, *, again
         return not_bounded(claim, why_stopped())
     number = machines.number(claim.expression)
     try:
-        if not machines.family.problem.dependent and is_smooth(machines.family, number):
+        if not machines.family.problem.dependent and is_smooth(number):
             found = _by_first_order(machines, claim, number, proving, again=again)
             if found is not None:
                 return found

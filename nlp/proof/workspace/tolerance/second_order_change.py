@@ -36,14 +36,6 @@ _BLOCK, _MOST = 128, 4096
 _SHARE, _NEAR = 0.02, 1.2
 #: Part of itself by which a bound moves outwards: its own rounding, and room for the check of a proof.
 _OUTWARDS = 1.02
-#: Operations whose derivatives jump: second derivatives say nothing of the change there.
-_KINKS = (ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX, ca.OP_LE, ca.OP_LT, ca.OP_IF_ELSE_ZERO)
-
-
-def is_smooth(family: Family, expression: SX) -> bool:
-    """Return whether an expression (1, 1) has no operation whose derivative jumps."""
-    function = ca.Function("number", [family.coordinates], [expression])
-    return not any(function.instruction_id(k) in _KINKS for k in range(function.n_instructions()))
 
 
 def second_order_change(family: Family, expression: SX, first: float) -> float:

@@ -19,7 +19,13 @@ def text_of(tables: Tables) -> str:
             return "{ " + ", ".join(f"{key} = {value(each)}" for key, each in given.items()) + " }"
         if isinstance(given, list | tuple | np.ndarray):
             return f"[{', '.join(map(value, given))}]"
-        return json.dumps(given) if isinstance(given, str) else str(given) if isinstance(given, int) else repr(float(given))
+        return (
+            json.dumps(given)
+            if isinstance(given, str)
+            else str(given)
+            if isinstance(given, int)
+            else repr(float(given))
+        )
 
     lines = []
     for name, table in tables.items():
@@ -57,7 +63,12 @@ def random_tasks(rng: np.random.Generator, size: float) -> list[Tables]:
     found = []
     for name in ("push", "turn")[: 1 + int(rng.random() < 0.25)]:
         pitch = float("inf") if rng.random() < 0.3 else float(rng.choice([0.0, 1.0]) * rng.normal() * size)
-        task = {"name": name, "sense": str(rng.choice(["max", "min"])), "axis": rng.normal(size=3).tolist(), "pitch": pitch}
+        task = {
+            "name": name,
+            "sense": str(rng.choice(["max", "min"])),
+            "axis": rng.normal(size=3).tolist(),
+            "pitch": pitch,
+        }
         found.append(task if np.isinf(pitch) else task | {"point": (rng.normal(size=3) * size).tolist()})
     return found
 
@@ -73,19 +84,32 @@ def random_legs(rng: np.random.Generator) -> Tables:
     if kind == "stewart-gough":
         robot["layout"] = str(rng.choice(["aligned", "octahedral"], p=[0.25, 0.75]))
         angles = [float(np.radians(rng.uniform(0, 25)) / unit) for _ in range(2)]
-        robot["parameters"] = {"x1": size * rng.uniform(0.8, 1.6), "x2": size * rng.uniform(0.4, 1), "x3": angles[0], "x4": angles[1]}
+        robot["parameters"] = {
+            "x1": size * rng.uniform(0.8, 1.6),
+            "x2": size * rng.uniform(0.4, 1),
+            "x3": angles[0],
+            "x4": angles[1],
+        }
     elif kind == "hexapod":
         azimuth = np.pi / 3 * (np.arange(6) // 2 * 2) + np.radians(10) * (2 * (np.arange(6) % 2) - 1)
         other = np.pi / 3 * ((np.arange(6) + 1) // 2 * 2 - 1) + np.radians(10) * (1 - 2 * (np.arange(6) % 2))
         noise = rng.choice([0.02, 0.15, 0.5])
         parameters: Tables = {}
-        for plate, radius, place in (("base", rng.uniform(0.8, 1.6), azimuth), ("platform", rng.uniform(0.4, 1), other)):
-            centres = radius * np.stack([np.cos(place), np.sin(place), 0 * place], 1) + noise * rng.normal(size=(6, 3)) * [1, 1, 0.4]
+        for plate, radius, place in (
+            ("base", rng.uniform(0.8, 1.6), azimuth),
+            ("platform", rng.uniform(0.4, 1), other),
+        ):
+            centres = radius * np.stack([np.cos(place), np.sin(place), 0 * place], 1) + noise * rng.normal(
+                size=(6, 3)
+            ) * [1, 1, 0.4]
             parameters |= {f"{plate}_{k + 1}": (size * each).tolist() for k, each in enumerate(centres)}
         robot["parameters"] = parameters
     else:
         robot["axes"] = str(rng.choice(["snu", "tsai"]))
-        robot["parameters"] = {"base_radius": size * rng.uniform(0.8, 1.6), "platform_radius": size * rng.uniform(0.3, 0.75)}
+        robot["parameters"] = {
+            "base_radius": size * rng.uniform(0.8, 1.6),
+            "platform_radius": size * rng.uniform(0.3, 0.75),
+        }
         robot["characteristic_length"] = float(size * rng.uniform(0.3, 1))
     wide = rng.choice([0.03, 0.15, 0.5])
     home = np.array([0, 0, height])
@@ -116,7 +140,10 @@ def limited_legs(rng: np.random.Generator, tables: Tables) -> Tables:
         if isinstance(about, str) and about == "list":
             about = (rng.normal(size=(len(Legs(tables).names), 3)) * 0.3 + [0, 0, 1]).tolist()
         if about is not None:
-            limits[f"{plate}_joint_angle"] = {"about": about if isinstance(about, str) else np.array(about).tolist(), "max": 1.0}
+            limits[f"{plate}_joint_angle"] = {
+                "about": about if isinstance(about, str) else np.array(about).tolist(),
+                "max": 1.0,
+            }
     size = float(np.linalg.norm(Legs(tables).platform, axis=1).mean())
     for key in ("condition_number", "smallest_singular_value"):
         if rng.random() < 0.25:
@@ -145,7 +172,9 @@ def limited_legs(rng: np.random.Generator, tables: Tables) -> Tables:
             limits["actuator"]["dead_length"] = float(max(dead, size * 0.1) * rng.uniform(0.7, 1.02))
     for plate in ("base", "platform"):
         if f"{plate}_joint_angle" in limits:
-            limits[f"{plate}_joint_angle"]["max"] = float(min(about_end(f"{plate}_joint_angle", largest=True), 3.0) / unit)
+            limits[f"{plate}_joint_angle"]["max"] = float(
+                min(about_end(f"{plate}_joint_angle", largest=True), 3.0) / unit
+            )
     if rng.random() < 0.4:
         limits["rate_share"] = {"max": float(np.clip(about_end("rate_share", largest=True), 0.2, 0.99))}
     if rng.random() < 0.4:
@@ -153,14 +182,22 @@ def limited_legs(rng: np.random.Generator, tables: Tables) -> Tables:
     for key in ("condition_number", "smallest_singular_value"):
         if key in limits:
             end = about_end(key, largest=key == "condition_number")
-            limits[key]["max" if key == "condition_number" else "min"] = max(float(end), 1.01 if key == "condition_number" else 1e-6)
+            limits[key]["max" if key == "condition_number" else "min"] = max(
+                float(end), 1.01 if key == "condition_number" else 1e-6
+            )
     if rng.random() < 0.2:
         limits["joint_spacing"] = {"min": float(abs(about_end("joint_spacing", largest=False)) + 1e-3 * size)}
     if rng.random() < 0.2:
-        limits["footprint"] = {"base": about_end("footprint base", largest=True), "platform": about_end("footprint platform", largest=True)}
+        limits["footprint"] = {
+            "base": about_end("footprint base", largest=True),
+            "platform": about_end("footprint platform", largest=True),
+        }
     if rng.random() < 0.2:
         ratio = float(values["radius_ratio"][0])
-        limits["radius_ratio"] = {"min": ratio * float(rng.uniform(0.9, 1.0001)), "max": ratio * float(rng.uniform(0.9999, 1.1))}
+        limits["radius_ratio"] = {
+            "min": ratio * float(rng.uniform(0.9, 1.0001)),
+            "max": ratio * float(rng.uniform(0.9999, 1.1)),
+        }
     if rng.random() < 0.3 and len(legs.names) == 6:
         least = min(
             legs.clearance(f"leg_clearance limbs {one} and {other}", poses).min()

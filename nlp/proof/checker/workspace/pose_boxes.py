@@ -1,21 +1,26 @@
-"""The box of the coordinates of a workspace, from fractions, and the ball of rotations about any axis."""
+"""Boxes of poses: the box of a workspace's coordinates, the leaves of a tree of it, and claims shown on pieces of them.
+
+The coordinates are three of position and three of rotation, tangents of half angles. Ends of the box are fractions;
+rotations about any axis are a ball in it. Nodes of a tree are ``cut``, ``bounded`` and ``outside`` of :mod:`..tree`.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .....models import FloatArray
 from ....case.pose import Free, Value
 from ....case.workspace import TurnKind, Workspace
+from ..bisection import Shown, show
 from ..fractions import tangent_ends
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from ..proof_file import ProofError
+from ..tree import Node, TreeReader
 
 #: Number of coordinates of a pose.
 COORDINATES = 6
@@ -126,3 +131,86 @@ def _down(value: Fraction) -> float:
 def _up(value: Fraction) -> float:
     """Return a double that is not below a fraction."""
     return 0.0 - _down(-value)
+
+
+class Attempt(NamedTuple):
+    """An attempt to show a claim on B boxes.
+
+    Attributes:
+        holds: (B,) whether it is shown.
+        shares: (B, 6) share of each coordinate in what is missing.
+        is_wrong: (B,) whether the number at the centre is clearly beyond the bound; None where that is not asked.
+    """
+
+    holds: NDArray[np.bool_]
+    shares: FloatArray
+    is_wrong: NDArray[np.bool_] | None = None
+
+
+class BoxClaim(Protocol):
+    """A claim about boxes of poses."""
+
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6)."""
+
+
+def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, int]:
+    """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined.
+
+    Raises:
+        ProofError: the bytes are no tree of the workspace, a leaf is not outside of it as it is claimed to be, or the
+            claim could not be shown.
+    """
+    reader, lows, highs, leaves = TreeReader(tree), [], [], [0]
+
+    def leaf(kind: int, _: int, low: FloatArray, high: FloatArray) -> None:
+        """Count a leaf, and keep it unless it is outside of the workspace."""
+        leaves[0] += 1
+        if kind == Node.BOUNDED:
+            lows.append(low)
+            highs.append(high)
+        elif kind != Node.OUTSIDE:
+            raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
+        elif not root.is_outside(low[None], high[None])[0]:
+            raise ProofError(f"the box {_words(low, high)} is not outside of the workspace")
+
+    reader.walk(root.lower, root.upper, leaf, frozenset({Node.CUT}))
+    reader.finish()
+    if not lows:
+        return leaves[0], 0
+    rule = _PoseRule(claim, root, np.array(lows).T, np.array(highs).T)
+    return leaves[0], show(rule, rule.lower, rule.upper)
+
+
+class _PoseRule:
+    """The rule of a claim about boxes of poses (6, L), of which those outside of the workspace need nothing."""
+
+    block, most_pieces = 1024, 5_000
+
+    def __init__(self, claim: BoxClaim, root: PoseRoot, lower: FloatArray, upper: FloatArray) -> None:
+        self._claim, self._root, self.lower, self.upper = claim, root, lower, upper
+        self.width = root.upper - root.lower
+
+    def examine(self, lower: FloatArray, upper: FloatArray, _: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (6, N)."""
+        low, high = lower.T, upper.T
+        kept = ~np.asarray(self._root.is_outside(low, high), dtype=bool)
+        low, high = self._root.contracted(low, high)
+        holds, shares, is_wrong = ~kept, np.zeros(low.shape), np.zeros(len(low), dtype=bool)
+        if kept.any():
+            found = self._claim.attempt(low[kept], high[kept])
+            holds[kept], shares[kept] = found.holds, found.shares
+            if found.is_wrong is not None:
+                at = np.flatnonzero(kept)[found.is_wrong]
+                # A claim about a box is wrong only at a pose of the workspace.
+                is_wrong[at] = [self._root.holds(y) for y in 0.5 * low[at] + 0.5 * high[at]]
+        return Shown(holds, shares.T, low.T, high.T, is_wrong)
+
+    def sentence(self, claim: int) -> str:
+        """Return the sentence that a claim could not be shown."""
+        return f"the claim could not be shown for the box {_words(self.lower[:, claim], self.upper[:, claim])}"
+
+
+def _words(lower: FloatArray, upper: FloatArray) -> str:
+    """Return a box in words."""
+    return ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in zip(lower, upper, strict=True))

@@ -1,0 +1,310 @@
+"""Examination of boxes by the C kernel: bounds, impossible conditions, monotonicity, contraction, next bisection."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+
+from ...errors import UncoveredError
+from ..enclosure.engine import kernel
+from ..enclosure.quadratic_models import QuadraticModel
+from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows, tangent_rows
+from ..enclosure.tape import Tape, compile_tape
+from ..statement.piecewise_derivatives import refuse_jumps
+from ..statement.standard_form import StandardForm
+from .threads import Threads, pieces
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ....models import FloatArray
+
+#: How many times longer than that of the functions a tape must be for the gradients of conditions to wait.
+_MANY_CONDITIONS = 4
+#: Largest number of variables for which the first pass is made: a value has half its square as coefficients.
+MOST_VARIABLES = 12
+#: Half of the kernel's block: large enough that Python's work between blocks takes no noticeable part of the time.
+_BOXES_PER_JOB = 2048
+#: An end of a box that contraction did not move, and one that was moved to the opposite face by monotonicity.
+UNMOVED, COLLAPSED = -2, -1
+
+
+class Verdict(enum.IntEnum):
+    """Verdict on a box: open, or closed by a rule. The numbers are those of ``kernel/examination.h``."""
+
+    OPEN = 0
+    BOUNDED = 1  # its bound does not exceed the threshold
+    INFEASIBLE = 2  # a condition holds nowhere in it
+    MONOTONE = 3  # the functions increase along a variable, in a direction in which the whole box goes on
+    EMPTIED = 4  # contraction along a variable left nothing of it
+
+
+@dataclass(frozen=True, eq=False)
+class Examination:
+    """Results for B boxes.
+
+    Attributes:
+        verdict: (B,) :class:`Verdict`.
+        reason: (B,) index of the condition that cannot hold, or of the variable that is monotone or emptied.
+        bound: (B,) upper bound over the feasible part of the box; infinite where a value may be undefined.
+        lower, upper: (n, B) the part of the box left by contraction, or the face that it collapsed on.
+        cut_lower, cut_upper: (n, B) index of the expression that moved that end, or ``UNMOVED`` or ``COLLAPSED``.
+        split: (B,) the variable to bisect next.
+        value: (B,) lower bound of the maximised value at the centre; -inf where a condition may be violated.
+        centre: (n, B).
+    """
+
+    verdict: NDArray[np.int32]
+    reason: NDArray[np.int32]
+    bound: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    cut_lower: NDArray[np.int32]
+    cut_upper: NDArray[np.int32]
+    split: NDArray[np.int32]
+    value: FloatArray
+    centre: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LimbModels:
+    """Upper models over B boxes of a limb with n variables, the first m of them shared with other limbs.
+
+    Nothing may be said of a shared variable from one limb alone: monotonicity and contraction are those of own
+    variables, by the limb's conditions.
+
+    Attributes:
+        is_possible: (B,) whether an optimum may lie in the box.
+        defined: (B,) whether the limb's function has a value in the whole box.
+        holds: (B,) whether every condition of the limb holds on the whole box.
+        lower, upper: (n, B) the part of the box that is left; shared variables as they were.
+        L: upper models of the Lagrangian, whose multipliers make its gradient small in the own variables.
+        slope_lo, slope_hi: (m, B) gradient of the function along shared variables.
+        stops_up, stops_down: (m, B) whether a condition may stop a point from moving along a shared variable.
+        high: (B,) upper bound of the function.
+        value: (B,) lower bound of the function at the centre; -inf where a condition may be violated there.
+    """
+
+    is_possible: NDArray[np.bool_]
+    defined: NDArray[np.bool_]
+    holds: NDArray[np.bool_]
+    lower: FloatArray
+    upper: FloatArray
+    L: QuadraticModel
+    slope_lo: FloatArray
+    slope_hi: FloatArray
+    stops_up: NDArray[np.bool_]
+    stops_down: NDArray[np.bool_]
+    high: FloatArray
+    value: FloatArray
+
+    def part(self, which: slice) -> LimbModels:
+        """Return the results of some boxes."""
+        L = QuadraticModel(**{name: values[..., which] for name, values in vars(self.L).items()})
+        return LimbModels(
+            **{**{name: values[..., which] for name, values in vars(self).items() if name != "L"}, "L": L}
+        )
+
+
+class Engine:
+    """The C kernel on several threads. The results do not depend on their number.
+
+    Args:
+        form: the form whose box is searched.
+        jobs: threads; one for each processor when left out.
+        shared: number of the first variables that the form, a limb's, shares with others; None for a whole form.
+        tangents: whether the first pass has tangents to the squares of a minimum.
+
+    Attributes:
+        block: number of boxes to examine at once.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+        InputError: the kernel was not built.
+    """
+
+    def __init__(
+        self,
+        form: StandardForm,
+        jobs: int | None = None,
+        shared: int | None = None,
+        *,
+        tangents: bool = True,
+    ) -> None:
+        self._module, self._shared = kernel(), shared or 0
+        self._threads = Threads(jobs)
+        # The size of a block decides the order of the search, so it must not depend on the number of threads.
+        self.block = 2 * _BOXES_PER_JOB
+        functions = len(form.functions)
+        rows = search_rows(form, apart=shared is not None)
+        squares = tangent_rows(form) if tangents and shared is None else None
+        tape, values = search_tape(form, rows), None if shared is not None else value_tape(form, squares)
+        objective = objective_tape(form, len(tape))
+        equation = np.where(form.follows, 2, form.is_equation).astype(np.int32)
+        depends = np.array(form.dependence, dtype=np.int32)
+        self._form = (
+            form.n,
+            functions,
+            equation,
+            depends,
+            form.lower,
+            form.upper,
+            np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32).ravel(),
+            tape.head,
+            None if values is None else values.head,
+            None if values is None or objective is None else objective.head,
+            np.array(() if squares is None else squares.functions, dtype=np.int32),
+        )
+
+    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
+        """Examine boxes, and close those whose bounds do not exceed a threshold.
+
+        Args:
+            lower: (n, B) lower ends.
+            upper: (n, B) upper ends.
+            threshold: boxes whose bound is at most this are closed.
+        """
+        return self._examine(lower, upper, threshold, ())
+
+    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
+        """Return upper models of a limb over boxes with ends (n, B).
+
+        Args:
+            lower: lower ends; those of shared variables come first.
+            upper: upper ends.
+            least: (B,) points whose values are less do not matter; None where all do.
+        """
+        m = self._shared
+        found = self._models(lower, upper, -np.inf, least, None)
+        found.lower[:m], found.upper[:m] = lower[:m], upper[:m]
+        return found
+
+    def common_models(self, lower: FloatArray, upper: FloatArray, tilts: FloatArray, threshold: float) -> LimbModels:
+        """Return upper models of the part with shared variables alone, with the limbs' tilts, over boxes (m, B).
+
+        What is left of the boxes is where the conditions can hold and the sum can exceed a threshold; nothing is left
+        where a lower end is above the upper one.
+
+        Args:
+            lower: lower ends.
+            upper: upper ends.
+            tilts: (3 + m + m^2, B) sum of the limbs' bests, sum of their sizes, bound of the rounding of each sum of
+                tilts, and these sums: gradients, and matrices row by row.
+            threshold: the threshold.
+        """
+        return self._models(lower, upper, threshold, None, tilts)
+
+    def _models(
+        self,
+        lower: FloatArray,
+        upper: FloatArray,
+        threshold: float,
+        least: FloatArray | None,
+        tilts: FloatArray | None,
+    ) -> LimbModels:
+        """Return upper models; the kernel writes flags, then the models, then slopes and stops of shared variables.
+
+        A flag is 1 where the function is defined, plus 2 where every condition holds.
+        """
+        (n, count), m = lower.shape, self._shared
+        rows = np.empty((3 + 4 * n + n * n + 4 * m, count))
+        matters = (None if each is None else np.ascontiguousarray(each) for each in (least, tilts))
+        found = self._examine(lower, upper, threshold, (m, rows, *matters))
+        vectors, H = rows[3 : 3 + 4 * n].reshape(4, n, -1), rows[3 + 4 * n :][: n * n].reshape(n, n, -1)
+        sides = rows[3 + 4 * n + n * n :].reshape(m, 4, count)
+        is_closed = found.verdict == Verdict.INFEASIBLE
+        if tilts is None:
+            is_closed |= (found.verdict == Verdict.MONOTONE) | (found.verdict == Verdict.EMPTIED)
+        return LimbModels(
+            is_possible=~is_closed,
+            defined=(rows[0] == 1) | (rows[0] == 3),
+            holds=rows[0] >= 2,
+            lower=found.lower,
+            upper=found.upper,
+            L=QuadraticModel(rows[1], vectors[0], H, vectors[1], vectors[2], vectors[3], rows[2]),
+            slope_lo=sides[:, 0],
+            slope_hi=sides[:, 1],
+            stops_up=sides[:, 2] > 0,
+            stops_down=sides[:, 3] > 0,
+            high=found.bound,
+            value=found.value,
+        )
+
+    def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float, models: tuple[Any, ...]) -> Examination:
+        """Examine boxes on all threads; with ``models`` those arguments of the kernel that only limbs have."""
+        n, count = lower.shape
+        verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
+        cut_lower, cut_upper = (np.empty((n, count), dtype=np.int32) for _ in range(2))
+        left_lower, left_upper, centre = (np.empty((n, count)) for _ in range(3))
+        bound, value = np.empty(count), np.empty(count)
+        ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
+
+        def examine_piece(piece: tuple[int, int]) -> None:
+            self._module.examine(self._form, (*ends, *found), count, *piece, threshold, *models)
+
+        self._threads.map(examine_piece, pieces(count, self._threads.jobs))
+        return Examination(*found)
+
+    def close(self) -> None:
+        """Stop the threads."""
+        self._threads.close()
+
+
+def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short: bool = True) -> Tape:
+    """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
+
+    Equal parts are written once with ``is_short``; looking for them cannot be stopped, and takes as long as the rest.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule, or its value jumps.
+    """
+    try:
+        rows = search_rows(form, apart=False) if rows is None else rows
+        refuse_jumps(rows.expressions, form.x)
+        results = [rows.expressions, rows.jacobian.T]
+        return compile_tape(ca.Function("search", [form.x], ca.cse(results) if is_short else results))
+    except UncoveredError as error:
+        raise UncoveredError(error.operation, _uncovered_limit(form)) from None
+
+
+def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | None:
+    """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
+
+    None is returned for a form with too many variables for a first pass.
+    """
+    if form.n > MOST_VARIABLES:
+        return None
+    every = form.expressions if rows is None else ca.densify(ca.vertcat(form.expressions, rows.expressions))
+    return compile_tape(ca.Function("values", [form.x], [ca.cse(every)]))
+
+
+def without_conditions(form: StandardForm) -> StandardForm:
+    """Return the form of the functions alone."""
+    return replace(form, conditions=(), signs=())
+
+
+def objective_tape(form: StandardForm, length: int) -> Tape | None:
+    """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
+    if form.n > MOST_VARIABLES or not form.conditions:
+        return None
+    tape = search_tape(without_conditions(form))
+    return tape if len(tape) * _MANY_CONDITIONS <= length else None
+
+
+def _uncovered_limit(form: StandardForm) -> str | None:
+    """Return the key of the limit whose expressions hold an operation without a rule; None where the robot's do."""
+    keys = {each.name: next(filter(None, each.keys), None) for each in form.nlp.program.constraints}
+    whose = [*(None for _ in form.functions), *(keys.get(each.name) for each in form.conditions)]
+    for k, key in enumerate(whose):
+        row = form.expressions[k]
+        try:
+            refuse_jumps(row, form.x)
+            compile_tape(ca.Function("row", [form.x], [row, ca.densify(ca.jacobian(row, form.x)).T]))
+        except UncoveredError:
+            return None if key is None else f"limits.{key}"
+    return None

@@ -1,0 +1,347 @@
+"""Closed loops over boxes: one, and only one, assembly between two ends at every value of the independent coordinates.
+
+Over a box with coordinates ``e_I`` and ``e_D`` from -1 to 1, independent and dependent ones, the loop equations are
+``0 = g + A_I e_I + A_D e_D + [-r, r]``. For a matrix Y near the inverse of A_D a closed point of the box has
+
+    e_D = off - T e_I + [-rho, rho],      off = -Y g,    T = Y A_I,    rho >= |I - Y A_D| 1 + |Y| r.
+
+Where the right side is inside of the box for every e_I, the map ``e_D - Y g`` has a fixed point there (Brouwer), and
+its defect is 0. Where moreover ``|I - Y J_D|`` has a spectral radius below 1 for the derivatives over the box, there is
+only one: ``Y (g(z) - g(z'))`` is not 0 for two points with the same e_I. It is a continuous function of e_I.
+
+Points with closed loops are computed by Newton's method, and proved by a small box about them. Source: R. Krawczyk,
+*Newton-Algorithmen zur Bestimmung von Nullstellen mit Fehlerschranken*, Computing 4 (1969).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from .....models import FloatArray
+from .....models.rows import independent_rows
+from ..polynomials import middles
+from ..proof_file import ProofError
+from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
+from .motion_matrix import PosedRobot
+
+#: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
+_CLOSED = 1e-10
+#: Largest residual of further equations of a loop: in another assembly it is of order 0.1.
+_OTHER = 1e-6
+#: Steps of Newton's method at most, steps on a way between closed points, and from home's assembly to another pose.
+_STEPS, _WAY, _FROM_HOME = 12, 8, 40
+#: Singular values below this part of the largest are zero.
+_ZERO = 1e-9
+#: Points about the start at which equations are looked at that follow from others, and their part of the workspace.
+_POINTS, _SPREAD, _SEED = 4, 0.5, 1
+#: Factor by which widths of dependent coordinates are made wider, and attempts.
+_WIDER, _ATTEMPTS = 1.2, 4
+#: Smallest and largest half width of a dependent coordinate, in parts of its size.
+_LEAST, _MOST = 1e-9, 1.0
+#: Number of pairs of boxes that are compared at once.
+_BLOCK = 512
+
+
+class LoopPoints:
+    """Points with closed loops.
+
+    Args:
+        robot: the robot.
+        equations: (k, 1) those that count.
+    """
+
+    def __init__(self, robot: PosedRobot, equations: SX) -> None:
+        self._size, self._count = robot.size, int(equations.numel())
+        outputs = [ca.densify(equations), ca.densify(ca.jacobian(equations, robot.z))]
+        self._function = ca.Function("loops", [robot.z], outputs)
+
+    def at(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return left sides (B, k) and their derivatives (B, k, n) at points (B, n), for coordinates of size 1."""
+        g, J = (each.full() for each in self._function(z.T))
+        return g.T, np.asarray(J.reshape(self._count, *z.shape).transpose(1, 0, 2) * self._size)
+
+    def closed(self, z: FloatArray, moving: Sequence[int]) -> FloatArray:
+        """Return closed points (B, n) near points, in which as many coordinates move as equations; NaN without one."""
+        z = z.copy()
+        with np.errstate(all="ignore"):
+            for _ in range(_STEPS):
+                g, J = self.at(z)
+                if not np.nanmax(np.abs(g), initial=0.0) > 1e-3 * _CLOSED:
+                    break
+                z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving]) @ g[:, :, None])[:, :, 0]
+            residual = np.abs(self.at(z)[0]).max(axis=1, initial=0.0)
+        z[~(residual <= _CLOSED)] = np.nan
+        return z
+
+    def moved(self, z: FloatArray, to: FloatArray, free: Sequence[int], moving: Sequence[int]) -> FloatArray:
+        """Return the closed points (B, n) on the way from closed points to other independent coordinates (B, f)."""
+        z = z.copy()
+        if not moving:
+            z[:, free] = to
+            return z
+        way = to - z[:, free]
+        with np.errstate(all="ignore"):
+            for k in range(_WAY):
+                J = self.at(z)[1]
+                step = (way / _WAY) if k < _WAY - 1 else to - z[:, free]
+                turned = inverses(J[:, :, moving]) @ J[:, :, free] @ (step / self._size[free])[:, :, None]
+                z[:, moving] -= self._size[moving] * turned[:, :, 0]
+                z[:, free] += step
+                z = self.closed(z, moving)
+        z[:, free] = to
+        return z
+
+    def _step(self, z: FloatArray, moving: Sequence[int], rest: FloatArray | float = 0.0) -> float:
+        """Return the largest residual beyond a rest at a point (n,), which moves by a step of Newton's towards it.
+
+        NaN, and no step, where the equations have no value.
+        """
+        g, J = (each[0] for each in self.at(z[None]))
+        g = g - rest
+        if not (np.isfinite(g).all() and np.isfinite(J).all()):
+            return np.nan
+        z[moving] -= self._size[moving] * np.linalg.lstsq(J[:, moving], g, rcond=_ZERO)[0]
+        return float(np.abs(g).max(initial=0.0))
+
+    def near(self, z: FloatArray, moving: Sequence[int]) -> FloatArray | None:
+        """Return a closed point (n,) near a point in which some coordinates move; None where none is found."""
+        z = z.copy()
+        for _ in range(_STEPS):
+            before = z.copy()
+            if self._step(z, moving) <= _CLOSED:
+                return before
+        return None
+
+    def from_home(self, z: FloatArray, moving: Sequence[int]) -> FloatArray | None:
+        """Return closed loops on a way along which the residuals at a point fall to 0; None where it ends before."""
+        first, z = self.at(z[None])[0][0], z.copy()
+        if float(np.abs(first).max(initial=0.0)) <= _CLOSED:
+            # Slopes of equations that hold by themselves are rounding, along which there is no step.
+            return z
+        for step in range(2, 2 * _FROM_HOME + 2):
+            if np.isnan(self._step(z, moving, first * (1 - (step // 2) / _FROM_HOME))):
+                return None
+        return self.near(z, moving)
+
+
+def start_of(robot: PosedRobot) -> FloatArray:
+    """Return closed loops (n,) in home's assembly, in the middle of the workspace or near it.
+
+    Raises:
+        ProofError: none are found.
+    """
+    points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(robot.centre)
+    # Numbers of the pose move only where the unknowns alone do not close the loops.
+    for moving in [list(range(count, n))] * (n > count) + [list(range(n))]:
+        found = points.from_home(robot.centre, moving)
+        if found is not None and is_home(robot, found):
+            return found
+    raise ProofError("no closed loops are found in the middle of the workspace, in the assembly of home")
+
+
+def is_home(robot: PosedRobot, z: FloatArray) -> bool:
+    """Return whether a closed point (n,) fulfils all loop equations, in home's working mode; not where it is NaN."""
+    loops, signs = (each.full() for each in ca.Function("mode", [robot.z], [robot.loops, robot.signs])(z))
+    return bool(np.isfinite(z).all() and (np.abs(loops) <= _OTHER).all() and (signs > 0).all())
+
+
+def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
+    """Return the equations that do not follow from others: by their rank at a few closed points."""
+    if not robot.equations.numel():
+        return []
+    points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(start)
+    rng = np.random.default_rng(_SEED)
+    slopes = [points.at(start[None])[1][0]]
+    for _ in range(_POINTS):
+        z = start.copy()
+        z[:count] += _SPREAD * robot.size[:count] * rng.uniform(-1, 1, count)
+        found = points.near(z, list(range(count, n))) if n > count else None
+        found = points.near(z, list(range(n))) if found is None else found
+        if found is not None:
+            slopes.append(points.at(found[None])[1][0])
+    return sorted(independent_rows(slopes)) if any(np.abs(each).max() > _ZERO for each in slopes) else []
+
+
+def dependent_coordinates(points: LoopPoints, robot: PosedRobot, start: FloatArray, count: int) -> list[int]:
+    """Return the coordinates that k equations determine: numbers of the pose where there are more, and all unknowns.
+
+    Raises:
+        ProofError: the equations leave an unknown free, or are singular at the start.
+    """
+    poses, n = len(robot.free), len(start)
+    unknowns = list(range(poses, n))
+    if count < len(unknowns):
+        raise ProofError("the loops leave a passive joint free")
+    J = points.at(start[None])[1][0]
+    basis = np.linalg.svd(J[:, unknowns])[0] if unknowns else np.eye(count)
+    rest = basis[:, len(unknowns) :].T @ J[:, :poses]
+    chosen = [*(sorted(independent_rows([rest.T])) if count > len(unknowns) else []), *unknowns]
+    values = np.linalg.svd(J[:, chosen], compute_uv=False) if len(chosen) == count else np.zeros(1)
+    if not values.min(initial=1.0) > _ZERO * values.max(initial=0.0):
+        raise ProofError("the loops are singular in the middle of the workspace")
+    return chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Enclosed:
+    """Closed points over B boxes.
+
+    Attributes:
+        lower, upper: (B, n) ends of all coordinates; NaN where nothing is known.
+        off, T, rho: (B, k), (B, k, f) and (B, k) of the relation of the dependent coordinates.
+        near: (B, n) closed points at the centres, computed.
+        shares: (B, f) how much each independent coordinate moves the others.
+        is_known: (B,) whether there is one closed point, and only one, between the ends at each value of the others.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    off: FloatArray
+    T: FloatArray
+    rho: FloatArray
+    near: FloatArray
+    shares: FloatArray
+    is_known: NDArray[np.bool_]
+
+    def known(self) -> Enclosed:
+        """Return those over the boxes of which they are known."""
+        return Enclosed(*(each[self.is_known] for each in vars(self).values()))
+
+
+class Assembly:
+    """The closed loops of a robot that change continuously from those at a start.
+
+    Args:
+        robot: the robot.
+        equations: (k, 1) those that count; none for a robot without loops.
+        start: (n,) closed loops.
+
+    Raises:
+        UncoveredError: an equation holds an operation without a rule.
+        ProofError: the equations leave an unknown free, or are singular at the start.
+    """
+
+    def __init__(self, robot: PosedRobot, equations: SX, start: FloatArray) -> None:
+        self._size, self._count = robot.size, int(equations.numel())
+        self.points = LoopPoints(robot, equations)
+        self.dependent = dependent_coordinates(self.points, robot, start, self._count) if self._count else []
+        self.independent = [k for k in range(len(start)) if k not in self.dependent]
+        # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
+        (middle,) = self.moved(start[None], robot.centre[None][:, self.independent])
+        self.start = middle if is_home(robot, middle) else start
+        columns = ca.jacobian(equations, robot.z)[:, self.dependent]
+        self._arithmetic = FormArithmetic(robot.z, ca.vertcat(SX(0, 1), equations, ca.vec(ca.densify(columns))))
+
+    def moved(self, z: FloatArray, to: FloatArray) -> FloatArray:
+        """Return the closed points (B, n) reached from closed points at other independent coordinates (B, f)."""
+        return self.points.moved(z, to, self.independent, self.dependent)
+
+    def near(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
+        """Return closed points (B, n) at the centres of independent coordinates (B, f), reached from the start."""
+        z = np.broadcast_to(self.start, (len(lower), len(self.start)))
+        return self.moved(z, middles(lower, upper)[0])
+
+    def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray) -> Enclosed:
+        """Return the closed points over boxes of independent coordinates (B, f), from those (B, n) at their centres."""
+        free, D, size = self.independent, self.dependent, self._size
+        (B, f), k = lower.shape, self._count
+        low, high = np.full_like(near, np.nan), np.full_like(near, np.nan)
+        low[:, free], high[:, free] = lower, upper
+        relation = np.zeros((B, k)), np.zeros((B, k, f)), np.zeros((B, k))
+        found = Enclosed(low, high, *relation, near, np.zeros((B, f)), np.full(B, not k))
+        if not k:
+            return found
+        with np.errstate(all="ignore"):
+            J = self.points.at(near)[1]
+            moved = np.abs(inverses(J[:, :, D]) @ J[:, :, free]) * (0.5 * (upper - lower) / size[free])[:, None]
+            found.shares[:] = moved.sum(axis=1)
+            width = size[D] * np.maximum(_WIDER * moved.sum(axis=2), _LEAST)
+            for _ in range(_ATTEMPTS):
+                rows = np.flatnonzero(~found.is_known & (width <= _MOST * size[D]).all(axis=1))
+                if rows.size:
+                    z = near[rows][:, D]
+                    low[rows[:, None], D], high[rows[:, None], D] = z - width[rows], z + width[rows]
+                    width[rows] = self._show(found, rows)
+        missing = np.flatnonzero(~found.is_known)[:, None]
+        low[missing, D] = high[missing, D] = np.nan
+        return found
+
+    def _show(self, found: Enclosed, rows: NDArray[np.int64]) -> FloatArray:
+        """Add what is shown of closed points between the ends of some boxes, and return widths (N, k) that may do."""
+        free, D, k = self.independent, self.dependent, self._count
+        low, high = found.lower[rows], found.upper[rows]
+        g, ends = self._arithmetic(low, high, k)
+        Y = inverses(g.a[:, :, D])
+        size = np.abs(Y)
+        off, T = -(Y @ g.c[:, :, None])[:, :, 0], Y @ g.a[:, :, free]
+        terms = g.r + PRODUCT * (np.abs(g.c) + np.abs(g.a).sum(axis=2))
+        rho = ((size @ terms[:, :, None])[:, :, 0] + off_identity(Y, g.a[:, :, D]).sum(axis=2)) * UP
+        reach = (np.abs(off) + np.abs(T).sum(axis=2) + rho) * UP
+        centre, radius = (each[:, D] for each in middles(low, high))
+        # Derivatives, one column after the other, for coordinates from -1 to 1.
+        least, most = (each.reshape(-1, k, k).transpose(0, 2, 1) * radius[:, None] for each in ends)
+        J = 0.5 * (least + most)
+        spread = 0.5 * (most - least) + PRODUCT * (np.abs(least) + np.abs(most))
+        defect = (off_identity(Y, J) + size @ spread) * UP
+        single, _ = contraction(np.where(np.isfinite(defect), defect, np.inf))
+        # Ends may be nearer to the centre on one side, by rounding.
+        room = np.nextafter(np.minimum(high[:, D] - centre, centre - low[:, D]), 0.0)
+        good = np.asarray((reach * radius * UP < room).all(axis=1) & single & np.isfinite(reach).all(axis=1))
+        kept = rows[good]
+        found.off[kept], found.T[kept], found.rho[kept] = off[good], T[good], rho[good]
+        found.is_known[kept] = True
+        return np.asarray(np.maximum(_WIDER * reach * radius, _LEAST * self._size[D]))
+
+    def holds(self, boxes: Enclosed, which: NDArray[np.int64], near: FloatArray) -> NDArray[np.bool_]:
+        """Return whether boxes hold a closed point (N, n), which is shown in a small box about it."""
+        D, at = self.dependent, near[:, self.independent]
+        small = self.enclosed(at, at, near)
+        inside = (small.lower >= boxes.lower[which])[:, D] & (small.upper <= boxes.upper[which])[:, D]
+        return np.asarray(small.is_known & inside.all(axis=1))
+
+    def refuse_apart(self, boxes: Enclosed) -> None:
+        """Refuse boxes whose closed loops are not shown to be those of one assembly, that of the start.
+
+        Over each box the closed point changes continuously. A small box about one, which surely holds it, ties two
+        boxes with a common value of the independent coordinates where it lies between the ends of both: there their
+        closed points are the same.
+
+        Raises:
+            ProofError: a box is not reached from the one that holds the start.
+        """
+        lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
+        start = np.broadcast_to(self.start, boxes.near.shape)
+        at = start[:, self.independent]
+        is_reached = ((lower <= at) & (at <= upper)).all(axis=1) & self.holds(boxes, np.arange(len(lower)), start)
+        border = np.flatnonzero(is_reached).tolist()
+        while border:
+            pairs = [
+                (one, other)
+                for one in border
+                for other in np.flatnonzero(
+                    ~is_reached & (lower <= upper[one]).all(axis=1) & (upper >= lower[one]).all(axis=1)
+                ).tolist()
+            ]
+            border = []
+            for begin in range(0, len(pairs), _BLOCK):
+                block = [pair for pair in pairs[begin : begin + _BLOCK] if not is_reached[pair[1]]]
+                if block:
+                    first, second = np.array(block).T
+                    common = middles(np.maximum(lower[first], lower[second]), np.minimum(upper[first], upper[second]))
+                    near = self.moved(boxes.near[first], common[0])
+                    tied = self.holds(boxes, first, near) & self.holds(boxes, second, near)
+                    new = np.unique(second[tied])
+                    is_reached[new] = True
+                    border += new.tolist()
+        if not is_reached.all():
+            ends = zip(lower[~is_reached][0], upper[~is_reached][0], strict=True)
+            box = ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in ends)
+            raise ProofError(
+                f"the loops closed in the box {box} are not shown to be of the same assembly as the others"
+            )

@@ -1,0 +1,221 @@
+"""The claim that a matrix of motions keeps its rank at every pose of a box, with closed loops.
+
+With forms ``M = M_0 + sum_k A_k e_k + [-E, E]`` of the matrix over a box, in which :mod:`.closed_loops` replaces the
+dependent coordinates, and C near a pseudo-inverse of M_0, every ``C M`` has an inverse where
+
+    |I - C M_0| + sum_k |C A_k| + |C| E     has a spectral radius below 1.
+
+M has full column rank then. A matrix with d freedoms gets d further rows first, a basis of the null space of M_0: full
+column rank then says that there are no more freedoms anywhere in the box.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from .....models import FloatArray, Model
+from ....case.case import Case
+from ....errors import UncoveredError
+from ...statement.claims import CONSTRAINTS
+from ..fractions import sign_of_determinant
+from ..proof_file import ProofError
+from .closed_loops import Assembly, Enclosed, needed_equations, start_of
+from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
+from .motion_matrix import Motions, PosedRobot, free_motions, locked_motions, posed_robot
+from .pose_boxes import Attempt, PoseRoot
+from .tolerance import change_of_rows
+
+#: Largest number of parts of the way between two poses.
+_PARTS = 4096
+
+
+def rank_claim(case: Case, model: Model, root: PoseRoot, name: str, tolerance: float = 0.0) -> RankClaim:
+    """Return the claim that a robot's J, or its constraint wrenches alone, keep their rank.
+
+    Loop equations that hold at all closed points by themselves are left out. That is found by their ranks at a few
+    points: where it is wrong, the claim is about more than the closed loops, and says more.
+
+    Args:
+        case: with fixed dimensions.
+        model: its robot without unknowns that follow in closed form.
+        root: the box of coordinates.
+        name: ``regular``, or ``constraints regular``.
+        tolerance: largest error of each joint centre of six straight legs in the machines that are meant.
+
+    Raises:
+        ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
+            free, or an expression has an operation without a rule.
+    """
+    robot = posed_robot(case, model, root)
+    start = start_of(robot)
+    needed = needed_equations(robot, start)
+    try:
+        assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
+        motions = free_motions(model, robot, start) if name == CONSTRAINTS else locked_motions(model, robot, start)
+        return RankClaim(robot, motions, assembly, tolerance)
+    except UncoveredError as error:
+        raise ProofError(f"the check has no rule for {error}") from None
+
+
+class RankClaim:
+    """The claim that a matrix of motions has no more freedoms than it is claimed to have.
+
+    Args:
+        robot: the robot.
+        motions: the matrix.
+        assembly: its closed loops.
+        tolerance: largest error of each joint centre; above 0 for six straight legs alone.
+
+    Raises:
+        UncoveredError: an entry holds an operation without a rule.
+    """
+
+    def __init__(self, robot: PosedRobot, motions: Motions, assembly: Assembly, tolerance: float = 0.0) -> None:
+        self._freedoms, self._assembly, self._tolerance = motions.freedoms, assembly, tolerance
+        self._length = robot.length
+        # Independent coordinates as those of poses.
+        self._free = [robot.free[j] for j in assembly.independent]
+        whole = motions.matrix
+        self._constant = np.zeros(whole.shape)
+        places, entries = [], []
+        for k, place in enumerate(zip(*whole.sparsity().get_triplet(), strict=True)):
+            if whole.nz[k].is_constant():
+                self._constant[place] = float(whole.nz[k])
+            else:
+                places.append(place)
+                entries.append(whole.nz[k])
+        self._at = tuple(np.array(places, dtype=int).reshape(-1, 2).T)
+        # The errors of joint centres change rows of legs by a part of these.
+        parts = [ca.horzcat(robot.position - foot, arm) for foot, arm in robot.legs * bool(tolerance)]
+        changes = ca.vertcat(robot.scale, *[ca.vec(each) for each in parts]) if parts else SX(0, 1)
+        self._count = len(entries)
+        self._entries = FormArithmetic(robot.z, ca.vertcat(SX(0, 1), *entries, changes))
+        self._shown: list[Enclosed] = []
+
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6)."""
+        closed = self._closed(lower, upper)
+        holds, shares = np.zeros(len(lower), dtype=bool), np.zeros((len(lower), 6))
+        shares[:, self._free] = closed.shares
+        rows = np.flatnonzero(closed.is_known)
+        if rows.size:
+            known = closed.known()
+            good, shares[rows[:, None], self._free] = self._examined(*self._matrices(known))
+            holds[rows] = good
+            if self._assembly.dependent:
+                known.is_known[:] = good
+                self._shown.append(known.known())
+        return Attempt(holds, shares)
+
+    def finish(self) -> None:
+        """Refuse boxes with closed loops that do not belong together, after all were shown.
+
+        Raises:
+            ProofError: they are not shown to be those of one assembly.
+        """
+        if self._shown:
+            every = zip(*(vars(each).values() for each in self._shown), strict=True)
+            self._assembly.refuse_apart(Enclosed(*map(np.concatenate, every)))
+
+    @property
+    def is_square(self) -> bool:
+        """Whether the matrix is J itself, with rows that are neither normalised nor zero, over poses without loops."""
+        return self._constant.shape == (6, 6) and not self._freedoms and not self._assembly.dependent
+
+    def values_at(self, y: FloatArray) -> FloatArray:
+        """Return the matrices (K, m, c) at poses (K, 6) without loops: computed numbers."""
+        return self._matrices(self._closed(y, y))[0]
+
+    def show_sign_change(self, root: PoseRoot, one: FloatArray, other: FloatArray) -> None:
+        """Show that the determinant has opposite signs at two poses (6,), and that there is a way between them.
+
+        The entries have values along the whole way in the workspace, which is convex in its coordinates: the
+        determinant changes continuously, and is 0 at a pose.
+
+        Raises:
+            ProofError: it could not be shown.
+        """
+        if not self.is_square:
+            raise ProofError("a singular pose has a proof for robots with six rows, without loops, alone")
+        signs = self._signs_at(np.stack([one, other]))
+        if signs[0] * signs[1] >= 0:
+            raise ProofError("the determinant has not opposite signs at the two poses")
+        waiting, parts = [(one, other)], 0
+        while waiting:
+            begin, end = waiting.pop()
+            parts += 1
+            closed = self._closed(np.minimum(begin, end)[None], np.maximum(begin, end)[None])
+            if all(np.isfinite(each).all() for each in self._matrices(closed)):
+                continue
+            middle = 0.5 * begin + 0.5 * end
+            if parts > _PARTS or not root.holds(middle):
+                raise ProofError("the determinant is not shown to change continuously between the two poses")
+            waiting += [(begin, middle), (middle, end)]
+
+    def _signs_at(self, y: FloatArray) -> list[int]:
+        """Return the signs of the determinant at poses (K, 6); 0 where a sign is not shown.
+
+        With ``|I - C M|`` of a spectral radius below 1 the determinant of ``C M`` is positive: that of M has the sign
+        of that of C, which is computed in fractions.
+        """
+        M, E, _ = self._matrices(self._closed(y, y))
+        C = inverses(M)
+        with np.errstate(all="ignore"):
+            bound = (off_identity(C, M) + np.abs(C) @ (E + PRODUCT * np.abs(M))) * UP
+        known, _ = contraction(np.where(np.isfinite(bound), bound, np.inf))
+        return [sign_of_determinant(each.tolist()) if good else 0 for each, good in zip(C, known, strict=True)]
+
+    def _closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
+        """Return the closed loops over boxes (B, 6)."""
+        low, high = lower[:, self._free], upper[:, self._free]
+        return self._assembly.enclosed(low, high, self._assembly.near(low, high))
+
+    def _matrices(self, closed: Enclosed) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the forms of the matrix: (B, m, c) middles, (B, m, c) rests, and (B, f, m, c) of each coordinate."""
+        (c, a, r), ends = self._entries(closed.lower, closed.upper, self._count)
+        dependent, slopes = a[:, :, self._assembly.dependent], a[:, :, self._assembly.independent]
+        size = np.abs(dependent)
+        with np.errstate(all="ignore"):
+            most = np.abs(closed.off) + np.abs(closed.T).sum(axis=2)
+            terms = np.abs(c) + np.abs(slopes).sum(axis=2) + (size @ most[:, :, None])[:, :, 0]
+            rest = (r + (size @ closed.rho[:, :, None])[:, :, 0] + PRODUCT * terms) * UP
+            middle = c + (dependent @ closed.off[:, :, None])[:, :, 0]
+            slopes = slopes - dependent @ closed.T
+        shape = (len(c), *self._constant.shape)
+        M, E = np.broadcast_to(self._constant, shape).copy(), np.zeros(shape)
+        A = np.zeros((len(c), slopes.shape[2], *self._constant.shape))
+        rows, columns = self._at
+        M[:, rows, columns], E[:, rows, columns] = middle, rest
+        A[:, :, rows, columns] = slopes.transpose(0, 2, 1)
+        if self._tolerance:
+            most = np.abs(ends).max(axis=0)
+            legs = most[:, 1:].reshape(len(c), -1, 2, 3)
+            E += change_of_rows(most[:, 0], legs[:, :, 0], legs[:, :, 1], self._tolerance, self._length)
+        return M, E, A
+
+    def _examined(self, M: FloatArray, E: FloatArray, A: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+        """Return where the rank is shown (B,), and shares (B, f), from the forms of the matrix."""
+        B, _, columns = M.shape
+        known = np.asarray(np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2)))
+        known &= np.isfinite(A).all(axis=(1, 2, 3))
+        M = np.where(known[:, None, None], M, 0.0)
+        E, A = np.where(known[:, None, None], E, 0.0), np.where(known[:, None, None, None], A, 0.0)
+        # Rows are made comparable by a power of two, which rounds nothing.
+        sizes = np.sqrt((M * M).sum(axis=2, keepdims=True))
+        scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
+        M, E, A = M * scale, E * scale, A * scale[:, None]
+        if self._freedoms:
+            null = np.linalg.svd(M, full_matrices=True)[2][:, columns - self._freedoms :]
+            M, E = np.concatenate([M, null], axis=1), np.concatenate([E, np.zeros_like(null)], axis=1)
+            A = np.concatenate([A, np.zeros((B, A.shape[1], *null.shape[1:]))], axis=2)
+        with np.errstate(all="ignore"):
+            C = np.asarray(np.linalg.pinv(M, rcond=1e-14), dtype=float)
+            moved = np.abs(C[:, None] @ A)
+            rest = E + PRODUCT * (np.abs(M) + np.abs(A).sum(axis=1))
+            bound = (off_identity(C, M) + np.abs(C) @ rest + moved.sum(axis=1)) * UP
+            holds, v = contraction(np.where(known[:, None, None] & np.isfinite(bound), bound, np.inf))
+            shares = (moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
+        return np.asarray(holds & known), np.where(known[:, None], shares, np.nan)
