@@ -23,7 +23,7 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.errors import CaseError
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
@@ -457,13 +457,37 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     del tables["workspace"]
     with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
         case_from_tables(tables, name="spherical", source="spherical.toml")
-    # Limits without a search over a workspace are open too, with and without a tolerance.
+
+
+def test_clearance_and_strokes_of_three_legs_hold_for_every_machine() -> None:
+    """The distance of two legs, and a stroke, against machines with random errors at random poses."""
     limits = "leg_clearance = { min = 0.01 }\nactuator = { stroke_max = 0.5 }\n"
-    tables = tomllib.loads(ROBOTS["three-upu"] + limits + HEAD + TURN)
-    case = case_from_tables(tables, name="upu", source="upu.toml")
+    case = case_from_tables(tomllib.loads(ROBOTS["three-upu"] + limits + HEAD + TURN), name="upu", source="upu.toml")
+    bounds = []
     for each in (case, replace(case, joint_centre_tolerance=None)):
-        found = {one.key: one.outcome for one in judge_workspace(each, with_objective=False).extremes}
-        assert found["leg_clearance.min"] is found["actuator.stroke_max"] is Outcome.OPEN
+        judged = judge_workspace(each, with_objective=False)
+        found = {one.name: one for one in judged.extremes if one.key.startswith(("leg_clearance", "actuator."))}
+        assert len(found) == 6
+        assert {one.outcome for one in found.values()} == {Outcome.PROVED}
+        bounds.append(found)
+        robot, box, rng = joint_centres(each), pose_box(workspace_of_case(each)), np.random.default_rng(3)
+        assert robot is not None
+        points = box.random(300, rng)
+        for _ in range(20):
+            errors = [rng.normal(size=(3, 3)) for _ in range(2)]
+            errors = [robot.tolerance * part / np.linalg.norm(part, axis=1, keepdims=True) for part in errors]
+            base, platform = robot.base + errors[0], robot.platform + errors[1]
+            ends = points[:, None, :3] + np.einsum("kij,lj->kli", box.rotations(points), platform)
+            lengths = np.linalg.norm(ends - base, axis=2)
+            share = np.linspace(0, 1, 11)[:, None, None]
+            along = base + share[..., None] * (ends - base)
+            for i, j in ((0, 1), (0, 2), (1, 2)):
+                apart = np.linalg.norm(along[:, None, :, i] - along[None, :, :, j], axis=3).min()
+                assert found[f"leg_clearance limbs {i + 1} and {j + 1}"].bound <= apart
+            for i, stroke in enumerate(np.ptp(lengths, axis=0)):
+                assert stroke <= found[f"actuator.stroke_max limb {i + 1}"].bound
+    built, exact = bounds
+    assert all(built[name].bound > exact[name].bound for name in exact if name.startswith("actuator"))
 
 
 def test_a_page_says_where_the_worst_pose_is_that_of_another_machine(

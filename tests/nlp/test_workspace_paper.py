@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hexapods import hexapod_text
+from hexapods import clearance, hexapod_text, over, subject_of
 
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Free, Task
@@ -41,13 +41,11 @@ from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
-from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstError, with_rest
-from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
+from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -418,11 +416,12 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
     lower, upper = random_boxes(root, 120, 0.03, rng)
     points = lower + rng.uniform(0, 1, (30, 120, 6)).round(1) * (upper - lower)
     flat = points.reshape(-1, 6)
+    subject = subject_of(robot, box)
     oracles: list[tuple[Oracle, float, float]] = [
-        (SingularValues(robot, box, 11.5, is_condition=False), 1.0, 0.9),
-        (SingularValues(robot, box, 11.5, is_condition=True), -1.0, 2.0),
-        (WorstError(robot, box, is_rotation=False), -1.0, 2.0),
-        (Clearance(robot, box, 0, 2), 1.0, 15.0),
+        (over(subject, subject.spectrum(11.5, is_condition=False)), 1.0, 0.9),
+        (over(subject, subject.spectrum(11.5, is_condition=True)), -1.0, 2.0),
+        (over(subject, WorstError(subject.problem, is_rotation=False)), -1.0, 2.0),
+        (clearance(robot, box, 0, 2), 1.0, 15.0),
     ]
     legs = posed(root, robot)
     claims: list[BoxClaim] = [

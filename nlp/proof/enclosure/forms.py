@@ -127,6 +127,14 @@ class SecondForms(NamedTuple):
     Q: FloatArray
     r: FloatArray
 
+    def as_terms(self) -> Forms:
+        """Return forms whose linear parts go on with the products of two coordinates, a square being 1/2 +- 1/2."""
+        n = self.a.shape[2]
+        squares = np.cumsum([0, *range(n, 1, -1)])
+        Q = self.Q.copy()
+        Q[:, :, squares] *= 0.5
+        return Forms(self.c + Q[:, :, squares].sum(axis=2), np.concatenate([self.a, Q], axis=2), self.r)
+
 
 class Encloser:
     """Forms of expressions.

@@ -18,7 +18,6 @@ from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ...statement.machine import Legs
 from ..home_poses import Homes
-from ..regular.signs import SignRefuter
 from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -27,6 +26,7 @@ from ..verdict import Outcome, Regularity
 from .covering import APART, Followed, LoopRule, contracted_boxes, coordinates_to_split
 from .loop_boxes import Examiner, LoopBoxes
 from .rank_rule import RankTest
+from .signs import SignRefuter
 from .singular_pose import NewtonRefuter, Refuter, Singular, singular_at
 
 if TYPE_CHECKING:
