@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 #: Modules of searches with a limit on their time; each looks at the clock once a step.
-SEARCHES = ("boxes.search", "workspace.numbers.extremes")
+SEARCHES = ("boxes.search",)
 #: Seconds from one look at the clock to the next: about those of a step on a quiet machine.
 STEP = 0.01
 

@@ -39,7 +39,7 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, prove_mi
 from screwsynth.nlp.proof.workspace.numbers.loop_limits import loop_extremes
 from screwsynth.nlp.proof.workspace.ranks import search as ranks
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
-from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
+from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family

@@ -22,8 +22,8 @@ from screwsynth.nlp.proof.enclosure.forms import Encloser, Forms, enclose
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.spectrum import Spectrum
+from screwsynth.nlp.proof.workspace.numbers.bound_search import OverPoses, prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.singular_values import SingularValues
 from screwsynth.nlp.proof.workspace.ranks import loop_boxes
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
@@ -283,7 +283,7 @@ def test_singular_values_of_a_delta_are_bounded() -> None:
     problem = build_problem(case, closed_form(model).model, box)
     points = box.random(500, np.random.default_rng(0))
     for is_condition in (False, True):
-        spectrum = Spectrum(problem, 1.0, is_condition=is_condition)
+        spectrum = OverPoses(SingularValues(problem, 1.0, is_condition=is_condition), problem)
         values_there = spectrum.values(points)
         found = prove_minimum(spectrum, box, gap=0.05 * abs(float(values_there[0])))
         assert not found.reason

@@ -1,5 +1,6 @@
 """Workspaces: a robot judged over a whole box of poses."""
 
+import itertools
 import json
 import math
 import tomllib
@@ -8,26 +9,25 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
-from hexapods import hexapod_text
+from hexapods import HEXAPOD, case_of_legs, clearance, hexapod_text, over, subject_of
 from typer.testing import CliRunner
 
-from screwsynth.models import FloatArray, hexapod
-from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, Task, json_data, load_result, solve
+from screwsynth.models import FloatArray
+from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, json_data, load_result, solve
 from screwsynth.nlp.case.reader import case_from_tables, load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.proof.enclosure.forms import Encloser
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle, prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
+from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.pose_error import WorstError
-from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
-from screwsynth.nlp.proof.workspace.regular.rows import LegRows
-from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
+from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
@@ -51,7 +51,6 @@ rotation = { angle = { min = -20, max = 20 } }
 """
 )
 POSITION = (Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0))
-HEXAPOD = hexapod()
 
 
 @pytest.fixture(scope="module")
@@ -78,16 +77,9 @@ def legs(case: Case) -> Legs:
     return found
 
 
-def case_of(robot: Legs) -> Case:
-    """A case about six legs with these joint centres."""
-    given = {f"{plate}_{i + 1}": getattr(robot, plate)[i].tolist() for plate in ("base", "platform") for i in range(6)}
-    task = Task([0, 0, 0, 0, 0, 1])
-    return Case(HEXAPOD, given, [0.0, 0.0, 0.0], [task], joint_centre_tolerance=robot.tolerance or None)
-
-
 def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> Regularity:
     """The verdict on the rank of the rows of six legs."""
-    problem = build_problem(case_of(robot), HEXAPOD, box)
+    problem = build_problem(case_of_legs(robot), HEXAPOD, box)
     return prove_rank(problem, problem.locked, refuter=SignRefuter(robot, problem), most_boxes=most_boxes)
 
 
@@ -175,7 +167,14 @@ def test_expansions_enclose_exact_rows_and_a_wrong_one_does_not(case: Case, kind
     centre = box.random(40, rng)
     half = (box.upper - box.lower) * rng.uniform(0, 0.2, (40, 1))
     lower, upper = centre - half, centre + half
-    middle, slopes, rest = LegRows(robot, box).over(lower, upper)
+    problem = subject_of(robot, box).problem
+    c, a, r = Encloser(problem.z, ca.vec(ca.densify(problem.scaled.rows).T)).second(lower.T, upper.T).as_terms()
+    units = np.array([1.0, 1.0, 1.0, *[problem.length] * 3])
+    middle, slopes, rest = (
+        c.reshape(-1, 6, 6) * units,
+        a.reshape(40, 6, 6, -1) * units[:, None],
+        r.reshape(-1, 6, 6) * units,
+    )
     wrong, unrounded = 0, 0
     for k in range(40):
         c = 0.5 * lower[k] + 0.5 * upper[k]
@@ -184,8 +183,10 @@ def test_expansions_enclose_exact_rows_and_a_wrong_one_does_not(case: Case, kind
         y = [Fraction(float(a)) + Fraction(float(b)) * Fraction(float(s)) for a, b, s in zip(c, h, e, strict=True)]
         exactly = np.array(exact_rows(robot, box, y), dtype=object)
         value = np.vectorize(Fraction)(middle[k])
-        for i in range(6):
-            value = value + np.vectorize(Fraction)(slopes[k, :, :, i]) * Fraction(float(e[i]))
+        pairs = itertools.combinations_with_replacement(range(6), 2)
+        squares = [2 * x * x - 1 if i == j else x * y for i, j in pairs for x, y in [(Fraction(e[i]), Fraction(e[j]))]]
+        for i, term in enumerate([*map(Fraction, e), *squares]):
+            value = value + np.vectorize(Fraction)(slopes[k, :, :, i]) * term
         off = np.abs(exactly - value).astype(float)
         assert (off <= rest[k]).all()
         wrong += (off > 0.3 * rest[k]).any()
@@ -231,9 +232,9 @@ def test_random_robots_are_never_called_regular_where_the_determinant_changes_it
 def test_bounds_over_boxes_hold_at_samples(case: Case, kind: TurnKind, name: str) -> None:
     rng = np.random.default_rng(5)
     box, robot = pose_box(turned(kind, 25)), legs(case)
-    oracle: Oracle = Clearance(robot, box, 1, 2)
+    oracle, subject = clearance(robot, box, 1, 2), subject_of(robot, box)
     if name != "clearance":
-        oracle = SingularValues(robot, box, 11.5, is_condition=name == "condition number")
+        oracle = over(subject, subject.spectrum(11.5, is_condition=name == "condition number"))
     lower = box.random(150, rng)
     upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (150, 6)), box.upper)
     bound = oracle.bounds(lower, upper).lower
@@ -249,9 +250,9 @@ def test_bounds_over_boxes_hold_at_samples(case: Case, kind: TurnKind, name: str
 
 def test_the_smallest_clearance_is_met_within_the_gap(case: Case) -> None:
     box, robot = pose_box(turned(TurnKind.ANY_AXIS, 20)), legs(case)
-    found = prove_minimum(Clearance(robot, box, 1, 2), box, gap=0.05)
+    found = prove_minimum(clearance(robot, box, 1, 2), box, gap=0.05)
     assert found.value - 0.05 <= found.bound <= found.value
-    samples = Clearance(robot, box, 1, 2).values(box.random(100_000, np.random.default_rng(0)))
+    samples = clearance(robot, box, 1, 2).values(box.random(100_000, np.random.default_rng(0)))
     assert samples.min() >= found.bound
 
 
@@ -459,7 +460,7 @@ def test_the_shipped_design_violates_nothing_at_a_million_poses() -> None:
         cosine = (span * home).sum(axis=2) / lengths / np.linalg.norm(home, axis=1)
         assert cosine.min() >= math.cos(math.radians(25))
         for one, other in ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 0)):
-            assert Clearance(robot, box, one, other).values(points[:2000]).min() >= 3
+            assert clearance(robot, box, one, other).values(points[:2000]).min() >= 3
     assert least.min() >= 20
     assert most.max() <= 38
     assert (most - least).max() <= 17
@@ -576,7 +577,8 @@ def test_errors_of_the_pose_are_bounded_for_every_machine_within_its_tolerances(
 def test_first_order_errors_are_bounded_over_boxes(case: Case, kind: TurnKind, is_rotation: bool) -> None:
     rng = np.random.default_rng(6)
     box = pose_box(turned(kind, 25))
-    oracle = WorstError(legs(case), box, is_rotation=is_rotation)
+    subject = subject_of(legs(case), box)
+    oracle = over(subject, WorstError(subject.problem, is_rotation=is_rotation))
     lower = box.random(100, rng)
     upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (100, 6)), box.upper)
     bound = oracle.bounds(lower, upper).lower

@@ -11,7 +11,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from hexapods import hexapod_text
+from hexapods import clearance, hexapod_text, over, subject_of
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
@@ -28,10 +28,8 @@ from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
-from screwsynth.nlp.proof.workspace.numbers.leg_numbers import pose_errors
-from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
+from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
@@ -217,11 +215,13 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
 ) -> None:
     robot, box = legs(case), pose_box(workspace_of_case(case))
     values = np.linalg.svd(machines.J[:20_000] / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
+    subject = subject_of(robot, box, 15.0)
+    spectra = [subject.spectrum(LENGTH, is_condition=is_condition) for is_condition in (False, True)]
     checks = [
-        (Clearance(robot, box, 0, 1), machines.clearance(0, 1)),
-        (Clearance(robot, box, 0, 2), machines.clearance(0, 2)),
-        (SingularValues(robot, box, LENGTH, is_condition=False, shortest=15.0), values[:, -1]),
-        (SingularValues(robot, box, LENGTH, is_condition=True, shortest=15.0), -values[:, 0] / values[:, -1]),
+        (clearance(robot, box, 0, 1), machines.clearance(0, 1)),
+        (clearance(robot, box, 0, 2), machines.clearance(0, 2)),
+        (over(subject, spectra[0]), values[:, -1]),
+        (over(subject, spectra[1]), -values[:, 0] / values[:, -1]),
     ]
     rng = np.random.default_rng(1)
     for oracle, sampled in checks:
@@ -229,26 +229,31 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
         # At a point the bound and the value of the worst machine differ by the rest, and by the 2 % of the norm.
         points = box.random(50, rng)
         at = oracle.bounds(points, points).lower
-        exact = type(oracle).values(oracle, points)
+        exact = oracle.values(points)
         assert (at <= exact + 1e-12).all()
         assert (at >= exact - 0.05 * np.abs(exact)).all()
-        assert max(np.linalg.norm(part, axis=1).max() for part in oracle.errors(points[0])) <= TOLERANCE
+    for number in spectra:
+        errors = number.errors(points[0])
+        assert errors is not None
+        assert max(np.linalg.norm(part, axis=1).max() for part in errors) <= TOLERANCE
 
 
 def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> None:
     robot, box = legs(case), pose_box(workspace_of_case(case))
     for y in box.random(5, np.random.default_rng(3)):
-        wide = robot._replace(tolerance=float(Clearance(robot, box, 0, 1).values(y[None])[0]))
-        assert Clearance(wide, box, 0, 1).values(y[None])[0] == 0
-        made = Clearance(wide, box, 0, 1).errors(y).applied(wide)
-        assert Clearance(made._replace(tolerance=0.0), box, 0, 1).values(y[None])[0] < 1e-9 * wide.tolerance
+        wide = robot._replace(tolerance=float(clearance(robot, box, 0, 1).values(y[None])[0]))
+        assert clearance(wide, box, 0, 1).values(y[None])[0] == 0
+        errors = subject_of(wide, box).nearest((0, 1), y)
+        assert errors is not None
+        made = errors.applied(wide)
+        assert clearance(made._replace(tolerance=0.0), box, 0, 1).values(y[None])[0] < 1e-9 * wide.tolerance
 
 
 def test_errors_of_a_machine_that_is_singular_at_every_pose_have_no_value(case: Case) -> None:
     """Joints of base and platform at the same azimuths: Newton's method finds no pose of a machine with errors."""
     robot = legs(case)
     similar, box = Legs(robot.base, 0.5 * robot.base), pose_box(Workspace((0.0, 0.0, 20.0), Turns()))
-    for each in pose_errors(similar, box, 1e-3, 10.0):
+    for each in pose_errors(similar, subject_of(similar, box).problem, 1e-3, 10.0):
         assert each.outcome is Outcome.OPEN
         assert (each.bound, each.pose) == (math.inf, None)
         assert math.isnan(each.reached)
@@ -398,7 +403,7 @@ def test_a_limit_is_refined_until_it_is_decided_whatever_the_gap_is(case: Case) 
         assert {outcome} <= {each.outcome for each in limited} <= {outcome, Outcome.PROVED}
     # The searches that are not those of certificates go on too, and end at a value that meets its limit.
     box = pose_box(workspace_of_case(case))
-    oracle = Clearance(robot, box, 0, 1)
+    oracle = clearance(robot, box, 0, 1)
     least = prove_minimum(oracle, box, gap=1e-4).value
     for limit, slack in ((least - 1e-6, 0.0), (least + 1e-10, 1e-9)):
         found = prove_minimum(oracle, box, gap=1.0, limit=limit, slack=slack, time_limit=20)

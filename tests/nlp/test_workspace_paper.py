@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hexapods import hexapod_text
+from hexapods import clearance, hexapod_text, over, subject_of
 
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Free, Task
@@ -29,9 +29,9 @@ from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace import check
 from screwsynth.nlp.proof.checker.workspace.forms import are_positive, contraction
 from screwsynth.nlp.proof.checker.workspace.leg_claims import (
-    AffineMatrix,
     ClearanceClaim,
     ErrorClaim,
+    LegInverse,
     SingularClaim,
     whole_errors,
 )
@@ -41,13 +41,11 @@ from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
-from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstError, with_rest
-from screwsynth.nlp.proof.workspace.numbers.singular import SingularValues
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
-from screwsynth.nlp.proof.workspace.regular.signs import SignRefuter
+from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -418,11 +416,12 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
     lower, upper = random_boxes(root, 120, 0.03, rng)
     points = lower + rng.uniform(0, 1, (30, 120, 6)).round(1) * (upper - lower)
     flat = points.reshape(-1, 6)
+    subject = subject_of(robot, box)
     oracles: list[tuple[Oracle, float, float]] = [
-        (SingularValues(robot, box, 11.5, is_condition=False), 1.0, 0.9),
-        (SingularValues(robot, box, 11.5, is_condition=True), -1.0, 2.0),
-        (WorstError(robot, box, is_rotation=False), -1.0, 2.0),
-        (Clearance(robot, box, 0, 2), 1.0, 15.0),
+        (over(subject, subject.spectrum(11.5, is_condition=False)), 1.0, 0.9),
+        (over(subject, subject.spectrum(11.5, is_condition=True)), -1.0, 2.0),
+        (over(subject, WorstError(subject.problem, is_rotation=False)), -1.0, 2.0),
+        (clearance(robot, box, 0, 2), 1.0, 15.0),
     ]
     legs = posed(root, robot)
     claims: list[BoxClaim] = [
@@ -445,18 +444,9 @@ def test_inverses_hold_those_at_samples(robot: Legs) -> None:
     rng = np.random.default_rng(8)
     root = pose_root(turned(TurnKind.ANY_AXIS, 20))
     lower, upper = random_boxes(root, 60, 0.1, rng)
-    seen: list[AffineMatrix] = []
-
-    class Kept(ErrorClaim):
-        """The claim that keeps the inverses of J over boxes."""
-
-        def _judged(self, inverse: AffineMatrix, *_: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            seen.append(inverse)
-            return np.ones(60, dtype=bool), np.zeros((60, 6)), np.zeros(60, dtype=bool)
-
-    claim = Kept(posed(root, robot), 1.0, is_rotation=False)
-    known = claim.attempt(lower, upper).holds
-    (P, T, rest), length = seen[0], posed(root, robot).length
+    legs = posed(root, robot)
+    (P, T, rest), known, _, _ = LegInverse(legs, legs.length)(lower, upper)
+    length = legs.length
     assert known.mean() > 0.5
     tight = 0
     for _ in range(10):

@@ -29,10 +29,10 @@ from screwsynth.nlp.proof.checker.workspace.motion_matrix import posed_robot
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.checker.workspace.tolerance import Machines, change_of_jacobian
-from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.statement.machine import Legs, joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.asked_values import spectral_extremes
+from screwsynth.nlp.proof.workspace.numbers.searched import Subject, asked_spectra_extremes
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
@@ -497,8 +497,8 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
         assert "could not be shown" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
-    options = {"gap": 0.1, "shortest": 0.0}
-    for extreme in spectral_extremes(case, case.model, pose_box(judged.workspace), ASKED[1:], **options):  # type: ignore[arg-type]
+    subject = Subject(case, case.model, pose_box(judged.workspace), joint_centres(case))
+    for extreme in asked_spectra_extremes(subject, ASKED[1:], gap=0.1):
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 
 

@@ -20,11 +20,11 @@ INSIDE = 1 - 1e-12
 
 
 class Legs(NamedTuple):
-    """Joint centres of a robot's six legs.
+    """Joint centres of a robot's k legs.
 
     Attributes:
-        base: (6, 3) in the world frame, length.
-        platform: (6, 3) in the platform frame, length.
+        base: (k, 3) in the world frame, length.
+        platform: (k, 3) in the platform frame, length.
         tolerance: largest error of each centre in the machines that are meant, length; 0 for the exact machine.
     """
 
@@ -34,7 +34,7 @@ class Legs(NamedTuple):
 
 
 class JointErrors(NamedTuple):
-    """Errors of the joint centres of one machine, (6, 3) each: base in the world frame, platform in its own, length."""
+    """Errors of the joint centres of one machine, (k, 3) each: base in the world frame, platform in its own, length."""
 
     base: FloatArray
     platform: FloatArray
@@ -42,6 +42,10 @@ class JointErrors(NamedTuple):
     def applied(self, legs: Legs) -> Legs:
         """Return the exact legs of the machine with these errors."""
         return Legs(legs.base + self.base, legs.platform + self.platform)
+
+    def of_centres(self, names: tuple[str, ...]) -> CentreErrors:
+        """Return the errors by the names of the centres: base, then platform, leg by leg."""
+        return CentreErrors(names, np.stack([self.base, self.platform], axis=1).reshape(-1, 3))
 
 
 class CentreErrors(NamedTuple):
@@ -95,10 +99,12 @@ def legs_of(case: Case) -> Legs | None:
 
     Their tolerance is the case's.
     """
-    if not has_straight_legs(case.model):
-        return None
-    base, platform = leg_joints(case)
-    return Legs(base, platform, case.joint_centre_tolerance or 0.0)
+    return joint_centres(case) if has_straight_legs(case.model) else None
+
+
+def joint_centres(case: Case) -> Legs | None:
+    """Return the straight legs of a robot with fixed dimensions, with the case's tolerance; None without legs."""
+    return Legs(*leg_joints(case), case.joint_centre_tolerance or 0.0) if case.model.legs else None
 
 
 def leg_joints(case: Case) -> tuple[FloatArray, FloatArray]:

@@ -16,15 +16,14 @@ from ...interruption import is_requested, one_call, within
 from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.machine import Legs, check_leg_error, legs_of, workspace_of_case
+from ..statement.machine import Legs, check_leg_error, has_straight_legs, joint_centres, legs_of, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
-from .numbers.asked_values import spectral_extremes
 from .numbers.extremes import GAP, Extreme, prove_extreme
-from .numbers.leg_numbers import own_searches, pose_errors
 from .numbers.loop_limits import loop_extremes
-from .numbers.robot_limits import limited_spectrum
+from .numbers.pose_error import pose_errors
+from .numbers.searched import Subject, asked_spectra_extremes, searched_limits
 from .numbers.strokes import Refine, with_strokes
 from .ranks.ranks import Ranks, not_judged, prove_ranks
 from .ranks.search import RankProgress
@@ -199,37 +198,36 @@ class _Numbers:
         Raises:
             InputError: the robot has no measure of a name.
         """
-        case, box, legs = self.case, pose_box(self.workspace), self.legs
+        case, legs, machines = self.case, self.legs, self.machines
         names = [name for name in quantities if name not in SPECTRAL]
-        family = None if self.machines is None else self.machines.family
-        if self.machines is not None:
+        refine: Refine
+        if machines is not None:
             proving = Proving(self.gap, self.jobs, self.progress, self.paper)
-            extremes = machine_extremes(self.machines, names, proving, with_objective=with_objective)
-            yield from _add(found, extremes if legs is None else map(_of_legs, extremes))
-            refine: Refine = partial(_refined_machines, self.machines, proving)
+            extremes = machine_extremes(machines, names, proving, with_objective=with_objective)
+            yield from _add(found, map(partial(_of_legs, machines), extremes))
+            refine = partial(_refined_machines, machines, proving)
         else:
             refine = yield from self._add_design(found, names, with_objective=with_objective)
         lengths = [each for each in found if each.name.startswith("leg_length limb ") and each.sense is Sense.MIN]
         shortest = min((each.bound for each in lengths), default=0.0)
-        if legs is not None:
-            before = len(found)
-            found[:] = with_strokes(case, legs, found, refine)
-            yield from found[before:]
-            others = own_searches(case, legs, box, gap=self.gap, shortest=shortest, paper=self.paper)
-            yield from _add(found, others)
-        spectra = spectral_extremes(
-            *(case, self.closed.model, box, quantities),
-            gap=self.gap,
-            shortest=shortest,
-            family=family,
+        subject = Subject(
+            case=case,
+            model=self.closed.model,
+            box=pose_box(self.workspace),
+            legs=joint_centres(case),
+            built=None if machines is None else (machines.built, machines.family),
             unknown=self.unknown,
-            paper=self.paper,
+            shortest=shortest,
         )
-        yield from self._add_others(found, spectra)
+        before = len(found)
+        found[:] = with_strokes(subject, found, refine)
+        yield from found[before:]
+        yield from _add(found, searched_limits(subject, gap=self.gap, paper=self.paper))
+        yield from _add(found, asked_spectra_extremes(subject, quantities, gap=self.gap, paper=self.paper))
         eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
         if legs is not None and with_objective and eps > 0:
             exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
-            yield from _add(found, pose_errors(legs, box, eps, exact, paper=self.paper))
+            yield from _add(found, pose_errors(legs, subject.problem, eps, exact, paper=self.paper))
 
     def _add_design(
         self, found: list[Extreme], names: Sequence[str], *, with_objective: bool
@@ -250,7 +248,7 @@ class _Numbers:
         prove = self._prove(layout)
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         decided: list[Extreme] = []
-        if self.legs is None and not case.joint_centre_tolerance:
+        if not case.joint_centre_tolerance:
             decided = [
                 each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
             ]
@@ -259,15 +257,6 @@ class _Numbers:
                 decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
         yield from self._add_proved(found, layout, claims, decided)
         return partial(_refined, partial(prove, paper=self.paper, again=True), claims)
-
-    def _add_others(self, found: list[Extreme], asked: Iterable[Extreme]) -> Iterator[Extreme]:
-        """Add the extremes of limits that no claim is about, without legs, and of measures that are asked for."""
-        if self.legs is None:
-            family = None if self.machines is None else self.machines.family
-            box = pose_box(self.workspace)
-            own = limited_spectrum(self.case, self.closed.model, box, family, self.unknown, gap=self.gap)
-            yield from _add(found, own)
-        yield from _add(found, asked)
 
     def _prove(self, layout: Layout) -> Callable[..., Extreme]:
         """Return the function that proves a claim to a gap."""
@@ -291,8 +280,10 @@ class _Numbers:
             yield from _add(found, [own])
 
 
-def _of_legs(each: Extreme) -> Extreme:
-    """Return an extreme with the errors of its machine as those of six straight legs."""
+def _of_legs(machines: Machines, each: Extreme) -> Extreme:
+    """Return an extreme with the errors of its machine as those of six straight legs, if it has these."""
+    if not has_straight_legs(machines.case.model):
+        return each
     return replace(each, errors=None if each.centres is None else of_legs(each.centres), centres=None)
 
 
@@ -322,7 +313,7 @@ def _refined_machines(
         proving.paper.directions[claims[0].name] = about
     prove = partial(machine_extreme, machines, again=True)
     found = _refined(lambda claim, *, gap: prove(claim, proving._replace(gap=gap)), claims, leg, sense, gap, about)
-    return None if found is None else _of_legs(found)
+    return None if found is None else _of_legs(machines, found)
 
 
 def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:

@@ -9,17 +9,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
+from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....interruption import one_search
 from ...boxes.rows import Boxes, Columns, bisected, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
+from ...enclosure.forms import Encloser, Forms
+from ..ranks.covering import APART, Followed, LoopRule
+from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
+from ..ranks.rank_rule import Tested
 from ..robot.pose_box import PoseBox
+from ..robot.posed_robot import Problem
+from ..robot.tolerance_model import Family
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,6 +41,10 @@ _POINTS, _STEPS, _AROUND = 256, 24, 32
 #: Factor of the size of steps from one to the next.
 _SHRINK = 0.7
 _SEED = 0
+#: Of a search that follows loops: number of boxes examined at once, number of those with the smallest bounds at which
+#: values are computed, and widths of a box, in parts of the whole box, below which it is not bisected.
+_FOLLOWED_BLOCK, _TRIED = 256, 8
+_LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Part of itself by which a value may be off by rounding: the first of several that are the same is taken.
 _TIE = 1e-11
 
@@ -56,8 +66,81 @@ class Oracle(Protocol):
         """Return the values (K,) at points (K, 6)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Minimum:
+class Bounded(Protocol):
+    """A number of which forms of expressions give bounds.
+
+    Attributes:
+        entries: (E, 1) the expressions, in the coordinates of a robot or of all machines.
+    """
+
+    entries: SX
+
+    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
+        """Return lower bounds over B boxes, and the share (B, f) of each independent coordinate in their slack.
+
+        Args:
+            forms: of the entries.
+            count: number f of the first terms, which are the independent coordinates.
+            errors: number of the last terms, which are errors of joint centres; those between are products of two
+                coordinates.
+        """
+
+
+class Number(Bounded, Protocol):
+    """A number with bounds and values.
+
+    Attributes:
+        family: all machines in whose coordinates the entries are; None for the design alone.
+    """
+
+    family: Family | None
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return the values (K,) at points (K, n) of the design."""
+
+
+class OverPoses:
+    """Bounds and values of a number of a robot without dependent coordinates.
+
+    Args:
+        number: the number.
+        problem: the robot.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    def __init__(self, number: Number, problem: Problem) -> None:
+        family = number.family
+        self._number, self._box, self._free = number, problem.box, list(problem.free)
+        # A single pose has no coordinate, and forms need one.
+        coordinates = problem.z if family is None else family.coordinates
+        self._encloser = Encloser(coordinates if coordinates.numel() else SX.sym("none"), number.entries)
+        self._errors = np.zeros(0) if family is None else np.full(family.errors.numel(), family.tolerance)
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return the values (K,) at points (K, 6)."""
+        return self._number.values(points[:, self._free])
+
+    def forms(self, lower: FloatArray, upper: FloatArray) -> Forms:
+        """Return forms of the number's entries over boxes (B, 6): coordinates, their products or errors of centres."""
+        errors = np.tile(self._errors, (len(lower), 1))
+        ends = np.hstack([lower[:, self._free], -errors]).T, np.hstack([upper[:, self._free], errors]).T
+        if not len(ends[0]):
+            ends = np.zeros((1, len(lower))), np.zeros((1, len(lower)))
+        return self._encloser(*ends) if errors.size else self._encloser.second(*ends).as_terms()
+
+    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
+        """Return lower bounds over boxes (B, 6)."""
+        found = self._number.over(self.forms(lower, upper), len(self._free), len(self._errors))
+        shares = np.zeros(lower.shape)
+        shares[:, self._free] = found.shares
+        whole = self._box.upper - self._box.lower
+        wide = (upper - lower) / np.where(whole > 0, whole, np.inf)
+        return Bounds(found.lower, np.where(shares.any(axis=1, keepdims=True), shares, wide))
+
+
+class Minimum(NamedTuple):
     """The smallest value of a function over the workspace.
 
     Attributes:
@@ -257,3 +340,108 @@ def _corners(box: PoseBox) -> FloatArray:
     """Return the corners (64, 6) of the box, moved into the workspace."""
     sides = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
     return box.clipped(box.lower + sides * (box.upper - box.lower))
+
+
+class _NumberTest:
+    """A number as a test of boxes: its bounds are their smallest values."""
+
+    def __init__(self, number: Bounded) -> None:
+        self.entries, self._number = number.entries, number
+
+    def examine(self, forms: Forms, f: int) -> Tested:
+        """Return the lower bounds of boxes; none is regular."""
+        found = self._number.over(forms, f, forms.a.shape[2] - f)
+        none = np.zeros(len(found.lower), dtype=np.int32)
+        return Tested(none.astype(bool), np.nan_to_num(found.shares), found.lower, none)
+
+
+class FollowedRule(LoopRule, SmallestValue[Followed]):
+    """Rule of a number of a robot whose dependent coordinates are followed, or of all machines.
+
+    Args:
+        problem: the robot.
+        family: all machines that are meant; None for the design alone.
+        number: the number, in the coordinates of the problem or of the machines.
+        smallest_in: returns the smallest value known at points of boxes.
+        goal: the bound that is to be reached.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    block = _FOLLOWED_BLOCK
+
+    def __init__(
+        self,
+        problem: Problem,
+        family: Family | None,
+        number: Bounded,
+        smallest_in: Callable[[LoopBoxes], Value | None],
+        goal: Goal,
+    ) -> None:
+        LoopRule.__init__(self, problem, Examiner(problem, _NumberTest(number), family))
+        SmallestValue.__init__(self, goal, Value(math.inf, problem.start if family is None else family.start))
+        self._smallest_in = smallest_in
+
+    def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
+        """Return bounds of boxes, and take note of small values in them."""
+        found = self.examined(boxes)
+        known = np.flatnonzero(found.boxes.is_known & np.isfinite(found.smallest))
+        if known.size:
+            order = np.argsort(found.smallest[known])[:_TRIED]
+            best = self._smallest_in(some(found.boxes, known[order]))
+            if best is not None and best.value < self.best.value:
+                self.best = best
+        width = self.widths(found)
+        score = found.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
+        split = first_largest(np.where(width > 0, score, -1.0))
+        # Nothing is known of a box in which dependent coordinates are not.
+        bound = np.where(found.boxes.is_known, -found.smallest, np.inf)
+        return self.verdicts(self.boxes_of(found, bound, split))
+
+    def minimum(self) -> Minimum:
+        """Return the smallest value over the workspace."""
+        found = searched(self, self.root, self.whole, _LEAST_WIDTHS)
+        if not math.isfinite(found.bound):
+            return found._replace(bound=-math.inf)
+        return found if self.is_one_assembly() else found._replace(bound=-math.inf, reason=APART)
+
+
+def smallest_number(
+    number: Number,
+    problem: Problem,
+    *,
+    gap: float,
+    limit: float | None = None,
+    slack: float = 0.0,
+    recorder: TreeRecord | None = None,
+) -> Minimum:
+    """Prove the smallest value of a number of a robot over its poses; the point found is that of a pose (6,).
+
+    Args:
+        number: the number.
+        problem: the robot.
+        gap: allowed distance of the bound from the best value known, in the number's unit.
+        limit: the search ends once the bound is at least this.
+        slack: how far a value may be below the limit and still count as on it.
+        recorder: records the boxes for a proof, without dependent coordinates.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+    if not problem.dependent:
+        over = OverPoses(number, problem)
+        return prove_minimum(over, problem.box, gap=gap, limit=limit, slack=slack, recorder=recorder)
+    loops, D, box = problem.loops, list(problem.dependent), problem.box
+
+    def smallest_in(boxes: LoopBoxes) -> Value | None:
+        """Return the smallest value of the design in the middle of boxes."""
+        z = loops.all_closed(boxes.centre.T, D).T
+        inside = are_between(z, boxes, D) & np.array([box.holds(each) for each in problem.pose_of(z)])
+        values = np.where(inside, number.values(np.where(inside[:, None], z, problem.start)), np.nan)
+        k = first_smallest(values) if np.isfinite(values).any() else -1
+        return None if k < 0 else Value(float(values[k]), z[k])
+
+    with one_search():
+        found = FollowedRule(problem, number.family, number, smallest_in, Goal(gap, limit, slack)).minimum()
+    return found._replace(at=problem.pose_of(found.at[: len(problem.start)]))

@@ -6,7 +6,6 @@ Every claim is a program over the numbers of the pose, which :mod:`screwsynth.nl
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -41,7 +40,7 @@ _FINEST = 1e-10
 #: Part of the room between a value and its limit that a finer gap is: the value known grows a little in a search.
 _SHARE = 0.9
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding.
-_ON_LIMIT = 1e-9
+ON_LIMIT = 1e-9
 #: Part of an expression's scale that gaps of smaller values are parts of, as in the search of certificates.
 _NEAR_ZERO = 1e-6
 #: Reason for a limit that stays open between a bound and a value although the search ended.
@@ -88,6 +87,14 @@ class Extreme:
     def fails(self) -> bool:
         """Whether it has a limit that is not proved to hold; a number without a limit is information."""
         return self.limit is not None and self.outcome is not Outcome.PROVED
+
+
+def nothing_known(
+    name: str, sense: Sense, dimension: Dimension, reason: str, *, key: str = "", limit: float | None = None
+) -> Extreme:
+    """Return the extreme of a number of which nothing is proved."""
+    bound = math.inf if sense is Sense.MAX else -math.inf
+    return Extreme(name, sense, dimension, key, limit, bound, math.nan, None, Outcome.OPEN, 0, 0.0, reason)
 
 
 def prove_extreme(
@@ -167,15 +174,14 @@ def _search(
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
-    began = time.perf_counter()
     # A program of a claim has one function, and its search is that of certify with or without a record.
     writer = None if record is None else TreeRecord()
     found = certify_program(nlp, gap=gap, jobs=jobs, recorder=writer)
-    boxes = found.boxes
+    boxes, seconds = found.boxes, found.seconds
     while (finer := _finer_gap(nlp, claim, found)) is not None and not is_requested():
         finer_writer = None if record is None else TreeRecord()
         again = certify_program(nlp, found.x, gap=finer, jobs=jobs, recorder=finer_writer)
-        boxes += again.boxes
+        boxes, seconds = boxes + again.boxes, seconds + again.seconds
         sign = 1.0 if claim.sense is Sense.MAX else -1.0
         if sign * again.bound <= sign * found.bound:
             writer = finer_writer
@@ -185,11 +191,10 @@ def _search(
     if record is not None and writer is not None and found.status is not CertificateStatus.INFEASIBLE:
         record.paper.program(claim, found, writer, again=record.again)
     if found.status is CertificateStatus.INFEASIBLE:
-        return _Found(boxes=boxes, seconds=found.seconds, reason="the robot has no pose there")
+        return _Found(boxes=boxes, seconds=seconds, reason="the robot has no pose there")
     # A search that ends early has a bound too, which may be as good as asked for.
     met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
     pose = None if found.x is None else _pose(nlp, found.x)
-    seconds = time.perf_counter() - began
     return _Found(found.bound, found.incumbent, pose, boxes, seconds, found.reason, met)
 
 
@@ -211,7 +216,7 @@ def slack_of(limit: float) -> float:
 
     It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
     """
-    return _ON_LIMIT * abs(limit)
+    return ON_LIMIT * abs(limit)
 
 
 def _extreme(claim: Claim, found: _Found, machine: WorstMachine | None) -> Extreme:

@@ -4,8 +4,8 @@ A leg's length changes by at most ``eps = leg error + 2 joint error`` when its j
 error, at every pose: by the triangle inequality. To first order the platform's origin and its rotation are off by
 ``J^-1 d`` with ``|d_i| <= eps``, and the largest size is met where every ``d_i`` is eps or -eps.
 
-Over a box ``J^-1`` is affine in the coordinates but for a rest (:mod:`.inverse`). Sizes are convex, and so largest at
-a corner of the box.
+Over a box ``J^-1`` is affine in the coordinates but for a rest (:mod:`.left_inverse`). Sizes are convex, and so largest
+at a corner of the box.
 
 For the rest of the pose error, let the error found be P eps in position and Q eps in rotation. By Taylor's formula the
 lengths at the true pose differ from those to first order by at most
@@ -18,69 +18,132 @@ machine comes continuously from the one without errors, and so its errors are th
 
 from __future__ import annotations
 
+import itertools
 import math
-from typing import NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
 
+import casadi as ca
 import numpy as np
 
-from .....models import FloatArray
-from ...statement.machine import Legs
+from .....models import Dimension, FloatArray
+from ....case.task import Sense
+from ...enclosure.forms import Forms
+from ...statement.machine import LEGS, Legs
 from ..ranks.krawczyk import inverses
-from ..regular.inverse import CORNERS, inverse_over
-from ..regular.rows import LegRows, rows_at
 from ..robot.pose_box import PoseBox
-from .bound_search import Bounds
+from ..robot.posed_robot import Problem
+from ..robot.tolerance_model import Family
+from ..verdict import Outcome
+from .bound_search import Bounds, smallest_number
+from .extremes import Extreme
+from .left_inverse import left_inverses, rows_over
+
+if TYPE_CHECKING:
+    from ..proof_record import PaperRecord
 
 #: Part of its size by which a computed bound is moved outwards: rounding.
 _ROUNDING = 1e-10
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
-_ERRORS = CORNERS[:32].T
+_ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=LEGS)))[: 2 ** (LEGS - 1)].T
 #: Steps in the search of the smallest r.
 _STEPS = 200
 #: Steps of Newton's method for a pose whose errors are small.
 _NEWTON = 8
 #: Part of the longest leg by which lengths may differ from those that are wanted: rounding.
 _CLOSED = 1e-10
+#: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
+_GAP = 0.1
+
+
+def pose_errors(
+    legs: Legs, problem: Problem, eps: float, shortest: float, *, paper: PaperRecord | None = None
+) -> Iterator[Extreme]:
+    """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
+
+    Args:
+        legs: joint centres.
+        problem: the robot.
+        eps: largest error of a leg's length, those of its joint centres included, length.
+        shortest: proven shortest length of a leg over the poses.
+        paper: records the searches for a proof.
+    """
+    names = (("position error", Dimension.LENGTH), ("rotation error", Dimension.ANGLE))
+    searches, found, box = [WorstError(problem, is_rotation=which) for which in (False, True)], [], problem.box
+    for each, (name, _) in zip(searches, names, strict=True):
+        middle = (0.5 * (box.lower + box.upper))[None, list(problem.free)]
+        recorder = None if paper is None else paper.own(name)
+        gap = _GAP * abs(float(each.values(middle)[0]))
+        found.append(smallest_number(each, problem, gap=gap, recorder=recorder))
+        if paper is not None:
+            paper.firsts[name] = -found[-1].bound
+    first = PoseErrors(*(-eps * each.bound for each in found))
+    reach = float(np.linalg.norm(legs.platform, axis=1).max())
+    whole = with_rest(first, eps, shortest, reach) if all(map(math.isfinite, first)) else PoseErrors(math.inf, math.inf)
+    for k, (name, dimension) in enumerate(names):
+        y, bound = found[k].at, whole[k]
+        worst = eps * searches[k].worst(y[list(problem.free)])
+        # To first order both signs give the same error.
+        both = [displaced(legs, box, y, sign * worst) for sign in (-1.0, 1.0)]
+        reached = max((each[k] for each in both if each is not None), default=math.nan)
+        is_proved = math.isfinite(bound) and not found[k].reason
+        reason = found[k].reason or "the errors are too large for a bound of their terms of second order"
+        yield Extreme(
+            name=name,
+            sense=Sense.MAX,
+            dimension=dimension,
+            key="",
+            limit=None,
+            bound=bound,
+            reached=reached,
+            pose=None if math.isnan(reached) else box.pose(y),
+            outcome=Outcome.PROVED if is_proved else Outcome.OPEN,
+            boxes=found[k].boxes,
+            seconds=found[k].seconds,
+            reason="" if is_proved else reason,
+        )
 
 
 class WorstError:
     """Minus the largest error of the pose to first order, for unit errors of legs: its smallest value is the worst.
 
     Args:
-        legs: joint centres.
-        box: the poses.
+        problem: six straight legs.
         is_rotation: whether the rotation is meant, and not the position of the platform's origin.
+
+    Attributes:
+        entries: (42, 1) the rows of J, column by column, and their sizes.
     """
 
-    def __init__(self, legs: Legs, box: PoseBox, *, is_rotation: bool) -> None:
-        self._legs, self._box, self._rows = legs, box, LegRows(legs, box)
+    def __init__(self, problem: Problem, *, is_rotation: bool) -> None:
+        self.family: Family | None = None
         self._part = slice(3, 6) if is_rotation else slice(0, 3)
+        self._scale = np.array([1.0, 1.0, 1.0, *[problem.length] * 3])
+        self.entries = ca.vertcat(ca.vec(ca.densify(problem.scaled.rows)), problem.scaled.sizes)
+        self._jacobian = ca.Function("J", [problem.z], [ca.densify(problem.scaled.jacobian)])
 
-    def values(self, points: FloatArray) -> FloatArray:
-        """Return minus the error (K,) at points (K, 6)."""
-        return np.asarray(-np.linalg.norm(self.responses(points) @ _ERRORS, axis=1).max(axis=1))
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return minus the error (K,) at points (K, n)."""
+        return np.asarray(-np.linalg.norm(self.responses(z) @ _ERRORS, axis=1).max(axis=1))
 
-    def worst(self, y: FloatArray) -> FloatArray:
-        """Return the signs (6,) of the errors of legs that are worst at a point (6,)."""
-        sizes = np.linalg.norm(self.responses(y[None])[0] @ _ERRORS, axis=0)
+    def worst(self, z: FloatArray) -> FloatArray:
+        """Return the signs (6,) of the errors of legs that are worst at a point (n,)."""
+        sizes = np.linalg.norm(self.responses(z[None])[0] @ _ERRORS, axis=0)
         return np.asarray(_ERRORS[:, int(np.argmax(sizes))])
 
-    def responses(self, points: FloatArray) -> FloatArray:
-        """Return the rows (K, 3, 6) of the inverses of J with unit rows."""
-        rows = rows_at(self._legs, self._box, points)
-        lengths = np.linalg.norm(rows[:, :, :3], axis=2)
-        with np.errstate(all="ignore"):
-            return np.asarray(inverses(rows)[:, self._part] * lengths[:, None, :])
+    def responses(self, z: FloatArray) -> FloatArray:
+        """Return the rows (K, 3, 6) of the inverses of J."""
+        J = self._jacobian(z.T).full().reshape(LEGS, len(z), 6).transpose(1, 0, 2) * self._scale
+        return inverses(J)[:, self._part]
 
-    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
-        """Return lower bounds over boxes (B, 6)."""
-        inverse = inverse_over(self._rows, lower, upper)
+    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
+        """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
+        inverse = left_inverses(rows_over(forms, self._scale, count, errors))
         with np.errstate(all="ignore"):
             corners = inverse.at_corners(self._part)
             worst = np.linalg.norm(corners @ _ERRORS, axis=2).max(axis=(1, 2))
             worst += np.linalg.norm(inverse.rest[:, self._part].sum(axis=2), axis=1)
-        bound = np.where(np.isfinite(worst), -worst * (1 + _ROUNDING), -np.inf)
-        return Bounds(bound, inverse.shares)
+        return Bounds(np.where(np.isfinite(worst), -worst * (1 + _ROUNDING), -np.inf), inverse.shares)
 
 
 class PoseErrors(NamedTuple):

@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from .....models import Dimension, FloatArray
-from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.task import Sense
-from ...statement.machine import LEGS, Legs
+from ...statement.machine import Legs
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
 from ..tolerance.leg_errors import along, spans
 from ..verdict import Outcome
 from .extremes import Extreme, slack_of
+from .searched import Subject
 
 #: Smallest gap of a length, as a part of it, and part of the room that lengths may leave: that of rounding.
 _FINEST, _SHARE = 1e-11, 0.9
@@ -41,7 +41,7 @@ class _Kind(NamedTuple):
     short: float
 
 
-def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Refine) -> list[Extreme]:
+def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine) -> list[Extreme]:
     """Return extremes, and after them those of the case's limits on telescoping legs.
 
     A stroke is the longest length less the shortest, at whichever poses: both are poses of the workspace. Where a limit
@@ -49,22 +49,25 @@ def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Re
     those given.
 
     Args:
-        case: the case.
-        legs: its joint centres.
+        subject: the robot.
         extremes: among them the smallest and the largest length of each leg.
         refine: proves a length more finely.
     """
-    limit = next((each for each in case.limits if isinstance(each, Actuator)), None)
+    legs = subject.legs
+    limit = next((each for each in subject.case.limits if isinstance(each, Actuator)), None)
     found, added = list(extremes), list[Extreme]()
-    if limit is None:
+    if limit is None or legs is None:
         return found
-    kinds = []
-    if limit.stroke_max is not None:
-        kinds.append(_Kind("actuator.stroke_max", Sense.MAX, limit.stroke_max, 1.0, -1.0))
-    if limit.dead_length is not None:
-        kinds.append(_Kind("actuator.dead_length", Sense.MIN, limit.dead_length, -1.0, 2.0))
+    kinds = [
+        _Kind(f"actuator.{name}", sense, value, long, short)
+        for name, sense, value, long, short in (
+            ("stroke_max", Sense.MAX, limit.stroke_max, 1.0, -1.0),
+            ("dead_length", Sense.MIN, limit.dead_length, -1.0, 2.0),
+        )
+        if value is not None
+    ]
     place = {(each.name, each.sense): k for k, each in enumerate(found)}
-    for i, leg in enumerate(case.model.legs):
+    for i, leg in enumerate(subject.case.model.legs):
         short, long = (place[f"leg_length limb {leg.name}", sense] for sense in (Sense.MIN, Sense.MAX))
         for kind in kinds:
             name = f"{kind.key} limb {leg.name}"
@@ -77,7 +80,9 @@ def with_strokes(case: Case, legs: Legs, extremes: Sequence[Extreme], refine: Re
                 before, extreme = extreme, _of_lengths(name, kind, legs, i, found[short], found[long])
                 if extreme.bound == before.bound:
                     break
-            added.append(_of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine))
+            extreme = _of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine)
+            centres = subject.centres(extreme.errors)
+            added.append(extreme if centres is None else replace(extreme, errors=None, centres=centres))
     return [*found, *added]
 
 
@@ -150,7 +155,7 @@ def _of_lengths(name: str, kind: _Kind, legs: Legs, i: int, short: Extreme, long
         # One machine has both lengths: its errors are along the change of the number, to first order.
         at = [_directions(legs, pose) for pose in (long.pose, short.pose)]
         turned = [n @ pose.rotation for n, pose in zip(at, (long.pose, short.pose), strict=True)]
-        base, platform = np.zeros((LEGS, 3)), np.zeros((LEGS, 3))
+        base, platform = np.zeros_like(legs.base), np.zeros_like(legs.base)
         base[i] = -sign * (kind.long * at[0][i] + kind.short * at[1][i])
         platform[i] = sign * (kind.long * turned[0][i] + kind.short * turned[1][i])
         errors = along(legs, np.eye(3), base, platform)

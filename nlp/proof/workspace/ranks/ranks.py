@@ -11,12 +11,12 @@ from ....errors import UncoveredError
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ...statement.machine import Legs
 from ..home_poses import Homes
-from ..regular.signs import SignRefuter
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..robot.tolerance_model import Family
 from ..verdict import Outcome, Regularity
 from .search import NewtonRefuter, RankProgress, prove_rank, singular_at
+from .signs import SignRefuter
 
 if TYPE_CHECKING:
     from ..proof_record import PaperRecord
@@ -53,7 +53,7 @@ def prove_ranks(
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is None:
                 continue
-            recorder = None if paper is None or (legs is None and family is not None) else paper.own(name)
+            recorder = None if paper is None else paper.own(name)
             is_shown = partial(_is_shown, problem, family, homes, constraints=name == CONSTRAINTS)
             newton = NewtonRefuter(problem, matrix, None if legs else family, is_shown)
             refuter = newton if legs is None else SignRefuter(legs, problem)

@@ -55,7 +55,7 @@ class SingularPose:
         self._equations = ca.Function(
             "singular", [z, v], [meant.equations, product, ca.jacobian(meant.equations, z), ca.jacobian(product, z)]
         )
-        self._jacobian = ca.Function("J", [z], [ca.densify(meant.jacobian)])
+        self._jacobian = ca.Function("J", [z], [ca.densify(meant.scaled.jacobian)])
 
     def smallest(self, z: FloatArray) -> float:
         """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Model, Substitution, frozen_array, jacobian
+from .....models import FloatArray, Model, Substitution, WrenchKind, frozen_array, jacobian
 from .....models.instance import homogenised, sizes_at
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
@@ -39,6 +40,25 @@ class NotJudgedError(ValueError):
     """Error of a robot whose loops or limbs are singular where a search begins; the message is a clause."""
 
 
+class ScaledRows(NamedTuple):
+    """J as rows divided by their sizes, moments about the platform's origin in parts of a length.
+
+    The row of a leg times its length is a polynomial of the pose, and so nearer to a linear function than the unit row.
+
+    Attributes:
+        rows: (m, 6) rows of any size.
+        sizes: (m, 1) positive.
+    """
+
+    rows: SX
+    sizes: SX
+
+    @property
+    def jacobian(self) -> SX:
+        """J, (m, 6)."""
+        return self.rows / ca.repmat(self.sizes, 1, 6)
+
+
 @dataclass(frozen=True, eq=False)
 class PosedModel:
     """A model as expressions of the coordinates: Substitution's numbers put in.
@@ -51,10 +71,12 @@ class PosedModel:
         every: all equations of loops, and signs that must be positive.
         signs: (s, 1) numbers that are positive in home's assembly.
         limbs: rows, members and actuators.
-        J: (rows, 6) of the limbs, couples times the characteristic length of the case.
+        characteristic_length: by which couples are multiplied in J.
         turned: the limbs with ``inverse * s R`` as the rotation.
         inverse: (1, 1) symbol of ``1 / s``.
         scale: (1, 1) ``s``.
+        symbols: those of the model.
+        given: expressions in their place, and those with ``inverse * s R`` as the rotation.
     """
 
     z: SX
@@ -64,18 +86,58 @@ class PosedModel:
     every: SX
     signs: SX
     limbs: Limbs
-    J: SX
+    characteristic_length: float
     turned: Limbs
     inverse: SX
     scale: SX
+    symbols: list[SX]
+    given: tuple[list[SX], list[SX]]
 
     def loops(self, equations: SX) -> Loops:
         """Return some of the equations as functions of the coordinates."""
         return Loops(self.z, equations, self.every, self.signs, self.size)
 
-    def jacobian(self, length: float) -> SX:
-        """Return J (rows, 6), moments about the platform's origin divided by a length."""
-        return ca.horzcat(*homogenised(self.J, self.limbs.position, length))
+    def scaled(self, length: float) -> ScaledRows:
+        """Return J with moments about the platform's origin divided by a length."""
+
+        def wrenches(limbs: Limbs) -> SX:
+            """Return rows of forces and couples, and 1 in a last column: the factor that makes them polynomials."""
+            rows = [
+                ca.horzcat(row.force.T, (row.moment - ca.cross(limbs.position, row.force)).T / length, 1)
+                for row in limbs.wrenches
+            ]
+            return ca.vertcat(SX(0, 7), *rows)
+
+        L, limbs = SX(self.characteristic_length), self.limbs
+        rows = ca.densify(self.polynomial(wrenches(limbs), wrenches(self.turned)))
+        factors = [L if row.kind is WrenchKind.COUPLE else SX(1) for row in limbs.wrenches]
+        sizes = [rows[i, 6] * ca.sqrt(row.square) / factors[i] for i, row in enumerate(limbs.wrenches)]
+        of_members = ca.horzcat(*homogenised(jacobian([], L, limbs.members), limbs.position, length))
+        ones = SX.ones(of_members.shape[0])
+        return ScaledRows(ca.vertcat(rows[:, :6], of_members), ca.vertcat(SX(0, 1), *sizes, ones))
+
+    def scaled_points(self, points: SX) -> tuple[SX, SX]:
+        """Return points (3 k, 1) in the symbols of the model as expressions of the coordinates, and these times s."""
+        function = ca.Function("points", self.symbols, [points])
+        plain, turned = (ca.horzcat(function.call(each)[0], SX.ones(points.shape[0])) for each in self.given)
+        rows = self.polynomial(plain, turned)
+        scaled = [rows[i, 0] * (self.scale if rows[i, 1].is_one() else 1) for i in range(rows.shape[0])]
+        return plain[:, 0], ca.vertcat(SX(0, 1), *scaled)
+
+    def polynomial(self, plain: SX, turned: SX) -> SX:
+        """Return a matrix whose rows that are linear in the rotation are multiplied by its scale, without a division.
+
+        Args:
+            plain: (m, c).
+            turned: the same with ``inverse * s R`` as the rotation.
+        """
+        slopes = ca.reshape(ca.jacobian(ca.densify(turned), self.inverse), *turned.shape)
+        constant = ca.substitute(turned, self.inverse, 0)
+        found = [
+            plain[i, :] if ca.depends_on(slopes[i, :], self.inverse) else constant[i, :] * self.scale + slopes[i, :]
+            for i in range(plain.shape[0])
+        ]
+        return ca.sparsify(ca.vertcat(SX(0, plain.shape[1]), *found))
 
     def locked_rows(
         self, columns: tuple[tuple[int, ...], ...], rows: tuple[tuple[int, ...], ...], length: float
@@ -88,13 +150,7 @@ class PosedModel:
             length: by which rotations are multiplied.
         """
         plain, turned = (locked_matrix(each.reduced(columns, rows, length)) for each in (self.limbs, self.turned))
-        slopes = ca.reshape(ca.jacobian(ca.densify(turned), self.inverse), *turned.shape)
-        constant = ca.substitute(turned, self.inverse, 0)
-        found = [
-            plain[i, :] if ca.depends_on(slopes[i, :], self.inverse) else constant[i, :] * self.scale + slopes[i, :]
-            for i in range(plain.shape[0])
-        ]
-        return RankMatrix(ca.sparsify(ca.vertcat(*found)), 0)
+        return RankMatrix(self.polynomial(plain, turned), 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +167,7 @@ class Problem:
         start: (n,) closed loops at the middle of the workspace, or near it.
         locked: rows and members with the actuators locked.
         unactuated: the same with free actuators; None for a robot without constraints.
-        jacobian: (rows, 6) J, moments about the platform's origin divided by ``length``.
+        scaled: J, moments divided by ``length``.
         length: of the order of the robot's, length.
         needed: indices of the equations among those of the model.
         columns: indices of the screws of each member that are kept.
@@ -128,7 +184,7 @@ class Problem:
     start: FloatArray
     locked: RankMatrix
     unactuated: RankMatrix | None
-    jacobian: SX
+    scaled: ScaledRows
     length: float
     needed: tuple[int, ...]
     columns: tuple[tuple[int, ...], ...]
@@ -203,7 +259,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         start=frozen_array(start, start.shape),
         locked=posed.locked_rows(columns, rows, length),
         unactuated=_unactuated(model, posed.limbs.reduced(columns, rows, length), at_start),
-        jacobian=posed.jacobian(length),
+        scaled=posed.scaled(length),
         length=length,
         needed=tuple(needed),
         columns=columns,
@@ -241,7 +297,8 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
-    function = ca.Function("model", Substitution.identity(model).all, outputs)
+    symbols = Substitution.identity(model).all
+    function = ca.Function("model", symbols, outputs)
 
     def limbs_of(following: Iterator[SX]) -> Limbs:
         """Return the limbs from the first outputs."""
@@ -258,7 +315,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
     limbs = limbs_of(following)
     polynomial, scale = polynomial_rotation(box, turn)
     inverse = SX.sym("inverse")
-    turned = limbs_of(iter(function.call([given.parameters, given.unknowns, inverse * polynomial, position])))
+    turned = replace(given, rotation=inverse * polynomial)
     signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
     sizes = sizes_at(
         model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns))
@@ -273,10 +330,12 @@ def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, 
         every=ca.vertcat(SX(0, 1), *scaled),
         signs=signs,
         limbs=limbs,
-        J=jacobian(limbs.wrenches, SX(case.characteristic_length), limbs.members),
-        turned=turned,
+        characteristic_length=case.characteristic_length,
+        turned=limbs_of(iter(function.call(turned.all))),
         inverse=inverse,
         scale=scale,
+        symbols=symbols,
+        given=(given.all, turned.all),
     )
 
 

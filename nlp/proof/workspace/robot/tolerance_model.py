@@ -20,7 +20,7 @@ from ...statement.machine import INSIDE, CentreErrors
 from ...statement.tolerance import BuiltModel
 from .closed_loops import Loops
 from .motion_matrix import RankMatrix, free_matrix
-from .posed_robot import NotJudgedError, PosedModel, Problem, posed_model
+from .posed_robot import NotJudgedError, PosedModel, Problem, ScaledRows, posed_model
 
 #: Errors at which equations that were left out are tested, as a part of the robot's length, and number of tests.
 _OFF, _TESTS = 1e-2, 4
@@ -46,7 +46,7 @@ class Family:
         every: (l, 1) all equations of loops with errors.
         signs: (s, 1) numbers that are positive in home's assembly.
         locked, unactuated: matrices of the problem with errors.
-        jacobian: (rows, 6) J with errors, as in the problem.
+        scaled: J with errors, as in the problem.
     """
 
     problem: Problem
@@ -58,7 +58,7 @@ class Family:
     signs: SX
     locked: RankMatrix
     unactuated: RankMatrix | None
-    jacobian: SX
+    scaled: ScaledRows
 
     @property
     def coordinates(self) -> SX:
@@ -133,7 +133,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
         signs=posed.signs,
         locked=posed.locked_rows(problem.columns, problem.rows, problem.length),
         unactuated=unactuated,
-        jacobian=posed.jacobian(problem.length),
+        scaled=posed.scaled(problem.length),
     )
     _check_freedoms(family, posed)
     return family

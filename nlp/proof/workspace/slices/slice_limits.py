@@ -1,7 +1,7 @@
 """Reach and limits over the boxes of a slice: each kept, or violated, at every pose of a box, or open.
 
-Reach and limits on expressions are decided by the ranges of :mod:`..numbers.limit_values`, those on the clearance of
-legs by its bound from below and by how far the legs move within the box. A limit on singular values is proved to be
+Reach and limits on expressions are decided by the ranges of :mod:`..numbers.loop_limits`, those on the clearance of
+legs by its bounds from below and from above. A limit on singular values is proved to be
 kept by its bound; it counts as violated where it is so at the corners and at the middle of the box, which is no proof.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import enum
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 from .....models import Dimension, FloatArray
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
-from ....case.limits.clearance import LegClearance
-from ....case.limits.singular_values import ConditionNumber, SmallestSingularValue
+from ....case.task import Sense
+from ....errors import UncoveredError
 from ...boxes.rows import some
-from ...statement.machine import legs_of
+from ...statement.machine import joint_centres
+from ..numbers.bound_search import OverPoses
 from ..numbers.clearance import Clearance
-from ..numbers.limit_values import ON_LIMIT, LimitValues
-from ..numbers.singular import SingularValues
-from ..numbers.spectrum import Spectrum
+from ..numbers.extremes import ON_LIMIT
+from ..numbers.loop_limits import LimitValues
+from ..numbers.searched import Subject, questions
 from ..ranks.krawczyk import Relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.posed_robot import Problem
@@ -78,38 +79,31 @@ class SliceLimits:
 
     def __init__(self, case: Case, closed: ClosedForm, problem: Problem) -> None:
         self._problem, self._values = problem, LimitValues(case, closed, problem)
-        self._reaches, legs = len(closed.reaches), legs_of(case)
+        self._reaches = len(closed.reaches)
+        exact = replace(case, joint_centre_tolerance=None)
+        subject = Subject(exact, closed.model, problem.box, joint_centres(exact), design=problem)
         limits: dict[str, SliceLimit] = {}
         for claim in self._values.claims:
             limit = claim.reading.from_value(claim.limit or 0.0)
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
         uncovered = dict.fromkeys(self._values.uncovered)
         self._others: list[_Apart | _Sampled] = []
-        for each in case.limits:
-            if isinstance(each, LegClearance):
-                key, value, dimension = "leg_clearance.min", each.min, Dimension.LENGTH
-            elif isinstance(each, SmallestSingularValue):
-                key, value, dimension = "smallest_singular_value.min", each.min, Dimension.NUMBER
-            elif isinstance(each, ConditionNumber):
-                key, value, dimension = "condition_number.max", each.max, Dimension.NUMBER
-            else:
-                continue
-            if legs is None and (isinstance(each, LegClearance) or problem.dependent):
+        for question in (each for limit in case.limits for each in questions(subject, limit)):
+            key, value, is_apart = question.key, question.limit or 0.0, question.places is not None
+            try:
+                number = question.number()
+                over = None if problem.dependent else OverPoses(number, problem)
+            except UncoveredError:
+                over = None
+            if over is None:
                 uncovered[key] = None
                 continue
-            limits[key] = SliceLimit(key, value, dimension, is_enclosed=isinstance(each, LegClearance))
-            if isinstance(each, LegClearance):
-                if legs is not None:
-                    pairs = itertools.combinations(range(len(legs.base)), 2)
-                    self._others += [_Apart(key, Clearance(legs, problem.box, *pair), value) for pair in pairs]
-                continue
-            is_condition = isinstance(each, ConditionNumber)
-            oracle = (
-                Spectrum(problem, each.length, is_condition=is_condition)
-                if legs is None
-                else SingularValues(legs, problem.box, each.length, is_condition=is_condition)
-            )
-            self._others.append(_Sampled(key, oracle, -value if is_condition else value))
+            limits[key] = SliceLimit(key, value, question.dimension, is_enclosed=is_apart)
+            least = value if question.sense is Sense.MIN else -value
+            if isinstance(number, Clearance):
+                self._others.append(_Apart(key, number, over, least))
+            else:
+                self._others.append(_Sampled(key, over, least))
         places = {key: k for k, key in enumerate(limits)}
         self._places = [places[each.key] for each in (*self._values.claims, *self._others)]
         #: Keys of limits that are not decided on boxes.
@@ -180,25 +174,23 @@ def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[
 class _Apart:
     """The clearance of a pair of legs."""
 
-    def __init__(self, key: str, pair: Clearance, limit: float) -> None:
-        self.key, self._pair, self._limit = key, pair, limit - ON_LIMIT * abs(limit)
+    def __init__(self, key: str, pair: Clearance, over: OverPoses, limit: float) -> None:
+        self.key, self._pair, self._over, self._limit = key, pair, over, limit - ON_LIMIT * abs(limit)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
         """Return the states (B,) over boxes (B, 6)."""
-        bounds = self._pair.bounds(lower, upper)
-        # Each of the two legs moves by at most the sum of the shares from its place at the middle of the box.
-        most = self._pair.values(0.5 * lower + 0.5 * upper) + 2 * bounds.shares.sum(axis=1)
-        return _states_of(bounds.lower >= self._limit, most < self._limit)
+        kept = self._over.bounds(lower, upper).lower >= self._limit
+        return _states_of(kept, self._pair.most(self._over.forms(lower, upper)) < self._limit)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return whether it is violated at points (P, 6): (P,)."""
-        return np.asarray(self._pair.values(points) < self._limit)
+        return np.asarray(self._over.values(points) < self._limit)
 
 
 class _Sampled:
     """A function that is bounded from below only; violated where it is so at the corners and the middle of a box."""
 
-    def __init__(self, key: str, oracle: SingularValues | Spectrum, limit: float) -> None:
+    def __init__(self, key: str, oracle: OverPoses, limit: float) -> None:
         self.key, self._oracle, self._limit = key, oracle, limit - ON_LIMIT * abs(limit)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
