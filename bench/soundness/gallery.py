@@ -282,7 +282,8 @@ def machine(sampled: Sampled, found: Tables) -> Array:
     for each in found.get("machine", {}).get("centres", ()):
         for chain in robot.chains:
             for turn in chain.turns:
-                if robot.places[turn.coordinate] == each["joint"]:
+                end = ", other end" if turn.factor < 0 else ""
+                if robot.places[turn.coordinate] + end == each["joint"]:
                     own[0, turn.centre] = each["error"]
     return own
 

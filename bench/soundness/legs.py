@@ -169,13 +169,8 @@ class Legs:
             found[f"leg_length limb {name}"] = length[:, k]
         for plate in ("base", "platform"):
             limit = self.limits.get(f"{plate}_joint_angle", 0)
-            own = (a, b) if self.first is not None else (self.platform, self.base)
-            axis = self.mounting(plate, limit.get("about", "normal") if isinstance(limit, dict) else "normal", *own)
-            axes = (
-                np.broadcast_to(axis, n.shape)
-                if plate == "base"
-                else np.einsum("nij,nkj->nki", R, np.broadcast_to(axis, n.shape))
-            )
+            axis = self.mounting(plate, limit.get("about", "normal") if isinstance(limit, dict) else "normal")
+            axes = np.broadcast_to(axis, n.shape) if plate == "base" else np.einsum("nij,kj->nki", R, axis)
             for key, those in (
                 ("", axes),
                 ("of", np.broadcast_to(Z, n.shape) if plate == "base" else np.broadcast_to(R[:, None, :, 2], n.shape)),
@@ -238,11 +233,8 @@ class Legs:
         b = self.base + np.zeros_like(a) + base_errors
         return segment_distance(b[:, one], a[:, one], b[:, other], a[:, other])
 
-    def mounting(self, plate: str, about: Any, platform: Array, base: Array) -> Array:  # noqa: ANN401
-        """Return mounting axes ([N,] m, 3) in the frame of a plate.
-
-        From home, they are along the legs of the design of six legs, and of the machine of another robot.
-        """
+    def mounting(self, plate: str, about: Any) -> Array:  # noqa: ANN401 - a word, a direction, or several
+        """Return mounting axes (m, 3) in the frame of a plate; from home they are along the legs of the design."""
         if about == "normal":
             return np.broadcast_to(Z, self.base.shape)
         if about == "home":
@@ -250,7 +242,7 @@ class Legs:
             R = turned(
                 np.array(home.get("axis", [0, 0, 1.0]), float)[None], np.array([home.get("angle", 0.0) * self.unit])
             )[0]
-            d = np.array(home["position"], float) + platform @ R.T - base
+            d = np.array(home["position"], float) + self.platform @ R.T - self.base
             d /= np.linalg.norm(d, axis=-1, keepdims=True)
             return d if plate == "base" else d @ R
         axes = np.array(about, float)

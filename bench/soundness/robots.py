@@ -122,7 +122,9 @@ class Robot:
                         self.actuated.append(coordinate)
                     found.append(Turn(coordinate, 1.0, centre, a, kind == "P"))
                     if kind == "Pa":
-                        found.append(Turn(coordinate, -1.0, centre_of(evaluated(joint["to"], names)), a, False))
+                        # The other end of the rods has an error of its own.
+                        self.points.append(placed(evaluated(joint["to"], names)))
+                        found.append(Turn(coordinate, -1.0, len(self.points) - 1, a, False))
             return found
 
         trunk = turns_of(table["joints"], f"{limb}:", 1)
