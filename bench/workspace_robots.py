@@ -15,7 +15,7 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
 

@@ -37,8 +37,8 @@ from screwsynth.nlp.proof.workspace import scale
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.loop_limits import loop_extremes
-from screwsynth.nlp.proof.workspace.ranks import search as ranks
-from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.ranks import ranks
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
@@ -58,7 +58,7 @@ LOOPS = (
     *(str(ROOT / "proof" / "boxes" / name) for name in ("incumbent.py", "search.py", "optimum.py")),
     *(str(ROOT / "proof" / "boxes" / "limbs" / name) for name in ("independent.py", "shared.py")),
     *(str(ROOT / "proof" / "workspace" / name) for name in ("judge.py", "scale.py")),
-    str(ROOT / "proof" / "workspace" / "ranks" / "search.py"),
+    str(ROOT / "proof" / "workspace" / "ranks" / "ranks.py"),
     *(str(ROOT / "proof" / "workspace" / "numbers" / name) for name in ("loop_limits.py", "bound_search.py")),
     str(ROOT / "proof" / "workspace" / "tolerance" / "machine_number.py"),
 )

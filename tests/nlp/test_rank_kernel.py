@@ -27,7 +27,7 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
-from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, family_of

@@ -25,7 +25,7 @@ from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
-from screwsynth.nlp.proof.workspace.ranks import search
+from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
@@ -111,10 +111,10 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    target, name = (search._RankRule, "divided") if place == "branch" else (Examiner, "examine")
+    target, name = (ranks._RankRule, "divided") if place == "branch" else (Examiner, "examine")
     monkeypatch.setattr(target, name, interrupt)
     # The poses of opposite signs that are known before a box is bisected would refute the claim, as they should.
     problem = build_problem(case, model, box)
-    found = search.prove_rank(problem, problem.locked, refuter=SimpleNamespace(look=lambda *_: None))
+    found = ranks.prove_rank(problem, problem.locked, refuter=SimpleNamespace(look=lambda *_: None))
     assert found.outcome is Outcome.OPEN
     assert found.reason == "interrupted"

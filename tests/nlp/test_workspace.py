@@ -26,7 +26,7 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
 from screwsynth.nlp.proof.workspace.numbers.pose_error import WorstError
-from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem

@@ -29,8 +29,8 @@ from screwsynth.nlp.proof.workspace.home_poses import Homes
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
-from screwsynth.nlp.proof.workspace.ranks.ranks import prove_ranks
-from screwsynth.nlp.proof.workspace.ranks.search import NewtonRefuter, prove_rank
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank, prove_ranks
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import NewtonRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome

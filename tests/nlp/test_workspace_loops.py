@@ -13,7 +13,7 @@ from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.statement.claims import REGULAR
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.ranks.search import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome

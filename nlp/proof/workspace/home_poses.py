@@ -26,9 +26,9 @@ from ...program.layout import Layout
 from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import CentreErrors
 from ..statement.posed_layout import extreme_program
+from ..statement.tolerance import coordinate_layout
 from .numbers.extremes import Extreme, slack_of
-from .robot.box_layout import box_layout
-from .robot.pose_box import PoseBox
+from .robot.pose_box import PoseBox, pose_coordinates
 from .tolerance.machines import Machines
 from .verdict import Outcome
 
@@ -129,7 +129,7 @@ class Homes:
 
     @cached_property
     def _design(self) -> _HomePoses:
-        layout = box_layout(self.case, self.box, self.box.free)
+        layout = coordinate_layout(self.case, pose_coordinates(self.box))
         return _HomePoses(layout, claims_of(layout, self._quantities))
 
     @cached_property

@@ -25,8 +25,7 @@ from .numbers.loop_limits import loop_extremes
 from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, asked_spectra_extremes, searched_limits
 from .numbers.strokes import Refine, with_strokes
-from .ranks.ranks import Ranks, not_judged, prove_ranks
-from .ranks.search import RankProgress
+from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError
 from .tolerance.leg_errors import of_legs

@@ -28,12 +28,12 @@ from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ...enclosure.forms import Encloser, Forms
 from ...enclosure.tape import compile_tape
 from ...statement.claims import claims_of
+from ...statement.tolerance import coordinate_layout
 from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
 from ..ranks.krawczyk import ROUNDING, Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
 from ..ranks.rank_rule import RankTest
-from ..robot.box_layout import box_layout
-from ..robot.pose_box import PoseBox
+from ..robot.pose_box import PoseBox, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..verdict import Outcome
 from .extremes import CLOSE, ON_LIMIT, Extreme
@@ -85,7 +85,7 @@ class LimitValues:
 
     def __init__(self, case: Case, closed: ClosedForm, problem: Problem) -> None:
         self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
-        layout = box_layout(replace(case, model=closed.model), problem.box, problem.free)
+        layout = coordinate_layout(replace(case, model=closed.model), pose_coordinates(problem.box))
         # The variables of the layout are those of the problem, in its order.
         given = [problem.z, SX(ca.DM(layout.table.values))]
         own = [layout.table.variables_vector, layout.table.arguments_vector]

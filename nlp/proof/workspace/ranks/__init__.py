@@ -2,6 +2,6 @@
 
 The modules import each other in this order: ``krawczyk`` (how passive joints follow over a box), ``rank_rule`` (the
 test of a matrix), ``entry_change`` (of its entries within a tolerance), ``loop_boxes`` (boxes of a search),
-``covering`` (of a workspace, and of one assembly), ``singular_pose`` (Newton's method for one), ``search`` (until every
-box is proved), ``signs`` (singular poses of six legs by exact signs of determinants), and ``ranks`` (all of a robot).
+``covering`` (of a workspace, and of one assembly), ``singular_pose`` (Newton's method for one), ``signs`` (exact
+signs of determinants of six straight legs), and ``ranks`` (all of a robot).
 """

@@ -32,9 +32,9 @@ _POLYNOMIAL = (
 )
 
 
-def is_polynomial(entries: SX, family: Family) -> bool:
-    """Return whether entries (E, 1) are polynomials in the coordinates of machines."""
-    function = ca.Function("entries", [family.coordinates], [entries])
+def is_polynomial(entries: SX, coordinates: SX) -> bool:
+    """Return whether entries (E, 1) are polynomials in coordinates (n, 1)."""
+    function = ca.Function("entries", [coordinates], [entries])
     constant: set[int] = set()  # work places, which are used again
     for k in range(function.n_instructions()):
         op, to, places = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)

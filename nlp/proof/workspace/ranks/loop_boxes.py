@@ -156,7 +156,7 @@ class Examiner:
     def _use_second_order(self, test: RankTest) -> None:
         """Examine by forms of second order; with errors, of polynomials alone."""
         family = self._family
-        if family is not None and not is_polynomial(test.entries, family):
+        if family is not None and not is_polynomial(test.entries, family.coordinates):
             return
         self._rank, self._change = test, None if family is None else EntryChange(family, test.entries)
         self.second = Encloser(self.problem.z, test.entries if self._change is None else self._change.exact)

@@ -27,7 +27,7 @@ from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
 from .krawczyk import inverses
 from .loop_boxes import Examined
-from .search import Singular
+from .singular_pose import Singular
 
 #: Change of the logarithm of the determinant to first order from which a change of sign is looked for, and the number
 #: of poses at which it is looked for in one call: exact determinants take a while.

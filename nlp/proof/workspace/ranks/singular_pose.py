@@ -4,17 +4,24 @@ A pose is singular where ``M(z) v = 0`` for a unit vector v, with closed loops: 
 method with steps of least squares. It converges where the determinant changes its sign, and more slowly where it
 touches 0 without a change of sign. What it finds is computed, not proved: J at the pose, with unit rows and moments
 divided by a length, has a singular value of at most 1e-10 of the largest.
+
+Source: 1. M. Frank, P. Wolfe, *An algorithm for quadratic programming*, Naval Research Logistics Quarterly 3 (1956).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
 import casadi as ca
 import numpy as np
 
-from .....models import FloatArray
+from .....models import FloatArray, frozen_array
+from ...statement.machine import CentreErrors, JointErrors
 from ..robot.motion_matrix import RankMatrix
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import Family
+from .loop_boxes import Examined, LoopBoxes
 
 #: Singular value, in parts of the largest, below which a pose counts as singular.
 SINGULAR = 1e-10
@@ -24,6 +31,8 @@ _STEPS = 60
 _PATIENCE = 8
 #: Singular value of M, in parts of the largest, below which J is looked at.
 _NEAR = 1e-6
+#: Steps toward machines with smaller singular values.
+_MACHINES = 6
 #: Largest step of a coordinate, in parts of its size.
 _STEP = 0.25
 #: Largest residual of closed loops.
@@ -32,6 +41,19 @@ _CLOSED = 1e-9
 _DEPENDENT = 1e-12
 #: Smallest part of the platform's motion in the null vector: below, passive joints alone move.
 _MOVES = 1e-3
+
+
+#: Smallest singular value, in parts of the largest, from which Newton's method looks for a singular pose, and most
+#: attempts.
+_SMALL, _MOST = 0.1, 24
+#: Number of boxes after which a singular machine is looked for first; later ones are twice as many each.
+_FIRST = 64
+#: Part of the value before at which it tries again.
+_SMALLER = 0.6
+#: Random poses from which Newton's method looks for a singular one, and number of the worst that are tried.
+_POSES, _TRIED, _SEED = 2048, 8, 0
+#: How a singular pose of Newton's method is known.
+BY_NEWTON = "found singular to 1e-10 by Newton's method"
 
 
 class SingularPose:
@@ -80,7 +102,8 @@ class SingularPose:
         M = self._values(z).full()
         if not np.isfinite(M).all():
             return None
-        v = self._direction(M)
+        # The direction that M shrinks most, among those across its null space.
+        v = np.linalg.svd(M)[2][M.shape[1] - self._matrix.nullity - 1]
         seen: list[float] = []
         for _ in range(_STEPS):
             _, values, right = np.linalg.svd(M)
@@ -130,14 +153,10 @@ class SingularPose:
         """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
         problem = self._problem
         if problem.equations.numel():
-            g = self._equations(z, np.zeros(problem_columns(self._matrix)))[0].full()
+            g = self._equations(z, np.zeros(self._matrix.matrix.shape[1]))[0].full()
             if not float(np.abs(g).max()) <= _CLOSED:
                 return False
         return problem.box.holds(problem.pose_of(z)) and self.smallest(z) <= SINGULAR
-
-    def _direction(self, M: FloatArray) -> FloatArray:
-        """Return the unit vector that a matrix shrinks most, among those across its null space."""
-        return np.asarray(np.linalg.svd(M)[2][M.shape[1] - self._matrix.nullity - 1])
 
     def _inside(self, z: FloatArray) -> FloatArray:
         """Return a point with the numbers of its pose moved into the workspace."""
@@ -147,6 +166,145 @@ class SingularPose:
         return z if self._family is None else self._family.within(z)
 
 
-def problem_columns(matrix: RankMatrix) -> int:
-    """Return the number of columns of a matrix."""
-    return int(matrix.matrix.shape[1])
+class SingularMachine:
+    """Search for a machine within a tolerance that is singular at a pose.
+
+    The smallest singular value of the design is made smaller by errors of the joint centres, each along its derivative:
+    the method of Frank and Wolfe [1], whose steps stay within the tolerance. From each machine on the way Newton's
+    method looks for a singular one, at the pose or near it.
+
+    Args:
+        family: the machines.
+        matrix: whose rank is judged, one of the two of the family.
+    """
+
+    def __init__(self, family: Family, matrix: RankMatrix) -> None:
+        self._family, self._newton, self._loops = family, SingularPose(family.problem, matrix, family), family.loops
+
+    def search(self, z: FloatArray) -> FloatArray | None:
+        """Return the coordinates (n + 3 m,) of a singular machine and its pose, near a pose (n,); None without one."""
+        family, n = self._family, len(self._family.problem.start)
+        dependent = list(family.problem.dependent)
+        machine: FloatArray | None = family.exact(z)
+        for step in range(_MACHINES):
+            if dependent and machine is not None:
+                machine = self._loops.closed(machine, dependent)
+            slopes = None if machine is None else self._newton.slopes(machine)
+            if machine is None or slopes is None:
+                return None
+            parts = slopes[n:].reshape(-1, 3)
+            sizes = np.linalg.norm(parts, axis=1, keepdims=True)
+            unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > 0)
+            machine = machine.copy()
+            machine[n:] += 2 / (step + 2) * (-family.tolerance * unit.ravel() - machine[n:])
+            found = self._newton.search(family.within(machine))
+            if found is not None:
+                return found
+        return None
+
+
+class Singular(NamedTuple):
+    """A singular pose.
+
+    Attributes:
+        y: (6,) its coordinates.
+        reason: how it is known, where that is no proof; else empty.
+        sides: (2, 6) two poses at which the determinant has opposite signs, without rounding; None without them.
+        errors: of the joint centres of the machine that is singular, of six straight legs; None for the design.
+        centres: the same for another robot.
+    """
+
+    y: FloatArray
+    reason: str = ""
+    sides: FloatArray | None = None
+    errors: JointErrors | None = None
+    centres: CentreErrors | None = None
+
+
+class Refuter(Protocol):
+    """Search for a singular pose."""
+
+    def look(self, found: Examined, boxes: int) -> Singular | None:
+        """Return a singular pose, or None.
+
+        Args:
+            found: the boxes that were examined last.
+            boxes: number of all that were examined.
+        """
+
+
+class NewtonRefuter:
+    """Newton's method from the boxes whose matrices are nearest to a singular one.
+
+    Args:
+        problem: the robot.
+        matrix: whose rank is judged.
+        family: all machines that are meant; None for the design alone.
+        is_shown: whether a singular point (n,), or (n + 3 m,) of another machine, is one in home's assembly.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        matrix: RankMatrix,
+        family: Family | None = None,
+        is_shown: Callable[[FloatArray], bool] = lambda _: True,
+    ) -> None:
+        self._problem, self._family, self._is_shown = problem, family, is_shown
+        self._newton = SingularPose(problem, matrix)
+        self._machine = None if family is None else SingularMachine(family, family.matrix(matrix))
+        self._attempts, self._last = 0, _SMALL
+        # Number of boxes from which a singular machine is looked for, although no pose of the design is near to one.
+        self._due = _FIRST
+
+    def look(self, found: Examined, boxes: int) -> Singular | None:
+        """Return a singular pose from the worst of these boxes."""
+        values = np.where(found.is_regular, np.inf, found.smallest)
+        order = np.argsort(values)[:2]
+        for k in order:
+            if not values[k] < self._last or self._attempts >= _MOST:
+                break
+            self._attempts += 1
+            near = self._newton.search(self._middle(found.boxes, k))
+            shown = self._if_shown(near)
+            if shown is not None:
+                return shown
+            # A singular pose of another assembly says nothing about where one of home's is.
+            self._last = _SMALLER * float(values[k]) if near is None else self._last
+        if self._machine is None or boxes < self._due or not np.isfinite(values[order[0]]):
+            return None
+        self._due = 2 * boxes
+        return self._if_shown(self._machine.search(self._middle(found.boxes, order[0])))
+
+    def from_random(self) -> Singular | None:
+        """Return a singular pose near random ones, from those with the smallest singular values."""
+        points = self._problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(self._problem.free)]
+        values = np.array([self._newton.smallest(each) for each in points])
+        worst = [points[k] for k in np.argsort(values)[:_TRIED] if np.isfinite(values[k])]
+        searches: list[Callable[[FloatArray], FloatArray | None]] = [self._newton.search]
+        if self._machine is not None:
+            searches.append(self._machine.search)
+        for search in searches:
+            for point in worst:
+                shown = self._if_shown(search(point))
+                if shown is not None:
+                    return shown
+        return None
+
+    def _if_shown(self, z: FloatArray | None) -> Singular | None:
+        """Return a singular pose if it is one in home's assembly: Newton's method may end in another one."""
+        return singular_at(self._problem, self._family, z) if z is not None and self._is_shown(z) else None
+
+    def _middle(self, boxes: LoopBoxes, k: np.int64) -> FloatArray:
+        """Return a point (n,) in the middle of a box, with closed loops or near them."""
+        z: FloatArray = boxes.near[k].copy()
+        own = [*self._problem.independent, *self._problem.dependent]
+        z[own] = boxes.centre[k, own]
+        return z
+
+
+def singular_at(problem: Problem, family: Family | None, z: FloatArray) -> Singular:
+    """Return the singular pose at a point (n,), or (n + 3 m,) of another machine."""
+    is_machine = family is not None and len(z) > len(problem.start)
+    centres = family.errors_of(z) if family is not None and is_machine else None
+    return Singular(frozen_array(problem.pose_of(z), (6,)), BY_NEWTON, centres=centres)

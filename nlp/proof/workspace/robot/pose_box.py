@@ -22,6 +22,7 @@ from casadi import SX
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from ....case.pose import Free, Value
 from ....case.workspace import TurnKind, Workspace
+from ...statement.tolerance import PoseCoordinates
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -187,6 +188,15 @@ def pose_box(workspace: Workspace) -> PoseBox:
     return PoseBox(
         turns.kind, frozen_array(turns.axis, (3,)), frozen_array(lower, (6,)), frozen_array(upper, (6,)), ball
     )
+
+
+def pose_coordinates(box: PoseBox) -> PoseCoordinates:
+    """Return the coordinates of a box as those of a layout."""
+    middle = 0.5 * box.lower + 0.5 * box.upper
+    values: list[Value] = [float(each) for each in (*middle[:3], *(2 * np.arctan(middle[3:])))]
+    for k in box.free:
+        values[k] = Free(float(box.lower[k]), float(box.upper[k]))
+    return PoseCoordinates(values, lambda turn: rotation_of(box, turn), box.ball)
 
 
 def scaled(workspace: Workspace, factor: float) -> Workspace:

@@ -26,6 +26,7 @@ from ...boxes.rows import Boxes, bisected, joined, some
 from ...boxes.search import Order, Search, Verdicts
 from ...statement.machine import workspace_of_case
 from ..ranks.covering import Followed, LoopRule, loop_boxes_of, one_assembly
+from ..ranks.entry_change import is_polynomial
 from ..ranks.loop_boxes import Examiner, LoopBoxes
 from ..ranks.rank_rule import RankTest
 from ..robot.pose_box import PoseBox, pose_box, scaled
@@ -132,7 +133,7 @@ class _Robot:
         limits: its limits.
         examiners: of its ranks.
         sign: of the determinant in the middle; 0 for a matrix that is not square.
-        other: region of regular boxes with another sign. Where all limbs reach all poses, a singular pose is between.
+        other: region of regular boxes with another sign: of a matrix of polynomials a singular pose is between.
         free: indices of those numbers of the pose, among the six of a box, that the robot can choose.
 
     Raises:
@@ -150,7 +151,8 @@ class _Robot:
         except (NotJudgedError, UncoveredError) as error:
             raise CaseError("workspace", f"has no slices: {error}", source=case.source) from None
         self.sign = tests[0].sign
-        self.other = Region.OTHER_SIGN if problem.dependent or closed.reaches else Region.BEYOND
+        is_continuous = not problem.dependent and is_polynomial(tests[0].entries, problem.z)
+        self.other = Region.BEYOND if is_continuous else Region.OTHER_SIGN
         self.free = tuple(problem.free[k] for k in problem.independent)
 
 

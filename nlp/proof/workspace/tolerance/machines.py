@@ -26,7 +26,6 @@ from .....models.joints import RobotError
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.limits.constraint import Reading
-from ....case.pose import Free, Value
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
@@ -36,7 +35,6 @@ from ...statement.machine import INSIDE, CentreErrors
 from ...statement.tolerance import (
     BuiltModel,
     MachineLayout,
-    PoseCoordinates,
     built_model,
     design_layout,
     is_smooth,
@@ -45,7 +43,7 @@ from ...statement.tolerance import (
 )
 from ..numbers.bound_search import Minimum
 from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
-from ..robot.pose_box import PoseBox, PoseNumbers, rotation_of
+from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, build_problem
 from ..robot.tolerance_model import Family, family_of
 from ..verdict import Outcome
@@ -85,11 +83,7 @@ class Machines:
 
     def __init__(self, case: Case, model: Model, built: BuiltModel, family: Family) -> None:
         self.case, self.model, self.built, self.family = case, model, built, family
-        box, middle = family.problem.box, 0.5 * family.problem.box.lower + 0.5 * family.problem.box.upper
-        values: list[Value] = [float(each) for each in (*middle[:3], *(2 * np.arctan(middle[3:])))]
-        for k in box.free:
-            values[k] = Free(float(box.lower[k]), float(box.upper[k]))
-        self._at = PoseCoordinates(values, lambda turn: rotation_of(box, turn), box.ball)
+        self._at = pose_coordinates(family.problem.box)
         self.symbols: MachineLayout = machine_layout(case, built, family.tolerance, self._at)
         self._rests: dict[tuple[str, str], float] = {}
 
