@@ -9,7 +9,7 @@ import numpy as np
 
 from ....models import FloatArray
 from ...errors import InputError
-from ...evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
+from ...evidence.kkt import FEASIBLE, Linearisation, close_equations, correct_point, linearise
 from ...evidence.state import loops_are_closed
 from ...interruption import is_requested
 from ...program.sampling import starting_points
@@ -127,9 +127,9 @@ class Incumbent:
         at = linearise(nlp, whole)
         if not math.isfinite(at.violation):
             return
-        self._keep_if_better(self._form.point_of(whole))
+        self._keep_if_better(self._form.point_of(whole), at)
         corrected = correct_point(nlp, whole, at.active())
-        self._keep_if_better(self._form.point_of(np.clip(corrected.x, nlp.lower, nlp.upper)))
+        self._keep_if_better(self._form.point_of(np.clip(corrected.x, nlp.lower, nlp.upper)), corrected)
 
     def _with_level(self, point: FloatArray, value: float) -> FloatArray:
         """Return the point with the program's epigraph variable, where it has one."""
@@ -139,7 +139,7 @@ class Incumbent:
         nlp = self._form.nlp
         return np.append(variables, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
 
-    def _violation(self, point: FloatArray, value: float) -> float:
+    def _violation(self, point: FloatArray, value: float, known: Linearisation | None = None) -> float:
         """Return the largest violation of the program's limits, in half ranges; infinite where loops are open.
 
         The program has independent loop equations only, which other ways to assemble the joints fulfil too.
@@ -147,12 +147,14 @@ class Incumbent:
         nlp, whole = self._form.nlp, self._with_level(point, value)
         if not self._form.keeps_signs(whole):
             return math.inf
-        violation = linearise(nlp, whole).violation
+        at = known if known is not None and np.array_equal(known.x, whole) else linearise(nlp, whole)
+        violation = at.violation
         return violation if violation > FEASIBLE or loops_are_closed(nlp, whole) else math.inf
 
-    def _keep_if_better(self, point: FloatArray) -> None:
+    def _keep_if_better(self, point: FloatArray, known: Linearisation | None = None) -> None:
+        """Keep a point if it is feasible and better; the program linearised there may be known."""
         value = self._form.value_at(point)
         # Rounding chooses none of several points with the same value.
         better = value > self.value + _TIE * self._form.nlp.objective_size
-        if better and self._violation(point, value) <= FEASIBLE:
+        if better and self._violation(point, value, known) <= FEASIBLE:
             self._best = _Point(np.array(point), value)
