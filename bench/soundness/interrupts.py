@@ -25,7 +25,12 @@ from campaign import Row, campaign
 import screwsynth.nlp
 from screwsynth.nlp import case_from_tables, certify_program, formulate, judge_workspace, largest_scale
 
-WATCHED = tuple(str(Path(screwsynth.nlp.__file__).parent / name) for name in ("proof", "interruption.py"))
+PACKAGE = Path(screwsynth.nlp.__file__).parent
+#: The code whose instructions are counted, in turn: the one loop of every search, and all of the proofs.
+WATCHED = tuple(
+    tuple(str(PACKAGE / each) for each in names)
+    for names in (("proof/boxes", "interruption.py"), ("proof", "interruption.py"))
+)
 TASK = '[[task]]\nname = "one"\nsense = "max"\naxis = [1, 2, 6]\npoint = [3, 1, 12]\npitch = 0.1\n'
 PLATFORM = (
     '[robot]\nmodel = "stewart-gough"\nlayout = "octahedral"\nparameters = { x1 = 26.5, x2 = 11.5, x3 = 1, x4 = 5 }\n'
@@ -129,7 +134,7 @@ class Claim(NamedTuple):
 
 
 @contextmanager
-def at_instruction(n: int) -> Iterator[list[int]]:
+def at_instruction(n: int, watched: tuple[str, ...]) -> Iterator[list[int]]:
     """Raise an interrupt before the n-th instruction of the watched code; gives the number of those that ran."""
     count = [0]
 
@@ -141,7 +146,7 @@ def at_instruction(n: int) -> Iterator[list[int]]:
         return local
 
     def every(frame: FrameType, _: str, __: object) -> Callable[..., Any] | None:
-        if not frame.f_code.co_filename.startswith(WATCHED):
+        if not frame.f_code.co_filename.startswith(watched):
             return None
         frame.f_trace_opcodes, frame.f_trace_lines = True, False
         return local
@@ -200,10 +205,10 @@ def search(kind: str) -> Callable[[], Claim]:
 
 
 @cache
-def whole(kind: str) -> tuple[Claim, int]:
+def whole(kind: str, watched: tuple[str, ...]) -> tuple[Claim, int]:
     """Return the claim of a search that nothing interrupts, and the number of its instructions."""
     found = search(kind)()
-    with at_instruction(-1) as count:
+    with at_instruction(-1, watched) as count:
         search(kind)()
     return found, count[0]
 
@@ -212,12 +217,13 @@ def examine(seed: int) -> Row:
     """Interrupt a search once."""
     rng = np.random.default_rng(seed)
     kind = list(CASES)[seed % len(CASES)]
-    claim, instructions = whole(kind)
+    watched = WATCHED[seed // len(CASES) % 2]
+    claim, instructions = whole(kind, watched)
     # Half of the interrupts come near the beginning or the end.
     part = rng.choice([rng.random(), rng.random(), rng.random() ** 4, 1 - rng.random() ** 4])
     n = 1 + int(part * (instructions - 1))
     try:
-        with at_instruction(n):
+        with at_instruction(n, watched):
             found = copy_context().run(search(kind))
     except KeyboardInterrupt:
         return {"counts": {f"{kind}: raised": 1}, "faults": []}

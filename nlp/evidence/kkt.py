@@ -308,10 +308,9 @@ def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> Float
         (n,) the point inside the variables' bounds; the last iterate where Newton's method does not converge.
     """
     rows = np.flatnonzero(nlp.sides.equal)
-    start = linearise_equations(nlp, rows, x, NO_GRADIENT)
     if not len(rows):
-        return start.x
-    at = start
+        return np.asarray(x, dtype=np.float64)
+    at = start = linearise_equations(nlp, rows, x, NO_GRADIENT)
     for movable in [list(nlp.program.places.inner)] if in_place else _movable(nlp):
         at = start
         for _ in range(_NEWTON_STEPS if len(movable) == nlp.n else _FIRST_STEPS):

@@ -4,7 +4,6 @@ from screwsynth.models import hexapod
 from screwsynth.nlp import Case, Task
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Number, OverPoses
-from screwsynth.nlp.proof.workspace.numbers.clearance import Pair
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox
 
@@ -59,4 +58,4 @@ def over(subject: Subject, number: Number) -> OverPoses:
 
 def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> OverPoses:
     """The distance of two legs."""
-    return over(subject := subject_of(robot, box), subject.clearance(Pair(("", ""), (one, other))))
+    return over(subject := subject_of(robot, box), subject.clearance((one, other)))

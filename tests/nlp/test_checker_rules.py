@@ -8,10 +8,10 @@ import pytest
 from casadi import SX
 
 from screwsynth.nlp import formulate, load_case
+from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.bisection import Shown
 from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
 from screwsynth.nlp.proof.checker.polymodels import Tilts
-from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.tolerance import change_of_jacobian, change_of_rows
 from screwsynth.nlp.proof.statement.machine import Legs

@@ -14,9 +14,8 @@ from screwsynth.nlp import Case, formulate, load_case, solve
 from screwsynth.nlp.proof.boxes.engine import Engine, LimbModels
 from screwsynth.nlp.proof.boxes.incumbent import Incumbent
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
-from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
-from screwsynth.nlp.proof.boxes.limbs.cuts import LeftOwn
-from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb
+from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, OwnBoxes, bound_limb
+from screwsynth.nlp.proof.boxes.limbs.shared import LeftOwn
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
@@ -24,7 +23,7 @@ from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
-from screwsynth.nlp.proof.enclosure.quadratic_models import QuadraticModel
+from screwsynth.nlp.proof.enclosure.forms import QuadraticModel
 from screwsynth.nlp.proof.statement.limb_separation import separate
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 

@@ -11,9 +11,10 @@ from random_graphs import N, random_function
 from screwsynth.models import robot_function
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate, load_case
 from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.polymodels import forms_of, polynomial_sum, reaching_part
-from screwsynth.nlp.proof.checker.polynomials import Polynomial, PolynomialArithmetic, middles, places
+from screwsynth.nlp.proof.checker.polynomials import Polynomial, middles, places
 from screwsynth.nlp.proof.checker.premises import program_of
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.enclosure.tape import compile_tape

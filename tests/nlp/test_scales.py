@@ -13,8 +13,8 @@ from numpy_engine.second_order import enclose_second, monomials
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.proof.boxes.engine import Engine, Verdict
-from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic, middles, places
-from screwsynth.nlp.proof.checker.slopes import SlopeArithmetic
+from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
+from screwsynth.nlp.proof.checker.polynomials import middles, places
 from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of, midpoints
 from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
@@ -151,22 +151,10 @@ def of_search(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[
     return found
 
 
-def of_checkers(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[str, Ends]:
-    """Enclosures of the checkers: interval slopes, and polynomials with a ball; NaN proves nothing."""
-    slope, value = SlopeArithmetic(function)(low, high)[0], PolynomialArithmetic(function)(low, high)[0]
+def of_checker(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[str, Ends]:
+    """Enclosures of the checker: polynomials with a ball; NaN proves nothing."""
+    (value,) = PolynomialArithmetic(function)(low, high)
     at, on, (centre, radius) = places(len(value.on)), list(value.on), middles(low, high)
-
-    def slopes(k: int, point: np.ndarray) -> tuple[object, object] | None:
-        """The value at the point from that at the centre."""
-        middle = np.clip(0.5 * (low[:, k] + high[:, k]), low[:, k], high[:, k])
-        (least, most), C = (each[:, k] for each in slope.S), [each[k] for each in slope.C]
-        if np.isnan([*C, *least, *most]).any():
-            return None
-        ends = [arb(each) for each in C]
-        for i in np.flatnonzero(point != middle):
-            S = (least[i], most[i]) if point[i] > middle[i] else (most[i], least[i])
-            ends = [each + arb(end) * (arb(point[i]) - arb(middle[i])) for each, end in zip(ends, S, strict=True)]
-        return ends[0], ends[1]
 
     def polynomial(k: int, point: np.ndarray) -> tuple[object, object] | None:
         if np.isnan(value.s[k]):
@@ -176,12 +164,10 @@ def of_checkers(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dic
         total += linear(0.0, P[at.products], [e[i] * e[j] for i, j in zip(at.first, at.second, strict=True)])
         return ball(total, 0.0, 0.0, value.s[k])
 
-    found: dict[str, Ends] = {"slopes": slopes, "polynomial": polynomial}
-    for name, (least, most) in (("slopes", slope.V), ("polynomial", value.V)):
-        found[f"range of {name}"] = lambda k, _, ends=(least, most): (
-            None if np.isnan([ends[0][k], ends[1][k]]).any() else (arb(ends[0][k]), arb(ends[1][k]))
-        )
-    return found
+    def interval(k: int, _: np.ndarray) -> tuple[object, object] | None:
+        return None if np.isnan(value.s[k]) else (arb(value.V[0][k]), arb(value.V[1][k]))
+
+    return {"polynomial": polynomial, "range of polynomial": interval}
 
 
 @pytest.mark.parametrize("name", GRAPHS)
@@ -190,7 +176,7 @@ def test_no_value_of_any_scale_is_outside(name: str) -> None:
     tape = compile_tape(function)
     low, high = boxes(len(name), 70)
     with np.errstate(all="ignore"):
-        every = of_search(function, low, high) | of_checkers(function, low, high)
+        every = of_search(function, low, high) | of_checker(function, low, high)
     bad, held = Counter[str](), Counter[str]()
     for point in points_of(low, high, 5, 1):
         for k in range(low.shape[1]):

@@ -13,15 +13,15 @@ from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
-from screwsynth.nlp.proof.boxes.limbs.boxes import OwnBoxes
-from screwsynth.nlp.proof.boxes.limbs.sums import LimbBound, bound_limb, first_largest_of_lists
+from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, OwnBoxes, bound_limb, first_largest_of_lists
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.polymodels import Tilts, forms_of, polynomial_sum
-from screwsynth.nlp.proof.checker.polynomials import PolynomialArithmetic, difference
+from screwsynth.nlp.proof.checker.polynomials import sub
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Statement
 from screwsynth.nlp.proof.checker.tree import Node, SharedLeaf, leaf_bytes, read_shared
@@ -203,7 +203,7 @@ def test_models_of_limbs_minus_tilts_bound_every_point(kind: str) -> None:
     with np.errstate(all="ignore"):
         (value,) = PolynomialArithmetic(ca.Function("f", [limb.x], [limb.functions[0]]))(low, high)
         assert np.isfinite(value.s).all()
-        forms = forms_of([difference(value, tilts.polynomial(low, high))], low, high, limb)
+        forms = forms_of([sub(value, tilts.polynomial(low, high))], low, high, limb)
         bound = polynomial_sum(forms, np.ones((1, L))).bound()
     share = np.concatenate([rng.random((limb.n, L, points)), rng.integers(0, 2, (limb.n, L, points))], axis=2)
     x = low[:, :, None] + share * size[:, :, None]

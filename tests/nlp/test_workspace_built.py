@@ -28,7 +28,6 @@ from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.clearance import Pair
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
@@ -244,7 +243,7 @@ def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> Non
     for y in box.random(5, np.random.default_rng(3)):
         wide = robot._replace(tolerance=float(clearance(robot, box, 0, 1).values(y[None])[0]))
         assert clearance(wide, box, 0, 1).values(y[None])[0] == 0
-        errors = subject_of(wide, box).nearest(Pair(("", ""), (0, 1)), y)
+        errors = subject_of(wide, box).nearest((0, 1), y)
         assert errors is not None
         made = errors.applied(wide)
         assert clearance(made._replace(tolerance=0.0), box, 0, 1).values(y[None])[0] < 1e-9 * wide.tolerance

@@ -29,9 +29,9 @@ from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace import check
 from screwsynth.nlp.proof.checker.workspace.forms import are_positive, contraction
 from screwsynth.nlp.proof.checker.workspace.leg_claims import (
-    AffineMatrix,
     ClearanceClaim,
     ErrorClaim,
+    LegInverse,
     SingularClaim,
     whole_errors,
 )
@@ -444,18 +444,9 @@ def test_inverses_hold_those_at_samples(robot: Legs) -> None:
     rng = np.random.default_rng(8)
     root = pose_root(turned(TurnKind.ANY_AXIS, 20))
     lower, upper = random_boxes(root, 60, 0.1, rng)
-    seen: list[AffineMatrix] = []
-
-    class Kept(ErrorClaim):
-        """The claim that keeps the inverses of J over boxes."""
-
-        def _judged(self, inverse: AffineMatrix, *_: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            seen.append(inverse)
-            return np.ones(60, dtype=bool), np.zeros((60, 6)), np.zeros(60, dtype=bool)
-
-    claim = Kept(posed(root, robot), 1.0, is_rotation=False)
-    known = claim.attempt(lower, upper).holds
-    (P, T, rest), length = seen[0], posed(root, robot).length
+    legs = posed(root, robot)
+    (P, T, rest), known, _, _ = LegInverse(legs, legs.length)(lower, upper)
+    length = legs.length
     assert known.mean() > 0.5
     tight = 0
     for _ in range(10):

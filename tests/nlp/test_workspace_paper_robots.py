@@ -259,7 +259,7 @@ def test_forms_hold_the_entries_and_could_be_no_smaller() -> None:
     entries = rank_claim(case, closed_form(case.model).model, root, "regular")._entries
     rng = np.random.default_rng(3)
     lower, upper = boxes_about(0.5 * (root.lower + root.upper), 0.5 * (root.upper - root.lower), rng)
-    (c, a, r), _ = entries(lower, upper)
+    c, a, r = entries(lower, upper).forms()
     e = rng.choice([-1.0, 1.0], lower.shape) * (1 - 1e-9)
     values = entries.function(ca.DM((0.5 * (lower + upper) + 0.5 * (upper - lower) * e).T)).full().T
     missed = np.abs(values - c - np.einsum("brn,bn->br", a, e))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import UncoveredError
 from ..enclosure.engine import kernel
-from ..enclosure.quadratic_models import QuadraticModel
+from ..enclosure.forms import QuadraticModel
 from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows, tangent_rows
 from ..enclosure.tape import Tape, compile_tape
 from ..statement.piecewise_derivatives import refuse_jumps
@@ -101,13 +101,6 @@ class LimbModels:
     stops_down: NDArray[np.bool_]
     high: FloatArray
     value: FloatArray
-
-    def part(self, which: slice) -> LimbModels:
-        """Return the results of some boxes."""
-        L = QuadraticModel(**{name: values[..., which] for name, values in vars(self.L).items()})
-        return LimbModels(
-            **{**{name: values[..., which] for name, values in vars(self).items() if name != "L"}, "L": L}
-        )
 
 
 class Engine:
@@ -291,6 +284,11 @@ def without_conditions(form: StandardForm) -> StandardForm:
 def objective_tape(form: StandardForm, length: int) -> Tape | None:
     """Compile the functions and their derivatives; None where they take much of a whole tape of so many operations."""
     if form.n > MOST_VARIABLES or not form.conditions:
+        return None
+    # Without derivatives it is shorter, and mostly too long already.
+    values = ca.Function("values", [form.x], [ca.cse(ca.vertcat(*form.functions))])
+    shortest = sum(values.instruction_id(k) != ca.OP_CONST for k in range(values.n_instructions()))
+    if (shortest + len(form.functions) * form.n) * _MANY_CONDITIONS > length:
         return None
     tape = search_tape(without_conditions(form))
     return tape if len(tape) * _MANY_CONDITIONS <= length else None

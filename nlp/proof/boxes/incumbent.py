@@ -113,7 +113,8 @@ class Incumbent:
 
     def consider(self, point: FloatArray) -> None:
         """Keep a point (n,) if it is feasible and better; likewise the points that Newton's method reaches from it."""
-        self._keep_if_better(point)
+        if self._form.nlp.sides.equal.any():  # else the point is that at which equations hold
+            self._keep_if_better(point)
         self.improve_near(point)
 
     def improve_near(self, point: FloatArray) -> None:

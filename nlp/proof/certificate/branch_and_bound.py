@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
 
 from ....models import FloatArray, frozen_array
 from ...case.task import Sense
@@ -151,13 +150,6 @@ def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder
     return shared_search(form, separation, incumbent, jobs, recorder)
 
 
-class _Gap(NamedTuple):
-    """Largest difference of bound and incumbent, in the objective's unit, and whether it is a part of the incumbent."""
-
-    size: float
-    is_relative: bool
-
-
 @dataclass
 class _Search:
     """The state of a search; all values are those of the standard form, which is maximised.
@@ -193,7 +185,7 @@ class _Search:
         if self.incumbent.x is None:
             return -math.inf
         # The bound moves outwards in the end, and the gap must hold with that.
-        return self.incumbent.value + self._allowed_gap().size - 2 * _FOLDED * abs(self.incumbent.value)
+        return self.incumbent.value + self._allowed_gap()[0] - 2 * _FOLDED * abs(self.incumbent.value)
 
     def _has_counterexample(self) -> bool:
         """Return whether F is not above the value at a known point; an F that is rounding error counts as 0."""
@@ -201,11 +193,12 @@ class _Search:
             return False
         return self.incumbent.value >= -self.above - ZERO_F * self.form.nlp.objective_size
 
-    def _allowed_gap(self) -> _Gap:
+    def _allowed_gap(self) -> tuple[float, bool]:
+        """Return the largest difference of bound and incumbent, and whether it is a part of the incumbent."""
         floor, value = _NEAR_ZERO * self.form.nlp.objective_size, abs(self.incumbent.value)
         if floor < value < math.inf:
-            return _Gap(self.gap * value, is_relative=True)
-        return _Gap(self.gap * floor, is_relative=False)
+            return self.gap * value, True
+        return self.gap * floor, False
 
     @property
     def bound(self) -> float:
@@ -231,7 +224,7 @@ class _Search:
         """Return whether the bound is as good as asked for, once no box is open."""
         if self.above is not None:
             return self.bound < -self.above
-        return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap().size
+        return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap()[0]
 
     def run(self, progress: CertifyProgress | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text."""

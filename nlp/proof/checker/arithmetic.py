@@ -1,204 +1,137 @@
-"""Operations of CasADi's graphs in any arithmetic of the check: a list of steps, and those that are composed of others.
+"""Operations of CasADi's graphs in polynomials with a ball: those that have a rule, and those composed of others.
 
-An arithmetic of this package derives from :class:`Composed`, writes a dozen operations, and has the others by exact
-identities of real numbers.
+Compositions are exact identities of real numbers.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from ...errors import UncoveredError
+from . import polynomials as poly
+from .polynomials import Polynomial
 
-Value = TypeVar("Value")
+if TYPE_CHECKING:
+    from ....models import FloatArray
+
 #: The largest whole power that is written as products.
 _LARGEST_POWER = 64
+_ONE = poly.constant(1.0)
 
 
-class Composed(ABC, Generic[Value]):
-    """Operations on values of one arithmetic; those that are written here are composed of the abstract ones."""
-
-    @abstractmethod
-    def variable(self, i: int) -> Value:
-        """Return variable number i."""
-
-    @abstractmethod
-    def constant(self, value: float) -> Value:
-        """Return a constant."""
-
-    @abstractmethod
-    def number(self, u: Value) -> float | None:
-        """Return the number that a constant is; None for what is not known to be one."""
-
-    @abstractmethod
-    def add(self, u: Value, v: Value) -> Value:
-        """Return u + v."""
-
-    @abstractmethod
-    def sub(self, u: Value, v: Value) -> Value:
-        """Return u - v."""
-
-    @abstractmethod
-    def mul(self, u: Value, v: Value) -> Value:
-        """Return u v."""
-
-    @abstractmethod
-    def div(self, u: Value, v: Value) -> Value:
-        """Return u / v."""
-
-    @abstractmethod
-    def scale(self, u: Value, by: float) -> Value:
-        """Return a multiple of u."""
-
-    @abstractmethod
-    def square(self, u: Value) -> Value:
-        """Return the square of u."""
-
-    @abstractmethod
-    def sqrt(self, u: Value) -> Value:
-        """Return the root of u."""
-
-    @abstractmethod
-    def sin(self, u: Value) -> Value:
-        """Return the sine of u."""
-
-    @abstractmethod
-    def cos(self, u: Value) -> Value:
-        """Return the cosine of u."""
-
-    @abstractmethod
-    def exp(self, u: Value) -> Value:
-        """Return the exponential of u."""
-
-    @abstractmethod
-    def log(self, u: Value) -> Value:
-        """Return the natural logarithm of u."""
-
-    @abstractmethod
-    def atan(self, u: Value) -> Value:
-        """Return the arc tangent of u."""
-
-    @abstractmethod
-    def ramp(self, u: Value) -> Value:
-        """Return max(u, 0)."""
-
-    @abstractmethod
-    def step(self, u: Value) -> Value:
-        """Return 1 where u is not negative, else 0."""
-
-    def one(self) -> Value:
-        """Return 1."""
-        return self.constant(1.0)
-
-    def fmax(self, u: Value, v: Value) -> Value:
-        """Return the larger of two values."""
-        return self.add(v, self.ramp(self.sub(u, v)))
-
-    def fmin(self, u: Value, v: Value) -> Value:
-        """Return the smaller of two values."""
-        return self.scale(self.fmax(self.scale(u, -1.0), self.scale(v, -1.0)), -1.0)
-
-    def sign(self, u: Value) -> Value:
-        """Return 1 where u is not negative, else -1."""
-        return self.sub(self.scale(self.step(u), 2.0), self.one())
-
-    def fabs(self, u: Value) -> Value:
-        """Return the size of u."""
-        return self.sub(self.scale(self.ramp(u), 2.0), u)
-
-    def tan(self, u: Value) -> Value:
-        """Return the tangent of u."""
-        return self.div(self.sin(u), self.cos(u))
-
-    def asin(self, u: Value) -> Value:
-        """Return the arc sine of u."""
-        return self.atan(self.div(u, self.sqrt(self.sub(self.one(), self.square(u)))))
-
-    def acos(self, u: Value) -> Value:
-        """Return the arc cosine of u."""
-        return self.sub(self.scale(self.atan(self.one()), 2.0), self.asin(u))
-
-    def atan2(self, y: Value, x: Value) -> Value:
-        """Return the angle off the negative x-axis, ``2 atan(y / (sqrt(x^2 + y^2) + x))``."""
-        return self.scale(self.atan(self.div(y, self.add(self.hypot(y, x), x))), 2.0)
-
-    def hypot(self, y: Value, x: Value) -> Value:
-        """Return the root of the sum of two squares."""
-        return self.sqrt(self.add(self.square(y), self.square(x)))
-
-    def power(self, u: Value, exponent: Value) -> Value:
-        """Return a constant whole or half power.
-
-        Raises:
-            UncoveredError: the power is another one.
-        """
-        power = self.number(exponent)
-        if power is None or not ((2 * power).is_integer() and 0 < abs(power) <= _LARGEST_POWER):
-            raise UncoveredError("a power that is not constant, or not whole or half")
-        base, left = (u, int(abs(power))) if power.is_integer() else (self.sqrt(u), int(abs(2 * power)))
-        result: Value | None = None
-        while left:
-            if left & 1:
-                result = base if result is None else self.mul(result, base)
-            left >>= 1
-            base = self.square(base) if left else base
-        positive = self.one() if result is None else result
-        return positive if power > 0 else self.div(self.one(), positive)
+def _fmax(u: Polynomial, v: Polynomial) -> Polynomial:
+    """Return the larger of two values."""
+    return poly.add(v, poly.ramp(poly.sub(u, v)))
 
 
-_UNARY: dict[int, Callable[[Composed[Any], Any], Any]] = {
-    ca.OP_ASSIGN: lambda _, u: u,
-    ca.OP_NEG: lambda at, u: at.scale(u, -1.0),
-    ca.OP_TWICE: lambda at, u: at.scale(u, 2.0),
-    ca.OP_SQ: lambda at, u: at.square(u),
-    ca.OP_SQRT: lambda at, u: at.sqrt(u),
-    ca.OP_INV: lambda at, u: at.div(at.one(), u),
-    ca.OP_SIN: lambda at, u: at.sin(u),
-    ca.OP_COS: lambda at, u: at.cos(u),
-    ca.OP_TAN: lambda at, u: at.tan(u),
-    ca.OP_ATAN: lambda at, u: at.atan(u),
-    ca.OP_ASIN: lambda at, u: at.asin(u),
-    ca.OP_ACOS: lambda at, u: at.acos(u),
-    ca.OP_EXP: lambda at, u: at.exp(u),
-    ca.OP_FABS: lambda at, u: at.fabs(u),
-    ca.OP_SIGN: lambda at, u: at.sign(u),
-    ca.OP_LOG: lambda at, u: at.log(u),
+def _fmin(u: Polynomial, v: Polynomial) -> Polynomial:
+    """Return the smaller of two values."""
+    return poly.scale(_fmax(poly.scale(u, -1.0), poly.scale(v, -1.0)), -1.0)
+
+
+def _sign(u: Polynomial) -> Polynomial:
+    """Return 1 where u is not negative, else -1."""
+    return poly.sub(poly.scale(poly.step(u), 2.0), _ONE)
+
+
+def _fabs(u: Polynomial) -> Polynomial:
+    """Return the size of u."""
+    return poly.sub(poly.scale(poly.ramp(u), 2.0), u)
+
+
+def _tan(u: Polynomial) -> Polynomial:
+    """Return the tangent of u."""
+    return poly.div(poly.sin(u), poly.cos(u))
+
+
+def _asin(u: Polynomial) -> Polynomial:
+    """Return the arc sine of u."""
+    return poly.atan(poly.div(u, poly.sqrt(poly.sub(_ONE, poly.square(u)))))
+
+
+def _acos(u: Polynomial) -> Polynomial:
+    """Return the arc cosine of u."""
+    return poly.sub(poly.scale(poly.atan(_ONE), 2.0), _asin(u))
+
+
+def _atan2(y: Polynomial, x: Polynomial) -> Polynomial:
+    """Return the angle off the negative x-axis, ``2 atan(y / (sqrt(x^2 + y^2) + x))``."""
+    return poly.scale(poly.atan(poly.div(y, poly.add(_hypot(y, x), x))), 2.0)
+
+
+def _hypot(y: Polynomial, x: Polynomial) -> Polynomial:
+    """Return the root of the sum of two squares."""
+    return poly.sqrt(poly.add(poly.square(y), poly.square(x)))
+
+
+def _power(u: Polynomial, exponent: Polynomial) -> Polynomial:
+    """Return a constant whole or half power.
+
+    Raises:
+        UncoveredError: the power is another one.
+    """
+    power = poly.number_of(exponent)
+    if power is None or not ((2 * power).is_integer() and 0 < abs(power) <= _LARGEST_POWER):
+        raise UncoveredError("a power that is not constant, or not whole or half")
+    base, left = (u, int(abs(power))) if power.is_integer() else (poly.sqrt(u), int(abs(2 * power)))
+    result: Polynomial | None = None
+    while left:
+        if left & 1:
+            result = base if result is None else poly.mul(result, base)
+        left >>= 1
+        base = poly.square(base) if left else base
+    positive = _ONE if result is None else result
+    return positive if power > 0 else poly.div(_ONE, positive)
+
+
+_UNARY: dict[int, Callable[[Polynomial], Polynomial]] = {
+    ca.OP_ASSIGN: lambda u: u,
+    ca.OP_NEG: lambda u: poly.scale(u, -1.0),
+    ca.OP_TWICE: lambda u: poly.scale(u, 2.0),
+    ca.OP_SQ: poly.square,
+    ca.OP_SQRT: poly.sqrt,
+    ca.OP_INV: lambda u: poly.div(_ONE, u),
+    ca.OP_SIN: poly.sin,
+    ca.OP_COS: poly.cos,
+    ca.OP_TAN: _tan,
+    ca.OP_ATAN: poly.atan,
+    ca.OP_ASIN: _asin,
+    ca.OP_ACOS: _acos,
+    ca.OP_EXP: poly.exp,
+    ca.OP_FABS: _fabs,
+    ca.OP_SIGN: _sign,
+    ca.OP_LOG: poly.log,
 }
-_BINARY: dict[int, Callable[[Composed[Any], Any, Any], Any]] = {
-    ca.OP_ADD: lambda at, u, v: at.add(u, v),
-    ca.OP_SUB: lambda at, u, v: at.sub(u, v),
-    ca.OP_MUL: lambda at, u, v: at.mul(u, v),
-    ca.OP_DIV: lambda at, u, v: at.div(u, v),
-    ca.OP_POW: lambda at, u, v: at.power(u, v),
-    ca.OP_CONSTPOW: lambda at, u, v: at.power(u, v),
-    ca.OP_ATAN2: lambda at, u, v: at.atan2(u, v),
-    ca.OP_HYPOT: lambda at, u, v: at.hypot(u, v),
-    ca.OP_FMAX: lambda at, u, v: at.fmax(u, v),
-    ca.OP_FMIN: lambda at, u, v: at.fmin(u, v),
-    ca.OP_LE: lambda at, u, v: at.step(at.sub(v, u)),
+_BINARY: dict[int, Callable[[Polynomial, Polynomial], Polynomial]] = {
+    ca.OP_ADD: poly.add,
+    ca.OP_SUB: poly.sub,
+    ca.OP_MUL: poly.mul,
+    ca.OP_DIV: poly.div,
+    ca.OP_POW: _power,
+    ca.OP_CONSTPOW: _power,
+    ca.OP_ATAN2: _atan2,
+    ca.OP_HYPOT: _hypot,
+    ca.OP_FMAX: _fmax,
+    ca.OP_FMIN: _fmin,
+    ca.OP_LE: lambda u, v: poly.step(poly.sub(v, u)),
 }
 
 
-class Steps:
-    """The operations of a function of one vector, in order.
+class PolynomialArithmetic:
+    """Polynomials of a function of one vector: its operations, in order.
 
     Args:
         function: made of ``SX``, with one dense input (n, 1) and dense outputs.
-
-    Attributes:
-        outputs: number of the outputs' elements.
 
     Raises:
         UncoveredError: the function holds an operation without a rule.
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._registers = function.sz_w()
         self._steps: list[tuple[int, Sequence[int], Sequence[int], float]] = []
         for k in range(function.n_instructions()):
             op = function.instruction_id(k)
@@ -207,21 +140,21 @@ class Steps:
             value = function.instruction_constant(k) if op == ca.OP_CONST else 0.0
             self._steps.append((op, function.instruction_input(k), function.instruction_output(k), value))
         self._offset = np.concatenate([[0], np.cumsum([function.numel_out(i) for i in range(function.n_out())])])
-        self.outputs = int(self._offset[-1])
 
-    def run(self, arithmetic: Composed[Value]) -> list[Value]:
-        """Return the outputs' elements, column by column, as values of an arithmetic."""
-        work: list[Value | None] = [None] * self._registers
-        results: list[Value | None] = [None] * self.outputs
+    def __call__(self, lower: FloatArray, upper: FloatArray) -> list[Polynomial]:
+        """Return polynomials of the outputs' elements, column by column, over boxes with ends (n, N)."""
+        work: dict[int, Polynomial] = {}
+        results: dict[int, Polynomial] = {}
         with np.errstate(all="ignore"):
             for op, source, target, constant in self._steps:
                 if op == ca.OP_OUTPUT:
                     results[int(self._offset[target[0]]) + target[1]] = work[source[0]]
                 elif op == ca.OP_INPUT:
-                    work[target[0]] = arithmetic.variable(source[1])
+                    work[target[0]] = poly.variable(source[1], lower[source[1]], upper[source[1]])
                 elif op == ca.OP_CONST:
-                    work[target[0]] = arithmetic.constant(constant)
+                    work[target[0]] = poly.constant(constant)
+                elif op in _UNARY:
+                    work[target[0]] = _UNARY[op](work[source[0]])
                 else:
-                    operands = [work[each] for each in source]
-                    work[target[0]] = (_UNARY[op] if op in _UNARY else _BINARY[op])(arithmetic, *operands)
-        return [each for each in results if each is not None]
+                    work[target[0]] = _BINARY[op](work[source[0]], work[source[1]])
+        return [results[k] for k in range(int(self._offset[-1]))]

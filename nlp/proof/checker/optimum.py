@@ -17,9 +17,10 @@ import numpy as np
 from casadi import SX
 
 from ..statement.standard_form import StandardForm
+from .arithmetic import PolynomialArithmetic
 from .bisection import Shown
 from .polymodels import Forms, Tilts, forms_of, polynomial_sum, reaching_part, weights_of
-from .polynomials import Polynomial, PolynomialArithmetic, difference, places
+from .polynomials import Polynomial, places, sub
 from .tree import FACES, Node
 
 if TYPE_CHECKING:
@@ -142,7 +143,7 @@ class BoundRule(FormRule):
     def _attempt(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
         J, bound, values = self._J, self._claims.bounds[of], self._arithmetic(lower, upper)
         if self._claims.tilts is not None:
-            values[0] = difference(values[0], self._claims.tilts.select(of).polynomial(lower, upper))
+            values[0] = sub(values[0], self._claims.tilts.select(of).polynomial(lower, upper))
         forms = forms_of(values, lower, upper, self._form)
         defined = np.isfinite(forms.high[:J]).all(axis=0)
         holds = defined & (forms.high[:J].min(axis=0) <= bound)

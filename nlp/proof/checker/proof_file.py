@@ -17,8 +17,9 @@ and, where it is about every machine within a tolerance on joint centres, also b
     one machine         two directions, and two lemmas: lengths of a leg of one machine at two poses
     singular machine    the opposite: a pose, and a machine at which the determinant has another sign there
 
-Lemmas are claims of their own that others rest on: the shortest lengths of the exact machine's legs, and those of
-``one machine``. Each is proved by a tree for a program.
+Lemmas are claims of their own that others rest on: lengths of ``one machine``, each proved by a tree for a program, and
+
+    second order        a bound of the terms of second order in the errors, by which a number of all machines is bounded
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from ...errors import InputError
 from ...system.strictjson import json_tree, object_of
 
 _FORMAT = "screwsynth-proof"
-_VERSION = 4
+_VERSION = 5
 #: Formats of earlier versions.
 _EARLIER = ("screwsynth-workspace-proof",)
 #: Largest tree in bytes: the proofs of docs/certificate.md have a few million.

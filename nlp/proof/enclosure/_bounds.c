@@ -167,9 +167,9 @@ static PyObject *enclose(PyObject *module, PyObject *args)
     Py_ssize_t B = found.B, all_rows = tape.outputs * B;
     Array each[] = {READ(found.lower, n * B), READ(found.upper, n * B), WRITE(found.c, all_rows), WRITE(found.p, all_rows),
                     WRITE(found.q, all_rows), WRITE(found.s, all_rows), WRITE(found.lo, all_rows), WRITE(found.hi, all_rows),
-                    WRITE(found.a, all_rows * (Py_ssize_t)terms_to_enclose(n, found.order))};
+                    WRITE(found.a, all_rows * (Py_ssize_t)terms_of_order(n, found.order))};
     good = good && borrow_all(&all, arrays, each, COUNT(each));
-    double *memory = memory_of_call(good, good ? memory_to_enclose(&tape, n, found.order) : 0);
+    double *memory = memory_of_call(good, good ? memory_of_run(&tape, n, found.order) : 0);
     if (memory) {
         Py_BEGIN_ALLOW_THREADS
         enclose_all(&tape, n, &found, memory);

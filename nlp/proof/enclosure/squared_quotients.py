@@ -59,19 +59,25 @@ class SearchRows:
     quotients: tuple[Quotient, ...]
 
 
-def search_rows(form: StandardForm, *, apart: bool) -> SearchRows:
-    """Return the expressions of a form, with the squared quotients of its functions taken apart if so wanted."""
-    found: list[Quotient] = []
+def _taken_apart(form: StandardForm, signs: tuple[int, ...]) -> tuple[list[SX], list[Quotient]]:
+    """Return the functions of a form without their squared quotients of some signs, and these."""
     rests: list[SX] = []
-    for j, function in enumerate(form.functions if apart else ()):
+    found: list[Quotient] = []
+    for j, function in enumerate(form.functions):
         rest = SX(0)
         for term in terms_of(function):
             quotient = as_quotient(term, j)
-            if quotient is None:
+            if quotient is None or quotient.sign not in signs:
                 rest = rest + term
             else:
                 found.append(quotient)
         rests.append(rest)
+    return rests, found
+
+
+def search_rows(form: StandardForm, *, apart: bool) -> SearchRows:
+    """Return the expressions of a form, with the squared quotients of its functions taken apart if so wanted."""
+    rests, found = _taken_apart(form, (1, -1)) if apart else ([], [])
     if not found:
         return SearchRows(form.expressions, form.jacobian, ())
     conditions = [each.expression for each in form.conditions]
@@ -115,17 +121,6 @@ class TangentRows(NamedTuple):
 
 def tangent_rows(form: StandardForm) -> TangentRows | None:
     """Return the rows of a form for tangents; None where no function has squares with a minus sign."""
-    rests: list[SX] = []
-    parts: list[SX] = []
-    functions: list[int] = []
-    for j, function in enumerate(form.functions):
-        rest = SX(0)
-        for term in terms_of(function):
-            quotient = as_quotient(term, j)
-            if quotient is None or quotient.sign > 0:
-                rest = rest + term
-            else:
-                parts += [quotient.N, quotient.D]
-                functions.append(j)
-        rests.append(rest)
-    return TangentRows(ca.vertcat(*rests, *parts), tuple(functions)) if functions else None
+    rests, found = _taken_apart(form, (-1,))
+    parts = [part for each in found for part in (each.N, each.D)]
+    return TangentRows(ca.vertcat(*rests, *parts), tuple(each.function for each in found)) if found else None

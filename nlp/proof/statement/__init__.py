@@ -2,5 +2,6 @@
 
 The modules import each other in this order: ``piecewise_derivatives``, ``form``, ``reduced_form`` (a program without
 unknowns in closed form), ``standard_form`` and ``limb_separation`` for certificates; ``machine`` (a robot with its
-dimensions), ``tolerance_bound``, ``claims`` and ``posed_layout`` (a case as expressions of the pose) for workspaces.
+dimensions), ``claims``, ``posed_layout`` (a case as expressions of the pose) and ``tolerance`` (every machine) for
+workspaces.
 """

@@ -26,7 +26,7 @@ REGULAR, CONSTRAINTS = "regular", "constraints regular"
 #: Key of the claims that limbs reach every pose.
 REACH = "reach"
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
-OWN_SEARCHES = ("leg_clearance", "link_clearance", "smallest_singular_value", "condition_number")
+OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
 #: Names of the measures that are no quantities of a robot.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
 

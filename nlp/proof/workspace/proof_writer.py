@@ -28,8 +28,10 @@ _OUTWARDS = 1e-6
 _RANKS = ("regular", "constraints")
 #: Kinds of claims that rest on the shortest lengths of legs where machines are meant.
 _OF_ROWS = ("singular value", "condition")
-#: Reason of claims about machines within a tolerance that are not six straight legs.
-_AS_BUILT = "it is about every machine within the tolerance of joint centres, which proofs cover for six straight legs"
+#: Reason of claims about machines within a tolerance that are not known.
+_AS_BUILT = "the robot cannot be put together with errors of its joint centres"
+#: Reason of numbers of machines whose coordinates follow from others, or that have kinks.
+_BY_MACHINES = "it is proved by a search of boxes for all machines together, which has no proof on paper"
 #: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
 _NO_BOUND = "its search has no bound"
@@ -62,10 +64,11 @@ def paper_of(
     unproved = []
     expected = expected_claims(judged.case, robot, quantities, leg_error)
     for each in expected:
-        if judged.case.joint_centre_tolerance and (robot.machines is None or (each.kind in _RANKS and legs is None)):
+        if judged.case.joint_centre_tolerance and robot.machines is None:
             unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
             continue
-        if each.kind == "number" and each.layout is None and not is_reached:
+        is_reach = each.claim is not None and each.claim.key == REACH
+        if each.kind == "number" and not (is_reach or is_reached):
             unproved.append(Unproved(each.name, each.sense, _NO_REACH))
             continue
         extremes = first if each.kind == "number" else last
@@ -74,6 +77,8 @@ def paper_of(
         is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind in _OF_ROWS)
         if is_of_lengths and not _has_lengths(judged, proved):
             found = _NO_LENGTHS
+        if found == _NO_BOUND and judged.case.joint_centre_tolerance and each.key not in record.programs:
+            found = _BY_MACHINES
         if isinstance(found, ProofClaim):
             proved[each.key] = found
         else:

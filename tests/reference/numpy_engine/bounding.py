@@ -1,7 +1,7 @@
 """Examination of boxes with NumPy: bounds, impossible conditions, monotonicity, contraction, the next bisection.
 
 Each box gets an upper bound of the maximised value over its feasible part, by the models of
-:mod:`screwsynth.nlp.proof.enclosure.quadratic_models`. ``docs/certificate.md`` explains the formulas.
+:mod:`screwsynth.nlp.proof.enclosure.forms`. ``docs/certificate.md`` explains the formulas.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp.proof.boxes.engine import UNMOVED, Verdict
-from screwsynth.nlp.proof.enclosure.quadratic_models import Ends
+from screwsynth.nlp.proof.enclosure.forms import Ends
 from screwsynth.nlp.proof.enclosure.tape import Tape
 
 from .intervals import TINY, ULP

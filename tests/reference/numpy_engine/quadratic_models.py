@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.enclosure import quadratic_models
-from screwsynth.nlp.proof.enclosure.forms import Enclosures
-from screwsynth.nlp.proof.enclosure.quadratic_models import Ends
+from screwsynth.nlp.proof.enclosure import forms
+from screwsynth.nlp.proof.enclosure.forms import Enclosures, Ends
 
 from .intervals import TINY, ULP
 
@@ -21,8 +20,6 @@ _TANGENT_ROUNDS = 3
 _ROOT_SLACK = 1e-12
 #: Least size of the terms of a quadratic whose roots are taken; its inverse is the largest.
 _LEAST_SIZE = 1e-140
-
-
 #: Rounds of the coordinate-wise search for multipliers: any result of it gives a bound.
 _MULTIPLIER_ROUNDS = 8
 #: Largest weight of a condition: what underflow takes from its model, times the weight, is still less than ``TINY``.
@@ -159,7 +156,7 @@ class GradientModel:
         return Total(middle, b, A, p, q, s, *ends(self.slope_lo, self.slope_hi), largest)
 
 
-class QuadraticModel(quadratic_models.QuadraticModel):
+class QuadraticModel(forms.QuadraticModel):
     """An upper model that NumPy bounds."""
 
     def bound(self) -> FloatArray:

@@ -3,14 +3,14 @@
 A box of the shared variables is handed down to its halves with its limbs' lists. An own box is dropped where its bound
 and the best of all others together do not exceed the threshold. What is wider decides on the next step: the lists of
 the limbs with the largest spread are refined, or the shared box is bisected. See
-:mod:`screwsynth.nlp.proof.boxes.limbs.sums` for the bounds.
+:mod:`screwsynth.nlp.proof.boxes.limbs.decomposition` for the bounds.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,15 +18,14 @@ import numpy as np
 
 from .....models.arrays import first_largest
 from ...checker.tree import Node, leaf_bytes, node_bytes
+from ...enclosure.forms import ULP, midpoints
 from ..engine import Engine, LimbModels
 from ..optimum import LEAST_WIDTHS, reason_without_bound
 from ..rows import SMALL, WHOLE, Boxes, some
 from ..search import Order, Rule, Search, Verdicts
 from ..threads import Threads
 from ..tree import TreeRecord, halves_of, keys_of
-from .boxes import OwnBoxes, SharedBoxes
-from .cuts import LINEAR, Left, LeftOwn, SharedSums, collapse_monotone, cut_own
-from .sums import LimbBound, bound_limb, first_largest_of_lists, tilts_of
+from .decomposition import LimbBound, OwnBoxes, SharedBoxes, bound_limb, first_largest_of_lists, tilts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,6 +35,14 @@ if TYPE_CHECKING:
     from ...statement.standard_form import StandardForm
     from ..incumbent import Incumbent
 
+#: Weight of a model's linear part beside its curved part in the choice of a variable, as in the kernel.
+_LINEAR = 0.3
+#: Own boxes are bisected where their bound is within this part of the limb's spread of the best.
+_NEAR = 0.5
+#: Part of its side that a contraction of a box must gain.
+_WORTH = 0.1
+#: Rounding of sums of a few values, in parts of their sizes.
+_SUM = 1e-13
 #: Shared boxes that are examined at once: with long lists too, a step takes about half a second.
 _BLOCK = 256
 #: Own boxes of one list above which the shared box is bisected instead.
@@ -48,11 +55,51 @@ _RESERVE = 0.5
 _PATIENCE = 1.0
 
 
-class _ExaminedLimb(NamedTuple):
-    """Models of a limb, and its bounds."""
+@dataclass(frozen=True, eq=False)
+class SharedSums:
+    """Bounds of B shared boxes.
 
-    models: LimbModels
-    bound: LimbBound
+    Attributes:
+        models: of each limb.
+        parts: bounds of each limb.
+        common: models of the part with shared variables alone, with all tilts and bests, and what is left of the boxes.
+        sums: (B,) upper bounds from these models: the limbs' bests, and the most that the common part adds to them.
+        bound: (B,) upper bounds: the lesser of these and of those that the boxes had before.
+        is_possible: (B,) whether the common conditions can hold and every limb has a box left.
+    """
+
+    models: list[LimbModels]
+    parts: list[LimbBound]
+    common: LimbModels
+    sums: FloatArray
+    bound: FloatArray
+    is_possible: NDArray[np.bool_]
+
+
+class Left(NamedTuple):
+    """The parts of B boxes that are left: ends (m, B), and whether anything is (B,)."""
+
+    lower: FloatArray
+    upper: FloatArray
+    alive: NDArray[np.bool_]
+
+
+class LeftOwn(NamedTuple):
+    """A limb's own boxes that are left.
+
+    Attributes:
+        own: the boxes; a list may be empty.
+        spread: (B,) how much the bound of the best box of each list can change along its own variables.
+        good: (d, B) the best point known of the own variables.
+        is_near: (N,) whether a box is to be bisected where its list is refined.
+        along: (N,) the variable to bisect.
+    """
+
+    own: OwnBoxes
+    spread: FloatArray
+    good: FloatArray
+    is_near: NDArray[np.bool_]
+    along: NDArray[np.intp]
 
 
 class SharedColumns(NamedTuple):
@@ -173,7 +220,7 @@ class SharedRule(Rule[SharedColumns]):
     def _examine(self, boxes: SharedBoxes, below: float) -> SharedSums:
         """Return bounds of shared boxes, and their parts in which the sum can exceed a value."""
         found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
-        models, parts = [each.models for each in found], [each.bound for each in found]
+        models, parts = (list(each) for each in zip(*found, strict=True))
         common = self._common.common_models(boxes.lower, boxes.upper, tilts_of(parts), below)
         bound = common.L.bound()
         known = common.defined & np.all([np.isfinite(part.best) for part in parts], axis=0)
@@ -182,7 +229,7 @@ class SharedRule(Rule[SharedColumns]):
         emptied = np.any([part.best == -np.inf for part in parts], axis=0)
         return SharedSums(models, parts, common, sums, bound, common.is_possible & ~emptied)
 
-    def _examine_limb(self, k: int, boxes: SharedBoxes) -> _ExaminedLimb:
+    def _examine_limb(self, k: int, boxes: SharedBoxes) -> tuple[LimbModels, LimbBound]:
         """Return models and bounds of a limb over shared boxes and its own boxes."""
         engine, opposite, own, good = self._engines[k], self._opposites[k], boxes.own[k], boxes.good[k]
         # NumPy's warnings are switched off for each thread by itself.
@@ -195,7 +242,7 @@ class SharedRule(Rule[SharedColumns]):
             lower = np.concatenate([boxes.lower[:, own.of], own.lower])
             upper = np.concatenate([boxes.upper[:, own.of], own.upper])
             models = engine.limb_models(lower, upper, least[own.of])
-            return _ExaminedLimb(models, bound_limb(models, at_good, fall, own, self._m))
+            return models, bound_limb(models, at_good, fall, own, self._m)
 
     def _cut_limb(self, k: int, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> LeftOwn:
         """Return a limb's own boxes that are left."""
@@ -272,7 +319,7 @@ class SharedRule(Rule[SharedColumns]):
     def _shared_change(self, boxes: SharedBoxes, sums: SharedSums, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Return how much (m, B) the bound can change along each shared variable of the part that is left."""
         m, M = self._m, sums.common.L
-        change = LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
+        change = _LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
         for part in sums.parts:
             change = change + part.L.w[:m, part.top] + np.abs(part.L.H[:m, :, part.top]).sum(axis=1)
         width = boxes.upper - boxes.lower
@@ -298,3 +345,80 @@ def _leaf(sums: SharedSums, k: int, emptied: NDArray[np.bool_], target: float) -
     room = (target - sums.sums[k]) / (len(parts) + 1)
     g, Q = (np.array([each[..., k] for each in ends]) for ends in zip(*[part.tilt for part in parts], strict=True))
     return leaf_bytes(np.array([part.best[k] for part in parts]) + room, g, Q)
+
+
+def collapse_monotone(form: StandardForm, boxes: SharedBoxes, sums: SharedSums, left: Left) -> Left:
+    """Return shared boxes collapsed on faces of the whole box, or dropped, where the sum rises along a variable.
+
+    The argument is that of the search of whole boxes: no condition may stop a point, of the common part or of a limb.
+    """
+    lower, upper, alive = left.lower.copy(), left.upper.copy(), left.alive.copy()
+    parts = [*zip(sums.models, [own.starts for own in boxes.own], strict=True), (sums.common, np.arange(boxes.count))]
+    for i in range(form.n):
+        for side in (1, -1):
+            slope, size = np.zeros(boxes.count), np.zeros(boxes.count)
+            stopped = np.zeros(boxes.count, dtype=bool)
+            for found, starts in parts:
+                each = found.slope_lo[i] if side > 0 else -found.slope_hi[i]
+                least = np.minimum.reduceat(np.where(found.is_possible, each, np.inf), starts)
+                slope, size = slope + least, size + np.abs(least)
+                stops = found.is_possible & (found.stops_up[i] if side > 0 else found.stops_down[i])
+                stopped |= np.logical_or.reduceat(stops, starts)
+            rises = (slope - _SUM * size > 0) & ~stopped & alive & (boxes.upper[i] > boxes.lower[i])
+            whole = form.upper[i] if side > 0 else form.lower[i]
+            at_face = rises & ((upper[i] if side > 0 else lower[i]) == whole)
+            alive &= ~(rises & ~at_face)
+            (lower if side > 0 else upper)[i, at_face] = whole
+    return Left(lower, upper, alive)
+
+
+def cut_own(
+    good: FloatArray,
+    found: LimbModels,
+    part: LimbBound,
+    own: OwnBoxes,
+    sums: FloatArray,
+    threshold: float,
+) -> LeftOwn:
+    """Return a limb's own boxes that can exceed a threshold together with the best of everything else.
+
+    Args:
+        good: (d, B) the best point known of the own variables.
+        found: models of the limb.
+        part: its bounds.
+        own: its boxes.
+        sums: (B,) upper bounds of the shared boxes, each the sum of the limbs' bests and of what the common part adds.
+            A lesser bound of the whole, from elsewhere, would say nothing of the other limbs.
+        threshold: the threshold.
+    """
+    m = len(found.lower) - len(own.lower)
+    # The others give at most ``sums - best``, so this limb must give the rest.
+    level = threshold - (sums - part.best)
+    level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(part.best))
+    level = np.fmax(np.where(np.isfinite(level), level, -np.inf), part.reached)
+    keep = (part.bounds > -np.inf) & ~(part.bounds < level[own.of])
+    ends = part.L.ends_reaching(level[own.of])
+    centre, radius = midpoints(own.lower, own.upper)
+    margin = (np.abs(centre) + radius) * (4 * ULP)
+    low = centre + radius * ends.low[m:] - margin
+    high = centre + radius * ends.high[m:] + margin
+    old_lower, old_upper = found.lower[m:], found.upper[m:]
+    worth = _WORTH * (old_upper - old_lower)
+    lower = np.where(found.defined & (low - old_lower > worth), low, old_lower)
+    upper = np.where(found.defined & (old_upper - high > worth), high, old_upper)
+    alive = (lower <= upper).all(axis=0)
+    keep &= alive
+    lower, upper = np.where(alive, lower, old_lower), np.where(alive, upper, old_upper)
+    width = np.where(own.upper > own.lower, own.upper - own.lower, 1.0)
+    change = _LINEAR * np.abs(part.L.b[m:]) + np.abs(part.L.H[m:]).sum(axis=1) + part.L.w[m:]
+    change = np.where(upper > lower, change * (upper - lower) / width, 0.0)
+    change = np.where(np.isfinite(change), change, np.where(upper > lower, upper - lower, 0.0))
+    total = change.sum(axis=0)
+    spread = np.where(np.isfinite(part.best), total[part.top], 0.0)
+    is_near = (part.bounds > (part.best - _NEAR * total[part.top])[own.of]) & (total > 0)
+    # The centre of the best box becomes the good point where its value is larger.
+    best = first_largest_of_lists(found.value, own)
+    better = found.value[best] > part.value_of_good
+    good = np.where(better, centre[:, best], good)
+    left = OwnBoxes(lower[:, keep], upper[:, keep], own.of[keep], own.count)
+    return LeftOwn(left, spread, good, is_near[keep], first_largest(change.T)[keep])

@@ -8,7 +8,7 @@ forms (:mod:`.forms`), and signs of determinants with fractions.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,7 +18,7 @@ from casadi import SX
 from .....models import Dimension
 from ....case.case import Case
 from ....case.task import Sense
-from ....errors import ScrewsynthError, UncoveredError
+from ....errors import InputError, UncoveredError
 from ....program.layout import Layout
 from ...statement.claims import REACH, Claim
 from ...statement.machine import Legs, check_leg_error, workspace_of_case
@@ -38,8 +38,6 @@ from .tolerance import Machines, change_of_jacobian, refuse_unless_singular
 _ROUNDING = 1e-15
 #: The tree of one leaf.
 _WHOLE = bytes([Node.BOUNDED])
-#: Callback with the name of a claim, the number of claims checked, and of all.
-PaperProgress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -83,15 +81,12 @@ class VerifiedWorkspace:
     pieces: int
 
 
-def check_workspace_proof(
-    proof: WorkspaceProof, case: Case, progress: PaperProgress | None = None, *, leg_error: float = 0.0
-) -> VerifiedWorkspace:
+def check_workspace_proof(proof: WorkspaceProof, case: Case, *, leg_error: float = 0.0) -> VerifiedWorkspace:
     """Check a proof of a workspace, by showing each of its claims again.
 
     Args:
         proof: the proof.
         case: the case that it is about.
-        progress: called before each claim.
         leg_error: largest error of a leg's length, length.
 
     Raises:
@@ -112,13 +107,9 @@ def check_workspace_proof(
         name = " ".join(min(wrong)).strip() if wrong else "one of them"
         raise ProofError(f"the claims are not those of the case, each once: see {name}")
     claims = []
-    for done, (key, each) in enumerate(expected.items()):
-        if key not in given:
-            continue
-        if progress is not None:
-            progress(each.name, done, len(expected))
+    for key in (each for each in expected if each in given):
         try:
-            claims.append(checker.check(each, given[key]))
+            claims.append(checker.check(expected[key], given[key]))
         except ProofError as error:
             raise ProofError(f"{' '.join(key).strip()}: {error}") from None
     return VerifiedWorkspace(tuple(claims), proof.unproved, checker.numbers_at, checker.leaves, checker.pieces)
@@ -148,9 +139,7 @@ class _Checker:
         self.leaves = self.pieces = 0
         try:
             self.expected = expected_claims(case, robot, proof.quantities, leg_error)
-        except ProofError:
-            raise
-        except ScrewsynthError as error:
+        except InputError as error:
             raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
         self._machines = robot.machines
         self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
@@ -208,9 +197,8 @@ class _Checker:
 
     def _check_rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank."""
-        if self._tolerance and self._legs is None:
-            raise ProofError("ranks of machines are covered for six straight legs alone")
-        claim = rank_claim(self._case, self._model, self._root, each.name, self._tolerance)
+        built = None if self._machines is None or self._legs is not None else self._machines.symbols.built
+        claim = rank_claim(self._case, self._model, self._root, each.name, self._tolerance, built)
         self._show(claim, given.tree)
         claim.finish()
         return CheckedClaim(each.name, each.sense)

@@ -174,7 +174,7 @@ def dependent_coordinates(points: LoopPoints, robot: PosedRobot, start: FloatArr
     Raises:
         ProofError: the equations leave an unknown free, or are singular at the start.
     """
-    poses, n = len(robot.free), len(start)
+    poses, n = len(robot.free), len(start) - robot.errors
     unknowns = list(range(poses, n))
     if count < len(unknowns):
         raise ProofError("the loops leave a passive joint free")
@@ -276,7 +276,8 @@ class Assembly:
         """Add what is shown of closed points between the ends of some boxes, and return widths (N, k) that may do."""
         free, D, k = self.independent, self.dependent, self._count
         low, high = found.lower[rows], found.upper[rows]
-        g, ends = self._arithmetic(low, high, k)
+        values = self._arithmetic(low, high)
+        g = values.forms(slice(0, k))
         Y = inverses(g.a[:, :, D])
         size = np.abs(Y)
         off, T = -(Y @ g.c[:, :, None])[:, :, 0], Y @ g.a[:, :, free]
@@ -285,7 +286,9 @@ class Assembly:
         reach = (np.abs(off) + np.abs(T).sum(axis=2) + rho) * UP
         centre, radius = (each[:, D] for each in middles(low, high))
         # Derivatives, one column after the other, for coordinates from -1 to 1.
-        least, most = (each.reshape(-1, k, k).transpose(0, 2, 1) * radius[:, None] for each in ends)
+        least, most = (
+            end.reshape(k, k, -1).transpose(2, 1, 0) * radius[:, None] for end in values.ends(slice(k, None))
+        )
         J = 0.5 * (least + most)
         spread = 0.5 * (most - least) + PRODUCT * (np.abs(least) + np.abs(most))
         defect = (off_identity(Y, J) + size @ spread) * UP

@@ -5,7 +5,6 @@ Over a box of coordinates ``z_i = c_i + r_i e_i``, ``|e_i| <= 1``, an expression
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -14,7 +13,8 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import FloatArray
-from ..polynomials import UNIT, Polynomial, PolynomialArithmetic, places
+from ..arithmetic import PolynomialArithmetic
+from ..polynomials import UNIT, Polynomial, places
 
 #: Part of itself by which a sum of nonnegative products moves outwards: more than the rounding of fewer than 400 terms.
 UP = 1 + 1024 * UNIT
@@ -42,12 +42,38 @@ class Forms(NamedTuple):
     r: FloatArray
 
 
-class FormArithmetic:
-    """Affine forms of a vector of expressions.
+class Values(NamedTuple):
+    """Polynomials of R expressions over boxes.
 
-    Args:
-        z: (n, 1) symbols.
-        expressions: (R, 1).
+    Attributes:
+        polynomials: R of them.
+        shape: (B, n) of the ends of the boxes.
+    """
+
+    polynomials: list[Polynomial]
+    shape: tuple[int, int]
+
+    def forms(self, which: slice = slice(None)) -> Forms:
+        """Return affine forms of some expressions: the square of a coordinate is 1/2, give or take 1/2."""
+        values, (B, n) = self.polynomials[which], self.shape
+        c, a, r = np.zeros((B, len(values))), np.zeros((B, len(values), n)), np.zeros((B, len(values)))
+        for k, value in enumerate(values):
+            at = places(len(value.on))
+            squares, products = value.P[at.squares], value.P[at.products]
+            c[:, k] = value.P[0] + 0.5 * squares.sum(axis=0)
+            a[:, k, list(value.on)] = value.P[at.linear].T
+            rest = 0.5 * np.abs(squares).sum(axis=0) + np.abs(products).sum(axis=0)
+            r[:, k] = (rest + value.s + PRODUCT * value.size) * UP
+        return Forms(c, a, r)
+
+    def ends(self, which: slice = slice(None)) -> FloatArray:
+        """Return the ends (2, R, B) of the ranges of some expressions."""
+        ends = [[np.broadcast_to(each.V[k], self.shape[:1]) for each in self.polynomials[which]] for k in (0, 1)]
+        return np.array(ends, dtype=float).reshape(2, -1, self.shape[0])
+
+
+class FormArithmetic:
+    """Affine forms of a vector of expressions (R, 1) of symbols (n, 1).
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
@@ -57,36 +83,9 @@ class FormArithmetic:
         self.function = ca.Function("forms", [z], ca.cse([ca.densify(expressions)]))
         self._arithmetic = PolynomialArithmetic(self.function)
 
-    def ranges(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """Return the ends (2, B, R) of the expressions over boxes with ends (B, n)."""
-        return _ranges(self._arithmetic(lower.T, upper.T), len(lower))
-
-    def __call__(self, lower: FloatArray, upper: FloatArray, count: int | None = None) -> tuple[Forms, FloatArray]:
-        """Return the forms of the first expressions over boxes with ends (B, n), and the ends of the others."""
-        values = self._arithmetic(lower.T, upper.T)
-        return _forms(values[:count], lower.shape), _ranges(
-            values[len(values) if count is None else count :], len(lower)
-        )
-
-
-def _ranges(values: Sequence[Polynomial], boxes: int) -> FloatArray:
-    """Return the ends (2, B, R) of values."""
-    ends = [[np.broadcast_to(each.V[side], boxes) for each in values] for side in (0, 1)]
-    return np.asarray(np.reshape(ends, (2, len(values), boxes)).transpose(0, 2, 1))
-
-
-def _forms(values: Sequence[Polynomial], shape: tuple[int, ...]) -> Forms:
-    """Return the affine forms of values over boxes of a shape (B, n): a square is 1/2, give or take 1/2."""
-    (B, n), count = shape, len(values)
-    c, a, r = np.zeros((B, count)), np.zeros((B, count, n)), np.zeros((B, count))
-    for k, value in enumerate(values):
-        at = places(len(value.on))
-        squares, products = value.P[at.squares], value.P[at.products]
-        c[:, k] = value.P[0] + 0.5 * squares.sum(axis=0)
-        a[:, k, list(value.on)] = value.P[at.linear].T
-        rest = 0.5 * np.abs(squares).sum(axis=0) + np.abs(products).sum(axis=0)
-        r[:, k] = (rest + value.s + PRODUCT * value.size) * UP
-    return Forms(c, a, r)
+    def __call__(self, lower: FloatArray, upper: FloatArray) -> Values:
+        """Return the expressions over boxes with ends (B, n)."""
+        return Values(self._arithmetic(lower.T, upper.T), lower.shape)
 
 
 def contraction(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:

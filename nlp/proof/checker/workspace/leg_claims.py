@@ -43,8 +43,6 @@ _WRONG = 1e-6
 _ENLARGED = 1e-6
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
 _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32].T
-#: Places of the forms of A, of F and of J.
-_PARTS = slice(0, 36), slice(36, 42), slice(42, None)
 #: Steps in the search of the part of second order of errors, and of the nearest points of two legs.
 _STEPS, _NEAREST = 200, 12
 
@@ -62,6 +60,10 @@ class AffineMatrix(NamedTuple):
         moved = self.A[:, :, part].transpose(0, 2, 3, 1) @ corners.T
         return np.asarray((self.M[:, part, :, None] + moved).transpose(0, 1, 3, 2))
 
+    def size_at_centre(self) -> FloatArray:
+        """Return the spectral norms (B,) at the centres: computed numbers, 0 where they are not known."""
+        return np.asarray(np.linalg.norm(np.where(np.isfinite(self.M), self.M, 0.0), 2, axis=(1, 2)))
+
     def size_is_at_most(self, most: FloatArray) -> NDArray[np.bool_]:
         """Return whether the spectral norm is shown to be at most numbers (B,)."""
         rest = self.E + PRODUCT * (np.abs(self.M) + np.abs(self.A).sum(axis=1))
@@ -73,15 +75,8 @@ class AffineMatrix(NamedTuple):
         return np.asarray((room > 0) & are_positive(free[..., None, None] * np.eye(6) - square).all(axis=1))
 
 
-def _affine(forms: Forms) -> AffineMatrix:
-    """Return matrices from the forms of their 36 entries, column after column."""
-    M, E = (each.reshape(-1, 6, 6).transpose(0, 2, 1) for each in (forms.c, forms.r))
-    n = forms.a.shape[2]
-    return AffineMatrix(M, forms.a.reshape(-1, 6, 6, n).transpose(0, 3, 2, 1), E)
-
-
-class _LegClaim:
-    """A claim about the inverse of J of six legs.
+class LegInverse:
+    """The inverse P of J of six straight legs over boxes of poses.
 
     Args:
         robot: six straight legs.
@@ -92,64 +87,55 @@ class _LegClaim:
     def __init__(self, robot: PosedRobot, length: float, *, is_unit: bool = False) -> None:
         # The line of a leg passes its platform joint: u x (s (p - b) + u) / s is its moment about the origin.
         spans = [(robot.position - foot, arm) for foot, arm in robot.legs]
-        rows = [ca.vertcat(robot.scale * d + u, ca.cross(u, d) / length).T for d, u in spans]
-        self._free, A = list(robot.free), ca.vertcat(*rows)
+        A = ca.vertcat(*[ca.vertcat(robot.scale * d + u, ca.cross(u, d) / length).T for d, u in spans])
         sizes = ca.vertcat(*[ca.norm_2(A[k, :3]) for k in range(6)])
         unit = A / ca.repmat(sizes, 1, 6) if is_unit else SX(6, 0)
-        self._forms = FormArithmetic(robot.z, ca.vertcat(ca.vec(A), sizes, ca.vec(unit)))
+        self.free, self._forms = list(robot.free), FormArithmetic(robot.z, ca.vertcat(ca.vec(A), sizes, ca.vec(unit)))
 
-    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6)."""
-        forms, _ = self._forms(lower[:, self._free], upper[:, self._free])
-        of_rows, of_sizes, of_unit = (Forms(*(each[:, part] for each in forms)) for part in _PARTS)
-        with np.errstate(all="ignore"):
-            inverse, known, shares = _inverse(_affine(of_rows), of_sizes)
-            holds, own, is_wrong = self._judged(inverse, shares, _affine(of_unit))
-        every = np.zeros((len(lower), 6))
-        every[:, self._free] = own
-        return Attempt(np.asarray(known & holds), every, np.asarray(known & is_wrong))
+    def __call__(
+        self, lower: FloatArray, upper: FloatArray
+    ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
+        """Return P over boxes (B, 6), where it is known, shares (B, n) of coordinates in its rest, and J if meant."""
+        values, leg = self._forms(lower[:, self.free], upper[:, self.free]), np.arange(6)
+        (M, A, E), J = (_affine(values.forms(part)) for part in (slice(0, 36), slice(42, None)))
+        sizes = values.forms(slice(36, 42))
+        C = inverses(M)
+        size, moved = np.abs(C), np.abs(C[:, None] @ A)
+        terms = np.abs(M) + np.abs(A).sum(axis=1)
+        bound = (off_identity(C, M) + size @ (E + PRODUCT * terms) + moved.sum(axis=1)) * UP
+        P = C * sizes.c[:, None, :]
+        # F - A P_0 at the centre, its slopes, and what both may be off by.
+        centre, slopes, radius = -(M @ P), -(A @ P[:, None]), (E + 4 * PRODUCT * terms) @ np.abs(P)
+        centre[:, leg, leg] += sizes.c
+        slopes[:, :, leg, leg] += sizes.a.transpose(0, 2, 1)
+        radius[:, leg, leg] += sizes.r + PRODUCT * (np.abs(sizes.c) + np.abs(sizes.a).sum(axis=2))
+        T = C[:, None] @ slopes
+        rest = (np.abs(C @ centre) + size @ (radius + PRODUCT * (np.abs(centre) + np.abs(slopes).sum(axis=1)))) * UP
+        Q = (rest + np.abs(T).sum(axis=1)) * UP
+        holds, v = contraction(np.where(np.isfinite(bound), bound, np.inf))
+        known = holds & np.isfinite(Q).all(axis=(1, 2))
+        system = np.where(known[:, None, None], np.eye(6) - bound, np.eye(6))
+        right = np.where(known[:, None, None], bound @ Q, 0.0) * UP
+        X = np.linalg.solve(system, right) * (1 + _ENLARGED) + _ENLARGED * right
+        # (I - B) X >= B Q with a spectral radius below 1: X is a bound.
+        known = known & (X >= 0).all(axis=(1, 2)) & ((bound @ X) * UP + right <= X).all(axis=(1, 2))
+        shares = (moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
+        return AffineMatrix(P, T, (rest + X) * UP), np.asarray(known), shares, J
 
-    def _judged(
-        self, inverse: AffineMatrix, shares: FloatArray, J: AffineMatrix
-    ) -> tuple[NDArray[np.bool_], FloatArray, NDArray[np.bool_]]:
-        """Return what is shown, shares of coordinates, and where the claim is wrong at the centre.
-
-        Args:
-            inverse: of J.
-            shares: (B, n) of coordinates in its rest.
-            J: with unit rows; empty where it is not meant.
-        """
-        raise NotImplementedError
-
-
-def _inverse(rows: AffineMatrix, sizes: Forms) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray]:
-    """Return P, where it is known (B,), and shares (B, n) of coordinates in its rest, from A and F."""
-    (M, A, E), leg = rows, np.arange(6)
-    C = inverses(M)
-    size, moved = np.abs(C), np.abs(C[:, None] @ A)
-    terms = np.abs(M) + np.abs(A).sum(axis=1)
-    bound = (off_identity(C, M) + size @ (E + PRODUCT * terms) + moved.sum(axis=1)) * UP
-    P = C * sizes.c[:, None, :]
-    # F - A P_0 at the centre, its slopes, and what both may be off by.
-    centre, slopes, radius = -(M @ P), -(A @ P[:, None]), (E + 4 * PRODUCT * terms) @ np.abs(P)
-    centre[:, leg, leg] += sizes.c
-    slopes[:, :, leg, leg] += sizes.a.transpose(0, 2, 1)
-    radius[:, leg, leg] += sizes.r + PRODUCT * (np.abs(sizes.c) + np.abs(sizes.a).sum(axis=2))
-    T = C[:, None] @ slopes
-    rest = (np.abs(C @ centre) + size @ (radius + PRODUCT * (np.abs(centre) + np.abs(slopes).sum(axis=1)))) * UP
-    Q = (rest + np.abs(T).sum(axis=1)) * UP
-    holds, v = contraction(np.where(np.isfinite(bound), bound, np.inf))
-    known = holds & np.isfinite(Q).all(axis=(1, 2))
-    system = np.where(known[:, None, None], np.eye(6) - bound, np.eye(6))
-    right = np.where(known[:, None, None], bound @ Q, 0.0) * UP
-    X = np.linalg.solve(system, right) * (1 + _ENLARGED) + _ENLARGED * right
-    # (I - B) X >= B Q with a spectral radius below 1: X is a bound.
-    known = known & (X >= 0).all(axis=(1, 2)) & ((bound @ X) * UP + right <= X).all(axis=(1, 2))
-    shares = (moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
-    return AffineMatrix(P, T, (rest + X) * UP), np.asarray(known), shares
+    def attempt(self, holds: NDArray[np.bool_], shares: FloatArray, is_wrong: NDArray[np.bool_]) -> Attempt:
+        """Return an attempt on boxes of poses, from shares (B, n)."""
+        every = np.zeros((len(shares), 6))
+        every[:, self.free] = shares
+        return Attempt(np.asarray(holds), every, np.asarray(is_wrong))
 
 
-class SingularClaim(_LegClaim):
+def _affine(forms: Forms) -> AffineMatrix:
+    """Return matrices from the forms of their 36 entries, column after column."""
+    M, E = (each.reshape(-1, 6, 6).transpose(0, 2, 1) for each in (forms.c, forms.r))
+    return AffineMatrix(M, forms.a.reshape(-1, 6, 6, forms.a.shape[2]).transpose(0, 3, 2, 1), E)
+
+
+class SingularClaim:
     """The claim that the smallest singular value of J is at least a number, or its condition number at most.
 
     Args:
@@ -163,29 +149,30 @@ class SingularClaim(_LegClaim):
     def __init__(
         self, robot: PosedRobot, length: float, bound: float, *, is_condition: bool, change: float = 0.0
     ) -> None:
-        super().__init__(robot, length, is_unit=is_condition)
+        self._inverse = LegInverse(robot, length, is_unit=is_condition)
         self._bound, self._change, self._is_condition = bound, change, is_condition
 
-    def _judged(
-        self, inverse: AffineMatrix, shares: FloatArray, J: AffineMatrix
-    ) -> tuple[NDArray[np.bool_], FloatArray, NDArray[np.bool_]]:
-        """Show the claim from the sizes of P, and for the condition number those of J."""
-        low = 1 / np.linalg.norm(np.nan_to_num(inverse.M, nan=np.inf), 2, axis=(1, 2))
+    @np.errstate(all="ignore")
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6), from the sizes of P, and for the condition number those of J."""
+        inverse, known, shares, J = self._inverse(lower, upper)
+        low, high = 1 / inverse.size_at_centre(), J.size_at_centre()
         shares = np.abs(inverse.A).sum(axis=(2, 3)) + shares * inverse.E.sum(axis=(1, 2))[:, None]
-        if not self._is_condition:
-            least = np.full(len(low), (self._bound + self._change) * (1 + 4 * UNIT))
-            return inverse.size_is_at_most((1 - 4 * UNIT) / least), shares, low < least * (1 - _WRONG)
-        high = np.linalg.norm(np.nan_to_num(J.M), 2, axis=(1, 2))
-        # The smallest singular value changes more: most of the room between the two is left to it.
-        least = (high + self._change) / self._bound
-        t = least * np.sqrt(np.sqrt((low - self._change) / least))
-        most = (t * self._bound * (1 - 4 * UNIT) - self._change) * (1 - 4 * UNIT)
-        one, other = inverse.size_is_at_most((1 - 8 * UNIT) / (t + self._change)), J.size_is_at_most(most)
-        shares = shares + np.where(other, 0.0, 1.0)[:, None] * np.abs(J.A).sum(axis=(2, 3))
-        return one & other, shares, high > low * self._bound * (1 + _WRONG)
+        if self._is_condition:
+            # The smallest singular value changes more: most of the room between the two is left to it.
+            least = (high + self._change) / self._bound
+            t = least * np.sqrt(np.sqrt((low - self._change) / least))
+            flat = J.size_is_at_most((t * self._bound * (1 - 4 * UNIT) - self._change) * (1 - 4 * UNIT))
+            shares += np.where(flat, 0.0, 1.0)[:, None] * np.abs(J.A).sum(axis=(2, 3))
+            known, is_wrong = known & flat, known & (high > low * self._bound * (1 + _WRONG))
+        else:
+            t = np.full(len(low), self._bound)
+            is_wrong = known & (low < self._bound * (1 - _WRONG))
+        holds = known & inverse.size_is_at_most((1 - 8 * UNIT) / (t + self._change))
+        return self._inverse.attempt(holds, shares, is_wrong)
 
 
-class ErrorClaim(_LegClaim):
+class ErrorClaim:
     """The claim that errors of legs of at most 1 move the platform, to first order, by at most a number.
 
     Args:
@@ -195,17 +182,14 @@ class ErrorClaim(_LegClaim):
     """
 
     def __init__(self, robot: PosedRobot, most: float, *, is_rotation: bool) -> None:
-        super().__init__(robot, robot.length)
+        self._inverse = LegInverse(robot, robot.length)
         self._most = most * robot.length * (1 - 2 * UNIT) if is_rotation else most
         self._part = slice(3, 6) if is_rotation else slice(0, 3)
 
-    def _judged(
-        self,
-        inverse: AffineMatrix,
-        shares: FloatArray,
-        J: AffineMatrix,  # noqa: ARG002 - of one claim
-    ) -> tuple[NDArray[np.bool_], FloatArray, NDArray[np.bool_]]:
-        """Show the claim at all corners of the boxes and of the errors."""
+    @np.errstate(all="ignore")
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6), at all corners of the boxes and of the errors."""
+        inverse, known, shares, _ = self._inverse(lower, upper)
         corners = np.ascontiguousarray(inverse.at_corners(self._part))
         moves = (corners.reshape(-1, 6) @ _ERRORS).reshape(len(corners), 3, -1)
         worst = np.sqrt((moves * moves).sum(axis=1).max(axis=1))
@@ -213,7 +197,10 @@ class ErrorClaim(_LegClaim):
         terms = np.abs(inverse.M[:, self._part]).sum(axis=(1, 2)) + sizes.sum(axis=1)
         worst = (worst + np.sqrt((sums * sums).sum(axis=1)) + 64 * UNIT * terms) * UP
         at_centre = np.linalg.norm(inverse.M[:, self._part] @ _ERRORS, axis=1).max(axis=1)
-        return worst <= self._most, sizes + shares * sums.sum(axis=1)[:, None], at_centre > self._most * (1 + _WRONG)
+        is_wrong = known & (at_centre > self._most * (1 + _WRONG))
+        return self._inverse.attempt(
+            known & (worst <= self._most), sizes + shares * sums.sum(axis=1)[:, None], is_wrong
+        )
 
 
 def whole_errors(position: float, rotation: float, eps: float, shortest: float, reach: float) -> tuple[float, float]:
@@ -272,7 +259,7 @@ class ClearanceClaim:
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
-        (c, a, r), _ = self._forms(lower[:, self._free], upper[:, self._free])
+        c, a, r = self._forms(lower[:, self._free], upper[:, self._free]).forms()
         gaps = (c[:, :9] / c[:, 9:]).reshape(-1, 3, 3)
         n = _between(self._feet, gaps[:, 0], gaps[:, 1])
         size = np.sqrt((n * n).sum(axis=1))

@@ -48,7 +48,8 @@ class PosedRobot:
     """A robot with its dimensions over a workspace.
 
     Attributes:
-        z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns.
+        z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns, then errors.
+        errors: number of components of errors of joint centres, which are the last coordinates.
         free: indices of these coordinates among the six.
         middle: (6,) the middle of the workspace: the values of the others.
         size: (n,) by which coordinates are comparable: half ranges, and sizes of the unknowns.
@@ -66,6 +67,7 @@ class PosedRobot:
     """
 
     z: SX
+    errors: int
     free: tuple[int, ...]
     middle: FloatArray
     size: FloatArray
@@ -91,13 +93,14 @@ class PosedRobot:
         return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
 
 
-def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
+def posed_robot(case: Case, model: Model, root: PoseRoot, errors: int = 0) -> PosedRobot:
     """Return a robot over a workspace.
 
     Args:
         case: with fixed dimensions.
         model: its robot, some of whose unknowns may have been replaced by expressions.
         root: the box of coordinates.
+        errors: number of components of errors of joint centres, the last parameters of the robot.
     """
     middle = 0.5 * root.lower + 0.5 * root.upper
     free = tuple(np.flatnonzero(root.upper > root.lower).tolist())
@@ -106,7 +109,10 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     position, inverse = ca.vertcat(*y[:3]), SX.sym("inverse")
     turned, scale = turned_rotation(root, y[3:])
     values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    numbers = Substitution(ca.vertcat(SX(0, 1), *values), ca.vertcat(SX(0, 1), *unknowns), turned / scale, position)
+    off = SX.sym("errors", errors)
+    numbers = Substitution(
+        ca.vertcat(SX(0, 1), *values, off), ca.vertcat(SX(0, 1), *unknowns), turned / scale, position
+    )
     symbols = Substitution.identity(model).all
     about = [row.moment - ca.cross(model.pose.position, row.force) for row in model.wrenches]
     vectors = [ca.vertcat(row.force, moment) for row, moment in zip(model.wrenches, about, strict=True)]
@@ -126,7 +132,8 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     following = iter(ca.Function("robot", symbols, outputs).call(numbers.all))
     ranges = (0.5 * (root.upper - root.lower))[list(free)]
     robot = PosedRobot(
-        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
+        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns, off),
+        errors=errors,
         free=free,
         middle=middle,
         size=ranges,
@@ -144,7 +151,8 @@ def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
         loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
         signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
     )
-    return replace(robot, size=np.concatenate([ranges, [float(next(following)) for _ in model.unknowns]]))
+    sizes = [float(next(following)) for _ in model.unknowns]
+    return replace(robot, size=np.concatenate([ranges, sizes, np.full(errors, case.joint_centre_tolerance or 0.0)]))
 
 
 def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
@@ -169,45 +177,27 @@ def _without_division(row: SX, inverse: SX, scale: SX) -> SX:
     return scale * ca.substitute(row, inverse, 0) + slope
 
 
-@dataclass(frozen=True, eq=False)
-class Motions:
-    """A matrix of expressions.
+def motion_matrix(model: Model, robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> tuple[SX, int]:
+    """Return the matrix (m, c), and the dimensions of its null space claimed to be all: freedoms and idle rates.
 
-    Attributes:
-        matrix: (m, c) sparse, m not below c less the freedoms; its first six columns are those of the platform.
-        freedoms: dimensions of its null space that are claimed to be all: the robot's freedoms and idle rates.
-    """
-
-    matrix: SX
-    freedoms: int = 0
-
-
-def locked_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
-    """Return the matrix with locked actuators.
+    With free actuators the matrix of a robot given by its rows is that of its couples, which are constraints.
 
     Args:
         model: the robot's model.
         robot: the robot.
         start: (n,) closed loops, at which those screws of each member are chosen that are independent.
+        is_locked: whether the actuators are locked, and there are no freedoms.
 
     Raises:
-        ProofError: the screws or loops of a member are singular there.
+        ProofError: the screws or loops of a member are singular at the start, or all freedoms of a platform are left.
     """
-    return Motions(_whole_matrix(model, robot, start, ()))
-
-
-def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
-    """Return the matrix with free actuators; of a robot given by its rows that of its couples, which are constraints.
-
-    Arguments are those of :func:`locked_motions`.
-
-    Raises:
-        ProofError: screws or loops of a member are singular at the start, or all freedoms of a platform are left.
-    """
+    if is_locked:
+        return _whole_matrix(model, robot, start, ()), 0
     if robot.actuators:
         matrix = _whole_matrix(model, robot, start, robot.actuators)
     else:
-        matrix = row_matrix(robot, [row for row in robot.rows if row.kind is WrenchKind.COUPLE])
+        couples = [_work(robot, row) for row in robot.rows if row.kind is WrenchKind.COUPLE]
+        matrix = ca.vertcat(SX(0, 6), *couples)
     if model.generic is not None:
         freedoms, idle = 6 - model.generic.constraints, model.generic.idle
     else:
@@ -215,12 +205,12 @@ def free_motions(model: Model, robot: PosedRobot, start: FloatArray) -> Motions:
         freedoms, idle = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0])), 0
     if not 0 < freedoms < 6:
         raise ProofError("the robot has no constraint wrenches of which the rank could be claimed")
-    return Motions(matrix, freedoms + idle)
+    return matrix, freedoms + idle
 
 
-def row_matrix(robot: PosedRobot, rows: Sequence[Wrench]) -> SX:
-    """Return rows of limbs as a matrix (m, 6), moments divided by the robot's length."""
-    return ca.vertcat(SX(0, 6), *[ca.horzcat(row.force.T, row.moment.T / robot.length) for row in rows])
+def _work(robot: PosedRobot, row: Wrench) -> SX:
+    """Return the work (1, 6) of a limb's row in motions."""
+    return ca.horzcat(row.force.T, row.moment.T / robot.length)
 
 
 def _whole_matrix(model: Model, robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
@@ -248,7 +238,7 @@ def _whole_matrix(model: Model, robot: PosedRobot, start: FloatArray, actuators:
 
 
 def _independent(rows: FloatArray, rank: int, whose: str) -> list[int]:
-    """Return the indices of independent rows, as many as their rank; rows that loops hold still are rounding errors.
+    """Return as many independent rows as their rank; rows that loops hold still are rounding errors.
 
     Raises:
         ProofError: they have another rank.
@@ -270,7 +260,7 @@ def _matrix(robot: PosedRobot, members: Sequence[Member], actuators: Sequence[Ac
         return [SX(seen.shape[0], 1) if screw is None else -seen @ _motion(robot, screw) for screw in screws]
 
     for row in robot.rows:
-        work = row_matrix(robot, [row])
+        work = _work(robot, row)
         blocks.append(ca.horzcat(work, SX(1, passive), *driven(row.label.member, work)))
     for each in members:
         # The velocity of a pinned member's centre is v + omega x arm.

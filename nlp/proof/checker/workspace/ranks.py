@@ -17,22 +17,31 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import FloatArray, Model
+from .....models.member import scaled_twists
 from ....case.case import Case
 from ....errors import UncoveredError
 from ...statement.claims import CONSTRAINTS
+from ...statement.tolerance import BuiltModel
 from ..fractions import sign_of_determinant
 from ..proof_file import ProofError
 from .closed_loops import Assembly, Enclosed, needed_equations, start_of
 from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
-from .motion_matrix import Motions, PosedRobot, free_motions, locked_motions, posed_robot
+from .motion_matrix import PosedRobot, motion_matrix, posed_robot
 from .pose_boxes import Attempt, PoseRoot
 from .tolerance import change_of_rows
 
+#: Errors at which equations and screws that were left out are tested, in parts of the robot's length, part of the
+#: workspace about its middle in which the poses lie, number of tests, and largest residual of a closed loop.
+_OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
+#: Singular values below this part of the largest are zero.
+_ZERO = 1e-9
 #: Largest number of parts of the way between two poses.
 _PARTS = 4096
 
 
-def rank_claim(case: Case, model: Model, root: PoseRoot, name: str, tolerance: float = 0.0) -> RankClaim:
+def rank_claim(
+    case: Case, model: Model, root: PoseRoot, name: str, tolerance: float = 0.0, built: BuiltModel | None = None
+) -> RankClaim:
     """Return the claim that a robot's J, or its constraint wrenches alone, keep their rank.
 
     Loop equations that hold at all closed points by themselves are left out. That is found by their ranks at a few
@@ -43,21 +52,50 @@ def rank_claim(case: Case, model: Model, root: PoseRoot, name: str, tolerance: f
         model: its robot without unknowns that follow in closed form.
         root: the box of coordinates.
         name: ``regular``, or ``constraints regular``.
-        tolerance: largest error of each joint centre of six straight legs in the machines that are meant.
+        tolerance: largest error of each joint centre in the machines that are meant.
+        built: the robot with errors of its joint centres; None for six straight legs, and for the design.
 
     Raises:
         ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
-            free, or an expression has an operation without a rule.
+            free, an expression has an operation without a rule, or errors take freedoms from the robot.
     """
     robot = posed_robot(case, model, root)
     start = start_of(robot)
     needed = needed_equations(robot, start)
+    if built is not None:
+        model, robot = built.model, posed_robot(case, built.model, root, 3 * len(built.names))
+        start = np.concatenate([start, np.zeros(robot.errors)])
     try:
         assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
-        motions = free_motions(model, robot, start) if name == CONSTRAINTS else locked_motions(model, robot, start)
-        return RankClaim(robot, motions, assembly, tolerance)
+        matrix, freedoms = motion_matrix(model, robot, start, is_locked=name != CONSTRAINTS)
+        if built is not None:
+            _refuse_other_freedoms(robot, assembly)
+        return RankClaim(robot, matrix, freedoms, assembly, tolerance)
     except UncoveredError as error:
         raise ProofError(f"the check has no rule for {error}") from None
+
+
+def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
+    """Refuse machines in which equations or screws that were left out do not follow from the others.
+
+    Raises:
+        ProofError: they do not follow at random errors.
+    """
+    rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
+    poses = [j for j in assembly.independent if j < n]
+    for _ in range(_TESTS):
+        to = assembly.start[None].copy()
+        to[:, poses] += _SPREAD * robot.size[poses] * rng.uniform(-1, 1, len(poses))
+        to[:, n:] = _OFF * robot.length * rng.uniform(-1, 1, robot.errors)
+        (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
+        every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
+        if not (np.isfinite(z).all() and np.abs(every).max(initial=0.0) <= _CLOSED):
+            raise ProofError("with errors of joint centres the robot does not have the poses of the workspace")
+        for each in (one for one in robot.members if one.rank < one.screws.shape[1]):
+            columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
+            sizes = np.linalg.svd(robot.at(columns, z), compute_uv=False)
+            if int(np.count_nonzero(sizes > _ZERO * sizes.max(initial=0.0))) != each.rank:
+                raise ProofError("errors of joint centres take freedoms from the robot")
 
 
 class RankClaim:
@@ -65,31 +103,34 @@ class RankClaim:
 
     Args:
         robot: the robot.
-        motions: the matrix.
+        matrix: (m, c) sparse, m not below c less the freedoms.
+        freedoms: dimensions of its null space that are claimed to be all.
         assembly: its closed loops.
-        tolerance: largest error of each joint centre; above 0 for six straight legs alone.
+        tolerance: largest error of each joint centre, of six straight legs or in the robot's coordinates.
 
     Raises:
         UncoveredError: an entry holds an operation without a rule.
     """
 
-    def __init__(self, robot: PosedRobot, motions: Motions, assembly: Assembly, tolerance: float = 0.0) -> None:
-        self._freedoms, self._assembly, self._tolerance = motions.freedoms, assembly, tolerance
-        self._length = robot.length
+    def __init__(
+        self, robot: PosedRobot, matrix: SX, freedoms: int, assembly: Assembly, tolerance: float = 0.0
+    ) -> None:
+        self._freedoms, self._assembly, self._tolerance, self._length = freedoms, assembly, tolerance, robot.length
         # Independent coordinates as those of poses.
-        self._free = [robot.free[j] for j in assembly.independent]
-        whole = motions.matrix
-        self._constant = np.zeros(whole.shape)
+        self._errors = robot.errors
+        self._free = [robot.free[j] for j in assembly.independent if j < len(robot.free)]
+        self._constant = np.zeros(matrix.shape)
         places, entries = [], []
-        for k, place in enumerate(zip(*whole.sparsity().get_triplet(), strict=True)):
-            if whole.nz[k].is_constant():
-                self._constant[place] = float(whole.nz[k])
+        for k, place in enumerate(zip(*matrix.sparsity().get_triplet(), strict=True)):
+            if matrix.nz[k].is_constant():
+                self._constant[place] = float(matrix.nz[k])
             else:
                 places.append(place)
-                entries.append(whole.nz[k])
+                entries.append(matrix.nz[k])
         self._at = tuple(np.array(places, dtype=int).reshape(-1, 2).T)
         # The errors of joint centres change rows of legs by a part of these.
-        parts = [ca.horzcat(robot.position - foot, arm) for foot, arm in robot.legs * bool(tolerance)]
+        of_rows = bool(tolerance) and not robot.errors
+        parts = [ca.horzcat(robot.position - foot, arm) for foot, arm in robot.legs * of_rows]
         changes = ca.vertcat(robot.scale, *[ca.vec(each) for each in parts]) if parts else SX(0, 1)
         self._count = len(entries)
         self._entries = FormArithmetic(robot.z, ca.vertcat(SX(0, 1), *entries, changes))
@@ -99,7 +140,7 @@ class RankClaim:
         """Try to show the claim on boxes (B, 6)."""
         closed = self._closed(lower, upper)
         holds, shares = np.zeros(len(lower), dtype=bool), np.zeros((len(lower), 6))
-        shares[:, self._free] = closed.shares
+        shares[:, self._free] = closed.shares[:, : len(self._free)]
         rows = np.flatnonzero(closed.is_known)
         if rows.size:
             known = closed.known()
@@ -169,13 +210,15 @@ class RankClaim:
         return [sign_of_determinant(each.tolist()) if good else 0 for each, good in zip(C, known, strict=True)]
 
     def _closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
-        """Return the closed loops over boxes (B, 6)."""
-        low, high = lower[:, self._free], upper[:, self._free]
+        """Return the closed loops over boxes (B, 6), for all errors."""
+        errors = np.full((len(lower), self._errors), self._tolerance)
+        low, high = np.hstack([lower[:, self._free], -errors]), np.hstack([upper[:, self._free], errors])
         return self._assembly.enclosed(low, high, self._assembly.near(low, high))
 
     def _matrices(self, closed: Enclosed) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the forms of the matrix: (B, m, c) middles, (B, m, c) rests, and (B, f, m, c) of each coordinate."""
-        (c, a, r), ends = self._entries(closed.lower, closed.upper, self._count)
+        values = self._entries(closed.lower, closed.upper)
+        c, a, r = values.forms(slice(0, self._count))
         dependent, slopes = a[:, :, self._assembly.dependent], a[:, :, self._assembly.independent]
         size = np.abs(dependent)
         with np.errstate(all="ignore"):
@@ -190,8 +233,8 @@ class RankClaim:
         rows, columns = self._at
         M[:, rows, columns], E[:, rows, columns] = middle, rest
         A[:, :, rows, columns] = slopes.transpose(0, 2, 1)
-        if self._tolerance:
-            most = np.abs(ends).max(axis=0)
+        if self._tolerance and not self._errors:
+            most = np.abs(values.ends(slice(self._count, None))).max(axis=0).T
             legs = most[:, 1:].reshape(len(c), -1, 2, 3)
             E += change_of_rows(most[:, 0], legs[:, :, 0], legs[:, :, 1], self._tolerance, self._length)
         return M, E, A
@@ -213,9 +256,12 @@ class RankClaim:
             A = np.concatenate([A, np.zeros((B, A.shape[1], *null.shape[1:]))], axis=2)
         with np.errstate(all="ignore"):
             C = np.asarray(np.linalg.pinv(M, rcond=1e-14), dtype=float)
-            moved = np.abs(C[:, None] @ A)
+            moved, p = np.abs(C[:, None] @ A), len(self._free)
+            # The error of a centre is no larger than the tolerance in any direction.
+            whole = np.sqrt((moved[:, p:].reshape(B, -1, 3, *moved.shape[2:]) ** 2).sum(axis=2)).sum(axis=1)
+            moved = moved[:, :p]
             rest = E + PRODUCT * (np.abs(M) + np.abs(A).sum(axis=1))
-            bound = (off_identity(C, M) + np.abs(C) @ rest + moved.sum(axis=1)) * UP
+            bound = (off_identity(C, M) + np.abs(C) @ rest + whole + moved.sum(axis=1)) * UP
             holds, v = contraction(np.where(known[:, None, None] & np.isfinite(bound), bound, np.inf))
             shares = (moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
         return np.asarray(holds & known), np.where(known[:, None], shares, np.nan)

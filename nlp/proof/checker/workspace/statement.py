@@ -115,8 +115,6 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         more = [*_of_constraints(machines.model), *map(_of_number, reaches)]
         home = "the assembly of home" if case.model.unknowns else ""
         return RobotClaims(legs, machines.symbols.layout, machines.model, tuple(more), home, machines)
-    if legs is not None:
-        return RobotClaims(legs, posed_layout(case, workspace), case.model)
     closed = closed_form(case.model)
     more = _of_constraints(closed.model)
     numbers_at, layout = "every assembly" if case.model.unknowns else "", None
@@ -127,7 +125,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
             layout = closed_layout(case, closed, workspace)
             partly = "every assembly in which limbs in closed form are as at home"
             numbers_at = partly if closed.model.unknowns else "the assembly of home"
-    return RobotClaims(None, layout or posed_layout(case, workspace), closed.model, tuple(more), numbers_at)
+    return RobotClaims(legs, layout or posed_layout(case, workspace), closed.model, tuple(more), numbers_at)
 
 
 def _of_constraints(model: Model) -> list[ExpectedClaim]:

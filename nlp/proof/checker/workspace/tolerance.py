@@ -158,12 +158,12 @@ class SecondOrderClaim:
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
         errors = np.full((len(lower), self._errors), self._tolerance)
-        ends = self._entries.ranges(
+        values = self._entries(
             np.concatenate([lower[:, self._free], -errors], axis=1),
             np.concatenate([upper[:, self._free], errors], axis=1),
         )
         squares = np.zeros((self._block.max(initial=-1) + 1, len(lower)))
-        np.add.at(squares, self._block, (np.abs(ends).max(axis=0) ** 2).T)
+        np.add.at(squares, self._block, np.abs(values.ends()).max(axis=0) ** 2)
         whole = 0.5 * self._tolerance**2 * np.sqrt(squares).sum(axis=0) * UP
         return Attempt(np.asarray(whole <= self._bound), np.zeros(lower.shape))
 

@@ -14,23 +14,59 @@ static double *carve(double **rest, size_t count)
     return part;
 }
 
-/* Loads LANES boxes, of numbers first[0], first[1], ... or, without a list, from number start on; the last one again
- * where there are fewer. */
-static void load(const Form *form, const Report *report, const Py_ssize_t *list, Py_ssize_t start, Py_ssize_t finish,
-                 Lane *centre, Lane *radius, Lane *lower, Lane *upper)
+/* Memory in which a tape runs over LANES boxes: registers and results, the boxes, and the terms of an operation. */
+typedef struct {
+    const Tape *tape;
+    int n, order;
+    Store work, out;
+    Lane *centre, *radius, *lower, *upper, *terms;
+} Run;
+
+static size_t terms_of_order(int n, int order) { return (size_t)n + (order > 1 ? pairs_of(n) : 0); }
+
+static size_t stride_of_order(int n, int order)
+{
+    return order > 1 ? stride_of_form2(n) : sizeof(Value) / sizeof(double) + (size_t)n * LANES;
+}
+
+static size_t memory_of_run(const Tape *tape, int n, int order)
+{
+    return (size_t)(tape->registers + tape->outputs) * stride_of_order(n, order) +
+           (4 * (size_t)n + terms_of_order(n, order)) * LANES;
+}
+
+/* Lays a run over memory, which must be all 0 for forms of second order. */
+static Run prepare(const Tape *tape, int n, int order, double *memory)
+{
+    size_t stride = stride_of_order(n, order);
+    Run x = {.tape = tape, .n = n, .order = order};
+    x.work = (Store){carve(&memory, (size_t)tape->registers * stride), stride};
+    x.out = (Store){carve(&memory, (size_t)tape->outputs * stride), stride};
+    Lane **lanes[] = {&x.centre, &x.radius, &x.lower, &x.upper};
+    for (int i = 0; i < 4; i++)
+        *lanes[i] = (Lane *)carve(&memory, (size_t)n * LANES);
+    x.terms = (Lane *)memory;
+    return x;
+}
+
+/* Runs a tape over LANES of B boxes with these ends, of numbers list[start], list[start + 1], ... or, without a list, from
+ * number start on; the last one before finish again where there are fewer. */
+static void run_block(const Run *x, const double *lower, const double *upper, Py_ssize_t B, const Py_ssize_t *list,
+                      Py_ssize_t start, Py_ssize_t finish)
 {
     EACH
     {
         Py_ssize_t place = start + l < finish ? start + l : finish - 1, at = list ? list[place] : place;
-        for (int i = 0; i < form->n; i++, at += report->B) {
-            double lo = report->lower[at], hi = report->upper[at], middle = 0.5 * lo + 0.5 * hi;
+        for (int i = 0; i < x->n; i++, at += B) {
+            double lo = lower[at], hi = upper[at], middle = 0.5 * lo + 0.5 * hi;
             middle = smaller(larger(middle, lo), hi);
             double half = larger(hi - middle, middle - lo);
-            lower[i][l] = lo, upper[i][l] = hi, centre[i][l] = middle;
+            x->lower[i][l] = lo, x->upper[i][l] = hi, x->centre[i][l] = middle;
             half = half > 0 ? half * (1 + ULP) + TINY : 0.0;
-            radius[i][l] = larger(-lo, hi) < LARGEST ? half : INFINITY;
+            x->radius[i][l] = larger(-lo, hi) < LARGEST ? half : INFINITY;
         }
     }
+    (x->order > 1 ? run2 : run)(x->tape, x->n, x->work, x->out, x->centre, x->radius, x->lower, x->upper, x->terms);
 }
 
 /* The forms of second order of a box: centre, gradient and matrix of each row. */
@@ -38,8 +74,9 @@ static void read_form2(Box *x, int rows, Store out, int l)
 {
     int n = x->n;
     for (int k = 0; k < rows; k++) {
-        Form2 *v = form2_of(out, k);
-        const Lane *a = terms_of_form2(v), *Q = a + n;
+        Form2 *form = form2_of(out, k);
+        const Value *v = &form->v;
+        const Lane *a = terms_of_form2(form), *Q = a + n;
         x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
         x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
         double *H = x->gA + k * n * n;
@@ -77,21 +114,12 @@ static void read_forms(Box *x, size_t E, Store out, int l, const double *r)
 
 static size_t larger_size(size_t a, size_t b) { return a > b ? a : b; }
 
-static size_t stride_of_value(const Form *form) { return sizeof(Value) / sizeof(double) + (size_t)form->n * LANES; }
-
-/* Doubles for the registers and the results of the largest of the tapes, which are run one after the other. */
-static size_t registers_needed(const Form *form)
+/* Doubles for the largest of the tapes, which are run one after the other. */
+static size_t memory_of_runs(const Form *form)
 {
-    size_t first = (size_t)(form->tape.registers + form->tape.outputs) * stride_of_value(form);
-    size_t second = (size_t)(form->values.registers + form->values.outputs) * stride_of_form2(form->n);
-    size_t objective = (size_t)(form->objective.registers + form->objective.outputs) * stride_of_value(form);
-    first = larger_size(first, form->objective.length ? objective : 0);
-    return larger_size(first, form->values.length ? second : 0);
-}
-
-static size_t scratch_needed(const Form *form)
-{
-    return ((size_t)form->n + (form->values.length ? pairs_of(form->n) : 0)) * LANES;
+    size_t first = form->values.length ? memory_of_run(&form->values, form->n, 2) : 0;
+    size_t objective = form->objective.length ? memory_of_run(&form->objective, form->n, 1) : 0;
+    return larger_size(larger_size(first, objective), memory_of_run(&form->tape, form->n, 1));
 }
 
 /* Boxes that are open after the first pass, and the scores of their variables. */
@@ -120,12 +148,7 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
                           double *memory, Kept *kept)
 {
     size_t n = (size_t)form->n, E = rows_needed(form), J = form->quotients ? (size_t)form->functions : 0;
-    double *rest = memory, *registers = carve(&rest, registers_needed(form));
-    Lane *lanes[4];
-    for (int i = 0; i < 4; i++)
-        lanes[i] = (Lane *)carve(&rest, n * LANES);
-    Lane *centre = lanes[0], *radius = lanes[1], *lower = lanes[2], *upper = lanes[3];
-    Lane *scratch = (Lane *)carve(&rest, scratch_needed(form));
+    double *rest = memory, *registers = carve(&rest, memory_of_runs(form));
     Box x = {.n = form->n, .J = form->functions, .R = form->expressions, .squares = J > 0};
     double **singles[] = {&x.c, &x.p, &x.q, &x.s, &x.lo, &x.hi, &x.weights, &x.size, &x.high, &x.low};
     for (size_t i = 0; i < sizeof singles / sizeof *singles; i++)
@@ -146,15 +169,13 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
     double *scores = in_turn ? kept->scores : NULL;
     Py_ssize_t count = 0;
     if (passes) {
-        size_t stride = stride_of_form2(form->n);
-        Store work = {registers, stride}, out = {registers + (size_t)form->values.registers * stride, stride};
+        Run first = prepare(&form->values, form->n, 2, registers);
         for (Py_ssize_t start = begin; start < finish; start += LANES) {
-            load(form, report, NULL, start, finish, centre, radius, lower, upper);
-            run2(&form->values, form->n, work, out, centre, radius, lower, upper, scratch);
+            run_block(&first, report->lower, report->upper, report->B, NULL, start, finish);
             for (int l = 0; l < LANES && start + l < finish; l++) {
                 for (size_t i = 0; i < n; i++)
-                    c[i] = centre[i][l];
-                read_form2(&x, form->values.outputs, out, l);
+                    c[i] = first.centre[i][l];
+                read_form2(&x, form->values.outputs, first.out, l);
                 if (!pass_first(form, &x, c, report, start + l, threshold, scores ? scores + (size_t)count * n : NULL))
                     kept->open[count++] = start + l;
             }
@@ -163,20 +184,17 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
         for (Py_ssize_t at = begin; at < finish; at++)
             kept->open[count++] = at;
     /* The gradients: of the functions first where there are many conditions, and of the rest where they may decide. */
-    size_t stride = stride_of_value(form);
     for (int alone = in_turn; alone >= 0; alone--) {
-        const Tape *tape = alone ? &form->objective : &form->tape;
-        Store work = {registers, stride}, out = {registers + (size_t)tape->registers * stride, stride};
+        Run run = prepare(alone ? &form->objective : &form->tape, form->n, 1, registers);
         Py_ssize_t left = 0;
         x.R = alone ? form->functions : form->expressions;
         for (Py_ssize_t start = 0; start < count; start += LANES) {
-            load(form, report, kept->open, start, count, centre, radius, lower, upper);
-            run(tape, form->n, work, out, centre, radius, lower, upper, scratch);
+            run_block(&run, report->lower, report->upper, report->B, kept->open, start, count);
             for (int l = 0; l < LANES && start + l < count; l++) {
                 Py_ssize_t at = kept->open[start + l];
                 for (size_t i = 0; i < n; i++)
-                    c[i] = centre[i][l], r[i] = radius[i][l];
-                read_forms(&x, (size_t)(x.R + 2 * form->quotients), out, l, r);
+                    c[i] = run.centre[i][l], r[i] = run.radius[i][l];
+                read_forms(&x, (size_t)(x.R + 2 * form->quotients), run.out, l, r);
                 add_quotients(form, &x, r, report->least ? report->least + at : NULL);
                 if (judge(form, &x, c, r, report, at, threshold, passes, alone ? scores + (size_t)(start + l) * n : NULL))
                     kept->open[left++] = at;
@@ -190,7 +208,7 @@ static size_t memory_needed(const Form *form)
 {
     size_t n = (size_t)form->n, E = rows_needed(form), J = (size_t)form->functions;
     size_t vectors = 10 * E + 9 * E * n + 22 * n, matrices = (E + 4) * n * n + J * n * (n + 1);
-    return registers_needed(form) + 4 * n * LANES + scratch_needed(form) + vectors + matrices;
+    return memory_of_runs(form) + vectors + matrices;
 }
 
 #endif

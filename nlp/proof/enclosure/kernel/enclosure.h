@@ -47,30 +47,108 @@ INLINE void second_order(Part x, Part y, const double *balance, const double *si
     }
 }
 
-/* Writes a value: poisons one without a finite form, intersects the interval with the form's range. */
-INLINE void settle(Value *restrict v, int n, int first, int last, double slack, const Result *restrict from,
-                   Lane *restrict t)
+/* Ends of the square of an interval. */
+INLINE void square_ends(const Value *x, Result *restrict out)
 {
-    Lane *a = terms_of(v);
+    EACH
+    {
+        double one = fabs(x->lo[l]), two = fabs(x->hi[l]);
+        double small = one < two ? one : two, large = one < two ? two : one;
+        small = (x->lo[l] <= 0) & (x->hi[l] >= 0) ? 0.0 : small;
+        double lo = small * small, hi = large * large;
+        lo = lo - (lo * ULP + TINY);
+        out->lo[l] = lo > 0.0 ? lo : 0.0, out->hi[l] = hi + (hi * ULP + TINY);
+    }
+}
+
+/* Ends of the inverse of an interval without 0, and the size of its end that is nearest to 0; NaN for another one. */
+INLINE void inverse_ends(const Value *y, double *restrict near, double *restrict low, double *restrict high)
+{
+    EACH
+    {
+        int positive = y->lo[l] > 0;
+        double close = positive ? y->lo[l] : -y->hi[l], far = positive ? y->hi[l] : -y->lo[l];
+        near[l] = close = close > 0 ? close : NAN;
+        double one = (positive ? 1.0 : -1.0) / far, two = (positive ? 1.0 : -1.0) / close;
+        double least = one < two ? one : two, most = one < two ? two : one;
+        low[l] = least - (fabs(least) * ULP + TINY), high[l] = most + (fabs(most) * ULP + TINY);
+    }
+}
+
+/* A sum, or a difference where sign is -1, apart from its coefficients; sizes are those of all terms. */
+INLINE void add(const Value *x, const Value *y, double sign, const double *sizes, double slack, Result *restrict r)
+{
+    const double *p = sign > 0 ? y->p : y->q, *q = sign > 0 ? y->q : y->p;
+    const double *low = sign > 0 ? y->lo : y->hi, *high = sign > 0 ? y->hi : y->lo;
+    EACH
+    {
+        double c = x->c[l] + sign * y->c[l], lo = x->lo[l] + sign * low[l], hi = x->hi[l] + sign * high[l];
+        r->c[l] = c, r->p[l] = x->p[l] + sign * p[l], r->q[l] = x->q[l] + sign * q[l];
+        r->s[l] = x->s[l] + y->s[l] + slack * sizes[l];
+        r->lo[l] = lo - fabs(lo) * ULP, r->hi[l] = hi + fabs(hi) * ULP;
+    }
+}
+
+/* A value plus k, apart from its coefficients. */
+INLINE void shift(const Value *x, double k, double slack, Result *restrict r)
+{
+    EACH
+    {
+        double c = x->c[l] + k, lo = x->lo[l] + k, hi = x->hi[l] + k;
+        r->c[l] = c, r->p[l] = x->p[l], r->q[l] = x->q[l], r->s[l] = x->s[l] + slack * fabs(c);
+        r->lo[l] = lo - fabs(lo) * ULP, r->hi[l] = hi + fabs(hi) * ULP;
+    }
+}
+
+/* A value times k, apart from its coefficients; 1 and -1 cause no rounding. */
+INLINE void scale(const Value *x, double k, const double *sizes, double slack, Result *restrict r)
+{
+    double size = fabs(k);
+    EACH
+    {
+        double c = x->c[l] * k, down = x->lo[l] * k, up = x->hi[l] * k, p = x->p[l] * k, q = x->q[l] * k;
+        double lo = k >= 0 ? down : up, hi = k >= 0 ? up : down;
+        r->c[l] = c, r->p[l] = k >= 0 ? p : q, r->q[l] = k >= 0 ? q : p;
+        r->s[l] = size == 1 ? x->s[l] : x->s[l] * size + (slack * (fabs(c) + size * sizes[l]) + TINY);
+        r->lo[l] = size == 1 ? lo : lo - (fabs(lo) * ULP + TINY);
+        r->hi[l] = size == 1 ? hi : hi + (fabs(hi) * ULP + TINY);
+    }
+}
+
+/* Writes a value apart from its coefficients, from the sum of the sizes of the linear ones and the range of the others:
+ * poisons one without a finite form, intersects the interval with the form's range. Whether no lane is poisoned. */
+INLINE int settle_value(Value *restrict v, double slack, const Result *restrict from, const double *rad,
+                        const double *curved_lo, const double *curved_hi)
+{
     double grown = 1 + slack;
     int all = 1;
-    EACH v->rad[l] = 0.0;
-    for (int i = first; i < last; i++)
-        EACH v->rad[l] += fabs(t[i][l]);
     EACH
     {
         double c = from->c[l], p = smaller(from->p[l] * grown, 0.0), q = larger(from->q[l] * grown, 0.0);
-        double s = from->s[l] * grown, ends = ULP * fabs(c) + s, rad = v->rad[l];
-        double down = (rad - p + ends) * grown, up = (rad + q + ends) * grown;
+        double s = from->s[l] * grown, ends = ULP * fabs(c) + s;
+        double down = (rad[l] - curved_lo[l] - p + ends) * grown, up = (rad[l] + curved_hi[l] + q + ends) * grown;
         int good = (down < LARGEST) & (up < LARGEST) & (fabs(c) < LARGEST);
         double low = c - down, high = c + up;
         low = low - ULP * fabs(low), high = high + ULP * fabs(high);
         double lo = from->lo[l] > low ? from->lo[l] : low, hi = from->hi[l] < high ? from->hi[l] : high;
         all &= good;
-        v->c[l] = good ? c : 0.0, v->rad[l] = good ? rad : 0.0;
+        v->c[l] = good ? c : 0.0, v->rad[l] = good ? rad[l] : 0.0;
         v->p[l] = good ? p : 0.0, v->q[l] = good ? q : 0.0, v->s[l] = good ? s : INFINITY;
         v->lo[l] = good ? lo : -INFINITY, v->hi[l] = good ? hi : INFINITY;
     }
+    return all;
+}
+
+/* Writes a value and its coefficients. */
+INLINE void settle(Value *restrict v, int n, int first, int last, double slack, const Result *restrict from,
+                   Lane *restrict t)
+{
+    static const Lane none = {0};
+    Lane *a = terms_of(v), rad;
+    EACH rad[l] = 0.0;
+    for (int i = first; i < last; i++)
+        EACH rad[l] += fabs(t[i][l]);
+    int all = settle_value(v, slack, from, rad, none, none);
     memset(a, 0, (size_t)first * sizeof(Lane));
     memcpy(a + first, t + first, (size_t)(last - first) * sizeof(Lane));
     memset(a + last, 0, (size_t)(n - last) * sizeof(Lane));
@@ -115,50 +193,25 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
         case ADD:
             for (int i = first; i < last; i++)
                 EACH t[i][l] = ax[i][l] + ay[i][l];
-            EACH
-            {
-                double c = x->c[l] + y->c[l], lo = x->lo[l] + y->lo[l], hi = x->hi[l] + y->hi[l];
-                r.c[l] = c, r.p[l] = x->p[l] + y->p[l], r.q[l] = x->q[l] + y->q[l];
-                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + x->rad[l] + y->rad[l]);
-                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-            }
+            EACH sizes[l] = fabs(x->c[l] + y->c[l]) + x->rad[l] + y->rad[l];
+            add(x, y, 1.0, sizes, slack, &r);
             break;
         case SUB:
             for (int i = first; i < last; i++)
                 EACH t[i][l] = ax[i][l] - ay[i][l];
-            EACH
-            {
-                double c = x->c[l] - y->c[l], lo = x->lo[l] - y->hi[l], hi = x->hi[l] - y->lo[l];
-                r.c[l] = c, r.p[l] = x->p[l] - y->q[l], r.q[l] = x->q[l] - y->p[l];
-                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + x->rad[l] + y->rad[l]);
-                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-            }
+            EACH sizes[l] = fabs(x->c[l] - y->c[l]) + x->rad[l] + y->rad[l];
+            add(x, y, -1.0, sizes, slack, &r);
             break;
         case SHIFT:
             for (int i = first; i < last; i++)
                 EACH t[i][l] = ax[i][l];
-            EACH
-            {
-                double c = x->c[l] + k, lo = x->lo[l] + k, hi = x->hi[l] + k;
-                r.c[l] = c, r.p[l] = x->p[l], r.q[l] = x->q[l], r.s[l] = x->s[l] + slack * fabs(c);
-                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-            }
+            shift(x, k, slack, &r);
             break;
-        case SCALE: {
-            double size = fabs(k);
+        case SCALE:
             for (int i = first; i < last; i++)
                 EACH t[i][l] = ax[i][l] * k;
-            EACH
-            {
-                double c = x->c[l] * k, down = x->lo[l] * k, up = x->hi[l] * k, p = x->p[l] * k, q = x->q[l] * k;
-                double lo = k >= 0 ? down : up, hi = k >= 0 ? up : down;
-                r.c[l] = c, r.p[l] = k >= 0 ? p : q, r.q[l] = k >= 0 ? q : p;
-                r.s[l] = size == 1 ? x->s[l] : x->s[l] * size + (slack * (fabs(c) + size * x->rad[l]) + TINY);
-                r.lo[l] = size == 1 ? lo : lo - (fabs(lo) * ULP + TINY);
-                r.hi[l] = size == 1 ? hi : hi + (fabs(hi) * ULP + TINY);
-            }
+            scale(x, k, x->rad, slack, &r);
             break;
-        }
         case MUL: {
             EACH balance[l] = sizes[l] = plus[l] = minus[l] = 0.0;
             for (int i = first; i < last; i++)
@@ -190,36 +243,27 @@ WIDE static void run(const Tape *tape, int n, Store work, Store out, Lane *centr
                 r.p[l] = smaller(2 * c * p, 2 * c * q) - mixed;
                 r.q[l] = larger(2 * c * p, 2 * c * q) + (rad * rad + mixed);
                 r.s[l] = 2 * size * s + s * s + (slack * (size * size) + TINY);
-                double one = fabs(x->lo[l]), two = fabs(x->hi[l]);
-                double small = one < two ? one : two, large = one < two ? two : one;
-                small = (x->lo[l] <= 0) & (x->hi[l] >= 0) ? 0.0 : small;
-                double lo = small * small, hi = large * large;
-                lo = lo - (lo * ULP + TINY);
-                r.lo[l] = lo > 0.0 ? lo : 0.0, r.hi[l] = hi + (hi * ULP + TINY);
             }
+            square_ends(x, &r);
             break;
         case DIV: {
-            Lane zero, ratio, inverse, steep, pi, qi, ri, si, pn, qn, rn, sn, low, high;
+            Lane zero, ratio, inverse, steep, pi, qi, ri, si, pn, qn, rn, sn, low, high, near;
+            inverse_ends(y, near, low, high);
             EACH
             {
                 int positive = y->lo[l] > 0;
-                double c = y->c[l], near = positive ? y->lo[l] : -y->hi[l], far = positive ? y->hi[l] : -y->lo[l];
-                near = near > 0 ? near : NAN;
-                double my = larger(-y->p[l], y->q[l]), moved = y->rad[l] + my;
+                double c = y->c[l], my = larger(-y->p[l], y->q[l]), moved = y->rad[l] + my;
                 inverse[l] = 1.0 / c, steep[l] = inverse[l] * inverse[l];
-                double curved = moved * moved * steep[l] / near, p = -steep[l] * y->q[l], q = -steep[l] * y->p[l];
+                double curved = moved * moved * steep[l] / near[l], p = -steep[l] * y->q[l], q = -steep[l] * y->p[l];
                 pi[l] = positive ? p : p - curved, qi[l] = positive ? q + curved : q, ri[l] = steep[l] * y->rad[l];
                 double size = fabs(inverse[l]) + ri[l] + larger(-pi[l], qi[l]);
-                si[l] = y->s[l] * steep[l] * (1 + (2 * moved + y->s[l]) / near) + (slack * size + TINY);
+                si[l] = y->s[l] * steep[l] * (1 + (2 * moved + y->s[l]) / near[l]) + (slack * size + TINY);
                 double by = x->c[l] / c, steepness = fabs(by);
                 ratio[l] = by;
                 pn[l] = x->p[l] - (by >= 0 ? by * y->q[l] : by * y->p[l]);
                 qn[l] = x->q[l] - (by >= 0 ? by * y->p[l] : by * y->q[l]);
                 double all = fabs(x->c[l]) + x->rad[l] + steepness * (fabs(c) + y->rad[l]);
                 sn[l] = x->s[l] + steepness * y->s[l] + (slack * all + TINY * (1 + fabs(c)));
-                double one = (positive ? 1.0 : -1.0) / far, two = (positive ? 1.0 : -1.0) / near;
-                double least = one < two ? one : two, most = one < two ? two : one;
-                low[l] = least - (fabs(least) * ULP + TINY), high[l] = most + (fabs(most) * ULP + TINY);
                 zero[l] = rn[l] = balance[l] = sizes[l] = plus[l] = minus[l] = 0.0;
             }
             for (int i = first; i < last; i++)

@@ -1,4 +1,4 @@
-/* The examination of one box; bounding.py and limbs/models.py. */
+/* The examination of one box; bounding.py and limb_models.py. */
 #ifndef EXAMINATION_H
 #define EXAMINATION_H
 
@@ -10,21 +10,21 @@
 
 enum { OPEN, BOUNDED, INFEASIBLE, MONOTONE, EMPTIED };
 
-/* Arrays of results for B boxes, as in examination.py; the ends and reasons of variable i begin at i * B. */
+/* Arrays of results for B boxes, as in boxes/engine.py; the ends and reasons of variable i begin at i * B. */
 typedef struct {
     Py_ssize_t B;
     const double *lower, *upper;
     int *verdict, *reason, *split, *cut_lower, *cut_upper;
     double *bound, *value, *left_lower, *left_upper, *centre;
     int shared;     /* number of the first variables that other limbs have too */
-    double *models; /* of the Lagrangian and of the function's gradient, limbs/models.py; NULL without them */
+    double *models; /* of the Lagrangian and of the function's gradient: write_model; NULL without them */
     const double *least; /* (B) points with lesser values do not matter; NULL where all do */
     const double *tilts; /* of the other limbs, for the part with shared variables alone: add_tilts; NULL without them */
 } Report;
 
 static Py_ssize_t rows_of_models(int n, int shared) { return 3 + 4 * n + n * n + 4 * shared; }
 
-/* Writes row after row of a box's model: limbs/models.py names them. */
+/* Writes row after row of a box's model: boxes/engine.py reads them. */
 static void write_model(const Form *form, const Box *x, Report *report, Py_ssize_t at, int defined)
 {
     int n = x->n, J = x->J, R = x->R;

@@ -56,13 +56,8 @@ static int judge2(const Form *form, Box *x, const double *centre, Report *report
         }
     }
     choose_multipliers(x, form->equation, 0, x->s, 1);
-    for (int r = 0; r < R; r++) {
-        x->size[r] = fabs(x->c[r]) + (x->q[r] - x->p[r]) + x->s[r];
-        for (int i = 0; i < n; i++)
-            x->size[r] += fabs(x->gb[r * n + i]);
-        for (int i = 0; i < n * n; i++)
-            x->size[r] += fabs(x->gA[r * n * n + i]);
-    }
+    for (int r = 0; r < R; r++)
+        x->size[r] = size_of_row(x, r);
     combine2(x);
     double lagrangian = quadratic_bound(x);
     bound = lagrangian < bound ? lagrangian : bound;

@@ -26,6 +26,18 @@ typedef struct {
     double *aE, *HN, *HD, *bN, *bD, *wN, *wD; /* (n), HN and HD: (n, n) */
 } Box;
 
+/* Size of all terms of a form of second order. */
+static double size_of_row(const Box *x, int r)
+{
+    int n = x->n;
+    double size = fabs(x->c[r]) + (x->q[r] - x->p[r]) + x->s[r];
+    for (int i = 0; i < n; i++)
+        size += fabs(x->gb[r * n + i]);
+    for (int i = 0; i < n * n; i++)
+        size += fabs(x->gA[r * n * n + i]);
+    return size;
+}
+
 /* The gradient is made small in the variables from number first on; rounding errors, m for each expression, are those
  * of these gradients, or of the values: quadratic_models.py's multipliers. */
 static void choose_multipliers(Box *x, const int *equation, int first, const double *rounding, int m)
@@ -76,7 +88,7 @@ static void choose_multipliers(Box *x, const int *equation, int first, const dou
             x->weights[r] = r == 0;
 }
 
-/* One variable's part of a model, from the parts of a gradient's form: quadratic_models.py's _integrate. */
+/* One variable's part of a model, from the parts of a gradient's form: quadratic_models.py's integral. */
 static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s)
 {
     double margin = 64 * ULP * (fabs(*b) + across + q - p + s) + TINY;

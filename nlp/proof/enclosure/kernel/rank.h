@@ -214,15 +214,16 @@ static RankParts carve_rank(const Matrix *m, int n, double *memory)
 static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py_ssize_t start, RankParts x)
 {
     for (int e = 0; e < m->entries; e++) {
-        Form2 *v = form2_of(out, e);
-        const Lane *terms = terms_of_form2(v);
+        Form2 *form = form2_of(out, e);
+        const Value *v = &form->v;
+        const Lane *terms = terms_of_form2(form);
         double scale = m->scale[e];
         double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
         EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        EACH_OF(i, 0, v->terms.linear)
+        EACH_OF(i, 0, form->terms.linear)
         {
             EACH size[l] += fabs(terms[i][l]);
-            EACH_OF(j, i, v->terms.pairs[i])
+            EACH_OF(j, i, form->terms.pairs[i])
             {
                 const double *term = terms[n + row_of(n, i) + j];
                 if (i == j)
@@ -385,33 +386,20 @@ static int judge_lane(const Matrix *m, int n, int l, RankParts x, double *shares
     return good;
 }
 
-static size_t memory_for_ranks(const Tape *tape, const Matrix *m, int n)
-{
-    return (size_t)(tape->registers + tape->outputs) * stride_of_form2(n) + (5 * (size_t)n + pairs_of(n)) * LANES +
-           memory_of_rank(m, n);
-}
+static size_t memory_for_ranks(const Tape *tape, const Matrix *m, int n) { return memory_of_run(tape, n, 2) + memory_of_rank(m, n); }
 
 static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, double *memory)
 {
-    Form form = {.n = n};
-    Report report = {.B = found->B, .lower = found->lower, .upper = found->upper};
-    Store work = {memory, stride_of_form2(n)}, out = work;
-    double *rest = memory;
-    carve(&rest, (size_t)tape->registers * work.stride);
-    out.memory = carve(&rest, (size_t)tape->outputs * out.stride);
-    Lane *lanes[4], *terms = (Lane *)carve(&rest, ((size_t)n + pairs_of(n)) * LANES);
-    for (int i = 0; i < 4; i++)
-        lanes[i] = (Lane *)carve(&rest, (size_t)n * LANES);
-    RankParts parts = carve_rank(m, n, rest);
+    Run run = prepare(tape, n, 2, memory);
+    RankParts parts = carve_rank(m, n, memory + memory_of_run(tape, n, 2));
     /* V makes what does not become small with the box larger. */
     double near = found->change ? 0 : NEAR_SINGULAR;
     for (Py_ssize_t start = 0; start < found->B; start += LANES) {
-        load(&form, &report, NULL, start, found->B, lanes[0], lanes[1], lanes[2], lanes[3]);
-        run2(tape, n, work, out, lanes[0], lanes[1], lanes[2], lanes[3], terms);
-        middles_of(m, n, out, found, start, parts);
+        run_block(&run, found->lower, found->upper, found->B, NULL, start, found->B);
+        middles_of(m, n, run.out, found, start, parts);
         int ready[LANES] = {0};
         EACH if (start + l < found->B) ready[l] = invert_lane(m, l, parts, found->smallest + start + l, near);
-        add_moving(m, n, out, parts);
+        add_moving(m, n, run.out, parts);
         for (int l = 0; l < LANES && start + l < found->B; l++) {
             double shares[64] = {0};
             found->regular[start + l] = ready[l] && judge_lane(m, n, l, parts, shares);

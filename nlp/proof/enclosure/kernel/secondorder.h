@@ -12,11 +12,12 @@ typedef struct {
     unsigned linear, pairs[MOST_VARIABLES];
 } Terms;
 
-/* c + a e + Q(e) + [p, q] +- s, with Q's range [sl, sh] and the sum of |a|. The n coefficients a follow in memory, then
- * those of e_i e_j, i <= j, row by row. Memory is all 0 at first, and coefficients that are no terms stay so. */
+/* c + a e + Q(e) + [p, q] +- s, with Q's range [sl, sh]. The n coefficients a follow in memory, then those of e_i e_j,
+ * i <= j, row by row. Memory is all 0 at first, and coefficients that are no terms stay so. */
 typedef struct {
+    Value v;
+    Lane sl, sh;
     Terms terms;
-    Lane c, p, q, s, lo, hi, rad, sl, sh;
 } Form2;
 
 /* The variables i = from, ..., n - 1 of a set of bits. */
@@ -111,13 +112,10 @@ INLINE void write_terms(Form2 *v, int n, Terms terms, const Lane *t)
     v->terms = terms;
 }
 
-/* Writes a value: ranges of its parts, poison without a finite form, and the interval with the form's range. */
-INLINE void settle2(Form2 *restrict v, int n, Terms which, double slack, const Result *restrict from, Lane *restrict t)
+/* Writes a value and its coefficients, with the ranges of its parts. */
+INLINE void settle2(Form2 *restrict to, int n, Terms which, double slack, const Result *restrict from, Lane *restrict t)
 {
-    Lane *terms = terms_of_form2(v), rad, low, high;
-    double grown = 1 + slack;
-    size_t pairs = pairs_of(n);
-    int all = 1;
+    Lane *terms = terms_of_form2(to), rad, low, high;
     EACH rad[l] = low[l] = high[l] = 0.0;
     EACH_OF(i, 0, which.linear)
     {
@@ -136,25 +134,16 @@ INLINE void settle2(Form2 *restrict v, int n, Terms which, double slack, const R
                 low[l] -= size, high[l] += size;
             }
     }
+    int all = settle_value(&to->v, slack, from, rad, low, high);
+    write_terms(to, n, which, t);
     EACH
     {
-        double c = from->c[l], p = smaller(from->p[l] * grown, 0.0), q = larger(from->q[l] * grown, 0.0);
-        double s = from->s[l] * grown, ends = ULP * fabs(c) + s;
-        double down = (rad[l] - low[l] - p + ends) * grown, up = (rad[l] + high[l] + q + ends) * grown;
-        int good = (down < LARGEST) & (up < LARGEST) & (fabs(c) < LARGEST);
-        double least = c - down, most = c + up;
-        least = least - ULP * fabs(least), most = most + ULP * fabs(most);
-        double lo = from->lo[l] > least ? from->lo[l] : least, hi = from->hi[l] < most ? from->hi[l] : most;
-        all &= good;
-        v->c[l] = good ? c : 0.0, v->rad[l] = good ? rad[l] : 0.0;
-        v->sl[l] = good ? low[l] : 0.0, v->sh[l] = good ? high[l] : 0.0;
-        v->p[l] = good ? p : 0.0, v->q[l] = good ? q : 0.0, v->s[l] = good ? s : INFINITY;
-        v->lo[l] = good ? lo : -INFINITY, v->hi[l] = good ? hi : INFINITY;
+        int good = to->v.s[l] < INFINITY;
+        to->sl[l] = good ? low[l] : 0.0, to->sh[l] = good ? high[l] : 0.0;
     }
-    write_terms(v, n, which, t);
     if (!all)
-        for (size_t i = 0; i < (size_t)n + pairs; i++)
-            EACH terms[i][l] = v->s[l] < INFINITY ? terms[i][l] : 0.0;
+        for (size_t i = 0; i < (size_t)n + pairs_of(n); i++)
+            EACH terms[i][l] = to->v.s[l] < INFINITY ? terms[i][l] : 0.0;
 }
 
 /* Half of a function's second derivative at c, from its rule. */
@@ -199,83 +188,60 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
         const int *code = tape->code + 6 * index;
         int op = code[0];
         double k = tape->k[index];
-        Form2 *v = form2_of(op == OUTPUT ? out : work, code[1]);
+        Form2 *to = form2_of(op == OUTPUT ? out : work, code[1]);
+        Value *v = &to->v;
         if (op == OUTPUT) {
             const Form2 *from = form2_of(work, code[2]);
-            memcpy(v->c, from->c, sizeof(Form2) - offsetof(Form2, c));
-            write_terms(v, n, from->terms, terms_of_form2((Form2 *)from));
+            memcpy(to, from, offsetof(Form2, terms));
+            write_terms(to, n, from->terms, terms_of_form2((Form2 *)from));
             continue;
         }
         if (op == INPUT || op == CONSTANT) {
-            write_terms(v, n, none, t);
-            memset(v->c, 0, sizeof(Form2) - offsetof(Form2, c));
+            write_terms(to, n, none, t);
+            memset(to, 0, offsetof(Form2, terms));
         }
         if (op == INPUT) {
-            v->terms.linear = 1u << code[2];
+            to->terms.linear = 1u << code[2];
             memcpy(v->c, centre[code[2]], sizeof(Lane));
             memcpy(v->lo, lower[code[2]], sizeof(Lane));
             memcpy(v->hi, upper[code[2]], sizeof(Lane));
             memcpy(v->rad, radius[code[2]], sizeof(Lane));
-            memcpy(terms_of_form2(v)[code[2]], radius[code[2]], sizeof(Lane));
+            memcpy(terms_of_form2(to)[code[2]], radius[code[2]], sizeof(Lane));
             continue;
         }
         if (op == CONSTANT) {
             EACH v->c[l] = v->lo[l] = v->hi[l] = k;
             continue;
         }
-        const Form2 *x = form2_of(work, code[2]), *y = form2_of(work, code[3]);
-        const Lane *ax = (const Lane *)(x + 1), *ay = (const Lane *)(y + 1), *Qx = ax + n, *Qy = ay + n;
+        const Form2 *one = form2_of(work, code[2]), *other = form2_of(work, code[3]);
+        const Value *x = &one->v, *y = &other->v;
+        const double *xl = one->sl, *xh = one->sh, *yl = other->sl, *yh = other->sh;
+        const Lane *ax = (const Lane *)(one + 1), *ay = (const Lane *)(other + 1), *Qx = ax + n, *Qy = ay + n;
         int is_binary = op == ADD || op == SUB || op == MUL || op == DIV, is_sum = op == ADD || op == SUB || op == SHIFT || op == SCALE;
-        Terms X = x->terms, Y = is_binary ? y->terms : op == SQUARE ? X : none;
+        Terms X = one->terms, Y = is_binary ? other->terms : op == SQUARE ? X : none;
         const Terms which = structure_of(n, X, Y, op == MUL || op == SQUARE, !is_sum && op != MUL && op != SQUARE);
-        Lane cubic;
+        Lane cubic, sizes;
         Result r;
         switch (op) {
         case ADD:
             EACH_TERM(ax[i][l] + ay[i][l], ax[at][l] + ay[at][l])
-            EACH
-            {
-                double c = x->c[l] + y->c[l], lo = x->lo[l] + y->lo[l], hi = x->hi[l] + y->hi[l];
-                double size = (x->rad[l] + y->rad[l]) + ((x->sh[l] - x->sl[l]) + (y->sh[l] - y->sl[l]));
-                r.c[l] = c, r.p[l] = x->p[l] + y->p[l], r.q[l] = x->q[l] + y->q[l];
-                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + size);
-                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-            }
+            EACH sizes[l] = fabs(x->c[l] + y->c[l]) + ((x->rad[l] + y->rad[l]) + ((xh[l] - xl[l]) + (yh[l] - yl[l])));
+            add(x, y, 1.0, sizes, slack, &r);
             break;
         case SUB:
             EACH_TERM(ax[i][l] - ay[i][l], ax[at][l] - ay[at][l])
-            EACH
-            {
-                double c = x->c[l] - y->c[l], lo = x->lo[l] - y->hi[l], hi = x->hi[l] - y->lo[l];
-                double size = (x->rad[l] + y->rad[l]) + ((x->sh[l] - x->sl[l]) + (y->sh[l] - y->sl[l]));
-                r.c[l] = c, r.p[l] = x->p[l] - y->q[l], r.q[l] = x->q[l] - y->p[l];
-                r.s[l] = x->s[l] + y->s[l] + slack * (fabs(c) + size);
-                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-            }
+            EACH sizes[l] = fabs(x->c[l] - y->c[l]) + ((x->rad[l] + y->rad[l]) + ((xh[l] - xl[l]) + (yh[l] - yl[l])));
+            add(x, y, -1.0, sizes, slack, &r);
             break;
         case SHIFT:
             EACH_TERM(ax[i][l], ax[at][l])
-            EACH
-            {
-                double c = x->c[l] + k, lo = x->lo[l] + k, hi = x->hi[l] + k;
-                r.c[l] = c, r.p[l] = x->p[l], r.q[l] = x->q[l], r.s[l] = x->s[l] + slack * fabs(c);
-                r.lo[l] = lo - fabs(lo) * ULP, r.hi[l] = hi + fabs(hi) * ULP;
-            }
+            shift(x, k, slack, &r);
             break;
-        case SCALE: {
-            double size = fabs(k);
+        case SCALE:
             EACH_TERM(ax[i][l] * k, ax[at][l] * k)
-            EACH
-            {
-                double c = x->c[l] * k, down = x->lo[l] * k, up = x->hi[l] * k, p = x->p[l] * k, q = x->q[l] * k;
-                double lo = k >= 0 ? down : up, hi = k >= 0 ? up : down, all = x->rad[l] + (x->sh[l] - x->sl[l]);
-                r.c[l] = c, r.p[l] = k >= 0 ? p : q, r.q[l] = k >= 0 ? q : p;
-                r.s[l] = size == 1 ? x->s[l] : x->s[l] * size + (slack * (fabs(c) + size * all) + TINY);
-                r.lo[l] = size == 1 ? lo : lo - (fabs(lo) * ULP + TINY);
-                r.hi[l] = size == 1 ? hi : hi + (fabs(hi) * ULP + TINY);
-            }
+            EACH sizes[l] = x->rad[l] + (xh[l] - xl[l]);
+            scale(x, k, sizes, slack, &r);
             break;
-        }
         case MUL:
             EACH_OF(i, 0, which.linear)
             {
@@ -291,9 +257,9 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             {
                 double cx = x->c[l], cy = y->c[l], rx = x->rad[l], ry = y->rad[l], px = x->p[l], qx = x->q[l];
                 double py = y->p[l], qy = y->q[l], mx = larger(-px, qx), my = larger(-py, qy);
-                double Sx = larger(-x->sl[l], x->sh[l]), Sy = larger(-y->sl[l], y->sh[l]);
+                double Sx = larger(-xl[l], xh[l]), Sy = larger(-yl[l], yh[l]);
                 double higher = cubic[l] + Sx * Sy + ((rx + Sx) * my + (ry + Sy) * mx + mx * my);
-                double big = fabs(cx) + rx + (x->sh[l] - x->sl[l]) + mx, other = fabs(cy) + ry + (y->sh[l] - y->sl[l]) + my;
+                double big = fabs(cx) + rx + (xh[l] - xl[l]) + mx, other = fabs(cy) + ry + (yh[l] - yl[l]) + my;
                 r.c[l] = cx * cy;
                 r.p[l] = smaller(cx * py, cx * qy) + smaller(cy * px, cy * qx) - higher;
                 r.q[l] = larger(cx * py, cx * qy) + larger(cy * px, cy * qx) + higher;
@@ -314,33 +280,19 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             EACH
             {
                 double c = x->c[l], rad = x->rad[l], p = x->p[l], q = x->q[l], s = x->s[l], m = larger(-p, q);
-                double S = larger(-x->sl[l], x->sh[l]), mixed = cubic[l] + 2 * rad * m;
-                double size = fabs(c) + rad + (x->sh[l] - x->sl[l]) + m;
+                double S = larger(-xl[l], xh[l]), mixed = cubic[l] + 2 * rad * m;
+                double size = fabs(c) + rad + (xh[l] - xl[l]) + m;
                 r.c[l] = c * c;
                 r.p[l] = smaller(2 * c * p, 2 * c * q) - mixed;
                 r.q[l] = larger(2 * c * p, 2 * c * q) + (mixed + (S + m) * (S + m));
                 r.s[l] = 2 * size * s + s * s + (slack * (size * size) + TINY);
-                double one = fabs(x->lo[l]), two = fabs(x->hi[l]);
-                double small = one < two ? one : two, large = one < two ? two : one;
-                small = (x->lo[l] <= 0) & (x->hi[l] >= 0) ? 0.0 : small;
-                double lo = small * small, hi = large * large;
-                lo = lo - (lo * ULP + TINY);
-                r.lo[l] = lo > 0.0 ? lo : 0.0, r.hi[l] = hi + (hi * ULP + TINY);
             }
+            square_ends(x, &r);
             break;
         case DIV: {
             Lane ratio, inverse, near, rad, size, low, high;
-            EACH
-            {
-                int positive = y->lo[l] > 0;
-                double close = positive ? y->lo[l] : -y->hi[l], far = positive ? y->hi[l] : -y->lo[l];
-                close = close > 0 ? close : NAN;
-                near[l] = close, inverse[l] = 1.0 / y->c[l], ratio[l] = x->c[l] / y->c[l];
-                double one = (positive ? 1.0 : -1.0) / far, two = (positive ? 1.0 : -1.0) / close;
-                double least = one < two ? one : two, most = one < two ? two : one;
-                low[l] = least - (fabs(least) * ULP + TINY), high[l] = most + (fabs(most) * ULP + TINY);
-                rad[l] = size[l] = 0.0;
-            }
+            inverse_ends(y, near, low, high);
+            EACH inverse[l] = 1.0 / y->c[l], ratio[l] = x->c[l] / y->c[l], rad[l] = size[l] = 0.0;
             EACH_OF(i, 0, which.linear)
                 EACH
                 {
@@ -363,10 +315,10 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             {
                 int positive = y->lo[l] > 0;
                 double by = ratio[l], py = y->p[l], qy = y->q[l], my = larger(-py, qy), moved = rad[l] + size[l];
-                double Sy = larger(-y->sl[l], y->sh[l]), higher = cubic[l] + size[l] * Sy + moved * my;
+                double Sy = larger(-yl[l], yh[l]), higher = cubic[l] + size[l] * Sy + moved * my;
                 double p = x->p[l] - larger(by * py, by * qy) - higher, q = x->q[l] - smaller(by * py, by * qy) + higher;
-                double whole = fabs(by) + moved, ylong = fabs(y->c[l]) + y->rad[l] + (y->sh[l] - y->sl[l]) + my;
-                double xlong = fabs(x->c[l]) + x->rad[l] + (x->sh[l] - x->sl[l]);
+                double whole = fabs(by) + moved, ylong = fabs(y->c[l]) + y->rad[l] + (yh[l] - yl[l]) + my;
+                double xlong = fabs(x->c[l]) + x->rad[l] + (xh[l] - xl[l]);
                 double s = x->s[l] + whole * y->s[l] + (slack * (xlong + whole * ylong) + TINY * (1 + ylong));
                 r.c[l] = by, r.s[l] = s / near[l] + (slack * whole + TINY);
                 r.p[l] = (positive ? p : -q) / near[l], r.q[l] = (positive ? q : -p) / near[l];
@@ -381,8 +333,8 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             {
                 Rule rule = rule_of(op, x->c[l], x->lo[l], x->hi[l]);
                 double slope = rule.slope, curve = curve_of(op, rule, x->c[l]), p = x->p[l], q = x->q[l], s = x->s[l];
-                double m = larger(-p, q), S = larger(-x->sl[l], x->sh[l]), rad = x->rad[l];
-                double moved = rad + (x->sh[l] - x->sl[l]) + m, reach = moved + s;
+                double m = larger(-p, q), S = larger(-xl[l], xh[l]), rad = x->rad[l];
+                double moved = rad + (xh[l] - xl[l]) + m, reach = moved + s;
                 double mixed = cubic[l] + 2 * rad * m, square = mixed + (S + m) * (S + m);
                 double rest = reach * reach * (reach / 6), least = -rest, most = rest;
                 if (op != SIN && op != COS) {
@@ -412,7 +364,7 @@ WIDE static void run2(const Tape *tape, int n, Store work, Store out, Lane *cent
             }
         }
         }
-        settle2(v, n, which, slack, &r, t);
+        settle2(to, n, which, slack, &r, t);
     }
 }
 

@@ -8,17 +8,6 @@
 
 static int rows_of_tangents(const Form *form) { return form->tangents ? form->functions + 2 * form->tangents : 0; }
 
-static double size_of_row(const Box *x, int r)
-{
-    int n = x->n;
-    double size = fabs(x->c[r]) + (x->q[r] - x->p[r]) + x->s[r];
-    for (int i = 0; i < n; i++)
-        size += fabs(x->gb[r * n + i]);
-    for (int i = 0; i < n * n; i++)
-        size += fabs(x->gA[r * n * n + i]);
-    return size;
-}
-
 /* Value of a form of second order at e, apart from its remainder. */
 static double value_of_row(const Box *x, int r, const double *e)
 {

@@ -1,8 +1,7 @@
 """Proven smallest and largest values of numbers over a workspace.
 
-``extremes`` (by the certificate's search) and ``strokes`` come from expressions; ``bound_search``, ``clearance``,
-``singular``, ``pose_error`` and ``leg_numbers`` are branch and bound for numbers of six straight legs that are no
-single expression. ``limit_values``, ``spectrum`` and ``loop_limits`` have numbers of robots with loops,
-``robot_limits`` the limits of robots that are not six straight legs, ``asked_values`` singular values that no limit
-asks for.
+``extremes`` (by the certificate's search) bounds expressions, and ``loop_limits`` limits in home's assembly.
+``bound_search`` is branch and bound of a number with bounds of its own over boxes: ``left_inverse`` and
+``singular_values``, ``clearance``, ``pose_error``. ``searched`` has the claims about these, and ``strokes`` those that
+follow from lengths of legs.
 """

@@ -1,27 +1,23 @@
-"""Bounds of the distance between two links over boxes of poses: links as line segments between their joints.
+"""Bounds of the distance between two legs over boxes of poses: legs as line segments between their joints.
 
 For a unit vector n the distance of two segments is at least the least of ``n.(x - y)`` over their ends x and y: a plane
 normal to n separates them. With n between the nearest points at the middle of a box, the bound differs from the
 distance by a term of second order in the width of the box.
 
 Where every joint centre may be off by a tolerance, so may every point of a leg, and the least distance is smaller by
-twice the tolerance: that of two legs that are moved towards each other. Ends of other links move with errors as loops
-demand, and have them as coordinates.
+twice the tolerance: that of two legs that are moved towards each other.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from casadi import SX
 
 from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
-from ..ranks.krawczyk import by_centres
 from ..robot.posed_robot import PosedModel
 from ..robot.tolerance_model import Family
 from .bound_search import Bounds
@@ -32,77 +28,27 @@ _ROUNDING = 1e-13
 _PARALLEL = 1e-12
 
 
-class Link(NamedTuple):
-    """A link as a segment in the symbols of a model.
-
-    Attributes:
-        name: in the words of a case.
-        joints: labels of the joints at its ends; two links with a joint in common have no clearance.
-        start, end: (3, 1) its ends in the world frame, length.
-    """
-
-    name: str
-    joints: frozenset[str]
-    start: SX
-    end: SX
-
-
-class Pair(NamedTuple):
-    """Names of two links, and their places among all."""
-
-    names: tuple[str, str]
-    places: tuple[int, int]
-
-
-def links_of(model: Model) -> list[Link]:
-    """Return the legs of a robot, or the links of one that is given joint by joint."""
-    R, p = model.pose.rotation, model.pose.position
-    legs = [Link(each.name, frozenset([f"{each.name}"]), each.base, p + R @ each.platform) for each in model.legs]
-    return legs or [Link(each.name, each.ends, each.start, each.start + each.span) for each in model.links]
-
-
-def pairs_of(links: Sequence[Link]) -> list[Pair]:
-    """Return all pairs of links that share no joint."""
-    return [
-        Pair((one.name, other.name), (i, j))
-        for (i, one), (j, other) in itertools.combinations(enumerate(links), 2)
-        if not one.joints & other.joints
-    ]
-
-
-class Ends:
-    """Ends of all links of a robot, times the scale of its rotations: polynomials for ends on the platform.
+class Clearance:
+    """Distance between two straight legs.
 
     Args:
         posed: the robot.
-        model: its model, in whose symbols the links are.
+        model: its model, with legs.
+        places: those of the two legs.
+        tolerance: largest error of each of their joint centres, length.
+
+    Attributes:
+        entries: (13, 1) ends of the first leg, then of the second, times the scale of a rotation, and the scale.
     """
 
-    def __init__(self, posed: PosedModel, model: Model) -> None:
-        self.links = links_of(model)
-        ends = ca.vertcat(SX(0, 1), *[part for each in self.links for part in (each.start, each.end)])
-        (self._plain, self._scaled), self.scale = posed.scaled_points(ends), posed.scale
-
-    def of(self, pair: Pair) -> tuple[SX, SX]:
-        """Return the ends of two links, (12, 1), and these times the scale, with it, (13, 1)."""
-        rows = [k for place in pair.places for k in range(6 * place, 6 * place + 6)]
-        return self._plain[rows], ca.vertcat(self._scaled[rows], self.scale)
-
-
-class Clearance:
-    """Distance between two links.
-
-    Args:
-        z: (n, 1) coordinates of the robot.
-        ends: (12, 1) ends of the links of the design in these coordinates.
-        entries: (13, 1) ends of the links of all machines that are meant, times a scale, and the scale.
-        nearer: by how much the links of any machine may be nearer to each other at a pose, length.
-        family: all machines in whose coordinates the entries are; None for the design.
-    """
-
-    def __init__(self, z: SX, ends: SX, entries: SX, *, nearer: float = 0.0, family: Family | None = None) -> None:
-        self.entries, self._nearer, self.family = ca.densify(entries), nearer, family
-        self._ends = ca.Function("ends", [z], [ca.densify(ends)])
+    def __init__(self, posed: PosedModel, model: Model, places: tuple[int, int], *, tolerance: float = 0.0) -> None:
+        self.family: Family | None = None
+        self._nearer = 2 * tolerance
+        R, p = model.pose.rotation, model.pose.position
+        ends = ca.vertcat(*[end for k in places for end in (model.legs[k].base, p + R @ model.legs[k].platform)])
+        plain, scaled = posed.scaled_points(ends)
+        self.entries = ca.densify(ca.vertcat(scaled, posed.scale))
+        self._ends = ca.Function("ends", [posed.z], [ca.densify(plain)])
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the distances (K,) at points (K, n)."""
@@ -110,10 +56,10 @@ class Clearance:
         return np.asarray(np.maximum(distances - self._nearer, 0.0))
 
     def between(self, z: FloatArray) -> FloatArray:
-        """Return the vectors (K, 3) from the nearest point of the second link to that of the first."""
+        """Return the vectors (K, 3) from the nearest point of the second leg to that of the first."""
         return _between(self._ends(z.T).full().T)
 
-    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
+    def over(self, forms: Forms, count: int, errors: int) -> Bounds:  # noqa: ARG002 - the tolerance has them
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
         at = _EndsOver.of(forms)
         between = _between(at.ends.reshape(-1, 12))
@@ -126,14 +72,13 @@ class Clearance:
                 middle = (n * (at.ends[:, one] - at.ends[:, other])).sum(axis=1)
                 along = np.einsum("bk,bkt->bt", n, at.terms[:, one] - at.terms[:, other])
                 along -= middle[:, None] * at.of_scale
-                fall = np.abs(along[:, : along.shape[1] - errors]).sum(axis=1)
-                fall += by_centres(along[:, along.shape[1] - errors :]) + np.abs(middle) * at.rest_of_scale
+                fall = np.abs(along).sum(axis=1) + np.abs(middle) * at.rest_of_scale
                 fall += (np.abs(n) * (at.rest[:, one] + at.rest[:, other])).sum(axis=1)
                 bound = middle - fall / at.least_scale
                 falls = np.where((bound < least)[:, None], np.abs(along), falls)
                 least = np.minimum(least, bound)
         bound = np.maximum(least - at.rounding - self._nearer, 0.0)
-        return Bounds(np.where(np.isfinite(bound), bound, 0.0), np.nan_to_num(_shares(falls, count, errors)))
+        return Bounds(np.where(np.isfinite(bound), bound, 0.0), np.nan_to_num(_shares(falls, count)))
 
     def most(self, forms: Forms) -> FloatArray:
         """Return upper bounds (B,) of the distance of the design over boxes, from forms of the entries."""
@@ -146,7 +91,7 @@ class Clearance:
 
 
 class _EndsOver(NamedTuple):
-    """Ends of two links over B boxes.
+    """Ends of two legs over B boxes.
 
     Attributes:
         ends: (B, 4, 3) in the middle.
@@ -183,12 +128,11 @@ class _EndsOver(NamedTuple):
         )
 
 
-def _shares(falls: FloatArray, count: int, errors: int) -> FloatArray:
+def _shares(falls: FloatArray, count: int) -> FloatArray:
     """Return the share (B, f) of each coordinate in terms (B, t): its own, and half of each product with it."""
     shares = falls[:, :count].copy()
-    if falls.shape[1] - errors > count:
-        for k, (i, j) in enumerate(itertools.combinations_with_replacement(range(count), 2), start=count):
-            shares[:, [i, j]] += 0.5 * falls[:, [k]] * (2 if i == j else 1)
+    for k, (i, j) in enumerate(itertools.combinations_with_replacement(range(count), 2), start=count):
+        shares[:, [i, j]] += 0.5 * falls[:, [k]] * (2 if i == j else 1)
     return shares
 
 

@@ -40,7 +40,7 @@ _FINEST = 1e-10
 #: Part of the room between a value and its limit that a finer gap is: the value known grows a little in a search.
 _SHARE = 0.9
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding.
-_ON_LIMIT = 1e-9
+ON_LIMIT = 1e-9
 #: Part of an expression's scale that gaps of smaller values are parts of, as in the search of certificates.
 _NEAR_ZERO = 1e-6
 #: Reason for a limit that stays open between a bound and a value although the search ended.
@@ -216,7 +216,7 @@ def slack_of(limit: float) -> float:
 
     It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
     """
-    return _ON_LIMIT * abs(limit)
+    return ON_LIMIT * abs(limit)
 
 
 def _extreme(claim: Claim, found: _Found, machine: WorstMachine | None) -> Extreme:

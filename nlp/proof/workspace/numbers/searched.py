@@ -1,7 +1,8 @@
-"""Limits and measures with searches of their own: singular values and condition numbers of J, clearance of links."""
+"""Limits and measures with searches of their own: singular values and condition numbers of J, clearance of legs."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +14,6 @@ import numpy as np
 from .....models import Dimension, FloatArray, Model
 from ....case.case import Case
 from ....case.limits.clearance import LegClearance
-from ....case.limits.link_clearance import LinkClearance
 from ....case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ....case.task import Sense
 from ....errors import UncoveredError
@@ -26,7 +26,7 @@ from ..robot.tolerance_model import Family
 from ..tolerance.leg_errors import along
 from ..verdict import Outcome
 from .bound_search import OverPoses, smallest_number
-from .clearance import Clearance, Ends, Pair, links_of, pairs_of
+from .clearance import Clearance
 from .extremes import CLOSE, Extreme, nothing_known, slack_of
 from .singular_values import SingularValues
 
@@ -98,27 +98,17 @@ class Subject:
             self.problem, length, is_condition=is_condition, family=family, legs=legs, shortest=self.shortest
         )
 
-    @cached_property
-    def ends(self) -> tuple[Ends, Ends]:
-        """Ends of the links of the design and, but for legs, of all machines that are meant."""
-        own = Ends(posed_model(self.case, self.model, self.box, z=self.problem.z), self.model)
-        if self.built is None or self.legs is not None:
-            return own, own
-        (model, _, _), family = self.built
-        return own, Ends(posed_model(self.case, model, self.box, z=self.problem.z, errors=family.errors), model)
+    def clearance(self, places: tuple[int, int]) -> Clearance:
+        """Return the distance of two legs."""
+        posed = posed_model(self.case, self.model, self.box, z=self.problem.z)
+        return Clearance(posed, self.model, places, tolerance=0.0 if self.legs is None else self.legs.tolerance)
 
-    def clearance(self, pair: Pair) -> Clearance:
-        """Return the distance of two links."""
-        design, built = self.ends
-        nearer, family = (0.0, self.family) if self.legs is None else (2 * self.legs.tolerance, None)
-        return Clearance(self.problem.z, design.of(pair)[0], built.of(pair)[1], nearer=nearer, family=family)
-
-    def nearest(self, pair: Pair, y: FloatArray) -> JointErrors | None:
+    def nearest(self, places: tuple[int, int], y: FloatArray) -> JointErrors | None:
         """Return the errors with which two legs are nearest to each other at a pose (6,); None without legs."""
         if self.legs is None:
             return None
-        moved, between = np.zeros_like(self.legs.base), self.clearance(pair).between(y[None, list(self.problem.free)])
-        moved[list(pair.places)] = np.array([[-1.0], [1.0]]) * between
+        moved, between = np.zeros_like(self.legs.base), self.clearance(places).between(y[None, list(self.problem.free)])
+        moved[list(places)] = np.array([[-1.0], [1.0]]) * between
         errors = along(self.legs, self.box.pose(y).rotation, moved, moved)
         # Legs that the whole errors would move through each other touch with a part of them.
         part = min(1.0, float(np.linalg.norm(between)) / (2 * self.legs.tolerance))
@@ -134,7 +124,7 @@ class Question(NamedTuple):
         number: returns the number, or minus it.
         dimension: of the number.
         key, limit: of the limit in the case; empty and None without one.
-        pair: of links, of their distance; None for another number.
+        places: those of two legs, of their distance; None for another number.
     """
 
     name: str
@@ -143,7 +133,7 @@ class Question(NamedTuple):
     dimension: Dimension = Dimension.NUMBER
     key: str = ""
     limit: float | None = None
-    pair: Pair | None = None
+    places: tuple[int, int] | None = None
 
 
 def searched_limits(subject: Subject, *, gap: float, paper: PaperRecord | None = None) -> Iterator[Extreme]:
@@ -184,17 +174,16 @@ def questions(subject: Subject, limit: object) -> Iterator[Question]:
     elif isinstance(limit, ConditionNumber):
         question = _spectral(subject, limit.key, limit.length)
         yield question._replace(name=limit.key, key=f"{limit.key}.max", limit=limit.max)
-    elif isinstance(limit, LegClearance | LinkClearance) and limit.min is not None:
-        word = "limbs" if isinstance(limit, LegClearance) else "links"
-        for pair in pairs_of(links_of(subject.model)):
+    elif isinstance(limit, LegClearance):
+        for (i, one), (j, other) in itertools.combinations(enumerate(subject.model.legs), 2):
             yield Question(
-                f"{limit.key} {word} {pair.names[0]} and {pair.names[1]}",
+                f"{limit.key} limbs {one.name} and {other.name}",
                 Sense.MIN,
-                partial(subject.clearance, pair),
+                partial(subject.clearance, (i, j)),
                 Dimension.LENGTH,
                 f"{limit.key}.min",
                 limit.min,
-                pair,
+                (i, j),
             )
 
 
@@ -255,7 +244,7 @@ def _worst(
         return None
     if isinstance(number, SingularValues):
         return number.errors(y[list(subject.problem.free)])
-    return None if question.pair is None else subject.nearest(question.pair, y)
+    return None if question.places is None else subject.nearest(question.places, y)
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:

@@ -72,7 +72,7 @@ def prove_ranks(
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is None:
                 continue
-            recorder = None if paper is None or (legs is None and family is not None) else paper.own(name)
+            recorder = None if paper is None else paper.own(name)
             is_shown = partial(_is_shown, problem, family, homes, constraints=name == CONSTRAINTS)
             newton = partial(NewtonRefuter, problem, matrix, None if legs else family, is_shown)
             refuter = newton() if legs is None else SignRefuter(legs, problem)

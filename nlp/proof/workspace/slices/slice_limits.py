@@ -1,7 +1,7 @@
 """Reach and limits over the boxes of a slice: each kept, or violated, at every pose of a box, or open.
 
-Reach and limits on expressions are decided by the ranges of :mod:`..numbers.limit_values`, those on the clearance of
-links by its bounds from below and from above. A limit on singular values is proved to be
+Reach and limits on expressions are decided by the ranges of :mod:`..numbers.loop_limits`, those on the clearance of
+legs by its bounds from below and from above. A limit on singular values is proved to be
 kept by its bound; it counts as violated where it is so at the corners and at the middle of the box, which is no proof.
 """
 
@@ -24,7 +24,8 @@ from ...boxes.rows import some
 from ...statement.machine import joint_centres
 from ..numbers.bound_search import OverPoses
 from ..numbers.clearance import Clearance
-from ..numbers.limit_values import ON_LIMIT, LimitValues
+from ..numbers.extremes import ON_LIMIT
+from ..numbers.loop_limits import LimitValues
 from ..numbers.searched import Subject, questions
 from ..ranks.krawczyk import Relation
 from ..ranks.loop_boxes import LoopBoxes
@@ -88,7 +89,7 @@ class SliceLimits:
         uncovered = dict.fromkeys(self._values.uncovered)
         self._others: list[_Apart | _Sampled] = []
         for question in (each for limit in case.limits for each in questions(subject, limit)):
-            key, value, is_apart = question.key, question.limit or 0.0, question.pair is not None
+            key, value, is_apart = question.key, question.limit or 0.0, question.places is not None
             try:
                 number = question.number()
                 over = None if problem.dependent else OverPoses(number, problem)
@@ -171,7 +172,7 @@ def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[
 
 
 class _Apart:
-    """The clearance of a pair of links."""
+    """The clearance of a pair of legs."""
 
     def __init__(self, key: str, pair: Clearance, over: OverPoses, limit: float) -> None:
         self.key, self._pair, self._over, self._limit = key, pair, over, limit - ON_LIMIT * abs(limit)

@@ -1,5 +1,6 @@
 """Numbers of any robot over every machine within a tolerance of joint centres.
 
-``leg_errors`` has errors of six straight legs, ``second_order_change`` bounds of second derivatives by the errors,
-``machine_points`` and ``machine_number`` the smallest value over machines, and ``machines`` all claims.
+The modules import each other in this order: ``second_order_change`` (bounds of second derivatives by the errors),
+``machine_number`` (the smallest value over machines, by boxes of poses), ``machines`` (all claims); and for itself
+``leg_errors`` (worst machines of six straight legs).
 """

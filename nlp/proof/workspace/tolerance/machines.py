@@ -85,11 +85,25 @@ class Machines:
         self.case, self.model, self.built, self.family = case, model, built, family
         self._at = pose_coordinates(family.problem.box)
         self.symbols: MachineLayout = machine_layout(case, built, family.tolerance, self._at)
+        self._rests: dict[tuple[str, str], float] = {}
 
     @cached_property
     def design(self) -> Layout:
         """The design as symbols of the pose."""
         return design_layout(self.case, self.model, self._at)
+
+    def rest(self, claim: Claim, number: SX, single: _Machine) -> float:
+        """Return a bound of the terms of second order of a claim's number, the same for both senses; or infinite.
+
+        Raises:
+            UncoveredError: an expression holds an operation without a rule.
+        """
+        family, key = self.family, (claim.name, claim.key.rpartition(".")[0])
+        if key not in self._rests:
+            poses = family.problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(family.problem.free)]
+            first = max((single.first_order_change(z) for z in poses), default=0.0)
+            self._rests[key] = second_order_change(family, number, first)
+        return self._rests[key]
 
     def number(self, expression: SX) -> SX:
         """Return an expression of the symbols of machines in the coordinates of their family."""
@@ -224,8 +238,7 @@ def _by_first_order(machines: Machines, claim: Claim, number: SX, proving: Provi
     machine, whole, symbols = None, claim.expression, machines.symbols
     if any(ca.which_depends(number, family.errors, 1, True)):
         single = _Machine(family, number, claim.reading, sign)
-        poses = family.problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(family.problem.free)]
-        rest = second_order_change(family, number, max((single.first_order_change(z) for z in poses), default=0.0))
+        rest = machines.rest(claim, number, single)
         if not math.isfinite(rest):
             return None
         gradient = ca.densify(ca.gradient(whole, symbols.errors))

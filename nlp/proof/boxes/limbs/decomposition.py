@@ -1,4 +1,4 @@
-"""Bounds of a sum of limbs over boxes of shared variables, from upper models of the limbs.
+"""Lagrangian decomposition: bounds of a sum of limbs over boxes of shared variables, from upper models of the limbs.
 
 The sum of the limbs' bests over a box of the shared variables ``s`` is more than the best of the sum: each limb would
 choose another ``s``. So every limb's function is taken without a quadratic function ``t_k`` of ``s``, its *tilt*, and
@@ -7,26 +7,104 @@ the sum of the tilts is added to the part that depends on ``s`` alone:
     phi(s, o) <= sum_k max over the boxes of limb k of (phi_k - t_k) + max_s (phi_0 + sum_k t_k).
 
 This holds for any tilts. Those used are gradient and curvature, along ``s``, of the model of the limb at a good point
-of its own variables, so that what is left of the limb hardly depends on ``s``. (This is the Lagrangian decomposition of
-the sum with copies of ``s``.)
+of its own variables, so that what is left of the limb hardly depends on ``s``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...enclosure.forms import TINY, ULP
-from ...enclosure.quadratic_models import QuadraticModel
+from ...enclosure.forms import TINY, ULP, QuadraticModel
 from ..engine import LimbModels
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .....models import FloatArray
-    from .boxes import OwnBoxes
+
+
+@dataclass(frozen=True, eq=False)
+class OwnBoxes:
+    """Lists of boxes of one limb's own variables, for B shared boxes.
+
+    Attributes:
+        lower, upper: (d, N) ends of all lists, one after the other.
+        of: (N,) number of the shared box that a box belongs to, ascending.
+        count: number B of the shared boxes.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    of: NDArray[np.int64]
+    count: int
+
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """(B,) place of the first box of each list; none may be empty."""
+        return np.flatnonzero(np.diff(self.of, prepend=-1))
+
+    def some(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> OwnBoxes:
+        """Return the lists of some of the shared boxes, which may repeat."""
+        chosen = np.flatnonzero(which) if which.dtype == np.bool_ else which
+        sizes = np.bincount(self.of, minlength=self.count)
+        starts, counts = (np.cumsum(sizes) - sizes)[chosen], sizes[chosen]
+        before = np.cumsum(counts) - counts
+        places = np.repeat(starts - before, counts) + np.arange(int(counts.sum()))
+        of = np.repeat(np.arange(chosen.size), counts)
+        return OwnBoxes(self.lower[:, places], self.upper[:, places], of, chosen.size)
+
+    def joined(self, parts: Sequence[OwnBoxes]) -> OwnBoxes:
+        """Return the lists of several, one after the other."""
+        first = np.cumsum([0, *(part.count for part in parts)])
+        return OwnBoxes(
+            np.concatenate([part.lower for part in parts], axis=1),
+            np.concatenate([part.upper for part in parts], axis=1),
+            np.concatenate([part.of + start for part, start in zip(parts, first, strict=False)]),
+            int(first[-1]),
+        )
+
+    @property
+    def width(self) -> FloatArray:
+        """(B,) sum of all sides of the boxes of each list."""
+        return np.asarray(np.bincount(self.of, (self.upper - self.lower).sum(axis=0), minlength=self.count))
+
+    def bisect(self, which: NDArray[np.bool_], along: NDArray[np.intp]) -> OwnBoxes:
+        """Return the lists with some boxes (N,) bisected along one variable (N,) each."""
+        places = np.repeat(np.arange(self.of.size), 1 + which)
+        lower, upper = self.lower[:, places].copy(), self.upper[:, places].copy()
+        second = np.flatnonzero(np.diff(places, prepend=-1) == 0)
+        i = along[places[second]]
+        middle = 0.5 * lower[i, second] + 0.5 * upper[i, second]
+        upper[i, second - 1], lower[i, second] = middle, middle
+        return OwnBoxes(lower, upper, self.of[places], self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class SharedBoxes:
+    """B boxes of shared variables with lists of own boxes.
+
+    Attributes:
+        lower, upper: (m, B) ends.
+        bound: (B,) upper bound of the value that is maximised.
+        own: lists of each limb.
+        good: (d, B) a point of each limb's own variables that is the best known.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    bound: FloatArray
+    own: tuple[OwnBoxes, ...]
+    good: tuple[FloatArray, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of shared boxes."""
+        return int(self.bound.size)
 
 
 class Tilt(NamedTuple):
