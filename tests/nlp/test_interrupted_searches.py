@@ -42,7 +42,7 @@ from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family
+from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.tolerance.machine_number import smallest_of_machines
 from screwsynth.nlp.proof.workspace.tolerance.machines import machines_of
@@ -217,7 +217,7 @@ def loops() -> Claim:
 
 
 @cache
-def family() -> Family:
+def family() -> ToleranceModel:
     case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
     return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case))).family
 

@@ -30,7 +30,7 @@ from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, family_of
+from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel, family_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 FOLDER = Path(__file__).parents[2] / "nlp" / "proof" / "enclosure"
@@ -155,7 +155,7 @@ class Copy:
         return first, second, np.eye(columns) - np.outer(t, t)
 
 
-def is_found(copy: Copy, problem: Problem, family: Family | None = None) -> bool:
+def is_found(copy: Copy, problem: Problem, family: ToleranceModel | None = None) -> bool:
     """Whether ``I - C M(y)`` is beyond the kernel's bound at a point, or a box counts with too large a bound."""
     rng, meant = np.random.default_rng(1), family or problem
     z = problem.z if family is None else family.coordinates

@@ -34,7 +34,7 @@ from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, 
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import Family, family_of
+from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel, family_of
 from screwsynth.nlp.proof.workspace.tolerance.leg_errors import of_legs
 from screwsynth.nlp.proof.workspace.tolerance.machines import Proving, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -271,7 +271,7 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
     exact = build_problem(case, case.model, box)
     family = family_of(case, built_model(case.model), exact, robot.tolerance)
 
-    def examined(family: Family | None) -> Examined:
+    def examined(family: ToleranceModel | None) -> Examined:
         """The boxes, for all machines of a family, or for the design."""
         matrix, z, start = (
             (exact.locked, exact.z, exact.start)

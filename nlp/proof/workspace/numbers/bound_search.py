@@ -25,7 +25,7 @@ from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
 from ..ranks.rank_rule import Tested
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -93,7 +93,7 @@ class Number(Bounded, Protocol):
         family: all machines in whose coordinates the entries are; None for the design alone.
     """
 
-    family: Family | None
+    family: ToleranceModel | None
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (K,) at points (K, n) of the design."""
@@ -374,7 +374,7 @@ class FollowedRule(LoopRule, SmallestValue[Followed]):
     def __init__(
         self,
         problem: Problem,
-        family: Family | None,
+        family: ToleranceModel | None,
         number: Bounded,
         smallest_in: Callable[[LoopBoxes], Value | None],
         goal: Goal,

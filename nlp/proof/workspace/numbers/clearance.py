@@ -19,7 +19,7 @@ import numpy as np
 from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
 from ..robot.posed_robot import PosedModel
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 from .bound_search import Bounds
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
@@ -42,7 +42,7 @@ class Clearance:
     """
 
     def __init__(self, posed: PosedModel, model: Model, places: tuple[int, int], *, tolerance: float = 0.0) -> None:
-        self.family: Family | None = None
+        self.family: ToleranceModel | None = None
         self._nearer = 2 * tolerance
         R, p = model.pose.rotation, model.pose.position
         ends = ca.vertcat(*[end for k in places for end in (model.legs[k].base, p + R @ model.legs[k].platform)])

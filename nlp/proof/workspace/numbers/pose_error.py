@@ -33,7 +33,7 @@ from ...statement.machine import LEGS, Legs
 from ..ranks.krawczyk import inverses
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 from ..verdict import Outcome
 from .bound_search import Bounds, smallest_number
 from .extremes import Extreme
@@ -116,7 +116,7 @@ class WorstError:
     """
 
     def __init__(self, problem: Problem, *, is_rotation: bool) -> None:
-        self.family: Family | None = None
+        self.family: ToleranceModel | None = None
         self._part = slice(3, 6) if is_rotation else slice(0, 3)
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length] * 3])
         self.entries = ca.vertcat(ca.vec(ca.densify(problem.scaled.rows)), problem.scaled.sizes)

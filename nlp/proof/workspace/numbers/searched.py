@@ -22,7 +22,7 @@ from ...statement.machine import CentreErrors, JointErrors, Legs, has_straight_l
 from ...statement.tolerance import BuiltModel
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem, posed_model
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 from ..tolerance.leg_errors import along
 from ..verdict import Outcome
 from .bound_search import OverPoses, smallest_number
@@ -61,13 +61,13 @@ class Subject:
     model: Model
     box: PoseBox
     legs: Legs | None
-    built: tuple[BuiltModel, Family] | None = None
+    built: tuple[BuiltModel, ToleranceModel] | None = None
     unknown: str = ""
     shortest: float = 0.0
     design: Problem | None = None
 
     @property
-    def family(self) -> Family | None:
+    def family(self) -> ToleranceModel | None:
         """The machines within the tolerance; None for the design alone."""
         return None if self.built is None else self.built[1]
 

@@ -20,7 +20,7 @@ from .....models import FloatArray
 from ...enclosure.forms import Forms
 from ...statement.machine import JointErrors, Legs
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 from ..tolerance.leg_errors import change_of_rows, worst_rows
 from .bound_search import Bounds
 from .left_inverse import ROUNDING, RowsOver, at_corners, left_inverses, rows_over
@@ -53,7 +53,7 @@ class SingularValues:
         length: float,
         *,
         is_condition: bool,
-        family: Family | None = None,
+        family: ToleranceModel | None = None,
         legs: Legs | None = None,
         shortest: float = 0.0,
     ) -> None:

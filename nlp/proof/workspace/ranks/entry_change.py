@@ -16,7 +16,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ...enclosure.forms import Encloser, Forms
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,7 +59,7 @@ class EntryChange:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, family: Family, entries: SX) -> None:
+    def __init__(self, family: ToleranceModel, entries: SX) -> None:
         problem, errors, t = family.problem, family.errors, family.tolerance
         self.exact: SX = _at_zero(entries, errors)
         self._tolerance, self._count = t, int(entries.numel())

@@ -14,7 +14,7 @@ from ...boxes.engine import MOST_VARIABLES
 from ...boxes.rows import some
 from ...enclosure.forms import Encloser, Forms
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 from .entry_change import EntryChange, is_polynomial
 from .krawczyk import (
     Coordinates,
@@ -125,7 +125,7 @@ class Examiner:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, problem: Problem, test: Test, family: Family | None = None) -> None:
+    def __init__(self, problem: Problem, test: Test, family: ToleranceModel | None = None) -> None:
         self.problem, self._test, self._family = problem, test, family
         n, coordinates = int(problem.z.numel()), problem.z if family is None else family.coordinates
         errors = list(range(n, int(coordinates.numel())))

@@ -21,7 +21,7 @@ from ..home_poses import Homes
 from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 from ..verdict import Outcome, Regularity
 from .covering import APART, Followed, LoopRule, contracted_boxes, coordinates_to_split
 from .loop_boxes import Examiner, LoopBoxes
@@ -87,7 +87,9 @@ def prove_ranks(
     return Ranks(found[0], found[1] if len(found) > 1 else None)
 
 
-def _is_shown(problem: Problem, family: Family | None, homes: Homes, z: FloatArray, *, constraints: bool) -> bool:
+def _is_shown(
+    problem: Problem, family: ToleranceModel | None, homes: Homes, z: FloatArray, *, constraints: bool
+) -> bool:
     """Return whether a singular point, or one of another machine, is singular in home's assembly."""
     at = singular_at(problem, family, z)
     return homes.is_singular(at.y, at.centres, constraints=constraints)
@@ -102,7 +104,7 @@ def prove_rank(
     problem: Problem,
     matrix: RankMatrix,
     *,
-    family: Family | None = None,
+    family: ToleranceModel | None = None,
     time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
@@ -193,7 +195,7 @@ class _RankRule(LoopRule):
         self,
         problem: Problem,
         matrix: RankMatrix,
-        family: Family | None,
+        family: ToleranceModel | None,
         recorder: TreeRecord | None,
         refuter: Refuter,
     ) -> None:

@@ -20,7 +20,7 @@ from .....models import FloatArray, frozen_array
 from ...statement.machine import CentreErrors, JointErrors
 from ..robot.motion_matrix import RankMatrix
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 from .loop_boxes import Examined, LoopBoxes
 
 #: Singular value, in parts of the largest, below which a pose counts as singular.
@@ -65,7 +65,7 @@ class SingularPose:
         family: all machines, whose errors are further coordinates; None for the design alone.
     """
 
-    def __init__(self, problem: Problem, matrix: RankMatrix, family: Family | None = None) -> None:
+    def __init__(self, problem: Problem, matrix: RankMatrix, family: ToleranceModel | None = None) -> None:
         self._problem, self._matrix, self._family = problem, matrix, family
         meant = problem if family is None else family
         self._size = meant.size
@@ -178,7 +178,7 @@ class SingularMachine:
         matrix: whose rank is judged, one of the two of the family.
     """
 
-    def __init__(self, family: Family, matrix: RankMatrix) -> None:
+    def __init__(self, family: ToleranceModel, matrix: RankMatrix) -> None:
         self._family, self._newton, self._loops = family, SingularPose(family.problem, matrix, family), family.loops
 
     def search(self, z: FloatArray) -> FloatArray | None:
@@ -247,7 +247,7 @@ class NewtonRefuter:
         self,
         problem: Problem,
         matrix: RankMatrix,
-        family: Family | None = None,
+        family: ToleranceModel | None = None,
         is_shown: Callable[[FloatArray], bool] = lambda _: True,
     ) -> None:
         self._problem, self._family, self._is_shown = problem, family, is_shown
@@ -303,7 +303,7 @@ class NewtonRefuter:
         return z
 
 
-def singular_at(problem: Problem, family: Family | None, z: FloatArray) -> Singular:
+def singular_at(problem: Problem, family: ToleranceModel | None, z: FloatArray) -> Singular:
     """Return the singular pose at a point (n,), or (n + 3 m,) of another machine."""
     is_machine = family is not None and len(z) > len(problem.start)
     centres = family.errors_of(z) if family is not None and is_machine else None

@@ -34,7 +34,7 @@ _SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class ToleranceModel:
     """All machines within a tolerance.
 
     Attributes:
@@ -105,7 +105,7 @@ class Family:
         return Loops(self.coordinates, self.equations, self.every, self.signs, self.size)
 
 
-def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float) -> Family:
+def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float) -> ToleranceModel:
     """Return all machines within a tolerance on joint centres.
 
     Args:
@@ -123,7 +123,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
     unactuated = None
     if problem.unactuated is not None:
         unactuated = RankMatrix(free_matrix(limbs), problem.unactuated.nullity)
-    family = Family(
+    family = ToleranceModel(
         problem=problem,
         names=built.names,
         errors=errors,
@@ -139,7 +139,7 @@ def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float)
     return family
 
 
-def _check_freedoms(family: Family, posed: PosedModel) -> None:
+def _check_freedoms(family: ToleranceModel, posed: PosedModel) -> None:
     """Refuse machines in which equations or screws that were left out do not follow from the others.
 
     Raises:

@@ -22,7 +22,7 @@ from ...statement.machine import INSIDE
 from ..numbers.bound_search import Bounds, FollowedRule, Goal, Minimum, Value
 from ..ranks.krawczyk import ROUNDING, by_centres, inverses
 from ..ranks.loop_boxes import LoopBoxes, are_between
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
 _INSIDE = 1e-13
@@ -49,7 +49,7 @@ class _Expression:
 
 
 def smallest_of_machines(
-    family: Family,
+    family: ToleranceModel,
     expression: SX,
     *,
     gap: float,
@@ -84,7 +84,7 @@ class _MachinePoints:
         expression: (1, 1) in their coordinates.
     """
 
-    def __init__(self, family: Family, expression: SX) -> None:
+    def __init__(self, family: ToleranceModel, expression: SX) -> None:
         self._family, problem = family, family.problem
         gradient = ca.densify(ca.gradient(expression, family.coordinates))
         self._function = ca.Function("number", [family.coordinates], [ca.densify(expression), gradient])

@@ -45,7 +45,7 @@ from ..numbers.bound_search import Minimum
 from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
 from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, build_problem
-from ..robot.tolerance_model import Family, family_of
+from ..robot.tolerance_model import ToleranceModel, family_of
 from ..verdict import Outcome
 from .machine_number import smallest_of_machines
 from .second_order_change import second_order_change
@@ -81,7 +81,7 @@ class Machines:
         family: the machines over the workspace.
     """
 
-    def __init__(self, case: Case, model: Model, built: BuiltModel, family: Family) -> None:
+    def __init__(self, case: Case, model: Model, built: BuiltModel, family: ToleranceModel) -> None:
         self.case, self.model, self.built, self.family = case, model, built, family
         self._at = pose_coordinates(family.problem.box)
         self.symbols: MachineLayout = machine_layout(case, built, family.tolerance, self._at)
@@ -263,7 +263,7 @@ class _Machine:
         sign: 1 where the largest value is meant, -1 where the smallest one is.
     """
 
-    def __init__(self, family: Family, number: SX, reading: Reading, sign: float) -> None:
+    def __init__(self, family: ToleranceModel, number: SX, reading: Reading, sign: float) -> None:
         self._family, self._reading, self._sign = family, reading, sign
         slopes = ca.densify(ca.gradient(number, family.errors))
         self._function = ca.Function("number", [family.coordinates], [number, slopes])
@@ -301,7 +301,7 @@ def _by_search(machines: Machines, claim: Claim, number: SX, proving: Proving) -
     return _of_minimum(machines.family, claim, found, slack)
 
 
-def _of_minimum(family: Family, claim: Claim, found: Minimum, slack: float) -> Extreme:
+def _of_minimum(family: ToleranceModel, claim: Claim, found: Minimum, slack: float) -> Extreme:
     """Return the extreme of a claim from the smallest value of its number, or of the negative of it."""
     sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
     is_bounded = math.isfinite(found.bound)

@@ -25,7 +25,7 @@ from ...boxes.search import Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser
 from ..ranks.covering import in_workspace, whole_workspace
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.tolerance_model import Family
+from ..robot.tolerance_model import ToleranceModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +38,7 @@ _SHARE, _NEAR = 0.02, 1.2
 _OUTWARDS = 1.02
 
 
-def second_order_change(family: Family, expression: SX, first: float) -> float:
+def second_order_change(family: ToleranceModel, expression: SX, first: float) -> float:
     """Return a bound of the change of an expression beyond first order; infinite where none is found.
 
     Args:
@@ -64,7 +64,7 @@ def _groups(H: SX, count: int) -> list[list[int]]:
     return [np.flatnonzero(group == each).tolist() for each in sorted(own)]
 
 
-def _of_centres(family: Family, H: SX, centres: list[int], first: float) -> float:
+def _of_centres(family: ToleranceModel, H: SX, centres: list[int], first: float) -> float:
     """Return the bound for errors of some centres, whose second derivatives depend on no other errors."""
     problem = family.problem
     places = [3 * j + k for j in centres for k in range(3)]
@@ -91,7 +91,7 @@ class _ChangeRule(Rule[FloatArray]):
 
     block = _BLOCK
 
-    def __init__(self, family: Family, encloser: Encloser, blocks: _Blocks, errors: int) -> None:
+    def __init__(self, family: ToleranceModel, encloser: Encloser, blocks: _Blocks, errors: int) -> None:
         self._family, self._encloser, self._blocks, self._errors = family, encloser, blocks, errors
         whole = whole_workspace(family.problem)
         widths = whole.upper - whole.lower
