@@ -37,14 +37,14 @@ def test_random_mechanisms_have_the_numbers_of_the_engine(seed: int) -> None:
 @pytest.mark.slow
 def test_many_random_mechanisms_have_the_numbers_of_the_engine() -> None:
     done = 0
-    for seed in (63, 243, *range(100, 130)):  # the first two: axes of universal joints are unknowns there
+    for seed in (63, 243, *range(100, 114)):  # the first two: axes of universal joints are unknowns there
         try:
             found = compare(random_mechanism(seed))
         except RobotError:  # such as a graph whose passive joints leave the platform free
             continue
         assert_equal(found)
         done += 1
-    assert done > 20
+    assert done > 10
 
 
 @pytest.mark.parametrize(
