@@ -94,7 +94,9 @@ def untrue(before: str, after: str, reached: dict[tuple[str, str], float]) -> st
                 return line
             continue
         for (side, first), (_, second) in zip(BOUND.findall(same), BOUND.findall(line), strict=True):
-            value = reached.get((line.strip().partition(":")[0], side), float(first))
+            # Names of joints have colons of their own.
+            name = line.strip().rpartition(": at ")[0] or line.strip().partition(":")[0]
+            value = reached.get((name, side), float(first))
             sign = 1.0 if side == "most" else -1.0
             if first != second and sign * (float(second) - value) < -1e-9 * abs(value):
                 return line
