@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -34,9 +33,8 @@ def judge(case: Case, *, gap: float) -> Judgement:
     """
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     if closed.reaches:
-        reach = reach_claims(case, closed, workspace)
-        prove = partial(prove_extreme, reach.layout, gap=gap, jobs=1)
-        found = tuple(prove(claim) for claim in reach.claims)
+        layout, claims = reach_claims(case, closed, workspace)
+        found = tuple(prove_extreme(layout, claim, gap=gap, jobs=1) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
             unknown = not_judged(pose_box(workspace), _UNREACHED)
             return Judgement(case, workspace, unknown, found)

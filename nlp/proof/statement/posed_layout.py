@@ -6,14 +6,14 @@ Some unknowns of a robot follow in closed form: then its limbs must reach every 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ....models import Dimension, Model, Substitution
-from ....models.joints.closedform import ClosedForm
+from ....models.joints.closedform import ClosedForm, Reach
 from ...case.case import Case
 from ...case.limits.constraint import Reading
 from ...case.limits.limits import Limits
@@ -104,22 +104,11 @@ def varies(layout: Layout, expressions: Sequence[SX]) -> list[bool]:
     return [bool(x.numel()) and any(ca.which_depends(each, x, 1, True)) for each in expressions]
 
 
-@dataclass(frozen=True, eq=False)
-class ReachClaims:
-    """Claims that limbs reach every pose.
+def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[Layout, tuple[Claim, ...]]:
+    """Return the claims that limbs reach every pose, one for each unknown in closed form, and the case they are about.
 
-    Attributes:
-        layout: the case as symbols of the pose, without loops, signs and limits: where a limb does not reach, its loop
-            has no value.
-        claims: one for each unknown in closed form.
-    """
-
-    layout: Layout
-    claims: tuple[Claim, ...]
-
-
-def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> ReachClaims:
-    """Return the claims that limbs reach every pose.
+    The case is one of symbols of the pose, without loops, signs and limits: where a limb does not reach, its loop has
+    no value.
 
     Args:
         case: with fixed dimensions.
@@ -127,13 +116,16 @@ def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> ReachC
         workspace: the poses.
     """
     layout = _bare_layout(case, closed.model, workspace)
-    values = _on(layout, [each.value for each in closed.reaches])
-    reading = Reading(Dimension.NUMBER)
-    claims = tuple(
+    return layout, reach_claims_on(layout, closed.reaches)
+
+
+def reach_claims_on(layout: Layout, reaches: Sequence[Reach]) -> tuple[Claim, ...]:
+    """Return the claims that limbs reach every pose in the symbols of a layout of their robot."""
+    values, reading = _on(layout, [each.value for each in reaches]), Reading(Dimension.NUMBER)
+    return tuple(
         Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, REACH, 0.0)
-        for each, value in zip(closed.reaches, values, strict=True)
+        for each, value in zip(reaches, values, strict=True)
     )
-    return ReachClaims(layout, claims)
 
 
 def closed_layout(case: Case, closed: ClosedForm, workspace: Workspace) -> Layout:
@@ -172,8 +164,12 @@ def _without_identities(case: Case, model: Model, workspace: Workspace) -> Model
 
 def _bare_layout(case: Case, model: Model, workspace: Workspace) -> Layout:
     """Return a case as symbols of the pose, without conditions on it."""
-    bare = replace(model, closure=(), loops=(), distances=(), signs=())
-    return posed_layout(replace(case, model=bare, limits=Limits()), workspace)
+    return posed_layout(replace(case, model=without_loops(model), limits=Limits()), workspace)
+
+
+def without_loops(model: Model) -> Model:
+    """Return a robot without the equations and signs of its loops."""
+    return replace(model, closure=(), loops=(), distances=(), signs=())
 
 
 def _on(layout: Layout, expressions: list[SX]) -> list[SX]:

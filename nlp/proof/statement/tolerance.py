@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import Dimension, FloatArray, Model, Substitution, matrix_from_axis_angle
+from ....models import Dimension, FloatArray, Model, matrix_from_axis_angle
 from ....models.displaced import DisplacedRobot, displaced_legs
 from ....models.joints import RobotError
 from ....models.joints.closedform import Reach, closed_form
@@ -28,9 +28,9 @@ from ...case.pose import HERE, Free, Pose, Rotation, Value
 from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
-from .claims import REACH, Claim, claims_of, one_machine_name
+from .claims import Claim, claims_of, one_machine_name
 from .machine import leg_joints
-from .posed_layout import at_one_pose
+from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
 #: Part of a derivative below which its size is smoothed, and place of the pose in its ranges at which it is taken.
 _PART, _PLACE = 0.03, 0.75
@@ -183,17 +183,8 @@ class MachineLayout(NamedTuple):
         Raises:
             InputError: the robot has no measure of a name.
         """
-        robot, own = self.layout.robots[0], Substitution.identity(self.built.model)
-        places, symbols = self.layout.places.unknowns, self.layout.table.variables_vector
-        unknowns = ca.vertcat(SX(0, 1), *[symbols[k] for each in places for k in each])
-        given = Substitution(robot.parameters, unknowns, robot.rotation, robot.position)
-        values = ca.Function("reach", own.all, [each.value for each in self.built.reaches]).call(given.all)
-        reading = Reading(Dimension.NUMBER)
-        reaches = [
-            Claim(f"reach limb {each.limb}", Sense.MIN, value, reading, REACH, 0.0)
-            for each, value in zip(self.built.reaches, values, strict=True)
-        ]
-        return reaches, claims_of(self.layout, quantities, with_objective=with_objective)
+        reaches = reach_claims_on(self.layout, self.built.reaches)
+        return list(reaches), claims_of(self.layout, quantities, with_objective=with_objective)
 
 
 def machine_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoordinates) -> MachineLayout:
@@ -237,8 +228,7 @@ def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
         model: its robot, all of whose unknowns are in closed form.
         at: the poses.
     """
-    free = replace(model, closure=(), loops=(), distances=(), signs=())
-    return coordinate_layout(replace(case, model=free), at)
+    return coordinate_layout(replace(case, model=without_loops(model)), at)
 
 
 def is_smooth(number: SX) -> bool:

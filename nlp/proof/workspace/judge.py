@@ -233,17 +233,15 @@ class _Numbers:
     ) -> Generator[Extreme, None, Refine]:
         """Add the extremes of the design, yield each, and return the function that proves its lengths more finely."""
         case, box = self.case, pose_box(self.workspace)
-        layout = posed_layout(case, self.workspace)
-        claims, is_reached = claims_of(layout, names, with_objective=with_objective), True
+        is_reached = True
         if self.closed.reaches:
-            reach = reach_claims(case, self.closed, self.workspace)
-            place, reaches = reach.layout, [replace(each, uncovered=self.unknown) for each in reach.claims]
-            yield from self._add_proved(found, place, reaches)
+            place, reaches = reach_claims(case, self.closed, self.workspace)
+            yield from self._add_proved(found, place, [replace(each, uncovered=self.unknown) for each in reaches])
             is_reached = not any(each.fails for each in found)
-            if is_reached:
-                # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
-                layout = closed_layout(case, self.closed, self.workspace)
-                claims = claims_of(layout, names, with_objective=with_objective)
+        # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
+        is_closed = self.closed.reaches and is_reached
+        layout = closed_layout(case, self.closed, self.workspace) if is_closed else posed_layout(case, self.workspace)
+        claims = claims_of(layout, names, with_objective=with_objective)
         prove = self._prove(layout)
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         decided: list[Extreme] = []

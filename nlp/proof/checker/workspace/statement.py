@@ -119,9 +119,9 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
     more = _of_constraints(closed.model)
     numbers_at, layout = "every assembly" if case.model.unknowns else "", None
     if closed.reaches:
-        reach = reach_claims(case, closed, workspace)
-        more += [_of_number(each, reach.layout) for each in reach.claims]
-        if all(each.name in reached for each in reach.claims):
+        place, claims = reach_claims(case, closed, workspace)
+        more += [_of_number(each, place) for each in claims]
+        if all(each.name in reached for each in claims):
             layout = closed_layout(case, closed, workspace)
             partly = "every assembly in which limbs in closed form are as at home"
             numbers_at = partly if closed.model.unknowns else "the assembly of home"

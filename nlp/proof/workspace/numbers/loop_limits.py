@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Substitution
+from .....models import FloatArray
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
@@ -28,6 +28,7 @@ from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ...enclosure.forms import Encloser, Forms
 from ...enclosure.tape import compile_tape
 from ...statement.claims import claims_of
+from ...statement.posed_layout import reach_claims_on
 from ...statement.tolerance import coordinate_layout
 from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
 from ..ranks.krawczyk import ROUNDING, Coordinates, Relation, relation_of, with_relation
@@ -89,10 +90,7 @@ class LimitValues:
         # The variables of the layout are those of the problem, in its order.
         given = [problem.z, SX(ca.DM(layout.table.values))]
         own = [layout.table.variables_vector, layout.table.arguments_vector]
-        robot, symbols = layout.robots[0], Substitution.identity(closed.model).all
-        unknowns = layout.table.variables_vector[len(problem.free) :]
-        at = [robot.parameters, unknowns, robot.rotation, robot.position]
-        reach = ca.Function("reach", symbols, [each.value for each in closed.reaches]).call(at)
+        reach = [claim.expression for claim in reach_claims_on(layout, closed.reaches)]
         claims = [claim for claim in claims_of(layout, with_objective=False) if claim.limit is not None]
         values = ca.Function("values", own, [*reach, *(claim.expression for claim in claims)]).call(given)
         self._reaches, uncovered = len(reach), dict[str, None]()
