@@ -12,6 +12,7 @@ import contextlib
 import io
 import json
 import sys
+import tempfile
 import time
 import traceback
 from collections import Counter
@@ -34,6 +35,19 @@ def command(*words: str) -> tuple[int, str, str]:
     finally:
         sys.argv = before
     return code, out.getvalue(), err.getvalue()
+
+
+def judged(text: str, *words: str) -> tuple[Any, Row]:
+    """Return the result of ``workspace`` for a case, or None and the row of a seed without one."""
+    with tempfile.TemporaryDirectory() as folder:
+        case, out = Path(folder) / "case.toml", Path(folder) / "result.json"
+        case.write_text(text, encoding="utf-8")
+        code, _, err = command("workspace", str(case), *words, "--json", str(out))
+        if out.exists():
+            return json.loads(out.read_text(encoding="utf-8")), {}
+    if code == 2:
+        return None, {"counts": {f"refused: {err.strip()[-60:]}": 1}, "faults": []}
+    return None, {"counts": {"failed": 1}, "faults": [err]}
 
 
 def campaign(examine: Callable[[int], Row]) -> None:

@@ -8,16 +8,13 @@ singular values.
 
 from __future__ import annotations
 
-import json
 import re
-import tempfile
 import tomllib
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from campaign import Row, campaign, command
+from campaign import Row, campaign, judged
 from legs import Array, Box, Poses, pose_of, turned, twist_of
 from randomcases import random_rotation, random_tasks, text_of
 from robots import FOLDER, Robot, close, numbers
@@ -306,17 +303,10 @@ def examine(seed: int) -> Row:
     """Judge a random workspace of a robot, and attack what is claimed."""
     rng = np.random.default_rng(seed)
     tables = limited(rng, random_gallery(rng, NAMES[seed % len(NAMES)]))
-    with tempfile.TemporaryDirectory() as folder:
-        case, out = Path(folder) / "case.toml", Path(folder) / "result.json"
-        case.write_text(text_of(tables), encoding="utf-8")
-        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([6, 12])), "--jobs", "1"]
-        code, _, err = command("workspace", str(case), *words, "--json", str(out))
-        if not out.exists():
-            return {
-                "counts": {f"refused: {err.strip()[-60:]}" if code == 2 else "failed": 1},
-                "faults": [] if code == 2 else [err],
-            }
-        result = json.loads(out.read_text(encoding="utf-8"))
+    words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([6, 12])), "--jobs", "1"]
+    result, row = judged(text_of(tables), *words)
+    if result is None:
+        return row
     counts, faults = judge_gallery(tables, result, rng)
     return {"counts": counts, "faults": faults}
 

@@ -7,15 +7,12 @@ Six legs of two robots, and ``three-upu``; the robots of the gallery are in ``ga
 
 from __future__ import annotations
 
-import json
 import re
-import tempfile
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from campaign import Row, campaign, command
+from campaign import Row, campaign, judged
 from legs import Array, Box, Legs, pose_of, turned
 from randomcases import limited_legs, random_legs, text_of
 
@@ -268,23 +265,16 @@ def examine(seed: int) -> Row:
     rng = np.random.default_rng(seed)
     tables = limited_legs(rng, random_legs(rng))
     leg_error = 0.0
-    with tempfile.TemporaryDirectory() as folder:
-        case, out = Path(folder) / "case.toml", Path(folder) / "result.json"
-        case.write_text(text_of(tables), encoding="utf-8")
-        words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([8, 15])), "--jobs", "1"]
-        if tables["robot"]["model"] != "three-upu" and rng.random() < 0.25:
-            leg_error = float(np.abs(Legs(tables).platform).max() * rng.choice([1e-4, 1e-3]))
-            words += ["--leg-error", repr(leg_error)]
-        for name in ("base_joint_angle", "platform_joint_angle", "condition_number", "smallest_singular_value"):
-            if rng.random() < 0.15:
-                words += ["--of-quantity", name]
-        code, _, err = command("workspace", str(case), *words, "--json", str(out))
-        if not out.exists():
-            return {
-                "counts": {f"refused: {err.strip()[-60:]}" if code == 2 else "failed": 1},
-                "faults": [] if code == 2 else [err],
-            }
-        result = json.loads(out.read_text(encoding="utf-8"))
+    words = ["--gap", str(rng.choice([0.3, 0.1, 0.02])), "--time", str(rng.choice([8, 15])), "--jobs", "1"]
+    if tables["robot"]["model"] != "three-upu" and rng.random() < 0.25:
+        leg_error = float(np.abs(Legs(tables).platform).max() * rng.choice([1e-4, 1e-3]))
+        words += ["--leg-error", repr(leg_error)]
+    for name in ("base_joint_angle", "platform_joint_angle", "condition_number", "smallest_singular_value"):
+        if rng.random() < 0.15:
+            words += ["--of-quantity", name]
+    result, row = judged(text_of(tables), *words)
+    if result is None:
+        return row
     counts, faults = judge_legs(tables, result, rng, leg_error)
     return {"counts": counts, "faults": faults}
 
