@@ -97,7 +97,7 @@ def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -
     """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
     rng, y, nothing = np.random.default_rng(1), SX.sym("y"), SX(0, 1)
     lists: tuple[tuple[()], ...] = ((),) * 5
-    robot = PosedRobot(y, 0, (0,), np.zeros(6), np.ones(1), 1.0, SX(3, 1), SX(1), *lists, nothing, nothing, nothing)
+    robot = PosedRobot(y, 0, [0], np.zeros(1), np.ones(1), 1.0, SX(3, 1), SX(1), *lists, nothing, nothing, nothing)
     assembly, at = Assembly(robot, nothing, np.zeros(1)), np.zeros((1, 6))
 
     def shown(block: np.ndarray) -> int:

@@ -27,7 +27,7 @@ from .....models import FloatArray
 from .....models.rows import independent_rows
 from ..polynomials import middles
 from ..proof_file import ProofError
-from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
+from .forms import PRODUCT, UP, FormArithmetic, Forms, contraction, inverses, off_identity
 from .motion_matrix import PosedRobot
 
 #: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
@@ -66,68 +66,56 @@ class LoopPoints:
         g, J = (each.full() for each in self._function(z.T))
         return g.T, np.asarray(J.reshape(self._count, *z.shape).transpose(1, 0, 2) * self._size)
 
-    def closed(self, z: FloatArray, moving: Sequence[int]) -> FloatArray:
-        """Return closed points (B, n) near points, in which as many coordinates move as equations; NaN without one."""
+    def _newton(
+        self, z: FloatArray, moving: Sequence[int], steps: int, zero: float | None, rest: FloatArray | float = 0.0
+    ) -> None:
+        """Move points (B, n) by steps of Newton's method in some coordinates, until left sides are at a rest."""
+        for _ in range(steps):
+            g, J = self.at(z)
+            g = g - rest
+            if not np.nanmax(np.abs(g), initial=0.0) > 1e-3 * _CLOSED:
+                break
+            z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving], zero) @ g[:, :, None])[:, :, 0]
+
+    @np.errstate(all="ignore")
+    def closed(self, z: FloatArray, moving: Sequence[int], zero: float | None = None) -> FloatArray:
+        """Return closed points (B, n) near points, in which some coordinates move; NaN without one.
+
+        Args:
+            z: the points.
+            moving: the coordinates.
+            zero: of slopes, for :func:`.forms.inverses`; None for as many coordinates as equations, all independent.
+        """
         z = z.copy()
-        with np.errstate(all="ignore"):
-            for _ in range(_STEPS):
-                g, J = self.at(z)
-                if not np.nanmax(np.abs(g), initial=0.0) > 1e-3 * _CLOSED:
-                    break
-                z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving]) @ g[:, :, None])[:, :, 0]
-            residual = np.abs(self.at(z)[0]).max(axis=1, initial=0.0)
-        z[~(residual <= _CLOSED)] = np.nan
+        self._newton(z, moving, _STEPS, zero)
+        z[~(np.abs(self.at(z)[0]).max(axis=1, initial=0.0) <= _CLOSED)] = np.nan
         return z
 
+    @np.errstate(all="ignore")
     def moved(self, z: FloatArray, to: FloatArray, free: Sequence[int], moving: Sequence[int]) -> FloatArray:
         """Return the closed points (B, n) on the way from closed points to other independent coordinates (B, f)."""
         z = z.copy()
-        if not moving:
-            z[:, free] = to
-            return z
         way = to - z[:, free]
-        with np.errstate(all="ignore"):
-            for k in range(_WAY):
-                J = self.at(z)[1]
-                step = (way / _WAY) if k < _WAY - 1 else to - z[:, free]
-                turned = inverses(J[:, :, moving]) @ J[:, :, free] @ (step / self._size[free])[:, :, None]
-                z[:, moving] -= self._size[moving] * turned[:, :, 0]
-                z[:, free] += step
-                z = self.closed(z, moving)
+        for k in range(_WAY if moving else 0):
+            J = self.at(z)[1]
+            step = (way / _WAY) if k < _WAY - 1 else to - z[:, free]
+            turned = inverses(J[:, :, moving]) @ J[:, :, free] @ (step / self._size[free])[:, :, None]
+            z[:, moving] -= self._size[moving] * turned[:, :, 0]
+            z[:, free] += step
+            z = self.closed(z, moving)
         z[:, free] = to
         return z
 
-    def _step(self, z: FloatArray, moving: Sequence[int], rest: FloatArray | float = 0.0) -> float:
-        """Return the largest residual beyond a rest at a point (n,), which moves by a step of Newton's towards it.
-
-        NaN, and no step, where the equations have no value.
-        """
-        g, J = (each[0] for each in self.at(z[None]))
-        g = g - rest
-        if not (np.isfinite(g).all() and np.isfinite(J).all()):
-            return np.nan
-        z[moving] -= self._size[moving] * np.linalg.lstsq(J[:, moving], g, rcond=_ZERO)[0]
-        return float(np.abs(g).max(initial=0.0))
-
-    def near(self, z: FloatArray, moving: Sequence[int]) -> FloatArray | None:
-        """Return a closed point (n,) near a point in which some coordinates move; None where none is found."""
-        z = z.copy()
-        for _ in range(_STEPS):
-            before = z.copy()
-            if self._step(z, moving) <= _CLOSED:
-                return before
-        return None
-
-    def from_home(self, z: FloatArray, moving: Sequence[int]) -> FloatArray | None:
-        """Return closed loops on a way along which the residuals at a point fall to 0; None where it ends before."""
-        first, z = self.at(z[None])[0][0], z.copy()
-        if float(np.abs(first).max(initial=0.0)) <= _CLOSED:
+    @np.errstate(all="ignore")
+    def from_home(self, z: FloatArray, moving: Sequence[int]) -> FloatArray:
+        """Return closed loops (1, n) on a way along which the residuals at a point fall to 0; NaN where it ends."""
+        first, z = self.at(z)[0], z.copy()
+        if np.abs(first).max(initial=0.0) <= _CLOSED:
             # Slopes of equations that hold by themselves are rounding, along which there is no step.
             return z
-        for step in range(2, 2 * _FROM_HOME + 2):
-            if np.isnan(self._step(z, moving, first * (1 - (step // 2) / _FROM_HOME))):
-                return None
-        return self.near(z, moving)
+        for k in range(1, _FROM_HOME + 1):
+            self._newton(z, moving, 2, _ZERO, first * (1 - k / _FROM_HOME))
+        return self.closed(z, moving, _ZERO)
 
 
 def start_of(robot: PosedRobot) -> FloatArray:
@@ -139,9 +127,9 @@ def start_of(robot: PosedRobot) -> FloatArray:
     points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(robot.centre)
     # Numbers of the pose move only where the unknowns alone do not close the loops.
     for moving in [list(range(count, n))] * (n > count) + [list(range(n))]:
-        found = points.from_home(robot.centre, moving)
-        if found is not None and is_home(robot, found):
-            return found
+        (found,) = points.from_home(robot.centre[None], moving)
+        if is_home(robot, found):
+            return np.asarray(found)
     raise ProofError("no closed loops are found in the middle of the workspace, in the assembly of home")
 
 
@@ -156,16 +144,12 @@ def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
     if not robot.equations.numel():
         return []
     points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(start)
-    rng = np.random.default_rng(_SEED)
-    slopes = [points.at(start[None])[1][0]]
-    for _ in range(_POINTS):
-        z = start.copy()
-        z[:count] += _SPREAD * robot.size[:count] * rng.uniform(-1, 1, count)
-        found = points.near(z, list(range(count, n))) if n > count else None
-        found = points.near(z, list(range(n))) if found is None else found
-        if found is not None:
-            slopes.append(points.at(found[None])[1][0])
-    return sorted(independent_rows(slopes)) if any(np.abs(each).max() > _ZERO for each in slopes) else []
+    z = np.repeat(start[None], _POINTS, axis=0)
+    z[:, :count] += _SPREAD * robot.size[:count] * np.random.default_rng(_SEED).uniform(-1, 1, (_POINTS, count))
+    near = points.closed(z, list(range(count, n)), _ZERO) if n > count else np.full_like(z, np.nan)
+    near = np.where(np.isfinite(near), near, points.closed(z, list(range(n)), _ZERO))
+    slopes = points.at(np.concatenate([start[None], near[np.isfinite(near).all(axis=1)]]))[1]
+    return sorted(independent_rows(list(slopes))) if (np.abs(slopes) > _ZERO).any() else []
 
 
 def dependent_coordinates(points: LoopPoints, robot: PosedRobot, start: FloatArray, count: int) -> list[int]:
@@ -209,9 +193,9 @@ class Enclosed:
     shares: FloatArray
     is_known: NDArray[np.bool_]
 
-    def known(self) -> Enclosed:
-        """Return those over the boxes of which they are known."""
-        return Enclosed(*(each[self.is_known] for each in vars(self).values()))
+    def only(self, which: NDArray[np.bool_]) -> Enclosed:
+        """Return those over some boxes."""
+        return Enclosed(*(each[which] for each in vars(self).values()))
 
 
 class Assembly:
@@ -247,6 +231,16 @@ class Assembly:
         z = np.broadcast_to(self.start, (len(lower), len(self.start)))
         return self.moved(z, middles(lower, upper)[0])
 
+    def followed(self, forms: Forms, closed: Enclosed) -> Forms:
+        """Return forms of all coordinates as forms of the independent ones, along closed points."""
+        dependent, slopes = forms.a[:, :, self.dependent], forms.a[:, :, self.independent]
+        size, most = np.abs(dependent), np.abs(closed.off) + np.abs(closed.T).sum(axis=2)
+        terms = np.abs(forms.c) + np.abs(slopes).sum(axis=2) + (size @ most[:, :, None])[:, :, 0]
+        rest = (forms.r + (size @ closed.rho[:, :, None])[:, :, 0] + PRODUCT * terms) * UP
+        middle = forms.c + (dependent @ closed.off[:, :, None])[:, :, 0]
+        return Forms(middle, slopes - dependent @ closed.T, rest)
+
+    @np.errstate(all="ignore")
     def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray) -> Enclosed:
         """Return the closed points over boxes of independent coordinates (B, f), from those (B, n) at their centres."""
         free, D, size = self.independent, self.dependent, self._size
@@ -257,17 +251,16 @@ class Assembly:
         found = Enclosed(low, high, *relation, near, np.zeros((B, f)), np.full(B, not k))
         if not k:
             return found
-        with np.errstate(all="ignore"):
-            J = self.points.at(near)[1]
-            moved = np.abs(inverses(J[:, :, D]) @ J[:, :, free]) * (0.5 * (upper - lower) / size[free])[:, None]
-            found.shares[:] = moved.sum(axis=1)
-            width = size[D] * np.maximum(_WIDER * moved.sum(axis=2), _LEAST)
-            for _ in range(_ATTEMPTS):
-                rows = np.flatnonzero(~found.is_known & (width <= _MOST * size[D]).all(axis=1))
-                if rows.size:
-                    z = near[rows][:, D]
-                    low[rows[:, None], D], high[rows[:, None], D] = z - width[rows], z + width[rows]
-                    width[rows] = self._show(found, rows)
+        J = self.points.at(near)[1]
+        moved = np.abs(inverses(J[:, :, D]) @ J[:, :, free]) * (0.5 * (upper - lower) / size[free])[:, None]
+        found.shares[:] = moved.sum(axis=1)
+        width = size[D] * np.maximum(_WIDER * moved.sum(axis=2), _LEAST)
+        for _ in range(_ATTEMPTS):
+            rows = np.flatnonzero(~found.is_known & (width <= _MOST * size[D]).all(axis=1))
+            if rows.size:
+                z = near[rows][:, D]
+                low[rows[:, None], D], high[rows[:, None], D] = z - width[rows], z + width[rows]
+                width[rows] = self._show(found, rows)
         missing = np.flatnonzero(~found.is_known)[:, None]
         low[missing, D] = high[missing, D] = np.nan
         return found
@@ -292,7 +285,7 @@ class Assembly:
         J = 0.5 * (least + most)
         spread = 0.5 * (most - least) + PRODUCT * (np.abs(least) + np.abs(most))
         defect = (off_identity(Y, J) + size @ spread) * UP
-        single, _ = contraction(np.where(np.isfinite(defect), defect, np.inf))
+        single, _ = contraction(defect)
         # Ends may be nearer to the centre on one side, by rounding.
         room = np.nextafter(np.minimum(high[:, D] - centre, centre - low[:, D]), 0.0)
         good = np.asarray((reach * radius * UP < room).all(axis=1) & single & np.isfinite(reach).all(axis=1))
@@ -322,26 +315,19 @@ class Assembly:
         start = np.broadcast_to(self.start, boxes.near.shape)
         at = start[:, self.independent]
         is_reached = ((lower <= at) & (at <= upper)).all(axis=1) & self.holds(boxes, np.arange(len(lower)), start)
-        border = np.flatnonzero(is_reached).tolist()
-        while border:
-            pairs = [
-                (one, other)
-                for one in border
-                for other in np.flatnonzero(
-                    ~is_reached & (lower <= upper[one]).all(axis=1) & (upper >= lower[one]).all(axis=1)
-                ).tolist()
-            ]
-            border = []
+        border = np.flatnonzero(is_reached)
+        while border.size:
+            touches = ((lower[border, None] <= upper) & (upper[border, None] >= lower)).all(axis=2) & ~is_reached
+            pairs, before = np.argwhere(touches), is_reached.copy()
             for begin in range(0, len(pairs), _BLOCK):
-                block = [pair for pair in pairs[begin : begin + _BLOCK] if not is_reached[pair[1]]]
-                if block:
-                    first, second = np.array(block).T
-                    common = middles(np.maximum(lower[first], lower[second]), np.minimum(upper[first], upper[second]))
-                    near = self.moved(boxes.near[first], common[0])
-                    tied = self.holds(boxes, first, near) & self.holds(boxes, second, near)
-                    new = np.unique(second[tied])
-                    is_reached[new] = True
-                    border += new.tolist()
+                block = pairs[begin : begin + _BLOCK]
+                first, second = block[~is_reached[block[:, 1]]].T
+                first = border[first]
+                common = middles(np.maximum(lower[first], lower[second]), np.minimum(upper[first], upper[second]))
+                near = self.moved(boxes.near[first], common[0])
+                tied = self.holds(boxes, first, near) & self.holds(boxes, second, near)
+                is_reached[second[tied]] = True
+            border = np.flatnonzero(is_reached & ~before)
         if not is_reached.all():
             ends = zip(lower[~is_reached][0], upper[~is_reached][0], strict=True)
             box = ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in ends)

@@ -22,7 +22,7 @@ by that number, so that they are polynomials.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 
@@ -36,6 +36,7 @@ from .....models.rows import independent_rows
 from ....case.case import Case
 from ....case.pose import Free
 from ....case.workspace import TurnKind
+from ...statement.machine import has_straight_legs
 from ..proof_file import ProofError
 from .pose_boxes import PoseRoot
 
@@ -50,8 +51,8 @@ class PosedRobot:
     Attributes:
         z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns, then errors.
         errors: number of components of errors of joint centres, which are the last coordinates.
-        free: indices of these coordinates among the six.
-        middle: (6,) the middle of the workspace: the values of the others.
+        free: indices of the varying coordinates among the six.
+        centre: (n,) the middle of the workspace, with unknowns and errors of 0.
         size: (n,) by which coordinates are comparable: half ranges, and sizes of the unknowns.
         length: by which rotations are multiplied, length: any positive number.
         position: (3, 1) the platform's origin, length.
@@ -68,8 +69,8 @@ class PosedRobot:
 
     z: SX
     errors: int
-    free: tuple[int, ...]
-    middle: FloatArray
+    free: list[int]
+    centre: FloatArray
     size: FloatArray
     length: float
     position: SX
@@ -83,76 +84,79 @@ class PosedRobot:
     loops: SX
     signs: SX
 
-    @property
-    def centre(self) -> FloatArray:
-        """(n,) the middle of the workspace, with unknowns of 0 as at home."""
-        return np.concatenate([self.middle[list(self.free)], np.zeros(self.z.numel() - len(self.free))])
-
     def at(self, expression: SX, z: FloatArray) -> FloatArray:
         """Return the values of a matrix of expressions at a point (n,)."""
         return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
 
 
-def posed_robot(case: Case, model: Model, root: PoseRoot, errors: int = 0) -> PosedRobot:
+def posed_robot(case: Case, model: Model, root: PoseRoot) -> PosedRobot:
     """Return a robot over a workspace.
 
     Args:
         case: with fixed dimensions.
-        model: its robot, some of whose unknowns may have been replaced by expressions.
+        model: its robot, some of whose unknowns may have been replaced by expressions; further parameters than the
+            case's are components of errors of joint centres, and come last.
         root: the box of coordinates.
-        errors: number of components of errors of joint centres, the last parameters of the robot.
     """
-    middle = 0.5 * root.lower + 0.5 * root.upper
-    free = tuple(np.flatnonzero(root.upper > root.lower).tolist())
+    middle, symbols = 0.5 * root.lower + 0.5 * root.upper, Substitution.identity(model).all
+    free = np.flatnonzero(root.upper > root.lower).tolist()
     y = [SX.sym(f"y{k}") if k in free else SX(float(middle[k])) for k in range(6)]
-    unknowns = [SX.sym(item.name) for item in model.unknowns]
-    position, inverse = ca.vertcat(*y[:3]), SX.sym("inverse")
-    turned, scale = turned_rotation(root, y[3:])
+    unknowns, position = ca.vertcat(SX(0, 1), *[SX.sym(item.name) for item in model.unknowns]), ca.vertcat(*y[:3])
     values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    off = SX.sym("errors", errors)
-    numbers = Substitution(
-        ca.vertcat(SX(0, 1), *values, off), ca.vertcat(SX(0, 1), *unknowns), turned / scale, position
-    )
-    symbols = Substitution.identity(model).all
-    about = [row.moment - ca.cross(model.pose.position, row.force) for row in model.wrenches]
-    vectors = [ca.vertcat(row.force, moment) for row, moment in zip(model.wrenches, about, strict=True)]
-    vectors += [model.pose.rotation @ leg.platform for leg in model.legs]
-    divided = ca.Function("rows", symbols, vectors).call(replace(numbers, rotation=inverse * turned).all)
-    without = [_without_division(ca.densify(each), inverse, scale) for each in divided]
-    rows, arms = without[: len(model.wrenches)], without[len(model.wrenches) :]
-    outputs = [
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *[leg.base for leg in model.legs],
-        *[each.loops[:, each.passive] for each in model.nested],
-        *[each.scaled for each in (*model.closure, *model.loops)],
-        *[each.value for each in model.signs],
-        *[each.size for each in model.unknowns],
-    ]
-    following = iter(ca.Function("robot", symbols, outputs).call(numbers.all))
-    ranges = (0.5 * (root.upper - root.lower))[list(free)]
-    robot = PosedRobot(
-        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns, off),
-        errors=errors,
+    errors = SX.sym("errors", symbols[0].numel() - len(values))
+    (turned, scale), inverse = turned_rotation(root, y[3:]), SX.sym("inverse")
+
+    def put(expressions: Iterable[SX], rotation: SX = turned / scale) -> list[SX]:
+        """Return expressions of the model with those of the coordinates in the place of its symbols."""
+        numbers = [ca.vertcat(SX(0, 1), *values, errors), unknowns, rotation, position]
+        return list(ca.Function("robot", symbols, list(expressions)).call(numbers))
+
+    def scaled(vectors: Iterable[SX]) -> list[SX]:
+        """Return vectors, those that are linear in the rotation as multiples without the inverse of the scale."""
+        found = put(map(ca.densify, vectors), inverse * turned)
+        for k, vector in enumerate(found):
+            slope = ca.jacobian(vector, inverse)
+            if ca.depends_on(slope, inverse) or not ca.depends_on(vector, inverse):
+                found[k] = ca.substitute(vector, inverse, 1 / scale)
+            else:
+                found[k] = scale * ca.substitute(vector, inverse, 0) + slope
+        return found
+
+    def stacked(expressions: Iterable[SX]) -> SX:
+        """Return numbers of the robot as a column."""
+        return ca.vertcat(SX(0, 1), *put(expressions))
+
+    arms = scaled(model.pose.rotation @ leg.platform for leg in model.legs)
+    legs = tuple(zip(put(leg.base for leg in model.legs), arms, strict=True))
+    if has_straight_legs(model):
+        # The line of a leg passes its platform joint: u x (s (p - b) + u) / s is its moment about the origin.
+        spans = [(position - foot, arm) for foot, arm in legs]
+        rows = [ca.vertcat(scale * d + u, ca.cross(u, d)) for d, u in spans]
+    else:
+        about = [row.moment - ca.cross(model.pose.position, row.force) for row in model.wrenches]
+        rows = scaled(ca.vertcat(row.force, moment) for row, moment in zip(model.wrenches, about, strict=True))
+    parts = iter(put(part for each in model.members for part in (each.centre, each.screws)))
+    moving = iter(put(part for each in model.actuators for part in (each.screws, each.relations)))
+    sizes = np.array(ca.evalf(stacked(each.size for each in model.unknowns))).ravel()
+    ends = np.full(errors.numel(), case.joint_centre_tolerance or 0.0)
+    return PosedRobot(
+        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], unknowns, errors),
+        errors=errors.numel(),
         free=free,
-        middle=middle,
-        size=ranges,
+        centre=np.concatenate([middle[free], np.zeros(len(sizes) + len(ends))]),
+        size=np.concatenate([(0.5 * (root.upper - root.lower))[free], sizes, ends]),
         length=case.characteristic_length,
         position=position,
         scale=scale,
         rows=tuple(replace(old, force=row[:3], moment=row[3:]) for old, row in zip(model.wrenches, rows, strict=True)),
-        members=tuple(
-            replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
-        ),
-        actuators=tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators),
-        legs=tuple((next(following), arm) for arm in arms),
-        nested=tuple(next(following) for _ in model.nested),
-        equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
-        loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
-        signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
+        members=tuple(replace(each, centre=next(parts), screws=next(parts), slide=None) for each in model.members),
+        actuators=tuple(replace(each, screws=next(moving), relations=next(moving)) for each in model.actuators),
+        legs=legs,
+        nested=tuple(put(each.loops[:, each.passive] for each in model.nested)),
+        equations=stacked(each.scaled for each in model.closure),
+        loops=stacked(each.scaled for each in model.loops),
+        signs=stacked(each.value for each in model.signs),
     )
-    sizes = [float(next(following)) for _ in model.unknowns]
-    return replace(robot, size=np.concatenate([ranges, sizes, np.full(errors, case.joint_centre_tolerance or 0.0)]))
 
 
 def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
@@ -167,14 +171,6 @@ def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
         single = [of_quaternion(t * SX.eye(3)[:, k]) for k, t in enumerate(turn)]
         return reduce(lambda done, each: (each[0] @ done[0], each[1] * done[1]), single)
     return of_quaternion(ca.vertcat(*turn) if root.kind is TurnKind.ANY_AXIS else turn[0] * SX(root.axis.tolist()))
-
-
-def _without_division(row: SX, inverse: SX, scale: SX) -> SX:
-    """Return a row, or for one that is linear in the rotation its multiple without the inverse of the scale."""
-    slope = ca.jacobian(row, inverse)
-    if ca.depends_on(slope, inverse) or not ca.depends_on(row, inverse):
-        return ca.substitute(row, inverse, 1 / scale)
-    return scale * ca.substitute(row, inverse, 0) + slope
 
 
 def motion_matrix(model: Model, robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> tuple[SX, int]:
@@ -260,8 +256,8 @@ def _matrix(robot: PosedRobot, members: Sequence[Member], actuators: Sequence[Ac
         return [SX(seen.shape[0], 1) if screw is None else -seen @ _motion(robot, screw) for screw in screws]
 
     for row in robot.rows:
-        work = _work(robot, row)
-        blocks.append(ca.horzcat(work, SX(1, passive), *driven(row.label.member, work)))
+        seen = _work(robot, row)
+        blocks.append(ca.horzcat(seen, SX(1, passive), *driven(row.label.member, seen)))
     for each in members:
         # The velocity of a pinned member's centre is v + omega x arm.
         arm = (each.centre - robot.position) / robot.length

@@ -18,9 +18,6 @@ A component of a vector product with f is at most t times the size of the two ot
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from fractions import Fraction
 from functools import cached_property
 
 import casadi as ca
@@ -29,19 +26,16 @@ from casadi import SX
 
 from .....models import FloatArray, Model
 from ....case.case import Case
-from ....case.pose import Free, Value
+from ....case.pose import Free
 from ....case.task import Sense
-from ....case.workspace import TurnKind, Workspace
 from ....errors import UncoveredError
 from ....program.layout import Layout
 from ...statement.claims import Claim
-from ...statement.machine import LEGS, Legs
 from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, is_smooth, machine_layout
-from ..fractions import determinant_sign
 from ..proof_file import ProofError
 from .forms import UP, FormArithmetic
 from .motion_matrix import turned_rotation
-from .pose_boxes import COORDINATES, Attempt, PoseRoot
+from .pose_boxes import Attempt, PoseRoot
 
 #: Indices after a component, and before it, of a vector.
 _AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
@@ -53,37 +47,30 @@ class Machines:
     Args:
         case: with fixed dimensions and a tolerance.
         model: its robot, without unknowns in closed form.
-        workspace: the poses.
         root: the box of coordinates.
 
     Attributes:
-        model: as given.
+        model, root: as given.
         symbols: the machines as symbols of one pose.
 
     Raises:
         RobotError: the robot cannot be put together with errors of its joint centres.
     """
 
-    def __init__(self, case: Case, model: Model, workspace: Workspace, root: PoseRoot) -> None:
-        turns, angles = workspace.turns, [*workspace.turns.angles, 0.0, 0.0][:3]
-        if turns.kind is TurnKind.ANY_AXIS:
-            angles = [Free(-1.0, 1.0) if root.upper[3] > 0 else 0.0] * 3
-        values: list[Value] = [*workspace.position, *angles]
-        self._free = [k for k, each in enumerate(values) if isinstance(each, Free) and each.lower < each.upper]
-        for k, each in enumerate(values):
-            if k in self._free:
-                values[k] = Free(float(root.lower[k]), float(root.upper[k]))
-            elif isinstance(each, Free):
-                values[k] = each.lower
-
+    def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
         def rotation(turn: SX) -> SX:
             """Return the rotation (3, 3) with coordinates (3, 1)."""
             turned, scale = turned_rotation(root, ca.vertsplit(turn))
             return turned / scale
 
-        self._at = PoseCoordinates(values, rotation, root.ball)
-        self._case, self.model, self.tolerance = case, model, case.joint_centre_tolerance or 0.0
-        self.symbols: MachineLayout = machine_layout(case, built_model(case.model), self.tolerance, self._at)
+        self._case, self._at, self.model, self.root = (
+            case,
+            PoseCoordinates(root.values, rotation, root.ball),
+            model,
+            root,
+        )
+        tolerance = case.joint_centre_tolerance or 0.0
+        self.symbols: MachineLayout = machine_layout(case, built_model(case.model), tolerance, self._at)
 
     @cached_property
     def design(self) -> Layout:
@@ -108,7 +95,7 @@ class Machines:
         squares = [ca.sumsqr(slopes[k : k + 3]) for k in range(0, errors.numel(), 3)]
         small = self.symbols.near_zero(claim.expression, self.design).tolist()
         first = sum((ca.sqrt(each + size**2) for each, size in zip(squares, small, strict=True)), SX(0))
-        whole = claim.expression + sign * (self.tolerance * first + rest)
+        whole = claim.expression + sign * (self.symbols.tolerance * first + rest)
         return self.symbols.of(whole, SX.zeros(errors.numel()), pose)
 
     def varies(self, claim: Claim) -> bool:
@@ -117,86 +104,43 @@ class Machines:
             ca.which_depends(claim.expression, self.symbols.errors, 1, True)
         )
 
-    def second_order(self, claim: Claim, bound: float) -> SecondOrderClaim:
-        """Return the claim that the terms of second order of a number are at most a bound.
-
-        Raises:
-            UncoveredError: an expression holds an operation without a rule.
-        """
-        return SecondOrderClaim(self.symbols, claim.expression, self._free, bound)
-
 
 class SecondOrderClaim:
     """The claim that the terms of second order of a number of machines are at most a bound.
 
     Args:
-        symbols: the machines.
-        expression: (1, 1) the number.
-        free: places of the symbols of the pose among the six coordinates.
+        machines: the machines.
+        expression: (1, 1) the number, in their symbols.
         bound: of these terms.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, symbols: MachineLayout, expression: SX, free: Sequence[int], bound: float) -> None:
-        self._free, self._bound, self._tolerance = list(free), bound, symbols.tolerance
-        pose, errors = SX.sym("pose", len(free)), SX.sym("errors", symbols.errors.numel())
+    def __init__(self, machines: Machines, expression: SX, bound: float) -> None:
+        symbols = machines.symbols
+        self.free = [k for k, each in enumerate(machines.root.values) if isinstance(each, Free)]
+        self._bound, self._tolerance = bound, symbols.tolerance
+        pose, errors = SX.sym("pose", len(self.free)), SX.sym("errors", symbols.errors.numel())
         number = symbols.of(expression, errors, pose)
         if not is_smooth(number):
             raise UncoveredError("a number whose derivatives jump")
         second = ca.hessian(number, errors)[0]
         rows, columns = (np.array(each, dtype=int) for each in second.sparsity().get_triplet())
         # Errors that second derivatives do not depend on are no variables of theirs.
-        entries = ca.vertcat(SX(0, 1), *[second.nz[k] for k in range(second.nnz())])
+        entries = ca.vertcat(SX(0, 1), second.nz[:])
         own = [k for k in range(errors.numel()) if ca.depends_on(entries, errors[k])]
         _, self._block = np.unique(rows // 3 * errors.numel() + columns // 3, return_inverse=True)
-        self._errors = len(own)
-        z = ca.vertcat(pose, errors[own])
-        self._entries = FormArithmetic(z, entries)
+        self._errors, self._entries = len(own), FormArithmetic(ca.vertcat(pose, errors[own]), entries)
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
         errors = np.full((len(lower), self._errors), self._tolerance)
-        values = self._entries(
-            np.concatenate([lower[:, self._free], -errors], axis=1),
-            np.concatenate([upper[:, self._free], errors], axis=1),
-        )
+        values = self._entries(np.hstack([lower[:, self.free], -errors]), np.hstack([upper[:, self.free], errors]))
         squares = np.zeros((self._block.max(initial=-1) + 1, len(lower)))
         np.add.at(squares, self._block, np.abs(values.ends()).max(axis=0) ** 2)
         whole = 0.5 * self._tolerance**2 * np.sqrt(squares).sum(axis=0) * UP
-        return Attempt(np.asarray(whole <= self._bound), np.zeros(lower.shape))
-
-
-def refuse_unless_singular(root: PoseRoot, legs: Legs, sides: Sequence[Sequence[float]]) -> None:
-    """Refuse a machine of six straight legs unless one between it and the design is singular at a pose.
-
-    Args:
-        root: the box of coordinates.
-        legs: joint centres of the design, with the tolerance.
-        sides: a pose (6,), and the joint centres of the machine (12, 3), base before platform.
-
-    Raises:
-        ProofError: the pose or the machine is none of those meant, or the determinant has the same sign for both.
-    """
-    numbers: list[FloatArray] = [np.array(side, dtype=float) for side in sides]
-    shapes = [(COORDINATES,), *[(3,)] * (2 * LEGS)]
-    if [each.shape for each in numbers] != shapes or not all(np.isfinite(each).all() for each in numbers):
-        raise ProofError("the claim has no pose and machine")
-    if not root.holds(numbers[0]):
-        raise ProofError("the pose is not one of the workspace")
-    exact = [*legs.base.tolist(), *legs.platform.tolist()]
-    moved = [each.tolist() for each in numbers[1:]]
-    for one, other in zip(exact, moved, strict=True):
-        square = sum((Fraction(a) - Fraction(b)) ** 2 for a, b in zip(one, other, strict=True))
-        if square > Fraction(legs.tolerance) ** 2:
-            raise ProofError("a joint centre of the machine is off by more than the tolerance")
-    y = numbers[0].tolist()
-    signs = [
-        determinant_sign(root.kind, root.axis.tolist(), joints[:LEGS], joints[LEGS:], y) for joints in (exact, moved)
-    ]
-    if signs[0] * signs[1] > 0:
-        raise ProofError("the determinant has the same sign for both machines")
+        return Attempt(np.asarray(whole <= self._bound), np.zeros((len(lower), len(self.free))))
 
 
 def change_of_rows(
@@ -216,24 +160,3 @@ def change_of_rows(
     # |f x e| is at most t^2, and so is each of its components.
     moments = (s * (across + tolerance) + along) * UP / length
     return np.concatenate([np.broadcast_to(2 * s, moments.shape), moments], axis=2) * tolerance * UP
-
-
-def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: float) -> float:
-    """Return a bound of the Frobenius norm of the change of J, by which every singular value changes at most.
-
-    The unit force of a leg changes by at most ``h = 2 t / l``, and its moment by ``|a| h + t``.
-
-    Args:
-        joints: joint centres of the design.
-        tolerance: t.
-        length: by which moments are divided.
-        shortest: l: no leg of any machine is shorter.
-
-    Returns:
-        Infinite where the errors may take up a whole leg.
-    """
-    if not shortest > 0:
-        return math.inf
-    turned = 2 * tolerance / shortest * UP
-    moments = (np.linalg.norm(joints.platform, axis=1) * UP * turned + tolerance) / length * UP
-    return float(np.sqrt((turned * turned + moments * moments).sum()) * UP)
