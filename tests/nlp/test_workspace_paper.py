@@ -28,7 +28,8 @@ from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unpr
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace import check
 from screwsynth.nlp.proof.checker.workspace.forms import contraction
-from screwsynth.nlp.proof.checker.workspace.leg_claims import (
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
+from screwsynth.nlp.proof.checker.workspace.number_claims import (
     ClearanceClaim,
     ErrorClaim,
     LegInverse,
@@ -36,7 +37,6 @@ from screwsynth.nlp.proof.checker.workspace.leg_claims import (
     are_positive,
     whole_errors,
 )
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot, posed_robot
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot, pose_root, show_on_leaves
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
@@ -233,7 +233,7 @@ def rank(root: PoseRoot, robot: Legs) -> RankClaim:
 
 
 def posed(root: PoseRoot, robot: Legs) -> PosedRobot:
-    return posed_robot(six_legs(robot), HEXAPOD, root)
+    return PosedRobot(six_legs(robot), HEXAPOD, root)
 
 
 def test_a_refuted_workspace_carries_two_poses() -> None:
@@ -446,7 +446,7 @@ def test_inverses_hold_those_at_samples(robot: Legs) -> None:
     root = pose_root(turned(TurnKind.ANY_AXIS, 20))
     lower, upper = random_boxes(root, 60, 0.1, rng)
     legs = posed(root, robot)
-    (P, T, rest), known, _, _ = LegInverse(legs, legs.length)(lower, upper)
+    (P, T, rest), known, _, _ = LegInverse(legs, legs.length).inverse(lower, upper)
     length = legs.length
     assert known.mean() > 0.5
     tight = 0

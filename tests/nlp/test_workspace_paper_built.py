@@ -24,11 +24,11 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.workspace import check
-from screwsynth.nlp.proof.checker.workspace.leg_claims import SingularClaim, change_of_jacobian
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import posed_robot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
+from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClaim, SingularClaim, change_of_jacobian
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
-from screwsynth.nlp.proof.checker.workspace.tolerance import Machines, SecondOrderClaim
+from screwsynth.nlp.proof.checker.workspace.statement import Machines
 from screwsynth.nlp.proof.statement.machine import Legs, joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
@@ -419,7 +419,7 @@ def test_no_claim_is_shown_where_a_machine_violates_it() -> None:
     root, t, shown, kept, singular = pose_root(Machine.WORKSPACE), 0.1, 0, 0, 0
     for seed in range(30):
         some = Machine(seed, t, 800)
-        at, robot = (some.y[None], some.y[None]), posed_robot(case_with(some.exact), HEXAPOD, root)
+        at, robot = (some.y[None], some.y[None]), PosedRobot(case_with(some.exact), HEXAPOD, root)
         values = np.linalg.svd(some.J / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
         least, condition = values[:, -1], values[:, 0] / values[:, -1]
         change = change_of_jacobian(some.exact, t, LENGTH, 0.999 * float(some.length[0].min()) - 2 * t)

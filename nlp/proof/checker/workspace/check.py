@@ -26,17 +26,18 @@ from ...statement.machine import Legs, check_leg_error, workspace_of_case
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
 from ..check import check_proof
-from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
+from ..proof_file import Proof, ProofClaim, ProofError, Statement, WorkspaceProof
 from ..tree import Node
-from .leg_claims import ClearanceClaim, ErrorClaim, SingularClaim, change_of_jacobian, whole_errors
-from .motion_matrix import PosedRobot, posed_robot
+from .motion_matrix import PosedRobot
+from .number_claims import ClearanceClaim, ErrorClaim, SecondOrderClaim, SingularClaim, change_of_jacobian, whole_errors
 from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
 from .ranks import rank_claim
-from .statement import ERRORS, ExpectedClaim, expected_claims, hold_premises, leg_error_of, robot_claims
-from .tolerance import Machines, SecondOrderClaim
+from .statement import ERRORS, ExpectedClaim, Machines, expected_claims, hold_premises, leg_error_of, robot_claims
 
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
+#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
+_ON_LIMIT = 1e-9
 #: The tree of one leaf.
 _WHOLE = bytes([Node.BOUNDED])
 
@@ -69,14 +70,12 @@ class VerifiedWorkspace:
 
     Attributes:
         claims: what it proves.
-        unproved: claims of the case that it does not prove, with the reasons that the file gives.
         numbers_at: assemblies that the claims about numbers cover; empty for a robot without loops.
         leaves: number of claims about boxes in it.
         pieces: number of boxes that were evaluated to show them.
     """
 
     claims: tuple[CheckedClaim, ...]
-    unproved: tuple[Unproved, ...]
     numbers_at: str
     leaves: int
     pieces: int
@@ -113,27 +112,20 @@ def check_workspace_proof(proof: WorkspaceProof, case: Case, *, leg_error: float
             claims.append(checker.check(expected[key], given[key]))
         except ProofError as error:
             raise ProofError(f"{' '.join(key).strip()}: {error}") from None
-    return VerifiedWorkspace(tuple(claims), proof.unproved, checker.robot.numbers_at, checker.leaves, checker.pieces)
+    return VerifiedWorkspace(tuple(claims), checker.robot.numbers_at, checker.leaves, checker.pieces)
 
 
 class _Checker:
-    """A check of claims one after the other; later ones use the bounds of earlier ones.
-
-    Args:
-        proof: the proof.
-        case: the case.
-        leg_error: largest error of a leg's length, length.
-
-    Raises:
-        ProofError: the proof is for another workspace, other joint centres or other errors.
-    """
+    """A check of claims one after the other; later ones use the bounds of earlier ones."""
 
     def __init__(self, proof: WorkspaceProof, case: Case, leg_error: float) -> None:
         workspace = workspace_of_case(case)
         self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         hold_premises(case, workspace, robot.legs, leg_error, proof)
         self._case, self._root, self._tolerance = case, pose_root(workspace), case.joint_centre_tolerance or 0.0
-        self._firsts = {each.name: each.bound for each in proof.claims if each.name in ERRORS}
+        self._firsts = {
+            each.name: each.bound for each in proof.claims if each.name in ERRORS and each.bound is not None
+        }
         self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
         self._eps = leg_error_of(case, leg_error)
         self._bounds: dict[tuple[str, str], float] = {}
@@ -144,11 +136,7 @@ class _Checker:
             raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
 
     def check(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check one claim.
-
-        Raises:
-            ProofError: it could not be shown.
-        """
+        """Check one claim."""
         rules: dict[tuple[str, str], Callable[[ExpectedClaim, ProofClaim], float]] = {
             ("number", "program"): self._number,
             ("lengths", "lengths"): self._lengths,
@@ -164,11 +152,14 @@ class _Checker:
         if (each.kind, given.reason) not in rules:
             raise ProofError(f"'{given.reason}' is no reason of this claim")
         _stated(given)
-        bound, read = rules[each.kind, given.reason](each, given), each.reading.from_value
-        each.keep_limit(bound)
+        bound, limit, read = rules[each.kind, given.reason](each, given), each.limit, each.reading.from_value
+        if limit is not None:
+            beyond = bound - limit if each.sense == Sense.MAX.value else limit - bound
+            if not beyond <= _ON_LIMIT * max(abs(limit), abs(bound)):
+                raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {limit:.10g}")
         self._bounds[each.key] = bound
-        limit = None if each.limit is None else read(each.limit)
-        return CheckedClaim(each.name, each.sense, each.reading.dimension, read(bound), limit)
+        kept = None if limit is None else read(limit)
+        return CheckedClaim(each.name, each.sense, each.reading.dimension, read(bound), kept)
 
     def _show(self, claim: BoxClaim, tree: bytes) -> None:
         """Show a claim on every leaf of a tree."""
@@ -182,10 +173,11 @@ class _Checker:
         by_machine = is_refuted and any(len(side) > COORDINATES for side in given.sides)
         if by_machine and machines is None:
             raise ProofError("the claim is about the exact machine")
-        # A tree for six straight legs has smaller boxes with another bound of their errors.
-        has_errors = by_machine or not (is_refuted or self.robot.legs)
-        built = machines.symbols.built if machines is not None and has_errors else None
-        claim = rank_claim(self._case, self.robot.model, self._root, each.name, self._tolerance, built)
+        tolerance = self._tolerance if by_machine or not is_refuted else 0.0
+        # The errors of six straight legs have a bound in their rows that shows larger boxes.
+        has_errors = by_machine or self.robot.legs is None
+        built = machines.symbols.built if machines is not None and tolerance and has_errors else None
+        claim = rank_claim(self._case, self.robot.model, self._root, each.name, tolerance, built)
         if is_refuted:
             claim.show_sign_change(self._root, given.sides)
         else:
@@ -228,21 +220,13 @@ class _Checker:
         return bound
 
     def _lemma(self, name: str, sense: Sense) -> ProofClaim:
-        """Return a lemma.
-
-        Raises:
-            ProofError: the proof has none.
-        """
+        """Return a lemma, or refuse a proof without it."""
         if (name, sense.value) not in self._lemmas:
             raise ProofError(f"{name}: has no proof")
         return self._lemmas[name, sense.value]
 
     def _length(self, leg: str, sense: Sense) -> float:
-        """Return the proven shortest or longest length of a leg, of all machines that are meant.
-
-        Raises:
-            ProofError: there is no proof of it.
-        """
+        """Return the proven shortest or longest length of a leg, of all machines that are meant."""
         key = f"leg_length limb {leg}", sense.value
         if key not in self._bounds:
             raise ProofError(f"the lengths of limb {leg} have no proof")
@@ -250,11 +234,7 @@ class _Checker:
         return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
 
     def _of_legs(self) -> tuple[Legs, float]:
-        """Return the joint centres of six straight legs, and a length than which none of any machine is shorter.
-
-        Raises:
-            ProofError: the robot has others, or there is no proof of a length.
-        """
+        """Return the joint centres of six straight legs, and a length than which none of any machine is shorter."""
         if self.robot.legs is None:
             raise ProofError("the case's robot is not six straight legs")
         return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
@@ -300,11 +280,11 @@ class _Checker:
 
     def _error(self, each: ExpectedClaim, given: ProofClaim) -> float:
         """Return the bound of an error of the pose: its part of first order by a tree, the whole from both parts."""
-        position, rotation = (self._firsts.get(name) for name in ERRORS)
-        if position is None or rotation is None:
+        if len(self._firsts) < len(ERRORS):
             raise ProofError("one of the two errors has no proof")
+        position, rotation = (self._firsts[name] for name in ERRORS)
         is_rotation = each.reading is not LENGTH
-        self._show(ErrorClaim(self._posed, (position, rotation)[is_rotation], is_rotation=is_rotation), given.tree)
+        self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.tree)
         legs, shortest = self._of_legs()
         # That of the design.
         shortest = (shortest + 2 * self._tolerance) * (1 - _ROUNDING)
@@ -317,15 +297,11 @@ class _Checker:
     @cached_property
     def _posed(self) -> PosedRobot:
         """The robot as expressions of the pose."""
-        return posed_robot(self._case, self.robot.model, self._root)
+        return PosedRobot(self._case, self.robot.model, self._root)
 
 
 def _stated(given: ProofClaim) -> float:
-    """Return the bound of a claim.
-
-    Raises:
-        ProofError: it has none.
-    """
+    """Return the bound of a claim, or refuse one without."""
     if given.bound is None or not math.isfinite(given.bound):
         raise ProofError("the claim has no bound")
     return given.bound

@@ -24,14 +24,33 @@ PRODUCT = 512 * UNIT
 _STEPS, _FLAT = 12, 1e-14
 
 
-class Forms(NamedTuple):
-    """R expressions over B boxes: in ``c + sum_i a_i e_i + [-r, r]``, with NaN where an expression may be undefined.
+class AffineMatrix(NamedTuple):
+    """Matrices over B boxes: in ``M + sum_k A_k e_k + [-E, E]``, with (B, m, c), (B, n, m, c) and (B, m, c)."""
 
-    Attributes:
-        c: (B, R).
-        a: (B, R, n).
-        r: (B, R).
-    """
+    M: FloatArray
+    A: FloatArray
+    E: FloatArray
+
+    @property
+    def rest(self) -> FloatArray:
+        """The rest (B, m, c), with the rounding of a product with M and A."""
+        return np.asarray(self.E + PRODUCT * (np.abs(self.M) + np.abs(self.A).sum(axis=1)))
+
+    def contracted(
+        self, C: FloatArray, moved: FloatArray | None = None
+    ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+        """Return where C (B, c, m) times the matrices has an inverse, bounds of ``|I - C M|``, and shares (B, n) of CA.
+
+        ``moved`` (B, k, c, c) are bounds of parts of ``C A`` in another grouping; None for the size of each.
+        """
+        moved = np.abs(C[:, None] @ self.A) if moved is None else moved
+        bound = (off_identity(C, self.M) + np.abs(C) @ self.rest + moved.sum(axis=1)) * UP
+        holds, v = contraction(bound)
+        return holds, bound, np.asarray((moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3)))
+
+
+class Forms(NamedTuple):
+    """Expressions over B boxes: in ``c + sum_i a_i e_i + [-r, r]``, (B, R), (B, R, n) and (B, R), NaN if undefined."""
 
     c: FloatArray
     a: FloatArray
@@ -47,12 +66,7 @@ class Forms(NamedTuple):
 
 
 class Values(NamedTuple):
-    """Polynomials of R expressions over boxes.
-
-    Attributes:
-        polynomials: R of them.
-        shape: (B, n) of the ends of the boxes.
-    """
+    """Polynomials of R expressions over boxes with ends of a shape (B, n)."""
 
     polynomials: list[Polynomial]
     shape: tuple[int, int]
@@ -92,54 +106,25 @@ class FormArithmetic:
         return Values(self._arithmetic(lower.T, upper.T), lower.shape)
 
 
-class AffineMatrix(NamedTuple):
-    """Matrices over B boxes: in ``M + sum_k A_k e_k + [-E, E]``, with (B, m, c), (B, n, m, c) and (B, m, c)."""
-
-    M: FloatArray
-    A: FloatArray
-    E: FloatArray
-
-    @property
-    def rest(self) -> FloatArray:
-        """The rest (B, m, c), with the rounding of a product with M and A."""
-        return np.asarray(self.E + PRODUCT * (np.abs(self.M) + np.abs(self.A).sum(axis=1)))
-
-    def contracted(
-        self, C: FloatArray, moved: FloatArray | None = None
-    ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-        """Return where (B,) C times the matrices has an inverse, with ``|I - C M|`` and shares (B, n) of ``C A``.
-
-        Args:
-            C: (B, c, m) approximate left inverses.
-            moved: (B, k, c, c) bounds of the parts of ``C A`` in some other grouping; None for the sizes of all.
-        """
-        moved = np.abs(C[:, None] @ self.A) if moved is None else moved
-        bound = (off_identity(C, self.M) + np.abs(C) @ self.rest + moved.sum(axis=1)) * UP
-        holds, v = contraction(bound)
-        return holds, bound, np.asarray((moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3)))
-
-
+@np.errstate(all="ignore")
 def contraction(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
     """Return which nonnegative matrices (B, k, k) have a spectral radius below 1, and v with ``B v < v`` there."""
     B = np.where(np.isfinite(B), B, np.inf)
     v, holds = np.ones(B.shape[:2]), np.zeros(len(B), dtype=bool)
-    with np.errstate(all="ignore"):
-        for _ in range(_STEPS):
-            w = np.einsum("bij,bj->bi", B, v) * UP
-            holds |= (w < v).all(axis=1)
-            if (holds | (w >= v).all(axis=1)).all():
-                break
-            following = w / w.sum(axis=1, keepdims=True) + 1e-12
-            v = np.where(holds[:, None], v, following)
+    for _ in range(_STEPS):
+        w = np.einsum("bij,bj->bi", B, v) * UP
+        holds |= (w < v).all(axis=1)
+        if (holds | (w >= v).all(axis=1)).all():
+            break
+        following = w / w.sum(axis=1, keepdims=True) + 1e-12
+        v = np.where(holds[:, None], v, following)
     return holds, v
 
 
 def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
     """Return approximate left inverses (B, c, m) of matrices (B, m, c); NaN where there is none.
 
-    Args:
-        matrices: the matrices.
-        zero: part of the largest singular value below which others are zero; None for that of rounding.
+    Singular values below a part ``zero`` of the largest count as 0; None for rounding alone.
     """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     found = np.full_like(np.swapaxes(matrices, 1, 2), np.nan)

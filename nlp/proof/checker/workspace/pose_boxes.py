@@ -64,7 +64,7 @@ class PoseRoot:
         least = np.maximum(np.maximum(lower[:, 3:], -upper[:, 3:]), 0.0)
         squares = least * least
         whole = squares.sum(axis=1, keepdims=True)
-        # Sums and differences of three squares round by less than 6 parts in 2^53 of the largest number in them.
+        # Sums and differences of three squares round by less than 8 parts in 2^53 of the numbers in them.
         room = np.maximum(self.ball - (whole - squares) + 2.0**-50 * (self.ball + whole), 0.0)
         most = np.sqrt(room) * (1 + 2.0**-50)
         low, high = np.maximum(lower[:, 3:], -most), np.minimum(upper[:, 3:], most)
@@ -75,19 +75,19 @@ class PoseRoot:
 def pose_root(workspace: Workspace) -> PoseRoot:
     """Return the box of coordinates of a workspace."""
     turns = workspace.turns
-    spans = [ends_of(each) for each in workspace.position]
+    spans = [_ends(each) for each in workspace.position]
     outer = [(Fraction(low), Fraction(high)) for low, high in spans]
     inner = list(outer)
     ball, inner_ball = math.inf, None
     if turns.kind is TurnKind.ANY_AXIS:
-        largest = max(map(abs, ends_of(turns.angles[0])))
+        largest = max(map(abs, _ends(turns.angles[0])))
         least, most = tangent_ends(largest)
         spans += [(-largest, largest)] * 3
         outer += [(-most, most)] * 3
         inner += [(-most, most)] * 3
         ball, inner_ball = _up(most * most), least * least
     else:
-        for low, high in map(ends_of, turns.angles):
+        for low, high in map(_ends, turns.angles):
             (below, start), (end, above) = tangent_ends(low), tangent_ends(high)
             wide = below - _AXIS * abs(below), above + _AXIS * abs(above)
             spans.append((low, high))
@@ -105,7 +105,7 @@ def pose_root(workspace: Workspace) -> PoseRoot:
     return PoseRoot(turns.kind, axis, tuple(values), lower, upper, tuple(inner + flat), ball, inner_ball)
 
 
-def ends_of(value: Value) -> tuple[float, float]:
+def _ends(value: Value) -> tuple[float, float]:
     """Return the ends of a number: the same twice for a fixed one."""
     return (value.lower, value.upper) if isinstance(value, Free) else (float(value), float(value))
 
@@ -113,7 +113,7 @@ def ends_of(value: Value) -> tuple[float, float]:
 def _down(value: Fraction) -> float:
     """Return a double that is not above a fraction."""
     number = float(value)
-    return number if Fraction(number) <= value else math.nextafter(number, -math.inf)
+    return number if number <= value else math.nextafter(number, -math.inf)
 
 
 def _up(value: Fraction) -> float:
@@ -136,11 +136,7 @@ class Attempt(NamedTuple):
 
 
 class BoxClaim(Protocol):
-    """A claim about boxes of poses.
-
-    Attributes:
-        free: indices among the six coordinates of those that the claim's number varies with.
-    """
+    """A claim about boxes of poses; ``free`` are indices among the six coordinates of those that vary in it."""
 
     free: list[int]
 
@@ -149,12 +145,7 @@ class BoxClaim(Protocol):
 
 
 def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, int]:
-    """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined.
-
-    Raises:
-        ProofError: the bytes are no tree of the workspace, a leaf is not outside of it as it is claimed to be, or the
-            claim could not be shown.
-    """
+    """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined."""
     reader, leaves = TreeReader(tree), list[tuple[int, FloatArray, FloatArray]]()
     reader.walk(root.lower, root.upper, lambda kind, _, *box: leaves.append((kind, *box)), frozenset({Node.CUT}))
     reader.finish()
@@ -162,7 +153,7 @@ def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, i
         if kind not in (Node.BOUNDED, Node.OUTSIDE):
             raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
         if kind == Node.OUTSIDE and root.contracted(low[None], high[None])[2][0]:
-            raise ProofError(f"the box {_words(low, high)} is not outside of the workspace")
+            raise ProofError(f"the box {box_words(low, high)} is not outside of the workspace")
     boxes = [box for kind, *box in leaves if kind == Node.BOUNDED]
     rule = _PoseRule(claim, root, *np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0))
     return len(leaves), show(rule, rule.lower, rule.upper)
@@ -193,9 +184,9 @@ class _PoseRule:
 
     def sentence(self, claim: int) -> str:
         """Return the sentence that a claim could not be shown."""
-        return f"the claim could not be shown for the box {_words(self.lower[:, claim], self.upper[:, claim])}"
+        return f"the claim could not be shown for the box {box_words(self.lower[:, claim], self.upper[:, claim])}"
 
 
-def _words(lower: FloatArray, upper: FloatArray) -> str:
+def box_words(lower: FloatArray, upper: FloatArray) -> str:
     """Return a box in words."""
     return ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in zip(lower, upper, strict=True))

@@ -7,6 +7,11 @@ dependent coordinates, and C near a pseudo-inverse of M_0, every ``C M`` has an 
 
 M has full column rank then. A matrix with d freedoms gets d further rows first, a basis of the null space of M_0: full
 column rank then says that there are no more freedoms anywhere in the box.
+
+Of six straight legs, with e and f the errors of both joints of a leg in the world frame, the row
+``(s (p - b) + u, u x (p - b))`` changes by ``(s (f - e), s f x (p - b) - u x e - s f x e)``. A component of a vector
+product with f is at most the tolerance times the size of the two other components of the other vector. The errors of
+other robots are coordinates of the forms, which are never cut.
 """
 
 from __future__ import annotations
@@ -28,10 +33,9 @@ from ...statement.tolerance import BuiltModel
 from ..fractions import sign_of_determinant
 from ..proof_file import ProofError
 from .closed_loops import Assembly, Enclosed, needed_equations, start_of
-from .forms import AffineMatrix, FormArithmetic, inverses
-from .motion_matrix import PosedRobot, motion_matrix, posed_robot
+from .forms import UP, AffineMatrix, FormArithmetic, inverses
+from .motion_matrix import PosedRobot, motion_matrix
 from .pose_boxes import COORDINATES, Attempt, PoseRoot
-from .tolerance import change_of_rows
 
 #: Errors at which equations and screws that were left out are tested, in parts of the robot's length, part of the
 #: workspace about its middle in which the poses lie, number of tests, and largest residual of a closed loop.
@@ -40,6 +44,8 @@ _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
 _ZERO = 1e-9
 #: Largest number of parts of the way between two poses.
 _PARTS = 4096
+#: Indices after a component, and before it, of a vector.
+_AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 def rank_claim(
@@ -62,15 +68,15 @@ def rank_claim(
         ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
             free, an expression has an operation without a rule, or errors take freedoms from the robot.
     """
-    robot = posed_robot(case, model, root)
+    robot = PosedRobot(case, model, root)
     start = start_of(robot)
     needed = needed_equations(robot, start)
     if built is not None:
-        model, robot = built.model, posed_robot(case, built.model, root)
+        robot = PosedRobot(case, built.model, root)
         start = np.concatenate([start, np.zeros(robot.errors)])
     try:
         assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
-        matrix, freedoms = motion_matrix(model, robot, start, is_locked=name != CONSTRAINTS)
+        matrix, freedoms = motion_matrix(robot, start, is_locked=name != CONSTRAINTS)
         if built is not None:
             _refuse_other_freedoms(robot, assembly)
         return RankClaim(robot, matrix, freedoms, assembly, tolerance)
@@ -79,11 +85,7 @@ def rank_claim(
 
 
 def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
-    """Refuse machines in which equations or screws that were left out do not follow from the others.
-
-    Raises:
-        ProofError: they do not follow at random errors.
-    """
+    """Refuse machines in which, at random errors, equations or screws that were left out do not follow from others."""
     rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
     poses = [j for j in assembly.independent if j < n]
     for _ in range(_TESTS):
@@ -102,14 +104,9 @@ def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
 
 
 class RankClaim:
-    """The claim that a matrix of motions has no more freedoms than it is claimed to have.
+    """The claim that a sparse matrix of motions (m, c) has no more freedoms than it is claimed to have.
 
-    Args:
-        robot: the robot.
-        matrix: (m, c) sparse, m not below c less the freedoms.
-        freedoms: dimensions of its null space that are claimed to be all.
-        assembly: its closed loops.
-        tolerance: largest error of each joint centre, of six straight legs or in the robot's coordinates.
+    Errors of joint centres within a tolerance are those of six straight legs, or coordinates of the robot.
 
     Raises:
         UncoveredError: an entry holds an operation without a rule.
@@ -143,11 +140,7 @@ class RankClaim:
         return Attempt(holds, shares)
 
     def finish(self) -> None:
-        """Refuse boxes with closed loops that do not belong together, after all were shown.
-
-        Raises:
-            ProofError: they are not shown to be those of one assembly.
-        """
+        """Refuse boxes with closed loops that are not shown to be those of one assembly, after all were shown."""
         if self._shown:
             every = zip(*(vars(each).values() for each in self._shown), strict=True)
             self._assembly.refuse_apart(Enclosed(*map(np.concatenate, every)))
@@ -162,17 +155,10 @@ class RankClaim:
         return self._matrices(self._closed(y, y)).M
 
     def show_sign_change(self, root: PoseRoot, sides: Sequence[Sequence[float]]) -> None:
-        """Show that the determinant has opposite signs at two points, and that there is a way between them.
+        """Show that the determinant has opposite signs at two points (6 + e,): a pose, and errors of joint centres.
 
         The entries have values along the whole way between them, and poses and errors are convex in their coordinates:
         the determinant changes continuously, and is 0 at a point.
-
-        Args:
-            root: the box of coordinates.
-            sides: two points (6 + e,): coordinates of a pose, and errors of a machine's joint centres.
-
-        Raises:
-            ProofError: the points are none of those meant, or it could not be shown.
         """
         if not self.is_square:
             raise ProofError("a singular pose has a proof for robots with six rows, without loops, alone")
@@ -203,8 +189,7 @@ class RankClaim:
     def _signs_at(self, y: FloatArray) -> list[int]:
         """Return the signs of the determinant at points (K, 6 + e); 0 where a sign is not shown.
 
-        With ``|I - C M|`` of a spectral radius below 1 the determinant of ``C M`` is positive: that of M has the sign
-        of that of C, which is computed in fractions.
+        Where ``C M`` is near I its determinant is positive: that of M has the sign of that of C, in fractions.
         """
         matrices = self._matrices(self._closed(y, y))
         C = inverses(matrices.M)
@@ -217,8 +202,7 @@ class RankClaim:
             errors = np.full((len(lower), self._errors), self._tolerance)
             lower, upper = np.hstack([lower, -errors]), np.hstack([upper, errors])
         own = [*self.free, *range(COORDINATES, COORDINATES + self._errors)]
-        low, high = lower[:, own], upper[:, own]
-        return self._assembly.enclosed(low, high, self._assembly.near(low, high))
+        return self._assembly.enclosed(lower[:, own], upper[:, own])
 
     @np.errstate(all="ignore")
     def _matrices(self, closed: Enclosed) -> AffineMatrix:
@@ -250,3 +234,22 @@ class RankClaim:
         centres = np.sqrt((moved[:, p:].reshape(len(M), -1, 3, *moved.shape[2:]) ** 2).sum(axis=2))
         holds, _, shares = AffineMatrix(M, A, E).contracted(C, np.concatenate([moved[:, :p], centres], axis=1))
         return holds, shares[:, :p]
+
+
+def change_of_rows(
+    scale: FloatArray, span: FloatArray, arm: FloatArray, tolerance: float, length: float = 1.0
+) -> FloatArray:
+    """Return bounds (B, 6, 6) of the change of the rows of six legs, entry by entry, by errors within a tolerance.
+
+    Args:
+        scale: (B,) largest s.
+        span: (B, 6, 3) largest sizes of ``p - b``.
+        arm: (B, 6, 3) largest sizes of ``u``.
+        tolerance: of each joint centre.
+        length: by which moments are divided.
+    """
+    s = scale[:, None, None]
+    across, along = (np.hypot(each[..., _AFTER], each[..., _BEFORE]) for each in (span, arm))
+    # The size of f x e is at most the tolerance squared, and so is each of its components.
+    moments = (s * (across + tolerance) + along) * UP / length
+    return np.concatenate([np.broadcast_to(2 * s, moments.shape), moments], axis=2) * tolerance * UP

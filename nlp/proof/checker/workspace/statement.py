@@ -5,8 +5,11 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
+import casadi as ca
 import numpy as np
+from casadi import SX
 
 from .....models import Dimension, Model, WrenchKind
 from .....models.joints import RobotError
@@ -22,15 +25,14 @@ from ....program.layout import Layout
 from ...statement.claims import CONSTRAINTS, REGULAR, SPECTRAL, Claim, asked_name, asked_spectra, claims_of
 from ...statement.machine import Legs, legs_of
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
+from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
 from ..premises import exact
 from ..proof_file import ProofError, WorkspaceProof, workspace_numbers
-from .pose_boxes import pose_root
-from .tolerance import Machines
+from .motion_matrix import turned_rotation
+from .pose_boxes import PoseRoot, pose_root
 
 #: Errors of the pose, of its position and of its rotation, and how they read.
 ERRORS = {"position error": LENGTH, "rotation error": Reading(Dimension.ANGLE)}
-#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
-_ON_LIMIT = 1e-9
 #: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
 _SAME = 1e-9
 
@@ -68,18 +70,60 @@ class ExpectedClaim:
         """Name and sense, which tell claims apart."""
         return self.name, self.sense
 
-    def keep_limit(self, bound: float) -> None:
-        """Refuse a bound beyond the limit of the case.
 
-        Raises:
-            ProofError: it is beyond.
-        """
-        if self.limit is None:
-            return
-        sign = 1.0 if self.sense == Sense.MAX.value else -1.0
-        slack = _ON_LIMIT * max(abs(self.limit), abs(bound))
-        if not sign * (bound - self.limit) <= slack:
-            raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {self.limit:.10g}")
+class Machines:
+    """Every machine within a tolerance on joint centres, as the check states it.
+
+    With the derivatives g_j of a number g by the error of centre j, and the blocks H_jk of its second derivatives, the
+    number of a machine within the tolerance t differs from that of the design by at most
+
+        t sum_j |g_j| + t^2 / 2 sum_jk |H_jk|
+
+    at each pose. The first sum is an expression of the pose. The second is shown to be at most the bound that the proof
+    gives, over all poses and errors (:class:`~.number_claims.SecondOrderClaim`).
+
+    Attributes:
+        model: the robot of a case with fixed dimensions, without unknowns in closed form.
+        root: the box of coordinates.
+        symbols: the machines as symbols of one pose.
+
+    Raises:
+        RobotError: the robot cannot be put together with errors of its joint centres.
+    """
+
+    def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
+        self._case, self.model, self.root = case, model, root
+
+        def rotation(turn: SX) -> SX:
+            """Return the rotation (3, 3) with coordinates (3, 1)."""
+            turned, scale = turned_rotation(root, ca.vertsplit(turn))
+            return turned / scale
+
+        self._at = PoseCoordinates(root.values, rotation, root.ball)
+        tolerance = case.joint_centre_tolerance or 0.0
+        self.symbols: MachineLayout = machine_layout(case, built_model(case.model), tolerance, self._at)
+
+    @cached_property
+    def design(self) -> Layout:
+        """The design as symbols of the pose; refuses a robot of which coordinates follow from others."""
+        if self.model.unknowns:
+            raise ProofError("numbers of machines with loops that are not in closed form have no proof")
+        return design_layout(self._case, self.model, self._at)
+
+    def varies(self, claim: Claim) -> bool:
+        """Return whether a number changes with the errors."""
+        errors = self.symbols.errors
+        return bool(errors.numel()) and any(ca.which_depends(claim.expression, errors, 1, True))
+
+    def number(self, claim: Claim, rest: float) -> SX:
+        """Return a bound (1, 1) of a number over all machines in the symbols of the design, from the rest's bound."""
+        errors, pose = self.symbols.errors, self.design.table.variables_vector
+        slopes, sign = ca.densify(ca.gradient(claim.expression, errors)), 1.0 if claim.sense is Sense.MAX else -1.0
+        squares = [ca.sumsqr(slopes[k : k + 3]) for k in range(0, errors.numel(), 3)]
+        small = self.symbols.near_zero(claim.expression, self.design).tolist()
+        first = sum((ca.sqrt(each + size**2) for each, size in zip(squares, small, strict=True)), SX(0))
+        whole = claim.expression + sign * (self.symbols.tolerance * first + rest)
+        return self.symbols.of(whole, SX.zeros(errors.numel()), pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +150,7 @@ class RobotClaims:
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
-    """Return the robot of a case, with the claims about its reach.
-
-    Args:
-        case: with fixed dimensions.
-        workspace: the poses.
-        reached: names of those claims about reach that are proved.
-    """
+    """Return the robot of a case with fixed dimensions, and the claims about its reach, of which some are proved."""
     legs, closed, is_open = legs_of(case), closed_form(case.model), bool(case.model.unknowns)
     if case.joint_centre_tolerance:
         try:
@@ -136,13 +174,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
 
 
 def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[ExpectedClaim]:
-    """Return the claims about a case over its workspace.
-
-    Args:
-        case: the case.
-        robot: its robot.
-        quantities: measures that were asked for.
-        leg_error: largest error of a leg's length.
+    """Return the claims about a case over its workspace, and about measures that were asked for.
 
     Raises:
         InputError: the robot has no measure of a name.
@@ -214,18 +246,7 @@ def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
 
 
 def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, proof: WorkspaceProof) -> None:
-    """Refuse a proof whose file names other premises than those of the case; the check does without the file's.
-
-    Args:
-        case: the case.
-        workspace: its poses.
-        legs: its joint centres; None for a robot that is not six straight legs.
-        leg_error: largest error of a leg's length.
-        proof: the proof.
-
-    Raises:
-        ProofError: it is for another workspace, other joint centres or other errors.
-    """
+    """Refuse a proof whose file names other premises than those of the case; the check does without the file's."""
     if workspace_numbers(workspace) != proof.workspace:
         raise ProofError("the proof is for another workspace than this case's")
     if proof.leg_error != leg_error:

@@ -1,8 +1,8 @@
-"""Claims about six straight legs: singular values of J, errors of the pose to first order, and distances between legs.
+"""Claims about numbers that are no single expression: terms of second order, and those of six straight legs.
 
-With A the rows of the legs, F the diagonal matrix of the sizes of their forces, and J = F^-1 A with unit rows, the
-columns of ``P = A^-1 F`` are the platform's motions for unit changes of the legs' lengths. With C near the inverse of A
-at the centre of a box, ``P_0 = C F_0`` and ``B >= |I - C A|``,
+Of six straight legs, with A their rows, F the diagonal matrix of the sizes of their forces, and J = F^-1 A with unit
+rows, the columns of ``P = A^-1 F`` are the platform's motions for unit changes of the legs' lengths. With C near the
+inverse of A at the centre of a box, ``P_0 = C F_0`` and ``B >= |I - C A|``,
 
     P - P_0 = C (F - A P_0) + (C A)^-1 (I - C A) C (F - A P_0).
 
@@ -15,8 +15,8 @@ of affine matrices and vectors are convex: the corners of the box decide.
 * Two legs, as segments between their joints, are at least ``n.(x - y) / |n|`` apart, for any vector n and the least of
   it over their ends x and y.
 
-With a tolerance on joint centres every singular value changes by at most a number (:mod:`.tolerance`), so that the
-smallest is claimed to be larger by it, and the largest to be smaller by it.
+With a tolerance on joint centres every singular value changes by at most a number, so that the smallest is claimed to
+be larger by it, and the largest to be smaller by it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TypeVar
 
 import casadi as ca
 import numpy as np
@@ -33,11 +32,15 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import FloatArray
+from ....case.pose import Free
+from ....errors import UncoveredError
 from ...statement.machine import Legs
+from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
 from .forms import PRODUCT, UP, AffineMatrix, FormArithmetic, inverses
 from .motion_matrix import PosedRobot
 from .pose_boxes import Attempt
+from .statement import Machines
 
 #: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
 _WRONG = 1e-6
@@ -45,30 +48,59 @@ _WRONG = 1e-6
 _ENLARGED = 1e-6
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
 _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32].T
+#: Rows and columns of the entries of a matrix (6, 6).
+_DENSE = np.indices((6, 6), dtype=np.intp).reshape(2, -1)
 #: Part of the trace that is taken off before Cholesky's factorisation: many times the bound of its rounding for
 #: matrices (6, 6), which is 8 roundings. A factorisation that ends proves the matrix positive definite (S. M. Rump,
 #: *Verification of positive definiteness*, BIT 46 (2006)).
 _CHOLESKY = 1e-13
 #: Steps in the search of the part of second order of errors, and of the nearest points of two legs.
 _STEPS, _NEAREST = 200, 12
-#: A float or a fraction.
-_Number = TypeVar("_Number", float, Fraction)
 
 
+class SecondOrderClaim:
+    """The claim that the terms of second order of a number (1, 1) in the symbols of machines are at most a bound.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    def __init__(self, machines: Machines, expression: SX, bound: float) -> None:
+        symbols = machines.symbols
+        self.free = [k for k, each in enumerate(machines.root.values) if isinstance(each, Free)]
+        self._bound, self._tolerance = bound, symbols.tolerance
+        pose, errors = SX.sym("pose", len(self.free)), SX.sym("errors", symbols.errors.numel())
+        number = symbols.of(expression, errors, pose)
+        if not is_smooth(number):
+            raise UncoveredError("a number whose derivatives jump")
+        second = ca.hessian(number, errors)[0]
+        rows, columns = (np.array(each, dtype=int) for each in second.sparsity().get_triplet())
+        # Errors that second derivatives do not depend on are no variables of theirs.
+        entries = ca.vertcat(SX(0, 1), second.nz[:])
+        own = [k for k in range(errors.numel()) if ca.depends_on(entries, errors[k])]
+        _, self._block = np.unique(rows // 3 * errors.numel() + columns // 3, return_inverse=True)
+        self._errors, self._entries = len(own), FormArithmetic(ca.vertcat(pose, errors[own]), entries)
+
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6)."""
+        errors = np.full((len(lower), self._errors), self._tolerance)
+        values = self._entries(np.hstack([lower[:, self.free], -errors]), np.hstack([upper[:, self.free], errors]))
+        squares = np.zeros((self._block.max(initial=-1) + 1, len(lower)))
+        np.add.at(squares, self._block, np.abs(values.ends()).max(axis=0) ** 2)
+        whole = 0.5 * self._tolerance**2 * np.sqrt(squares).sum(axis=0) * UP
+        return Attempt(np.asarray(whole <= self._bound), np.zeros((len(lower), len(self.free))))
+
+
+@np.errstate(all="ignore")
 def are_positive(matrices: FloatArray) -> NDArray[np.bool_]:
     """Return whether symmetric matrices (..., n, n) are positive definite; their lower triangles are read."""
-    M = np.array(matrices)
-    n = M.shape[-1]
-    good = np.asarray(np.isfinite(M).all(axis=(-2, -1)))
-    shift = _CHOLESKY * np.abs(np.trace(M, axis1=-2, axis2=-1))
+    n, good = matrices.shape[-1], np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
+    M = matrices - _CHOLESKY * np.abs(np.trace(matrices, axis1=-2, axis2=-1))[..., None, None] * np.eye(n)
     for k in range(n):
-        M[..., k, k] -= shift
-    with np.errstate(all="ignore"):
-        for k in range(n):
-            pivot = M[..., k, k]
-            good = np.asarray(good & (pivot > 0))
-            column = M[..., k + 1 :, k] / np.sqrt(np.where(good, pivot, 1.0))[..., None]
-            M[..., k + 1 :, k + 1 :] -= column[..., :, None] * column[..., None, :]
+        pivot = M[..., k, k]
+        good = np.asarray(good & (pivot > 0))
+        column = M[..., k + 1 :, k] / np.sqrt(np.where(good, pivot, 1.0))[..., None]
+        M[..., k + 1 :, k + 1 :] -= column[..., :, None] * column[..., None, :]
     return good
 
 
@@ -97,28 +129,22 @@ def _size_is_at_most(matrices: AffineMatrix, most: FloatArray) -> NDArray[np.boo
 class LegInverse:
     """The inverse P of J of six straight legs over boxes of poses.
 
-    Args:
-        robot: six straight legs.
-        length: by which moments are divided, and rotations multiplied.
-        is_unit: whether J itself is meant too.
+    A length divides moments, and multiplies rotations; ``is_unit`` says whether J itself is meant too.
     """
 
     def __init__(self, robot: PosedRobot, length: float, *, is_unit: bool = False) -> None:
+        self.free = robot.free
         A = ca.vertcat(*[ca.vertcat(row.force, row.moment / length).T for row in robot.rows])
-        sizes, at = (
-            ca.vertcat(*[ca.norm_2(A[k, :3]) for k in range(6)]),
-            np.indices((6, 6), dtype=np.intp).reshape(2, -1),
-        )
-        self._at = at if is_unit else at[:, :0]
+        sizes = ca.vertcat(*[ca.norm_2(A[k, :3]) for k in range(6)])
         unit = A / ca.repmat(sizes, 1, 6) if is_unit else SX(0, 6)
-        self._dense, self._forms = at, FormArithmetic(robot.z, ca.vertcat(sizes, ca.vec(A.T), ca.vec(unit.T)))
+        self._is_unit, self._forms = is_unit, FormArithmetic(robot.z, ca.vertcat(sizes, ca.vec(A.T), ca.vec(unit.T)))
 
-    def __call__(
+    def inverse(
         self, lower: FloatArray, upper: FloatArray
     ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
-        """Return P over boxes (B, n), where it is known, shares (B, n) of coordinates in its rest, and J if meant."""
-        values, leg = self._forms(lower, upper), np.arange(6)
-        sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(self._dense, (6, 6))
+        """Return P over boxes (B, 6), where it is known, shares (B, n) of coordinates in its rest, and J or A."""
+        values, leg = self._forms(lower[:, self.free], upper[:, self.free]), np.arange(6)
+        sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(_DENSE, (6, 6))
         C = inverses(matrix.M)
         holds, bound, shares = matrix.contracted(C)
         P = C * sizes.c[:, None, :]
@@ -136,31 +162,26 @@ class LegInverse:
         X = np.linalg.solve(np.eye(6) - bound, right) * (1 + _ENLARGED) + _ENLARGED * right
         # (I - B) X >= B Q with a spectral radius below 1: X is a bound.
         known = known & (X >= 0).all(axis=(1, 2)) & ((bound @ X) * UP + right <= X).all(axis=(1, 2))
-        J = values.forms(slice(42, None)).matrix(self._at, (6, 6))
+        J = values.forms(slice(42, None)).matrix(_DENSE, (6, 6)) if self._is_unit else matrix
         return AffineMatrix(P, T, (rest + X) * UP), np.asarray(known), shares, J
 
 
-class SingularClaim:
-    """The claim that the smallest singular value of J is at least a number, or its condition number at most.
+class SingularClaim(LegInverse):
+    """The claim that the smallest singular value of J is at least a bound, or its condition number at most.
 
-    Args:
-        robot: six straight legs.
-        length: by which moments are divided.
-        bound: the number that is claimed.
-        is_condition: whether the condition number is meant.
-        change: by how much a singular value changes in the machines that are meant.
+    A length divides moments. In the machines that are meant singular values change by at most ``change``.
     """
 
     def __init__(
         self, robot: PosedRobot, length: float, bound: float, *, is_condition: bool, change: float = 0.0
     ) -> None:
-        self.free, self._inverse = robot.free, LegInverse(robot, length, is_unit=is_condition)
+        super().__init__(robot, length, is_unit=is_condition)
         self._bound, self._change, self._is_condition = bound, change, is_condition
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6), from the sizes of P, and for the condition number those of J."""
-        inverse, known, shares, J = self._inverse(lower[:, self.free], upper[:, self.free])
+        inverse, known, shares, J = self.inverse(lower, upper)
         low, high = 1 / _size_at_centre(inverse), _size_at_centre(J)
         shares = np.abs(inverse.A).sum(axis=(2, 3)) + shares * inverse.E.sum(axis=(1, 2))[:, None]
         if self._is_condition:
@@ -177,24 +198,21 @@ class SingularClaim:
         return Attempt(np.asarray(holds), shares, np.asarray(is_wrong))
 
 
-class ErrorClaim:
+class ErrorClaim(LegInverse):
     """The claim that errors of legs of at most 1 move the platform, to first order, by at most a number.
 
-    Args:
-        robot: six straight legs.
-        most: the size claimed.
-        is_rotation: whether the rotation is meant, and not the position of the platform's origin.
+    It is about the rotation, or about the position of the platform's origin.
     """
 
     def __init__(self, robot: PosedRobot, most: float, *, is_rotation: bool) -> None:
-        self.free, self._inverse = robot.free, LegInverse(robot, robot.length)
+        super().__init__(robot, robot.length)
         self._most = most * robot.length * (1 - 2 * UNIT) if is_rotation else most
         self._part = slice(3, 6) if is_rotation else slice(0, 3)
 
     @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6), at all corners of the boxes and of the errors."""
-        inverse, known, shares, _ = self._inverse(lower[:, self.free], upper[:, self.free])
+        inverse, known, shares, _ = self.inverse(lower, upper)
         corners = np.ascontiguousarray(_at_corners(inverse, self._part))
         moves = (corners.reshape(-1, 6) @ _ERRORS).reshape(len(corners), 3, -1)
         worst = np.sqrt((moves * moves).sum(axis=1).max(axis=1))
@@ -210,7 +228,7 @@ def whole_errors(position: float, rotation: float, eps: float, shortest: float, 
     """Return bounds of the whole errors of a pose, position and rotation; infinite where none is found.
 
     With errors of second order r in the lengths, ``p = P (eps + r)`` and ``w = Q (eps + r)``, r must be at least
-    ``((p + a w)^2 / (l - p - a w) + a w^2) / 2``. A candidate is checked in fractions.
+    ``((p + a w)^2 / (l - p - a w) + a w^2) / 2``. It is found by iteration in fractions.
 
     Args:
         position: P, error of the position to first order for errors of legs of 1.
@@ -219,39 +237,28 @@ def whole_errors(position: float, rotation: float, eps: float, shortest: float, 
         shortest: l, a length below which no leg is.
         reach: a, the largest distance of a joint from the platform's origin.
     """
-    numbers, r = (position, rotation, eps, shortest, reach), 0.0
+    P, Q, error, leg, arm = map(Fraction, (position, rotation, eps, shortest, reach))
+    r = 0.0
     for _ in range(_STEPS):
-        needed = _second_order(r, *numbers)
-        if needed <= r < math.inf and _second_order(*map(Fraction, (r, *numbers))) <= r:
-            return position * (eps + r) * (1 + 8 * UNIT), rotation * (eps + r) * (1 + 8 * UNIT)
+        p, w = P * (error + Fraction(r)), Q * (error + Fraction(r))
+        along = p + arm * w
+        if along >= leg:
+            break
+        needed = (along**2 / (leg - along) + arm * w**2) / 2
+        if needed <= r:
+            return float(p) * (1 + 8 * UNIT), float(w) * (1 + 8 * UNIT)
+        if needed > leg:
+            break
         r = float(needed) * (1 + _ENLARGED)
     return math.inf, math.inf
-
-
-def _second_order(
-    r: _Number, P: _Number, Q: _Number, eps: _Number, shortest: _Number, reach: _Number
-) -> float | _Number:
-    """Return the errors of second order that these bounds of all errors leave; infinite where they take up a leg."""
-    p, w = P * (eps + r), Q * (eps + r)
-    along = p + reach * w
-    if not along < shortest:
-        return math.inf
-    return (along * along / (shortest - along) + reach * w * w) / 2
 
 
 def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: float) -> float:
     """Return a bound of the Frobenius norm of the change of J, by which every singular value changes at most.
 
-    The unit force of a leg changes by at most ``h = 2 t / l``, and its moment by ``|a| h + t``.
-
-    Args:
-        joints: joint centres of the design.
-        tolerance: t.
-        length: by which moments are divided.
-        shortest: l: no leg of any machine is shorter.
-
-    Returns:
-        Infinite where the errors may take up a whole leg.
+    Within a tolerance t the unit force of a leg changes by at most ``h = 2 t / l``, with l the shortest length of a leg
+    of any machine, and its moment by ``|a| h + t``. A length divides moments. The bound is infinite where errors may
+    take up a whole leg.
     """
     if not shortest > 0:
         return math.inf
@@ -261,13 +268,7 @@ def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: 
 
 
 class ClearanceClaim:
-    """The claim that two legs are at least a distance apart.
-
-    Args:
-        robot: six straight legs.
-        pair: indices of the legs.
-        least: the distance, length.
-    """
+    """The claim that two legs, with these indices, are at least a distance apart."""
 
     def __init__(self, robot: PosedRobot, pair: Sequence[int], least: float) -> None:
         self.free, self._least = robot.free, least
