@@ -5,7 +5,7 @@ import pytest
 from limb_cases import poses
 
 from screwsynth.nlp import Case, formulate, load_case
-from screwsynth.nlp.proof.boxes.threads import Threads, pieces
+from screwsynth.nlp.proof.boxes.engine import Threads, pieces
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 

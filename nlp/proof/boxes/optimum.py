@@ -14,8 +14,7 @@ from ..checker.tree import Node, node_bytes
 from ..statement.standard_form import StandardForm
 from .engine import COLLAPSED, Engine, Examination, Verdict
 from .incumbent import PointKeeper
-from .rows import SMALL, WHOLE, Boxes
-from .search import Order, Rule, Search, Verdicts
+from .search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts
 from .tree import TreeRecord, halves_of, keys_of
 
 #: Widths, in parts of the whole box, below which a box is not bisected: one without a finite bound, which is taken to

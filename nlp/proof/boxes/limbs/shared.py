@@ -19,11 +19,9 @@ import numpy as np
 from .....models.arrays import first_largest
 from ...checker.tree import Node, leaf_bytes, node_bytes
 from ...enclosure.forms import ULP, midpoints
-from ..engine import Engine, LimbModels
+from ..engine import Engine, LimbModels, Threads
 from ..optimum import LEAST_WIDTHS, reason_without_bound
-from ..rows import SMALL, WHOLE, Boxes, some
-from ..search import Order, Rule, Search, Verdicts
-from ..threads import Threads
+from ..search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts, some
 from ..tree import TreeRecord, halves_of, keys_of
 from .decomposition import LimbBound, OwnBoxes, SharedBoxes, bound_limb, first_largest_of_lists, tilts_of
 
