@@ -193,7 +193,6 @@ def test_no_point_above_the_threshold_is_cut_off(name: str) -> None:
         again = Engine(form, jobs)
         for one, other in zip(vars(found).values(), vars(again.examine(lower, upper, threshold)).values(), strict=True):
             assert one.tobytes() == other.tobytes()
-        again.close()
     rng, points = np.random.default_rng(3), 60
     x = np.repeat(lower, points, axis=1) + rng.random((form.n, 240 * points)) * np.repeat(upper - lower, points, axis=1)
     values = np.array(function(x))
