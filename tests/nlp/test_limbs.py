@@ -184,7 +184,7 @@ def test_the_common_part_with_tilts_is_bounded_and_contracted() -> None:
     x, rng, B, points = found.common.x, np.random.default_rng(4), 60, 300
     m, whole = x.numel(), (found.common.upper - found.common.lower)[:, None]
     first = Condition("sum", ca.sum1(x) - float(np.sum(found.common.lower + 0.4 * whole.ravel())), is_equation=False)
-    form = replace(found.common, functions=(ca.sin(x[0]) + 0.3 * x[0] * x[m - 1],), conditions=(first,), signs=())
+    form = replace(found.common, functions=(ca.sin(x[0]) + 0.3 * x[0] * x[m - 1],), conditions=(first,))
     size = whole * 10.0 ** rng.uniform(-3, -0.1, (m, B))
     low = form.lower[:, None] + rng.random((m, B)) * (whole - size)
     g, Q, best = rng.normal(size=(m, B)), rng.normal(size=(m, m, B)), rng.normal(size=B)

@@ -117,7 +117,7 @@ def random_form(seed: int) -> StandardForm:
     conditions = tuple(Condition(f"h{k}", values[-1 - k] - 1.0, is_equation=k == 1) for k in range(2))
     ends = np.full(random_graphs.N, 4.0)
     nlp = formulate(load_case("paper-4.2-rotation"))
-    return StandardForm(nlp, x, -ends, ends, (values[-3],), conditions, (), 1.0, has_epigraph=False)
+    return StandardForm(nlp, x, -ends, ends, (values[-3],), conditions)
 
 
 def test_the_first_pass_is_that_of_the_reference_on_random_graphs() -> None:

@@ -289,7 +289,7 @@ def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | No
 
 def without_conditions(form: StandardForm) -> StandardForm:
     """Return the form of the functions alone."""
-    return replace(form, conditions=(), signs=())
+    return replace(form, conditions=())
 
 
 def objective_tape(form: StandardForm, length: int) -> Tape | None:

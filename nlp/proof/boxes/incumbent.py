@@ -118,7 +118,7 @@ class Incumbent:
     def _with_level(self, point: FloatArray, value: float) -> FloatArray:
         """Return the point with the program's epigraph variable, where it has one."""
         variables = self._form.program_variables(point)
-        if not self._form.has_epigraph:
+        if self._form.nlp.program.places.epigraph is None:
             return variables
         nlp = self._form.nlp
         return np.append(variables, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
