@@ -17,8 +17,7 @@ from casadi import SX
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....interruption import one_search
-from ...boxes.rows import Boxes, Columns, bisected, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
+from ...boxes.search import TOO_SMALL, Boxes, Columns, Effort, Order, Rule, Search, Verdicts, bisected, some
 from ...enclosure.forms import Encloser, Forms
 from ..ranks.covering import APART, Followed, LoopRule
 from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
