@@ -161,7 +161,8 @@ class _TapeWriter:
 
     def finish(self, outputs: int) -> Tape:
         """Return the tape."""
-        *codes, k, reach = zip(*self._rows, strict=True)
+        # Expressions without an entry have no instructions.
+        *codes, k, reach = zip(*self._rows, strict=True) if self._rows else [()] * 6
         spans = (
             [(each & -each).bit_length() - 1 if each else 0 for each in reach],
             [each.bit_length() for each in reach],
