@@ -3,9 +3,8 @@
  * The tape is interpreted over LANES boxes at once, so that an instruction is fetched once for all of them and its
  * loops become vector instructions; the boxes are then examined one by one. docs/certificate.md explains the formulas.
  * tests/reference has them in NumPy, in the same order, in the modules that the headers name. The headers of kernel/ have
- * an idea each and belong to this one translation unit, so that the compiler sees all of it: values, univariate,
- * enclosure, quadratic, quotients, contraction, examination, secondorder, firstpass, tangents, blocks, enclosed, models,
- * rank.
+ * an idea each and belong to this one translation unit, so that the compiler sees all of it: values, univariate, forms,
+ * quadratic, quotients, contraction, examination, firstpass, tangents, blocks, enclosed, models, rank.
  *
  * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
  * nor with contraction to fused operations, which would make it differ from the reference.

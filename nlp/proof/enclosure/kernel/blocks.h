@@ -4,7 +4,7 @@
 
 #include "firstpass.h"
 #include "quotients.h"
-#include "secondorder.h"
+#include "forms.h"
 #include "tangents.h"
 
 static double *carve(double **rest, size_t count)
@@ -19,15 +19,10 @@ typedef struct {
     const Tape *tape;
     int n, order;
     Store work, out;
-    Lane *centre, *radius, *lower, *upper, *terms;
+    Lane *box[4], *terms; /* centre, radius, lower and upper ends; terms */
 } Run;
 
-static size_t terms_of_order(int n, int order) { return (size_t)n + (order > 1 ? pairs_of(n) : 0); }
-
-static size_t stride_of_order(int n, int order)
-{
-    return order > 1 ? stride_of_form2(n) : sizeof(Value) / sizeof(double) + (size_t)n * LANES;
-}
+static size_t stride_of_order(int n, int order) { return sizeof(Value) / sizeof(double) + terms_of_order(n, order) * LANES; }
 
 static size_t memory_of_run(const Tape *tape, int n, int order)
 {
@@ -42,9 +37,8 @@ static Run prepare(const Tape *tape, int n, int order, double *memory)
     Run x = {.tape = tape, .n = n, .order = order};
     x.work = (Store){carve(&memory, (size_t)tape->registers * stride), stride};
     x.out = (Store){carve(&memory, (size_t)tape->outputs * stride), stride};
-    Lane **lanes[] = {&x.centre, &x.radius, &x.lower, &x.upper};
     for (int i = 0; i < 4; i++)
-        *lanes[i] = (Lane *)carve(&memory, (size_t)n * LANES);
+        x.box[i] = (Lane *)carve(&memory, (size_t)n * LANES);
     x.terms = (Lane *)memory;
     return x;
 }
@@ -61,12 +55,12 @@ static void run_block(const Run *x, const double *lower, const double *upper, Py
             double lo = lower[at], hi = upper[at], middle = 0.5 * lo + 0.5 * hi;
             middle = smaller(larger(middle, lo), hi);
             double half = larger(hi - middle, middle - lo);
-            x->lower[i][l] = lo, x->upper[i][l] = hi, x->centre[i][l] = middle;
+            x->box[LOWER][i][l] = lo, x->box[UPPER][i][l] = hi, x->box[CENTRE][i][l] = middle;
             half = half > 0 ? half * (1 + ULP) + TINY : 0.0;
-            x->radius[i][l] = larger(-lo, hi) < LARGEST ? half : INFINITY;
+            x->box[RADIUS][i][l] = larger(-lo, hi) < LARGEST ? half : INFINITY;
         }
     }
-    (x->order > 1 ? run2 : run)(x->tape, x->n, x->work, x->out, x->centre, x->radius, x->lower, x->upper, x->terms);
+    (x->order > 1 ? run2 : run1)(x->tape, x->n, x->work, x->out, x->box, x->terms);
 }
 
 /* The forms of second order of a box: centre, gradient and matrix of each row. */
@@ -74,16 +68,15 @@ static void read_form2(Box *x, int rows, Store out, int l)
 {
     int n = x->n;
     for (int k = 0; k < rows; k++) {
-        Form2 *form = form2_of(out, k);
-        const Value *v = &form->v;
-        const Lane *a = terms_of_form2(form), *Q = a + n;
+        const Value *v = value_of(out, k);
+        const Lane *a = terms_of(v);
         x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
         x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
         double *H = x->gA + k * n * n;
         for (int i = 0; i < n; i++) {
             x->gb[k * n + i] = a[i][l];
             for (int j = i; j < n; j++) {
-                double entry = Q[row_of(n, i) + j][l];
+                double entry = a[row_of(n, i) + j][l];
                 H[i * n + j] = H[j * n + i] = i == j ? 2 * entry : entry;
             }
         }
@@ -174,7 +167,7 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
             run_block(&first, report->lower, report->upper, report->B, NULL, start, finish);
             for (int l = 0; l < LANES && start + l < finish; l++) {
                 for (size_t i = 0; i < n; i++)
-                    c[i] = first.centre[i][l];
+                    c[i] = first.box[CENTRE][i][l];
                 read_form2(&x, form->values.outputs, first.out, l);
                 if (!pass_first(form, &x, c, report, start + l, threshold, scores ? scores + (size_t)count * n : NULL))
                     kept->open[count++] = start + l;
@@ -193,7 +186,7 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
             for (int l = 0; l < LANES && start + l < count; l++) {
                 Py_ssize_t at = kept->open[start + l];
                 for (size_t i = 0; i < n; i++)
-                    c[i] = run.centre[i][l], r[i] = run.radius[i][l];
+                    c[i] = run.box[CENTRE][i][l], r[i] = run.box[RADIUS][i][l];
                 read_forms(&x, (size_t)(x.R + 2 * form->quotients), run.out, l, r);
                 add_quotients(form, &x, r, report->least ? report->least + at : NULL);
                 if (judge(form, &x, c, r, report, at, threshold, passes, alone ? scores + (size_t)(start + l) * n : NULL))

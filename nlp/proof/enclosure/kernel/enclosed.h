@@ -20,8 +20,8 @@ static void enclose_all(const Tape *tape, int n, Enclosed *found, double *memory
         run_block(&run, found->lower, found->upper, B, NULL, start, B);
         Py_ssize_t lanes_used = B - start < LANES ? B - start : LANES;
         for (int k = 0; k < tape->outputs; k++) {
-            Value *v = value_of(run.out, k); /* also the first part of a form of second order */
-            const Lane *a = found->order > 1 ? terms_of_form2((Form2 *)v) : terms_of(v);
+            Value *v = value_of(run.out, k);
+            const Lane *a = terms_of(v);
             size_t at = (size_t)(k * B + start), bytes = (size_t)lanes_used * sizeof(double);
             memcpy(found->c + at, v->c, bytes), memcpy(found->p + at, v->p, bytes);
             memcpy(found->q + at, v->q, bytes), memcpy(found->s + at, v->s, bytes);

@@ -214,18 +214,17 @@ static RankParts carve_rank(const Matrix *m, int n, double *memory)
 static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py_ssize_t start, RankParts x)
 {
     for (int e = 0; e < m->entries; e++) {
-        Form2 *form = form2_of(out, e);
-        const Value *v = &form->v;
-        const Lane *terms = terms_of_form2(form);
+        const Value *v = value_of(out, e);
+        const Lane *terms = terms_of(v);
         double scale = m->scale[e];
         double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
         EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        EACH_OF(i, 0, form->terms.linear)
+        EACH_OF(i, 0, v->terms.linear)
         {
             EACH size[l] += fabs(terms[i][l]);
-            EACH_OF(j, i, form->terms.pairs[i])
+            EACH_OF(j, i, v->terms.pairs[i])
             {
-                const double *term = terms[n + row_of(n, i) + j];
+                const double *term = terms[row_of(n, i) + j];
                 if (i == j)
                     EACH middle[l] += 0.5 * term[l], size[l] += 0.5 * fabs(term[l]);
                 else
@@ -343,10 +342,10 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
                 double part = a >= n && b == a - n ? 0.5 : 1.0;
                 memset(x.row, 0, (size_t)c * sizeof(Lane));
                 for (int e = 0; e < m->entries; e++) {
-                    Form2 *v = form2_of(out, e);
+                    const Value *v = value_of(out, e);
                     if (!((a < n ? v->terms.linear >> a : v->terms.pairs[a - n] >> b) & 1))
                         continue;
-                    const double *term = terms_of_form2(v)[t], *by = C[m->at[2 * e]];
+                    const double *term = terms_of(v)[t], *by = C[m->at[2 * e]];
                     double *to = x.row[m->at[2 * e + 1]], scale = part * m->scale[e];
                     EACH to[l] += by[l] * (term[l] * scale);
                 }
