@@ -45,6 +45,22 @@ typedef struct {
     Tape objective; /* the functions and their derivatives; without instructions where all are evaluated at once */
 } Form;
 
+/* Memory that is laid out in parts, all 0 at first; without an address they are counted only. */
+typedef struct {
+    double *at;
+    size_t used;
+} Room;
+
+static double *carve(Room *room, size_t count)
+{
+    double *part = room->at ? room->at + room->used : NULL;
+    room->used += count;
+    return part;
+}
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+#define CARVE(parts, count) for (size_t part = 0; part < COUNT(parts); part++) *parts[part] = carve(room, count)
+
 static inline int rows_of(const Form *form) { return form->expressions + 2 * form->quotients; }
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
