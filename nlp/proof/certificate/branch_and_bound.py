@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 from ....models import FloatArray, frozen_array
 from ...case.task import Sense
@@ -25,7 +26,7 @@ from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search
 from ..boxes.optimum import optimum_search
-from ..boxes.search import TOO_SMALL, Effort, SearchMethod
+from ..boxes.search import TOO_SMALL, Effort, Search
 from ..boxes.symmetry import halved
 from ..boxes.tree import TreeRecord
 from ..enclosure.engine import ENGINE, kernel
@@ -47,6 +48,8 @@ _WHOLE_BOX = 12
 #: Largest number of entries in a history.
 _HISTORY = 200
 
+#: A search of the whole box.
+_Method = Search[Any] | IndependentSearch
 #: Callback with seconds, bound, incumbent, number of boxes examined, number of boxes open.
 CertifyProgress = Callable[[float, float, float, int, int], None]
 
@@ -105,16 +108,11 @@ def certify_program(
                 reason = search.run(progress)
                 if reason or not search.is_short():
                     break
-                search.method.close()
                 if recorder is not None:
                     recorder.clear()
             return reason
 
-        try:
-            reason = reason_of(run)
-        finally:
-            search.method.close()
-        return search.certificate(reason)
+        return search.certificate(reason_of(run))
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
@@ -134,7 +132,7 @@ def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate
     )
 
 
-def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder: TreeRecord | None) -> SearchMethod:
+def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder: TreeRecord | None) -> _Method:
     """Return the search for a form: by limbs where it separates, else of the whole box.
 
     A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to
@@ -143,7 +141,7 @@ def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder
     form = halved(form) if recorder is None else form
     separation = separate(form)
     if separation is not None and not separation.shared:
-        return IndependentSearch(form, separation, incumbent, jobs, recorder)
+        return IndependentSearch(separation, incumbent, jobs, recorder)
     if separation is None or form.n <= _WHOLE_BOX:
         build = partial(Engine, form, jobs, tangents=recorder is None)
         return optimum_search(form, build, incumbent, recorder)
@@ -168,7 +166,7 @@ class _Search:
 
     form: StandardForm
     incumbent: Incumbent
-    method: SearchMethod
+    method: _Method
     gap: float
     above: float | None
     effort: Effort
@@ -215,7 +213,7 @@ class _Search:
             return False
         return not self._is_met() and self.incumbent.value > self.first_value
 
-    def restart(self, method: SearchMethod) -> None:
+    def restart(self, method: _Method) -> None:
         """Begin again with a new search of the whole box, and the best point known by now."""
         self.boxes_before += self.method.boxes
         self.method, self.first_value = method, self.incumbent.value

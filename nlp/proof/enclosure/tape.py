@@ -258,9 +258,10 @@ class _TapeWriter:
 
     def finish(self, inputs: int, outputs: int) -> Tape:
         """Return the tape."""
-        *codes, k, reach = zip(*self._rows, strict=True)
-        first = [(each & -each).bit_length() - 1 if each else 0 for each in reach]
-        columns = (*codes, first, [each.bit_length() for each in reach])
+        # Expressions without an entry have no instructions.
+        *codes, k, reach = zip(*self._rows, strict=True) if self._rows else [()] * 6
+        least = [(each & -each).bit_length() - 1 if each else 0 for each in reach]
+        columns = (*codes, least, [each.bit_length() for each in reach])
         op, to, a, b, first, last = (np.array(each, dtype=np.int32) for each in columns)
         constants = np.array(k, dtype=np.float64)
         for column in (op, to, a, b, constants, first, last):

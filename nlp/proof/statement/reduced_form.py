@@ -22,7 +22,7 @@ from ....models.joints.elimination import Eliminated, eliminated
 from ....models.joints.replacing import Solved, with_replaced
 from ...program.layout import reference_of
 from ...program.nlp import Nlp
-from .form import Condition, Lift, StandardForm
+from .form import Condition, Kind, Lift, StandardForm
 
 #: Points of the box at which a condition is tested, and how many of them have to be within reach.
 _TESTS, _LEAST = 24, 4
@@ -53,37 +53,30 @@ class _Replaced(NamedTuple):
     edges: list[frozenset[int]]
 
 
-def without_unknowns(form: StandardForm, assembly: Sequence[Condition]) -> StandardForm:
-    """Return a form without the unknowns that follow in closed form; the same form where none does.
+def without_unknowns(form: StandardForm) -> StandardForm:
+    """Return the form of a program that keeps to home's working mode without the unknowns that follow in closed form.
 
-    An unknown stays a variable where its two solutions meet in the box: roots have infinite slopes there.
-
-    Args:
-        form: the form of a program that keeps to home's working mode.
-        assembly: those of its conditions that state how joints hold together.
+    It is the same form where none does. An unknown stays a variable where its two solutions meet in the box: roots have
+    infinite slopes there.
     """
     nowhere = [frozenset[int]() for _ in form.nlp.program.robots]
     found = _replaced(form, nowhere)
     if any(found.edges):
         found = _replaced(form, found.edges)
     solved = found.solved
-    kept = [i for i in range(form.n) if i not in solved]
+    kept, places = [i for i in range(form.n) if i not in solved], sorted(solved)
     if not solved or not kept:
         return form
-    own = {id(each) for each in assembly}
-    given = [each for each in form.conditions if not (id(each) in own and each.name in found.stated)]
-    expressions = [*form.functions, *[each.expression for each in (*given, *found.conditions)], found.reaches]
+    given = [each for each in form.conditions if not (each.is_of_joints and each.name in found.stated)]
+    every = [*given, *found.conditions]
+    expressions = [*form.functions, *[each.expression for each in every], found.reaches]
     *new, reaches = with_replaced([form.x], expressions, 0, solved)
     functions, rest = new[: len(form.functions)], new[len(form.functions) :]
-    conditions = [
-        replace(each, expression=expression) for each, expression in zip((*given, *found.conditions), rest, strict=True)
-    ]
+    conditions = [replace(each, expression=expression) for each, expression in zip(every, rest, strict=True)]
     x = form.x[kept]
     lower, upper = (frozen_array(each[kept], (len(kept),)) for each in (form.lower, form.upper))
-    may_go = [k for k, each in enumerate(given) if id(each) in own]
-    left = _left(x, lower, upper, conditions, may_go, reaches)
-    signs = {id(each) for each in form.signs}
-    places = sorted(solved)
+    may_go = [k for k, each in enumerate(given) if each.is_of_joints]
+    signs = [each.expression for each in form.conditions if each.kind is Kind.ASSEMBLY]
     sides = [each.expression for each in found.conditions if not each.is_equation]
     return replace(
         form,
@@ -91,17 +84,15 @@ def without_unknowns(form: StandardForm, assembly: Sequence[Condition]) -> Stand
         lower=lower,
         upper=upper,
         functions=tuple(functions),
-        conditions=tuple(conditions[k] for k in left),
-        signs=tuple(conditions[k] for k in left if k >= len(given) or id(given[k]) in signs),
+        conditions=tuple(conditions[k] for k in _left(x, lower, upper, conditions, may_go, reaches)),
         places=tuple(kept),
         lift=Lift(
             x=form.x,
-            kept=tuple(kept),
             places=tuple(places),
             values=ca.vertcat(*[solved[i].value for i in places]),
             is_angle=tuple(form.nlp.program.variables[i].dimension is Dimension.ANGLE for i in places),
             ranges=(form.upper - form.lower)[places] / 2,
-            signs=ca.vertcat(SX(0, 1), *[each.expression for each in form.signs], *sides),
+            signs=ca.vertcat(SX(0, 1), *signs, *sides),
         ),
     )
 
@@ -136,10 +127,11 @@ def _replaced(form: StandardForm, held: Sequence[frozenset[int]]) -> _Replaced:
             reaches.append(parts[3])
             if each.solved is None:
                 found.stated.add(f"{each.root.equation}{where}")
-                found.conditions.append(Condition(f"loop of {name}", parts[4], is_equation=True))
-                found.conditions.append(Condition(f"side of {name}", -parts[5], is_equation=False))
+                found.conditions.append(Condition(f"loop of {name}", parts[4], is_equation=True, kind=Kind.ASSEMBLY))
+                found.conditions.append(Condition(f"side of {name}", -parts[5], is_equation=False, kind=Kind.ASSEMBLY))
             elif not parts[3].is_constant():
-                found.conditions.append(Condition(f"reach of {name}", -parts[3] - _ROUNDING, is_equation=False))
+                reach = -parts[3] - _ROUNDING
+                found.conditions.append(Condition(f"reach of {name}", reach, is_equation=False, kind=Kind.ASSEMBLY))
         found.edges.append(_edges(form, of_roots, reaches[len(reaches) - len(of_roots) :]))
     return found._replace(reaches=ca.vertcat(SX(0, 1), *reaches))
 

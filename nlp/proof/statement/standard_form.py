@@ -20,25 +20,23 @@ too, but saved no boxes of a search.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ....models import FloatArray, frozen_array
-from ...case.limits.constraint import End, Spectral
+from ...case.limits.constraint import End
 from ...evidence.state import CLOSED
 from ...program.nlp import Nlp
 from ...program.pairs import with_all_pairs
-from ...program.program import Program
-from .form import Condition, StandardForm
+from .form import Condition, Kind, StandardForm
 from .reduced_form import without_unknowns
 
-__all__ = ["Condition", "StandardForm", "is_in_home_mode", "standard_form"]
+__all__ = ["Condition", "Kind", "StandardForm", "is_in_home_mode", "standard_form"]
 
 #: Orders of the principal minors. Those of 4 and 5 exclude boxes twice as wide as the determinant alone; smaller ones
 #: gain nothing more, as few poses have so many small singular values.
@@ -48,127 +46,50 @@ _ROUNDING = 1e-9
 _SIZE = 6
 
 
-class _BoundedExpression(NamedTuple):
-    """A constraint with numbers in the place of the program's arguments."""
-
-    name: str
-    expression: SX
-    lower: float
-    upper: float
-
-
 def standard_form(nlp: Nlp) -> StandardForm:
     """Return the standard form of a program with at least one variable."""
     nlp = with_all_pairs(nlp)
     program = nlp.program
-    x = SX.sym("x", nlp.n)
-    F, g = program.values.call([x, SX(ca.DM(nlp.arguments))])
+    x, arguments = SX.sym("x", nlp.n), SX(ca.DM(nlp.arguments))
+    F, g = program.values.call([x, arguments])
     epigraph = program.places.epigraph
     count = nlp.n if epigraph is None else epigraph.level
-    functions: list[SX] = [-nlp.sign * F]
-    lower, upper = nlp.g_lower.tolist(), nlp.g_upper.tolist()
-    constraints = [
-        _BoundedExpression(constraint.name, g[k], lower[k], upper[k])
-        for k, constraint in enumerate(program.constraints)
-    ]
-    if epigraph is not None:
-        pairs = list(zip(constraints, program.constraints, strict=True))
-        level = x[epigraph.level]
-        functions = [
-            _function_of_epigraph(each.expression, level, nlp.sign)
-            for each, constraint in pairs
-            if constraint in epigraph.constraints
-        ]
-        constraints = [each for each, constraint in pairs if constraint not in epigraph.constraints]
-    stated, implied = _conditions(constraints), _conditions(_further_loop_equations(nlp, x))
-    signs = _signs(nlp, x)
-    stated += _of_singular_values(nlp, x)
+    loops = {f"{each.name}{where}" for each in program.model.closure for where in _ends_of_names(nlp)}
+    functions: list[SX] = [-nlp.sign * F] if epigraph is None else []
+    stated: list[Condition] = []
+    for k, each in enumerate(program.constraints):
+        if epigraph is not None and each in epigraph.constraints:
+            functions.append(_function_of_epigraph(g[k], x[epigraph.level], nlp.sign))
+        else:
+            kind = Kind.LOOP if each.name in loops else Kind.LIMIT
+            stated += _conditions(each.name, g[k], float(nlp.g_lower[k]), float(nlp.g_upper[k]), kind)
+    found = [*_of_singular_values(nlp), *_of_joints(nlp)]
+    # Numbers take the place of arguments; what then depends on no variable says nothing of a robot's joints.
+    values = ca.Function("values", [program.x, program.p], [each.expression for each in found]).call([x, arguments])
+    numbered = [replace(each, expression=value) for each, value in zip(found, values, strict=True)]
+    stated += [each for each in numbered if not each.is_of_joints or any(ca.which_depends(each.expression, x, 1, True))]
     form = StandardForm(
         nlp=nlp,
         x=x[:count],
         lower=frozen_array(nlp.lower[:count], (count,)),
         upper=frozen_array(nlp.upper[:count], (count,)),
         functions=tuple(functions),
-        conditions=(*stated, *implied, *signs),
-        signs=tuple(signs),
-        sign=-nlp.sign,
-        has_epigraph=epigraph is not None,
+        conditions=tuple(stated),
     )
-    if not nlp.in_home_mode:
-        return form
-    loops = {f"{each.name}{where}" for each in program.model.closure for where in _poses(program)}
-    return without_unknowns(form, [*(each for each in stated if each.name in loops), *implied, *signs])
-
-
-def _of_singular_values(nlp: Nlp, x: SX) -> list[Condition]:
-    """Return the conditions that follow from limits on the smallest singular value."""
-    found = [
-        condition
-        for k, each in enumerate(nlp.program.constraints)
-        if each.spectral is not None
-        for condition in _spectral_conditions(each.name, each.spectral, float(nlp.g_lower[k]))
-    ]
-    values = _with_numbers(nlp, x, [each.expression for each in found])
-    return [replace(each, expression=value) for each, value in zip(found, values, strict=True)]
-
-
-def _poses(program: Program) -> list[str]:
-    """Return the end of the names of constraints of each pose."""
-    count = len(program.robots)
-    return [f" pose {k + 1}" for k in range(count)] if count > 1 else [""] * count
-
-
-def _with_numbers(nlp: Nlp, x: SX, expressions: Sequence[SX]) -> list[SX]:
-    """Return expressions of a program's symbols with x and numbers in the place of its variables and arguments."""
-    program = nlp.program
-    values = ca.Function("values", [program.x, program.p], list(expressions)) if expressions else None
-    return [] if values is None else list(values.call([x, SX(ca.DM(nlp.arguments))]))
-
-
-def _varying(nlp: Nlp, x: SX, named: dict[str, SX]) -> Iterator[tuple[str, SX]]:
-    """Yield those of some expressions, by name, that depend on a variable, with numbers in them."""
-    for name, each in zip(named, _with_numbers(nlp, x, list(named.values())), strict=True):
-        if any(ca.which_depends(each, x, 1, True)):
-            yield name, each
-
-
-def _further_loop_equations(nlp: Nlp, x: SX) -> list[_BoundedExpression]:
-    """Return the loop equations that the program leaves out, and distances that follow, with bounds of a closed loop.
-
-    The former follow from those of the program near its answer, but not in the whole box: there joints that are
-    assembled in no way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding
-    error in them, so that an exact equation could hold nowhere.
-    """
-    program, model = nlp.program, nlp.program.model
-    names = {constraint.name for constraint in program.constraints}
-    further: dict[str, SX] = {}
-    for where, robot in zip(_poses(program), program.robots, strict=True):
-        values = [*ca.vertsplit(robot.closure), *ca.vertsplit(robot.distances)]
-        for equation, expression in zip((*model.closure, *model.distances), values, strict=True):
-            if f"{equation.name}{where}" not in names:
-                further[f"{equation.name}{where}"] = expression
-    return [_BoundedExpression(name, each, -CLOSED, CLOSED) for name, each in _varying(nlp, x, further)]
+    return without_unknowns(form) if nlp.in_home_mode else form
 
 
 def is_in_home_mode(nlp: Nlp, x: FloatArray) -> bool | None:
     """Return whether a robot is in home's working mode at a point (n,); None where it has no sign of a mode."""
     if not nlp.n or not any(each.is_mode for each in nlp.program.model.signs):
         return None
-    form = standard_form(replace(nlp, in_home_mode=True))
-    return form.keeps_signs(x)
+    return standard_form(replace(nlp, in_home_mode=True)).keeps_signs(x)
 
 
-def _signs(nlp: Nlp, x: SX) -> list[Condition]:
-    """Return the conditions of a robot's assembly: where its joints do not hold together it is no robot.
-
-    Those of home's working mode count where the program says so.
-    """
-    found: dict[str, SX] = {}
-    for where, robot in zip(_poses(nlp.program), nlp.program.robots, strict=True):
-        for each, value in zip(nlp.program.model.signs, ca.vertsplit(robot.signs), strict=True):
-            if nlp.in_home_mode or not each.is_mode:
-                found[f"{each.name}{where}"] = -value
-    return [Condition(name, each, is_equation=False) for name, each in _varying(nlp, x, found)]
+def _ends_of_names(nlp: Nlp) -> list[str]:
+    """Return the end of the names of constraints of each pose."""
+    count = len(nlp.program.robots)
+    return [f" pose {k + 1}" for k in range(count)] if count > 1 else [""] * count
 
 
 def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:
@@ -179,31 +100,51 @@ def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:
     return -without / slope if sign < 0 else without / slope
 
 
-def _conditions(constraints: Sequence[_BoundedExpression]) -> list[Condition]:
-    """Return an equation for equal bounds, else an inequality for each finite bound."""
-    conditions = []
-    for name, expression, low, high in constraints:
-        if low == high:
-            conditions.append(Condition(name, expression - low, is_equation=True))
-            continue
-        if np.isfinite(high):
-            conditions.append(Condition(name, expression - high, is_equation=False))
-        if np.isfinite(low):
-            conditions.append(Condition(name, low - expression, is_equation=False))
-    return conditions
-
-
-def _spectral_conditions(name: str, spectral: Spectral, lower: float) -> Iterator[Condition]:
-    """Yield conditions on the minors of a function of J, given a lower bound of its smallest eigenvalue, if finite."""
-    if spectral.end is not End.SMALLEST or not (np.isfinite(lower) and lower > 0):
+def _conditions(name: str, expression: SX, low: float, high: float, kind: Kind) -> Iterator[Condition]:
+    """Yield an equation for equal bounds, else an inequality for each finite bound."""
+    if low == high:
+        yield Condition(name, expression - low, is_equation=True, kind=kind)
         return
-    scale = SX([1, 1, 1, *[1 / spectral.length] * 3])
-    J = spectral.matrix @ ca.diag(scale)
-    minors = _Minors(J.T @ J - (1 - _ROUNDING) * lower * SX.eye(_SIZE))
-    for order in _ORDERS:
-        for chosen in combinations(range(_SIZE), order):
-            places = "".join(str(k + 1) for k in chosen)
-            yield Condition(f"{name} minor {places}", -minors.of(chosen, chosen), is_equation=False, follows=True)
+    if np.isfinite(high):
+        yield Condition(name, expression - high, is_equation=False, kind=kind)
+    if np.isfinite(low):
+        yield Condition(name, low - expression, is_equation=False, kind=kind)
+
+
+def _of_joints(nlp: Nlp) -> Iterator[Condition]:
+    """Yield conditions of a robot's joints beside the program's constraints, in its symbols.
+
+    First the loop equations that the program leaves out, and distances that follow, with bounds of a closed loop. They
+    follow from those of the program near its answer, but not in the whole box: there joints that are assembled in no
+    way at all may fulfil the program's equations. Numbers in the place of arguments leave rounding error in them, so
+    that an exact equation could hold nowhere. Then the signs of the assembly: where joints do not hold together it is
+    no robot. Those of home's working mode count where the program says so.
+    """
+    model, names = nlp.program.model, {constraint.name for constraint in nlp.program.constraints}
+    poses = list(zip(_ends_of_names(nlp), nlp.program.robots, strict=True))
+    for where, robot in poses:
+        values = [*ca.vertsplit(robot.closure), *ca.vertsplit(robot.distances)]
+        for equation, value in zip((*model.closure, *model.distances), values, strict=True):
+            if f"{equation.name}{where}" not in names:
+                yield from _conditions(f"{equation.name}{where}", value, -CLOSED, CLOSED, Kind.LOOP)
+    for where, robot in poses:
+        for sign, value in zip(model.signs, ca.vertsplit(robot.signs), strict=True):
+            if nlp.in_home_mode or not sign.is_mode:
+                yield Condition(f"{sign.name}{where}", -value, is_equation=False, kind=Kind.ASSEMBLY)
+
+
+def _of_singular_values(nlp: Nlp) -> Iterator[Condition]:
+    """Yield conditions on the minors that follow from limits on the smallest singular value of J, in its symbols."""
+    for constraint, lower in zip(nlp.program.constraints, nlp.g_lower.tolist(), strict=True):
+        spectral = constraint.spectral
+        if spectral is None or spectral.end is not End.SMALLEST or not (np.isfinite(lower) and lower > 0):
+            continue
+        J = spectral.matrix @ ca.diag(SX([1, 1, 1, *[1 / spectral.length] * 3]))
+        minors = _Minors(J.T @ J - (1 - _ROUNDING) * lower * SX.eye(_SIZE))
+        for order in _ORDERS:
+            for chosen in combinations(range(_SIZE), order):
+                name = f"{constraint.name} minor {''.join(str(k + 1) for k in chosen)}"
+                yield Condition(name, -minors.of(chosen, chosen), is_equation=False, kind=Kind.FOLLOWS)
 
 
 class _Minors:

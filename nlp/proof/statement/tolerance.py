@@ -56,18 +56,19 @@ class BuiltModel(NamedTuple):
     reaches: tuple[Reach, ...]
 
 
-def built_model(model: Model) -> BuiltModel:
+def built_model(model: Model, *, extended: bool = False) -> BuiltModel:
     """Return a robot with errors of its joint centres.
 
     Args:
         model: the robot.
+        extended: whether closed forms have values out of reach too.
 
     Raises:
         RobotError: its joint centres are not known, or it cannot be put together with errors.
     """
     exact = closed_form(model).model
     displaced = _displaced(model)
-    closed = closed_form(displaced.model)
+    closed = closed_form(displaced.model, extended=extended)
     built = closed.model
     unknowns = [[item.name for item in each.unknowns] for each in (exact, built)]
     members = [[(item.rank, item.screws.shape, item.is_pinned) for item in each.members] for each in (exact, built)]

@@ -74,9 +74,6 @@ class NumpyEngine:
         tangents: whether the first pass has tangents to the squares of a minimum.
     """
 
-    #: Boxes that fit the processor's cache with all their registers.
-    block = 1024
-
     def __init__(
         self, form: StandardForm, jobs: int | None = None, *, apart: bool = False, tangents: bool = True
     ) -> None:
@@ -91,9 +88,6 @@ class NumpyEngine:
         self.functions = len(form.functions)
         self.equation, self._follows = np.array(form.is_equation), np.array(form.follows)
         self.depends = np.array(form.dependence, dtype=bool)
-
-    def close(self) -> None:
-        """Do nothing: this engine has no threads."""
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
         """Examine boxes, and close those whose bounds do not exceed a threshold.
