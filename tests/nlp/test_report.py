@@ -549,7 +549,9 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     service = webdriver.chrome.service.Service(str(driver))
     chrome = webdriver.Chrome(options=options, service=service)
+    # A busy machine is waited for.
     chrome.set_page_load_timeout(600)
+    chrome.set_script_timeout(600)
     yield chrome
     chrome.quit()
 
@@ -576,7 +578,9 @@ def size_of_window(width: int) -> dict[str, Any]:
     return {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
 
 
-def until(done: Callable[[], Any], seconds: float = 600) -> Any:
+def until(done: Callable[[], Any]) -> Any:
+    """What is asked for again and again, for as long as no machine takes that works."""
+    seconds = 600
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if value := done():
@@ -591,6 +595,8 @@ return document.getElementById("view").data.filter((each) => each.name.startsWit
 ROWS = """
 return [...document.querySelectorAll("#rates tbody tr")].map((row) => [row.querySelector("th").textContent,
   ...["length", "rate", "share"].map((name) => row.querySelector("." + name).textContent)])"""
+#: Ends when what was asked for before is drawn.
+FRAMES = "requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(arguments[0])))"
 MOVE = """
 const slider = document.getElementById("travel");
 slider.value = arguments[0];
@@ -603,13 +609,13 @@ def number(text: str) -> float:
 
 def check_clean(chrome: Any) -> None:
     """Check that a page that was just opened has no fault, asks no network, paints, and fits a telephone."""
-    time.sleep(0.5)
+    painted = "const paint = performance.getEntriesByName('first-contentful-paint'); return paint.length && paint[0]"
+    assert until(lambda: chrome.execute_script(f"{painted}.startTime")) > 0
+    chrome.execute_async_script(FRAMES)
     assert [entry for entry in chrome.get_log("browser") if entry["level"] == "SEVERE"] == []
     events = [json.loads(entry["message"])["message"] for entry in chrome.get_log("performance")]
     asked = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]
     assert [url for url in asked if not url.startswith(("data:", "blob:"))] == [chrome.current_url]
-    paint = chrome.execute_script("return performance.getEntriesByName('first-contentful-paint')[0].startTime")
-    assert paint > 0
     assert chrome.execute_script("return document.querySelectorAll('#view canvas').length") > 0
     # Nothing is wider than the page, also on a telephone.
     chrome.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size_of_window(400))
@@ -810,9 +816,11 @@ def test_hover_over_a_limb_and_slider_by_keyboard(opened: Callable[..., Any], pa
     for x, y in places:
         with suppress(Exception):
             ActionChains(chrome, duration=0).move_to_element_with_offset(view, x, y).perform()
+        # The point under the pointer is looked for when the next picture is drawn.
+        chrome.execute_async_script(FRAMES)
         if chrome.execute_script("return window.found"):
             break
-    name, text = until(lambda: chrome.execute_script("return window.found"), 5)
+    name, text = chrome.execute_script("return window.found")
     row = result["limbs"].index(name.removeprefix("limb "))
     text = text.replace("\N{MINUS SIGN}", "-")
     assert f"<b>{name}</b>" in text
