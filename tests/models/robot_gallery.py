@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from builders import Array
 from robot_files import Robot, every_joint
 
 import screwsynth.models
 
-Array = NDArray[np.float64]
 GALLERY = {path.stem: path for path in sorted((Path(screwsynth.models.__file__).parent / "robots").glob("*.toml"))}
 SPECIAL = {path.stem: path for path in sorted((Path(__file__).parent / "special").glob("*.toml"))}
 FILES = GALLERY | SPECIAL

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from builders import Array
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from screwsynth.models import ModelError, hexapod, moved_screw, stewart_gough
 from screwsynth.nlp import Case, Free, RobotState, Rotation, Task, evaluate, formulate, solve
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 HEXAPOD = hexapod()

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array
 from casadi import SX
-from numpy.typing import NDArray
 
 from screwsynth.models import (
     Model,
@@ -332,7 +332,6 @@ def test_robots_of_the_gallery(name: str) -> None:
 
 # The robots that are given by their rows equal their descriptions joint by joint: F and its gradient.
 
-Array = NDArray[np.float64]
 Build = Callable[[], Model]
 TWIST = np.array([0.3, -0.5, 0.7, 4.0, 6.0, -2.0])
 POINTS = 20

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array
 from casadi import SX
-from numpy.typing import NDArray
 
 from screwsynth.models import (
     Model,
@@ -24,8 +24,6 @@ from screwsynth.models import (
     robot_function,
     three_upu,
 )
-
-Array = NDArray[np.float64]
 
 CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
 LENGTH = 0.7

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array
 from mechanism_robots import Engine, four_bar_delta, geared, projector, turn, without
 from mujoco_robots import Oracle
-from numpy.typing import NDArray
 from robot_files import Joint, every_joint, robot_of
 
 import screwsynth.models
@@ -351,7 +351,6 @@ def test_welds_and_locked_actuators_make_one_body() -> None:
 
 # Wrenches and centre of a member against the forces and couples that mechanics gives for each type of limb.
 
-Array = NDArray[np.float64]
 X, Y, Z = np.eye(3)
 
 

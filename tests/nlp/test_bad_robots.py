@@ -4,14 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from builders import Run, refusal_of, saved
 
 from screwsynth.nlp import CaseError, load_case
-
-Run = Callable[..., tuple[int, str, str]]
 
 ROBOT = """name = "rps"
 home = [0, 0, "h"]
@@ -30,10 +28,7 @@ joints = [ { type = "R", at = "B", axis = "y" },
 """
 CASE = """[robot]
 file = "robot.toml"
-[robot.parameters]
-rb = 1
-rp = 0.6
-h = 1.1
+parameters = { rb = 1, rp = 0.6, h = 1.1 }
 [pose]
 position = [0, 0, { min = 0.9, max = 1.3 }]
 [[task]]
@@ -194,9 +189,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
 
 def put(folder: Path, content: str | bytes, case: str = CASE) -> str:
     (folder / "robot.toml").write_bytes(content if isinstance(content, bytes) else content.encode())
-    path = folder / "case.toml"
-    path.write_text(case, encoding="utf-8")
-    return str(path)
+    return str(saved(folder / "case.toml", case))
 
 
 def test_every_broken_robot_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
@@ -234,10 +227,7 @@ def test_a_robot_file_that_cannot_be_read_is_refused_with_status_2(tmp_path: Pat
         (ROBOT.replace(AXIS, '"().__class__"'), CASE, "robot.toml: limb 1, joint 2 (P), axis: is"),
         (ROBOT.replace(", actuated = true", ""), CASE, "robot.toml: actuated: is given at no joint"),
     ):
-        status, out, err = cli("solve", put(tmp_path, content, case), "--json", str(tmp_path / "result.json"))
-        assert (status, out) == (2, "")
-        assert fault in err
-        assert err.count("\n") == 1
+        refusal_of(cli("solve", put(tmp_path, content, case), "--json", str(tmp_path / "result.json")), fault)
         assert not (tmp_path / "result.json").exists()
 
 

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from builders import Run, case_from, output_of, refusal_of
 from generated import STRICT, made, needs_compiler, written
 
-from screwsynth.nlp import case_from_tables, load_case, solve
+from screwsynth.nlp import load_case, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.embedding.codegen import generate_c, size_words
 from screwsynth.nlp.embedding.ctext import identifier
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 def test_size_is_said_before_the_folder_is_written(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    code, out, err = cli("codegen", "paper-4.1-helical", "--no-measure", "--out", str(tmp_path / "made"))
-    assert (code, err) == (0, "")
+    out = output_of(cli("codegen", "paper-4.1-helical", "--no-measure", "--out", str(tmp_path / "made")))
     size, words = out.splitlines()[0].split(" ", 1)
     files = [path for path in (tmp_path / "made").iterdir() if path.suffix in {".c", ".h"}]
     assert int(size) == pytest.approx(sum(path.stat().st_size for path in files) / 1000, abs=1)
@@ -34,14 +31,14 @@ def test_size_is_said_before_the_folder_is_written(tmp_path: Path, cli: Run, mon
 def test_names_are_identifiers(name: str) -> None:
     assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", identifier(name))
     tables = tomllib.loads(find_case("paper-4.2-translation").read_text(encoding="utf-8"))
-    assert f"{identifier(name)}.h" in generate_c(case_from_tables(tables, name=name, source="x.toml"), "")
+    assert f"{identifier(name)}.h" in generate_c(case_from(tables, name), "")
 
 
 def test_names_of_two_cases_do_not_meet() -> None:
     tables = tomllib.loads(find_case("paper-4.2-translation").read_text(encoding="utf-8"))
     declared: dict[str, set[str]] = {}
     for name in ("x", "x solver", "x-sqp", "x qp", "x casadi", "x-f", "x variable"):
-        files = generate_c(case_from_tables(tables, name=name, source="x.toml"), "")
+        files = generate_c(case_from(tables, name), "")
         own = {file for file in files if file.startswith("screwsynth")}
         text = "\n".join(files[file] for file in own)
         own |= set(re.findall(r"#define (SCREWSYNTH_\w+)", text)) - {"SCREWSYNTH_STATUS", "SCREWSYNTH_VERSION"}
@@ -60,13 +57,12 @@ def test_what_a_case_says_cannot_break_the_c(tmp_path: Path) -> None:
         "pose": {"position": [0, 0, 40]},
         "task": [{"name": '??/"\n*/', "sense": "max", "axis": [0, 0, 1], "pitch": float("inf")}],
     }
-    where = written(case_from_tables(tables, name="3 legs!", source="bad.toml"), tmp_path)
+    where = written(case_from(tables, "3 legs!"), tmp_path)
     assert "0 failed" in made(where, f"CFLAGS={STRICT} -O2 -Wno-trigraphs", "test")
 
 
 def test_the_command_line_writes_the_folder(tmp_path: Path, cli: Run) -> None:
-    code, out, err = cli("codegen", "paper-4.1-helical", "--no-measure", "--out", str(tmp_path / "made"))
-    assert (code, err) == (0, "")
+    out = output_of(cli("codegen", "paper-4.1-helical", "--no-measure", "--out", str(tmp_path / "made")))
     assert "make -C" in out
     names = {path.name for path in (tmp_path / "made").iterdir()}
     assert {"case.toml", "Makefile", "CMakeLists.txt", "README.md", "selftest.c", "bench.c"} <= names
@@ -92,8 +88,7 @@ def test_a_compiled_solve_is_the_same_and_compiles_once(
     assert abs(interpreted.F - compiled.F) <= 1e-12 * interpreted.F
     (library,) = (tmp_path / "screwsynth").iterdir()
     made_at = library.stat().st_mtime_ns
-    code, out, err = cli("solve", "paper-4.3", "--starts", "2", "--compiled")
-    assert (code, err) == (0, "")
+    out = output_of(cli("solve", "paper-4.3", "--starts", "2", "--compiled"))
     assert "408.803" in out
     assert [path.stat().st_mtime_ns for path in (tmp_path / "screwsynth").iterdir()] == [made_at]
 
@@ -104,7 +99,4 @@ def test_compiling_without_a_compiler_is_told_in_a_sentence(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setenv("CC", compiler)
-    code, out, err = cli("solve", "paper-4.1-helical", "--compiled")
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert "compiler" in err
+    refusal_of(cli("solve", "paper-4.1-helical", "--compiled"), "compiler")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from builders import saved
 from generated import COMPILERS, made, needs_compiler, written
 
 from screwsynth.nlp.embedding.ctext import identifier
@@ -32,8 +33,7 @@ def run(where: Path, flags: str, *runner: str) -> subprocess.CompletedProcess[st
 @needs_compiler
 @pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.4-snu", "camera-mount"])
 def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
-    probe = tmp_path / "probe.c"
-    probe.write_text("int main(void) { return 0; }", encoding="utf-8")
+    probe = saved(tmp_path / "probe.c", "int main(void) { return 0; }")
     flags = "-fsanitize=address,undefined -fno-sanitize-recover=all"
     built = [COMPILERS[0], *flags.split(), str(probe), "-o", str(tmp_path / "probe")]
     if subprocess.run(built, check=False, capture_output=True).returncode:

@@ -10,7 +10,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array
 
 from screwsynth.models import (
     Closure,
@@ -25,8 +25,6 @@ from screwsynth.models import (
     stewart_gough,
 )
 from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, formulate
-
-Array = NDArray[np.float64]
 
 POINTS = 3  # of each program
 

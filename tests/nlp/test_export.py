@@ -4,7 +4,6 @@ import csv
 import io
 import re
 import tomllib
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,8 +12,8 @@ import ezdxf
 import mujoco
 import numpy as np
 import pytest
+from builders import Array, case_from, starter
 from mujoco_trees import Tree
-from numpy.typing import NDArray
 
 from screwsynth.models import WrenchKind, robot, robot_function
 from screwsynth.models.catalog import gallery_names
@@ -28,7 +27,6 @@ from screwsynth.nlp import (
     Nlp,
     QuantityLimit,
     Task,
-    case_from_tables,
     evaluate,
     formulate,
 )
@@ -45,17 +43,10 @@ from screwsynth.nlp.exchange.writing.mjcf import mjcf_text
 from screwsynth.nlp.exchange.writing.numbers import quaternion, roll_pitch_yaw
 from screwsynth.nlp.exchange.writing.urdf import urdf_of
 
-Array = NDArray[np.float64]
-Run = Callable[..., tuple[int, str, str]]
-
 ROBOTS = (*gallery_names(), "stewart-gough", "hexapod", "three-upu")
 #: One of each kind of limb and of closing, for tests that build the robot again.
 SOME = ("3-rps", "delta-parallelogram", "three-upu")
 OTHERS = ("delta", "exechon", "spherical-3-rrr", "6-rss", "hexapod")
-
-
-def starter(name: str) -> Case:
-    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
 
 
 @cache
@@ -251,7 +242,7 @@ def test_ranges_count_from_the_pose_and_reach_the_actuators() -> None:
     text = starter_case(robot_function("3-rps")()).replace("actuator_length", "# actuator_length")
     tables = tomllib.loads(text)
     tables["limits"] = {"actuator_length": {"min": -0.4, "max": 0.5}, "joint": {"1:1": {"max": 30}}}
-    nlp = formulate(case_from_tables(tables, name="rps", source="rps"))
+    nlp = formulate(case_from(tables, "rps"))
     found = mechanism_of(nlp, closed_start(nlp))
     state = evaluate(nlp, closed_start(nlp))
     joints = {joint.name: joint for joint in found.mechanism.joints}

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import Array
 from link_robots import CASE, COUPLING, ROBOT
 from mujoco_trees import Tree
-from numpy.typing import NDArray
 
 from screwsynth.models.mechanism import wrenches_of
 from screwsynth.nlp import InputError, Task, evaluate, formulate, load_case
@@ -18,8 +18,6 @@ from screwsynth.nlp.exchange.reading.importing import Request, import_robot
 from screwsynth.nlp.exchange.reading.reduction import Ends
 from screwsynth.nlp.exchange.solved.mechanism_of import mechanism_of
 from screwsynth.nlp.exchange.writing.mjcf import mjcf_text
-
-Array = NDArray[np.float64]
 
 
 def work_rates(J: Array) -> Array:

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import Array, saved
 
 from screwsynth.nlp import InputError
 from screwsynth.nlp.exchange.reading.importing import Request, import_robot
 from screwsynth.nlp.exchange.reading.reduction import Ends
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def model(end: str) -> str:
@@ -32,8 +31,7 @@ def model(end: str) -> str:
 
 
 def imported(folder: Path, text: str) -> Any:  # noqa: ANN401 - tables of a robot
-    path = folder / "loop.xml"
-    path.write_text(text, encoding="utf-8")
+    path = saved(folder / "loop.xml", text)
     return import_robot(Request(path, Ends("plate"), closes=True))
 
 

@@ -3,16 +3,14 @@
 import csv
 import io
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import Run, output_of, saved
 
 from screwsynth.nlp import load_case, load_result, pareto
 from screwsynth.nlp.results.front import FrontResult
-
-Run = Callable[..., tuple[int, str, str]]
 
 # Six legs with one free height. Of unit forces along z, x and y the sums of squares are F of the translations along
 # these axes, so that F up + F side + F of the third axis = 6, and the last two are equal by the symmetry of the robot.
@@ -22,11 +20,7 @@ length = "cm"
 [robot]
 model = "stewart-gough"
 layout = "aligned"
-[robot.parameters]
-x1 = 12
-x2 = 4
-x3 = 30
-x4 = 20
+parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = 20 }
 [pose]
 position = [0, 0, { min = 5, max = 40 }]
 [limits]
@@ -50,9 +44,7 @@ EXACT = 1e-8
 
 @pytest.fixture
 def case(tmp_path: Path) -> str:
-    path = tmp_path / "case.toml"
-    path.write_text(CASE, encoding="utf-8")
-    return str(path)
+    return str(saved(tmp_path / "case.toml", CASE))
 
 
 def table(text: str) -> list[dict[str, str]]:
@@ -62,8 +54,7 @@ def table(text: str) -> list[dict[str, str]]:
 def test_two_objectives_on_a_line(case: str, tmp_path: Path, cli: Run) -> None:
     out, picture = tmp_path / "front.csv", tmp_path / "front.svg"
     goals = ("--goals", "max F:up", "--goals", "max F:side")
-    code, said, err = cli("pareto", case, *goals, "--points", "9", "--csv", str(out), "--plot", str(picture))
-    assert (code, err) == (0, "")
+    said = output_of(cli("pareto", case, *goals, "--points", "9", "--csv", str(out), "--plot", str(picture)))
     assert said.startswith("9 points on the front of max F:up and max F:side\n")
     rows = table(out.read_text())
     # The terminal has the same points.
@@ -116,11 +107,7 @@ length = "cm"
 [robot]
 model = "stewart-gough"
 layout = "aligned"
-[robot.parameters]
-x1 = 12
-x2 = 12
-x3 = 20
-x4 = 20
+parameters = { x1 = 12, x2 = 12, x3 = 20, x4 = 20 }
 [pose]
 position = [{ min = 0, max = 20 }, { min = 0, max = 20 }, { min = 10, max = 15 }]
 [limits]

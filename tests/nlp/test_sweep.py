@@ -5,23 +5,23 @@ import os
 import signal
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import Run, starter_tables
 
-from screwsynth.nlp import InputError, build_model, case_from_tables, load_case, load_result, solve
+from screwsynth.nlp import InputError, case_from_tables, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.many import Numbers, judge_many
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.results.sweep import SweepResult
+from screwsynth.nlp.sweeps import cluster
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
 from screwsynth.nlp.sweeps.journal import Journal
 from screwsynth.nlp.sweeps.points import Points, grid
@@ -29,8 +29,6 @@ from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
 from screwsynth.nlp.sweeps.source import CaseSource
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
-
-Run = Callable[..., tuple[int, str, str]]
 
 CASE = "paper-4.1-helical"
 #: Case files that say the same number in two ways are the same to this part.
@@ -183,7 +181,7 @@ def test_rows_with_certificates_are_taken_up(tmp_path: Path) -> None:
 
 
 def test_joints_are_no_design() -> None:
-    case = case_from_tables(tomllib.loads(starter_case(build_model("3-rps"))), name="mine", source="mine")
+    case = case_from_tables(starter_tables("3-rps"), name="mine", source="mine")
     found = run_in_python(case, {"task.pitch": (2,)}, starts=1)
     assert [name for name in found.design if name.startswith("q") and name[1:2].isdigit()] == []
     assert set(found.design) == {"rb", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z"}
@@ -401,8 +399,9 @@ def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_an_unreachable_cluster(tmp_path: Path, cli: Run) -> None:
+def test_an_unreachable_cluster(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_WAIT", 0.2)
     out = tmp_path / "out.csv"
     code, _, err = cli("sweep", CASE, *OVER, "--dask", "tcp://127.0.0.1:9", "--out", str(out))
     assert (code, out.exists()) == (2, False)

@@ -3,11 +3,11 @@
 import csv
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from builders import Run, output_of, refusal_of, saved
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import (
@@ -29,19 +29,13 @@ from screwsynth.nlp import (
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.tradeoff import TradeoffResult
 
-Run = Callable[..., tuple[int, str, str]]
-
 SMALL = """\
 title = "A platform on a column"
 [units]
 length = "cm"
 [robot]
 model = "stewart-gough"
-[robot.parameters]
-x1 = 12
-x2 = 8
-x3 = 20
-x4 = 8
+parameters = { x1 = 12, x2 = 8, x3 = 20, x4 = 8 }
 [pose]
 position = [0, { min = -5, max = 5 }, { min = 20, max = 50 }]
 rotation = { axis = [0, 0, 1], angle = { min = -25, max = 25 } }
@@ -60,9 +54,7 @@ LIMIT = "limits.leg_length.max"
 
 @pytest.fixture
 def small(tmp_path: Path) -> str:
-    path = tmp_path / "small.toml"
-    path.write_text(SMALL, encoding="utf-8")
-    return str(path)
+    return str(saved(tmp_path / "small.toml", SMALL))
 
 
 def curve(cli: Run, case: str, over: str, *more: str, status: int = 0) -> dict[str, Any]:
@@ -77,8 +69,7 @@ def test_each_point_is_the_optimum_of_the_case_with_that_value(small: str, cli: 
     assert [point["value"] for point in found["points"]] == [26, 30, 34, 38, 42]
     assert (found["over"], found["unit"], found["senses"], found["tasks"]) == (LIMIT, "cm", ["max"], ["drive"])
     for point in found["points"]:
-        path = tmp_path / "edited.toml"
-        path.write_text(f"{SMALL}[limits]\nleg_length = {{ max = {point['value']} }}\n", encoding="utf-8")
+        path = saved(tmp_path / "edited.toml", f"{SMALL}[limits]\nleg_length = {{ max = {point['value']} }}\n")
         solution = solve(load_case(str(path)))
         assert point["F"] == pytest.approx(solution.F, rel=1e-9)
         assert point["tasks"] == [point["F"]]
@@ -108,8 +99,7 @@ def test_the_slope_is_that_of_the_curve(over: str, unit: str, small: str, cli: R
 
 
 def test_the_slope_of_a_smallest_value_that_is_minimised(small: str, cli: Run, tmp_path: Path) -> None:
-    path = tmp_path / "min.toml"
-    path.write_text(SMALL.replace('"max"', '"min"'), encoding="utf-8")
+    path = saved(tmp_path / "min.toml", SMALL.replace('"max"', '"min"'))
     for over in ("p_y.min=-4.99:-5.01:3", "p_z.min=30.01:29.99:3", "limits.leg_length.min=30.02:30:3"):
         first, middle, last = curve(cli, str(path), over)["points"]
         difference = (last["F"] - first["F"]) / (last["value"] - first["value"])
@@ -157,8 +147,7 @@ def test_csv_picture_and_page(small: str, cli: Run, tmp_path: Path) -> None:
     files = {kind: tmp_path / f"curve.{kind}" for kind in ("csv", "png", "svg", "html", "json")}
     arguments = ["--csv", str(files["csv"]), "--page", str(files["html"]), "--json", str(files["json"])]
     for kind in ("png", "svg"):
-        code, _, err = cli("tradeoff", small, "--over", f"{LIMIT}=12:40:5", "--plot", str(files[kind]), *arguments)
-        assert (code, err) == (0, "")
+        output_of(cli("tradeoff", small, "--over", f"{LIMIT}=12:40:5", "--plot", str(files[kind]), *arguments))
     result = json.loads(files["json"].read_text(encoding="utf-8"))
     again = load_result(files["json"])
     assert isinstance(again, TradeoffResult)
@@ -201,10 +190,7 @@ def test_csv_picture_and_page(small: str, cli: Run, tmp_path: Path) -> None:
 )
 def test_ranges_that_are_refused(over: str, words: str, small: str, cli: Run, tmp_path: Path) -> None:
     target = tmp_path / "out.csv"
-    code, out, err = cli("tradeoff", small, "--over", over, "--csv", str(target))
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert words in err
+    refusal_of(cli("tradeoff", small, "--over", over, "--csv", str(target)), words)
     assert not target.exists()
 
 
