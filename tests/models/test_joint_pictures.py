@@ -8,9 +8,9 @@ import pytest
 from builders import Array
 from mujoco_robots import Oracle
 from robot_files import every_joint
-from robot_gallery import GALLERY, table
+from robot_gallery import GALLERY, RANKS, table
 from robot_mjcf import elementary
-from test_robot_gallery import RANKS, configurations
+from test_robot_gallery import configurations
 
 from screwsynth.models import Body, JointKind, LinkKind, Model, robot
 from screwsynth.nlp import Case, Task, result_of, solve
