@@ -113,6 +113,10 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
     # Keys.
     ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, length_unit, home, dimensions, derived, limb"),
+    ("name =", "nme =", "nme: no such key; did you mean 'name'?"),
+    ("joints =", "joint =", "limb 1, joint: no such key; did you mean 'joints'?"),
+    ('axis = "A - B", ', "", "limb 1, joint 2 (P), axis: is missing"),
+    ('"A - B"', "3", "limb 1, joint 2, axis = 3: must be an expression in quotes or a list of 3"),
     (LAST, 'at = "A", friction = 1 }', "limb 1, joint 3, friction: no such key; allowed: type, name, at, axis"),
     ("typical = 1.0", "typical = 1.0, min = 0", "dimensions, rb, min: no such key; allowed: typical, kind, description"),
     ("repeat =", "mirror = true\nrepeat =", "limb 1, mirror: no such key; allowed: name, repeat, points, joints, branch"),
