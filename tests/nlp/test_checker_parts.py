@@ -72,7 +72,7 @@ def test_bounds_of_a_limb_are_shown_for_the_boxes_claimed(count: int, side: int)
     x, rng = SX.sym("x", 2), np.random.default_rng(count)
     function = (5 + side * (x[0] + 2 * x[1])) ** 2 / (4 - side * x[0])
     nlp = formulate(load_case("paper-4.2-rotation"))
-    form = StandardForm(nlp, x, -np.ones(2), np.ones(2), (function,), (), (), 1.0, has_epigraph=False)
+    form = StandardForm(nlp, x, -np.ones(2), np.ones(2), (function,), ())
     for _ in range(5):
         lower = rng.uniform(-1, 0.8, (count, 2))
         upper = lower + rng.uniform(0.01, 0.2, (count, 2))

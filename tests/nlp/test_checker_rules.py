@@ -108,7 +108,7 @@ def random_form(seed: int, is_equation: bool) -> StandardForm:
         Condition("cap", polynomial(x[:2]) - 0.5, is_equation=False),
         Condition("relation", x[2] - 0.3 * polynomial(x[:2]), is_equation=is_equation),
     )
-    return StandardForm(nlp, x, -np.ones(N), np.ones(N), functions, conditions, (1.0,) * 4, 1.0, has_epigraph=False)
+    return StandardForm(nlp, x, -np.ones(N), np.ones(N), functions, conditions)
 
 
 def attempt(

@@ -140,8 +140,9 @@ def check_agreement(name: str, part: float, degrees: float, limit: float) -> int
     again, _ = judged_on_paper(case)
     assert verdicts(judged) == verdicts(again)
     assert {each.outcome for each in judged.extremes if each.limit} <= {Outcome.PROVED, Outcome.REFUTED}
-    assert check_shown(case, again) == check_shown(case, judged)
-    return check_shown(case, judged)
+    count = check_shown(case, judged)
+    assert check_shown(case, again) == count
+    return count
 
 
 @pytest.mark.parametrize("name", ["3-prs", "five-bar"])
@@ -150,7 +151,7 @@ def test_limits_are_judged_alike_with_a_proof_and_without(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", gallery_names())
+@pytest.mark.parametrize("name", sorted({*gallery_names()} - {"3-prs", "five-bar"}))
 def test_limits_of_all_robots_are_judged_alike_with_a_proof_and_without(name: str) -> None:
     assert check_agreement(name, 0.02, 5, 0.01) >= 2 * len(build_model(name).quantities[0].owners)
 
