@@ -223,7 +223,8 @@ class RankClaim:
             known = np.asarray(np.isfinite(M).all(axis=(1, 2)))
             null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._freedoms :]
             none = np.zeros((len(M), A.shape[1], *null.shape[1:]))
-            M, E, A = (np.concatenate(each, axis=-2) for each in ((M, null), (E, none[:, 0]), (A, none)))
+            rows = (M, null), (E, np.zeros_like(null)), (A, none)
+            M, E, A = (np.concatenate(each, axis=-2) for each in rows)
         C, p = inverses(M), len(self.free)
         moved = np.abs(C[:, None] @ A)
         # The error of a centre is no larger than the tolerance in any direction.
