@@ -161,25 +161,20 @@ def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, i
         ProofError: the bytes are no tree of the workspace, a leaf is not outside of it as it is claimed to be, or the
             claim could not be shown.
     """
-    reader, lows, highs, leaves = TreeReader(tree), [], [], [0]
-
-    def leaf(kind: int, _: int, low: FloatArray, high: FloatArray) -> None:
-        """Count a leaf, and keep it unless it is outside of the workspace."""
-        leaves[0] += 1
+    reader, leaves, boxes = TreeReader(tree), 0, []
+    for kind, _, low, high in reader.walk(root.lower, root.upper, frozenset({Node.CUT})):
+        leaves += 1
         if kind == Node.BOUNDED:
-            lows.append(low)
-            highs.append(high)
+            boxes.append((low, high))
         elif kind != Node.OUTSIDE:
             raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
         elif not root.is_outside(low[None], high[None])[0]:
             raise ProofError(f"the box {_words(low, high)} is not outside of the workspace")
-
-    reader.walk(root.lower, root.upper, leaf, frozenset({Node.CUT}))
     reader.finish()
-    if not lows:
-        return leaves[0], 0
-    rule = _PoseRule(claim, root, np.array(lows).T, np.array(highs).T)
-    return leaves[0], show(rule, rule.lower, rule.upper)
+    if not boxes:
+        return leaves, 0
+    rule = _PoseRule(claim, root, *(np.array(ends).T for ends in zip(*boxes, strict=True)))
+    return leaves, show(rule, rule.lower, rule.upper)
 
 
 class _PoseRule:
