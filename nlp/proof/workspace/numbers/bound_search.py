@@ -17,8 +17,7 @@ from casadi import SX
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....interruption import one_search
-from ...boxes.rows import Boxes, Columns, bisected, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
+from ...boxes.search import TOO_SMALL, Boxes, Columns, Effort, Order, Rule, Search, Verdicts, bisected, some
 from ...enclosure.forms import Encloser, Forms
 from ..ranks.covering import APART, Followed, LoopRule
 from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
@@ -128,7 +127,7 @@ class OverPoses:
         ends = np.hstack([lower[:, self._free], -errors]).T, np.hstack([upper[:, self._free], errors]).T
         if not len(ends[0]):
             ends = np.zeros((1, len(lower))), np.zeros((1, len(lower)))
-        return self._encloser(*ends) if errors.size else self._encloser.second(*ends).as_terms()
+        return self._encloser(*ends) if errors.size else self._encloser.second(*ends)
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""

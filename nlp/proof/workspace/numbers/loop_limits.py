@@ -23,8 +23,7 @@ from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import one_search
-from ...boxes.rows import Boxes, joined, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
 from ...enclosure.forms import Encloser, Forms
 from ...enclosure.tape import compile_tape
 from ...statement.claims import claims_of

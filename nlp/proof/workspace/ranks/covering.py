@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .....models.arrays import first_largest
-from ...boxes.rows import Boxes, bisected, joined, some
-from ...boxes.search import Rule
+from ...boxes.search import Boxes, Rule, bisected, joined, some
 from ..robot.posed_robot import Problem
 from .krawczyk import Relation, no_relation
 from .loop_boxes import Examined, Examiner, LoopBoxes

@@ -11,7 +11,7 @@ import numpy as np
 
 from .....models import FloatArray
 from ...boxes.engine import MOST_VARIABLES
-from ...boxes.rows import some
+from ...boxes.search import some
 from ...enclosure.forms import Encloser, Forms
 from ..robot.posed_robot import Problem
 from ..robot.tolerance_model import ToleranceModel

@@ -20,7 +20,7 @@ from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
-from ...boxes.rows import some
+from ...boxes.search import some
 from ...statement.machine import joint_centres
 from ..numbers.bound_search import OverPoses
 from ..numbers.clearance import Clearance
