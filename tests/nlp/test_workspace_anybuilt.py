@@ -30,6 +30,7 @@ from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers import expressions
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
@@ -37,7 +38,6 @@ from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
-from screwsynth.nlp.proof.workspace.tolerance import machine_number
 from screwsynth.nlp.proof.workspace.tolerance import machines as tolerance
 from screwsynth.nlp.proof.workspace.tolerance.machines import Machines, Proving, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -302,9 +302,9 @@ def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
 
 
 def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    spread = machine_number.by_centres
+    spread = expressions.by_centres
     monkeypatch.setattr(tolerance, "_OUTWARDS", 0.8)
-    monkeypatch.setattr(machine_number, "by_centres", lambda slopes: 0.8 * spread(slopes))
+    monkeypatch.setattr(expressions, "by_centres", lambda slopes: 0.8 * spread(slopes))
     for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
         assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
 

@@ -21,7 +21,6 @@ from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
 from .numbers.extremes import GAP, Extreme, prove_extreme
-from .numbers.loop_limits import loop_extremes
 from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, asked_spectra_extremes, searched_limits
 from .numbers.strokes import Refine, with_strokes
@@ -214,7 +213,7 @@ class _Numbers:
             model=self.closed.model,
             box=pose_box(self.workspace),
             legs=joint_centres(case),
-            built=None if machines is None else (machines.built, machines.family),
+            family=None if machines is None else machines.family,
             unknown=self.unknown,
             shortest=shortest,
         )
@@ -246,12 +245,8 @@ class _Numbers:
         claims = [replace(each, uncovered=self.unknown) for each in claims]
         decided: list[Extreme] = []
         if not case.joint_centre_tolerance:
-            decided = [
-                each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
-            ]
-            if is_reached:
-                proving = Proving(self.gap, self.jobs)
-                decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
+            proving, options = Proving(self.gap, self.jobs), {"with_objective": with_objective, "with_free": is_reached}
+            decided = list(shown_extremes(case, self.closed, box, names, proving, **options))
         yield from self._add_proved(found, layout, claims, decided)
         return partial(_refined, partial(prove, paper=self.paper, again=True), claims)
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,11 +26,11 @@ from .....models import FloatArray, Model
 from .....models.joints import RobotError
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
-from ....case.limits.constraint import Reading
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
+from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
 from ...statement.machine import INSIDE, CentreErrors
 from ...statement.tolerance import (
@@ -41,13 +42,13 @@ from ...statement.tolerance import (
     machine_layout,
     second_order_name,
 )
-from ..numbers.bound_search import Minimum
-from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
+from ..numbers.bound_search import Minimum, smallest_values
+from ..numbers.expressions import Expressions
+from ..numbers.extremes import Extreme, extreme_of, goal_of, prove_extreme
 from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, build_problem
 from ..robot.tolerance_model import ToleranceModel, family_of
 from ..verdict import Outcome
-from .machine_number import smallest_of_machines
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
@@ -129,6 +130,17 @@ def machines_of(case: Case, model: Model, box: PoseBox) -> Machines:
     return Machines(case, model, built, family_of(case, built, problem, case.joint_centre_tolerance or 0.0))
 
 
+def design_alone(case: Case, closed: ClosedForm, box: PoseBox) -> Machines:
+    """Return the design as the only machine within a tolerance of nothing.
+
+    Raises:
+        NotJudgedError: its loops cannot be followed.
+    """
+    built = BuiltModel(closed.model, (), closed.reaches)
+    family = family_of(case, built, build_problem(case, closed.model, box), 0.0)
+    return Machines(case, closed.model, built, family)
+
+
 def machine_extremes(
     machines: Machines,
     quantities: Sequence[str],
@@ -157,7 +169,7 @@ def machine_extremes(
         if proving.progress is not None:
             proving.progress(claim.name, done, len(reaches) + len(claims))
         if done >= len(reaches) and not reached:
-            yield not_bounded(claim, _OUT_OF_REACH)
+            yield extreme_of(claim, Minimum(reason=_OUT_OF_REACH))
             continue
         found = machine_extreme(machines, claim, proving)
         reached = reached and (done >= len(reaches) or found.outcome is Outcome.PROVED)
@@ -165,13 +177,20 @@ def machine_extremes(
 
 
 def shown_extremes(
-    case: Case, closed: ClosedForm, box: PoseBox, quantities: Sequence[str], proving: Proving, *, with_objective: bool
+    case: Case,
+    closed: ClosedForm,
+    box: PoseBox,
+    quantities: Sequence[str],
+    proving: Proving,
+    *,
+    with_objective: bool,
+    with_free: bool = True,
 ) -> Iterator[Extreme]:
-    """Yield the extremes of numbers without a limit of a design with loops, in the assembly of home.
+    """Yield the extremes of a design with loops, in the assembly of home: of limits that are decided, then of others.
 
     Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is singular.
-    The design is searched as the only machine within a tolerance of nothing. None is yielded of a robot without loops,
-    or one whose loops cannot be followed.
+    The design is searched as the only machine within a tolerance of nothing, for all limits together. None is yielded
+    of a robot without loops, or one whose loops cannot be followed.
 
     Args:
         case: with fixed dimensions.
@@ -180,29 +199,35 @@ def shown_extremes(
         quantities: names of measures.
         proving: how they are proved.
         with_objective: whether F of each task is bounded.
+        with_free: whether numbers without a limit are.
 
     Raises:
         InputError: the robot has no measure of a name.
     """
     if not closed.model.unknowns:
         return
-    built = BuiltModel(closed.model, (), closed.reaches)
     try:
-        family = family_of(case, built, build_problem(case, closed.model, box), 0.0)
+        machines = design_alone(case, closed, box)
     except NotJudgedError:
         return
-    machines = Machines(case, closed.model, built, family)
-    for claim in machines.symbols.claims(quantities, with_objective=with_objective)[1]:
+    claims = machines.symbols.claims(quantities, with_objective=with_objective)[1]
+    limited = [claim for claim in claims if claim.limit is not None and _is_covered(machines, claim)]
+    if limited:
+        with suppress(UncoveredError):  # an equation of loops
+            found = _by_search(machines, limited, proving.gap, is_enough=True)
+            yield from (each for each in found if each.outcome is not Outcome.OPEN)
+    for claim in claims if with_free else ():
         if claim.limit is None:
             yield machine_extreme(machines, claim, proving)
 
 
-def not_bounded(claim: Claim, reason: str) -> Extreme:
-    """Return the extreme of a claim of which nothing is proved."""
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    limit = None if claim.limit is None else claim.reading.from_value(claim.limit)
-    nothing = (sign * math.inf, math.nan, None, Outcome.OPEN, 0, 0.0, reason)
-    return Extreme(claim.name, claim.sense, claim.reading.dimension, claim.key, limit, *nothing)
+def _is_covered(machines: Machines, claim: Claim) -> bool:
+    """Return whether a number has no operation without a rule."""
+    try:
+        compile_tape(ca.Function("number", [machines.family.coordinates], [machines.number(claim.expression)]))
+    except UncoveredError:
+        return False
+    return True
 
 
 def machine_extreme(machines: Machines, claim: Claim, proving: Proving, *, again: bool = False) -> Extreme:
@@ -215,16 +240,16 @@ def machine_extreme(machines: Machines, claim: Claim, proving: Proving, *, again
         again: whether the record takes the place of an earlier one of the same number.
     """
     if is_requested():
-        return not_bounded(claim, why_stopped())
+        return extreme_of(claim, Minimum(reason=why_stopped()))
     number = machines.number(claim.expression)
     try:
         if not machines.family.problem.dependent and is_smooth(number):
             found = _by_first_order(machines, claim, number, proving, again=again)
             if found is not None:
                 return found
-        return _by_search(machines, claim, number, proving)
+        return next(_by_search(machines, [claim], proving.gap))
     except UncoveredError as error:
-        return not_bounded(claim, str(error))
+        return extreme_of(claim, Minimum(reason=str(error)))
 
 
 def _by_first_order(machines: Machines, claim: Claim, number: SX, proving: Proving, *, again: bool) -> Extreme | None:
@@ -237,7 +262,7 @@ def _by_first_order(machines: Machines, claim: Claim, number: SX, proving: Provi
     sign = 1.0 if claim.sense is Sense.MAX else -1.0
     machine, whole, symbols = None, claim.expression, machines.symbols
     if any(ca.which_depends(number, family.errors, 1, True)):
-        single = _Machine(family, number, claim.reading, sign)
+        single = _Machine(family, number, sign)
         rest = machines.rest(claim, number, single)
         if not math.isfinite(rest):
             return None
@@ -259,12 +284,11 @@ class _Machine:
     Args:
         family: the machines, none of whose coordinates follows from others.
         number: (1, 1) in their coordinates, smooth.
-        reading: how it reads.
         sign: 1 where the largest value is meant, -1 where the smallest one is.
     """
 
-    def __init__(self, family: ToleranceModel, number: SX, reading: Reading, sign: float) -> None:
-        self._family, self._reading, self._sign = family, reading, sign
+    def __init__(self, family: ToleranceModel, number: SX, sign: float) -> None:
+        self._family, self._sign = family, sign
         slopes = ca.densify(ca.gradient(number, family.errors))
         self._function = ca.Function("number", [family.coordinates], [number, slopes])
 
@@ -274,62 +298,40 @@ class _Machine:
         return self._family.tolerance * float(np.nan_to_num(np.linalg.norm(slopes, axis=1)).sum())
 
     def worst(self, pose: PoseNumbers) -> tuple[CentreErrors, float]:
-        """Return the errors that are worst at a pose to first order, and the number, as people read it, with them."""
+        """Return the errors that are worst at a pose to first order, and the number with them."""
         family = self._family
         z = family.problem.box.coordinates(pose)[list(family.problem.free)]
         slopes = self._slopes(z)
         sizes = np.linalg.norm(slopes, axis=1, keepdims=True)
         unit = np.divide(slopes, sizes, out=np.zeros_like(slopes), where=sizes > 0)
         whole = np.concatenate([z, (self._sign * INSIDE * family.tolerance * unit).ravel()])
-        return family.errors_of(whole), self._reading.from_value(float(self._function(whole)[0]))
+        return family.errors_of(whole), float(self._function(whole)[0])
 
     def _slopes(self, z: FloatArray) -> FloatArray:
         """Return the derivatives (m, 3) by the errors of the design at a pose (n,)."""
         return np.array(self._function(self._family.exact(z))[1].full().reshape(-1, 3))
 
 
-def _by_search(machines: Machines, claim: Claim, number: SX, proving: Proving) -> Extreme:
-    """Return the extreme of a number by a search of boxes of poses for all machines.
+def _by_search(
+    machines: Machines, claims: Sequence[Claim], gap: float, *, is_enough: bool = False
+) -> Iterator[Extreme]:
+    """Yield the extremes of numbers by one search of boxes of poses for all machines.
+
+    Args:
+        machines: the machines.
+        claims: the numbers, in their symbols.
+        gap: as a part of a number.
+        is_enough: whether bounds within limits are enough whatever the gap is.
 
     Raises:
-        UncoveredError: the expression holds an operation without a rule.
+        UncoveredError: an expression holds an operation without a rule.
     """
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    slack = 0.0 if claim.limit is None else slack_of(claim.limit)
-    limit = None if claim.limit is None else -sign * claim.limit
-    found = smallest_of_machines(machines.family, -sign * number, gap=proving.gap, limit=limit, slack=slack)
-    return _of_minimum(machines.family, claim, found, slack)
-
-
-def _of_minimum(family: ToleranceModel, claim: Claim, found: Minimum, slack: float) -> Extreme:
-    """Return the extreme of a claim from the smallest value of its number, or of the negative of it."""
-    sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
-    is_bounded = math.isfinite(found.bound)
-    outcome, reason = (Outcome.OPEN if found.reason or not is_bounded else Outcome.PROVED), found.reason
-    if claim.limit is not None:
-        least = -sign * claim.limit
-        outcome = Outcome.OPEN
-        if found.value < least - slack:
-            outcome = Outcome.REFUTED
-        elif is_bounded and found.bound >= least - slack:
-            outcome = Outcome.PROVED
-    pose, centres = None, None
-    if math.isfinite(found.value):
-        problem = family.problem
-        pose = problem.box.pose(problem.pose_of(found.at))
-        centres = family.errors_of(found.at) if family.names else None
-    return Extreme(
-        name=claim.name,
-        sense=claim.sense,
-        dimension=claim.reading.dimension,
-        key=claim.key,
-        limit=None if claim.limit is None else read(claim.limit),
-        bound=read(-sign * found.bound) if is_bounded else sign * math.inf,
-        reached=math.nan if pose is None else read(-sign * found.value),
-        pose=pose,
-        outcome=outcome,
-        boxes=found.boxes,
-        seconds=found.seconds,
-        reason="" if outcome is not Outcome.OPEN else reason or CLOSE,
-        centres=centres,
-    )
+    family, problem = machines.family, machines.family.problem
+    signs = [1.0 if claim.sense is Sense.MAX else -1.0 for claim in claims]
+    numbers = [-sign * machines.number(claim.expression) for sign, claim in zip(signs, claims, strict=True)]
+    goals = [goal_of(claim, part=gap, is_enough=is_enough) for claim in claims]
+    every = smallest_values(Expressions(family, ca.vertcat(*numbers)), goals)
+    for claim, found in zip(claims, every, strict=True):
+        is_known = math.isfinite(found.value)
+        pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
+        yield extreme_of(claim, found, pose, centres=family.errors_of(found.at) if is_known and family.names else None)
