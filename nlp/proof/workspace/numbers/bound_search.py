@@ -101,7 +101,7 @@ class Number(ABC):
     def examine(self, forms: Forms, f: int) -> Tested:
         """Return the lower bounds (B, K) of boxes; none is regular."""
         lower, shares = self.over(forms, f)
-        shares = np.nan_to_num(shares)
+        shares = np.nan_to_num(shares, posinf=0.0)
         shares /= np.maximum(shares.sum(axis=2, keepdims=True), np.finfo(float).tiny)
         none = self.unknown(len(lower), f)
         return none._replace(shares=(shares * ~(lower >= self.levels)[:, :, None]).sum(axis=1), smallest=lower)
