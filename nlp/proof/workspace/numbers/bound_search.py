@@ -20,8 +20,7 @@ from ....interruption import one_search
 from ...boxes.rows import Boxes, Columns, bisected, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser, Forms
-from ..ranks.covering import APART, Followed, LoopRule
-from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
+from ..ranks.loop_boxes import APART, Examiner, Followed, LoopBoxes, LoopRule, are_between
 from ..ranks.rank_rule import Tested
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
@@ -114,7 +113,7 @@ class OverPoses:
         family = number.family
         self._number, self._box, self._free = number, problem.box, list(problem.free)
         # A single pose has no coordinate, and forms need one.
-        coordinates = problem.z if family is None else family.coordinates
+        coordinates = (family or problem).z
         self._encloser = Encloser(coordinates if coordinates.numel() else SX.sym("none"), number.entries)
         self._errors = np.zeros(0) if family is None else np.full(family.errors.numel(), family.tolerance)
 
@@ -379,8 +378,9 @@ class FollowedRule(LoopRule, SmallestValue[Followed]):
         smallest_in: Callable[[LoopBoxes], Value | None],
         goal: Goal,
     ) -> None:
-        LoopRule.__init__(self, problem, Examiner(problem, _NumberTest(number), family))
-        SmallestValue.__init__(self, goal, Value(math.inf, problem.start if family is None else family.start))
+        meant = family or problem
+        LoopRule.__init__(self, meant, Examiner(meant, _NumberTest(number)))
+        SmallestValue.__init__(self, goal, Value(math.inf, meant.start))
         self._smallest_in = smallest_in
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
@@ -436,7 +436,7 @@ def smallest_number(
 
     def smallest_in(boxes: LoopBoxes) -> Value | None:
         """Return the smallest value of the design in the middle of boxes."""
-        z = loops.all_closed(boxes.centre.T, D).T
+        z = loops.all_closed(boxes.centre[:, : len(problem.start)].T, D).T
         inside = are_between(z, boxes, D) & np.array([box.holds(each) for each in problem.pose_of(z)])
         values = np.where(inside, number.values(np.where(inside[:, None], z, problem.start)), np.nan)
         k = first_smallest(values) if np.isfinite(values).any() else -1

@@ -30,9 +30,8 @@ from ...enclosure.tape import compile_tape
 from ...statement.claims import claims_of
 from ...statement.posed_layout import reach_claims_on
 from ...statement.tolerance import coordinate_layout
-from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
 from ..ranks.krawczyk import ROUNDING, Coordinates, Relation, relation_of, with_relation
-from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
+from ..ranks.loop_boxes import APART, Examiner, Followed, LoopBoxes, LoopRule, are_between, coordinates_to_split
 from ..ranks.rank_rule import RankTest
 from ..robot.pose_box import PoseBox, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem

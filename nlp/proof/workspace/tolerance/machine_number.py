@@ -86,8 +86,8 @@ class _MachinePoints:
 
     def __init__(self, family: ToleranceModel, expression: SX) -> None:
         self._family, problem = family, family.problem
-        gradient = ca.densify(ca.gradient(expression, family.coordinates))
-        self._function = ca.Function("number", [family.coordinates], [ca.densify(expression), gradient])
+        gradient = ca.densify(ca.gradient(expression, family.z))
+        self._function = ca.Function("number", [family.z], [ca.densify(expression), gradient])
         self._loops = family.loops
         self._independent, self._dependent = list(problem.independent), list(problem.dependent)
         self._count, self._free = len(problem.start), list(problem.free)
@@ -122,7 +122,7 @@ class _MachinePoints:
         best: Value | None = None
         centre = boxes.centre
         with np.errstate(all="ignore"):
-            z = self.closed(np.hstack([centre, np.zeros((len(centre), self._family.errors.numel()))]))
+            z = self.closed(centre)
             slopes = self.slopes(z)
             errors = self._steepest(slopes[:, self._count :])
             for moves_pose in (False, True):

@@ -266,7 +266,7 @@ class _Machine:
     def __init__(self, family: ToleranceModel, number: SX, reading: Reading, sign: float) -> None:
         self._family, self._reading, self._sign = family, reading, sign
         slopes = ca.densify(ca.gradient(number, family.errors))
-        self._function = ca.Function("number", [family.coordinates], [number, slopes])
+        self._function = ca.Function("number", [family.z], [number, slopes])
 
     def first_order_change(self, z: FloatArray) -> float:
         """Return the first-order change at a pose (n,), of derivatives that are defined."""
