@@ -42,7 +42,6 @@ from screwsynth.nlp.proof.workspace.numbers.expressions import Expressions
 from screwsynth.nlp.proof.workspace.numbers.extremes import goal_of
 from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel
@@ -131,8 +130,7 @@ def six_legs_problem() -> Problem:
 def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> Regularity:
     """The verdict on the rank of the rows of these legs."""
     problem = six_legs_problem()
-    refuter = SignRefuter(legs_and_box()[0], problem)
-    return prove_rank(problem, problem.locked, refuter=refuter, most_boxes=most_boxes, progress=progress)
+    return prove_rank(problem, problem.locked, most_boxes=most_boxes, progress=progress)
 
 
 def six_legs() -> Claim:

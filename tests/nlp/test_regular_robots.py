@@ -126,15 +126,16 @@ def test_boxes_are_not_divided_before_the_widths_of_joints_settle(
 
 
 def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    judged = rank.RankTest._judged
+    matrices = rank.RankTest.matrices
 
-    def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray, *more: int) -> rank.Tested:
-        return judged(self, M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R), *more)
+    def without(self: rank.RankTest, forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray]:
+        M0, M, R = matrices(self, forms)
+        return M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R)
 
     monkeypatch.setattr(loop_boxes, "MOST_VARIABLES", 0)  # forms of first order, as robots with loops have them
     problem = problem_of("6-ups", 0.5, 80)
     assert not wrong_boxes(problem, problem.locked, 1.0, 1)[1]
-    monkeypatch.setattr(rank.RankTest, "_judged", without)
+    monkeypatch.setattr(rank.RankTest, "matrices", without)
     assert wrong_boxes(problem, problem.locked, 1.0, 1)[1]
 
 

@@ -27,7 +27,6 @@ from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
@@ -80,7 +79,7 @@ def legs(case: Case) -> Legs:
 def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> Regularity:
     """The verdict on the rank of the rows of six legs."""
     problem = build_problem(case_of_legs(robot), HEXAPOD, box)
-    return prove_rank(problem, problem.locked, refuter=SignRefuter(robot, problem), most_boxes=most_boxes)
+    return prove_rank(problem, problem.locked, most_boxes=most_boxes)
 
 
 def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:

@@ -27,6 +27,7 @@ from screwsynth.nlp.proof.checker.proof_file import read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
+from screwsynth.nlp.proof.enclosure.forms import Forms
 from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
@@ -317,20 +318,21 @@ def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:
     """
     family = machines(replace(case_of(name), joint_centre_tolerance=tolerance)).family
     problem, rng = family.problem, np.random.default_rng(0)
-    test = rank.RankTest(family.locked, family.coordinates, family.start)
-    examiner = Examiner(problem, test, family)
+    examiner = Examiner(family, rank.RankTest(family.locked, family.z, family.start))
     own, n, count = list(problem.independent), len(problem.start), 64
     middle = problem.box.random(count, rng)[:, list(problem.free)][:, own]
-    lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)
+    lower, upper = np.full((2, count, len(family.start)), tolerance)
+    lower[:, n:] = -tolerance
+    lower[:, :n] = upper[:, :n] = np.nan
     half = rng.uniform(0, 0.3, (count, 1)) * problem.size[own]
     lower[:, own], upper[:, own] = middle - half, middle + half
-    cells = LoopBoxes(lower, upper, np.tile(problem.start, (count, 1)), np.full(count, not problem.dependent))
+    cells = LoopBoxes(lower, upper, np.tile(family.start, (count, 1)), np.full(count, not problem.dependent))
     found = examiner.examine(cells)
-    loops, newton = family.loops, SingularPose(problem, family.locked, family)
-    M = ca.Function("M", [family.coordinates], [ca.densify(family.locked.matrix)])
+    loops, newton = family.loops, SingularPose(family, family.locked)
+    M = ca.Function("M", [family.z], [ca.densify(family.locked.matrix)])
     wrong = 0
     for k in np.flatnonzero(found.is_regular):
-        z = family.exact(found.boxes.centre[k])
+        z = found.boxes.centre[k].copy()
         design = loops.closed(z, list(problem.dependent))
         assert design is not None
         C = np.linalg.pinv(M(design).full())
@@ -350,12 +352,12 @@ def test_no_box_is_regular_for_all_machines_in_which_one_is_not(monkeypatch: pyt
         assert boxes >= 32
         assert not wrong
     # Without the part of the errors boxes are said to be regular in which a machine is not.
-    judged = rank.RankTest._judged
+    examine = rank.RankTest.examine
 
-    def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray, f: int) -> rank.Tested:
-        return judged(self, M0, M[:, :f], np.zeros_like(R), f)
+    def without(self: rank.RankTest, forms: Forms, f: int) -> rank.Tested:
+        return examine(self, Forms(forms.c, forms.a[:, :, :f], np.zeros_like(forms.r)), f)
 
-    monkeypatch.setattr(rank.RankTest, "_judged", without)
+    monkeypatch.setattr(rank.RankTest, "examine", without)
     assert wrong_boxes("6-ups", 0.4)[1]
 
 

@@ -34,8 +34,7 @@ from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
-from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel, family_of
+from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
 from screwsynth.nlp.proof.workspace.tolerance.leg_errors import of_legs
 from screwsynth.nlp.proof.workspace.tolerance.machines import Proving, machine_extremes, machines_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -274,18 +273,13 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
     exact = build_problem(case, case.model, box)
     family = family_of(case, built_model(case.model), exact, robot.tolerance)
 
-    def examined(family: ToleranceModel | None) -> Examined:
-        """The boxes, for all machines of a family, or for the design."""
-        matrix, z, start = (
-            (exact.locked, exact.z, exact.start)
-            if family is None
-            else (family.locked, family.coordinates, family.start)
-        )
+    def examined(meant: Problem) -> Examined:
+        """The boxes, for all machines or for the design."""
         cells = LoopBoxes(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
-        return Examiner(exact, RankTest(matrix, z, start), family).examine(cells)
+        return Examiner(meant, RankTest(meant.locked, meant.z, meant.start)).examine(cells)
 
     found, changed = examined(family), 0
-    for k in np.flatnonzero(examined(None).is_regular):
+    for k in np.flatnonzero(examined(exact).is_regular):
         signs = np.sign(np.linalg.det(Machines(robot, replace(box, lower=lower[k], upper=upper[k]), 60, seed=int(k)).J))
         if found.is_regular[k]:
             assert (signs == signs[0]).all()

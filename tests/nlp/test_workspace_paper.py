@@ -46,7 +46,6 @@ from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, with_r
 from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -308,8 +307,7 @@ def test_random_machines_are_accepted() -> None:
         workspace = Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8)))
         record = TreeRecord()
         problem = build_problem(six_legs(machine), HEXAPOD, pose_box(workspace))
-        refuter = SignRefuter(machine, problem)
-        found = prove_rank(problem, problem.locked, most_boxes=3000, recorder=record, refuter=refuter)
+        found = prove_rank(problem, problem.locked, most_boxes=3000, recorder=record)
         if found.outcome is not Outcome.PROVED:
             continue
         root = pose_root(workspace)

@@ -122,6 +122,11 @@ class Forms(NamedTuple):
         """Return the forms of some of the expressions."""
         return Forms(self.c[:, which], self.a[:, which], self.r[:, which])
 
+    @property
+    def sizes(self) -> FloatArray:
+        """Bounds (B, R) of the sizes of the expressions."""
+        return np.asarray(np.abs(self.c) + np.abs(self.a).sum(axis=2) + self.r)
+
 
 class SecondForms(NamedTuple):
     """R expressions over B boxes, with ``Q_ij e_i e_j`` for each pair i <= j, row by row.

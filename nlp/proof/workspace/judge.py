@@ -134,7 +134,7 @@ def judge_workspace(
         ranks = (
             Ranks(not_judged(box, unknown), None)
             if unknown
-            else prove_ranks(closed.model, homes, legs=legs, progress=rank_progress, paper=paper)
+            else prove_ranks(closed.model, homes, progress=rank_progress, paper=paper)
         )
         judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
         if not with_limits or (until_fault and not judged.is_regular):

@@ -21,12 +21,18 @@ from ....interruption import one_search
 from ...boxes.rows import Boxes, joined, some
 from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
 from ...enclosure.forms import Forms
-from ..ranks.covering import APART, Followed, LoopRule, coordinates_to_split
-from ..ranks.loop_boxes import Examined, Examiner, LoopBoxes, are_between
+from ..ranks.loop_boxes import (
+    APART,
+    Examined,
+    Examiner,
+    Followed,
+    LoopBoxes,
+    LoopRule,
+    are_between,
+    coordinates_to_split,
+)
 from ..ranks.rank_rule import Tested
-from ..robot.closed_loops import Loops
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import ToleranceModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,21 +65,18 @@ class Number(ABC):
     """K numbers of a robot whose smallest values are looked for: a test of boxes, and values at points.
 
     Args:
-        problem: the robot.
-        entries: (E, 1) expressions whose forms give bounds, in the coordinates of the robot or of the machines.
-        family: all machines that are meant; None for the design alone.
+        problem: the design, or all machines that are meant.
+        entries: (E, 1) expressions of its coordinates whose forms give bounds.
         count: K.
 
     Attributes:
-        problem, entries, family, count: as given.
-        start: (n,) a closed point, in the coordinates of points.
+        problem, entries, count: as given.
         levels: (K,) bounds from which on a number has no part in where boxes are bisected.
     """
 
-    def __init__(self, problem: Problem, entries: SX, family: ToleranceModel | None = None, count: int = 1) -> None:
-        self.problem, self.entries, self.family, self.count = problem, entries, family, count
-        self.errors = 0 if family is None else int(family.errors.numel())
-        self.start, self.levels = problem.start, np.full(count, np.inf)
+    def __init__(self, problem: Problem, entries: SX, count: int = 1) -> None:
+        self.problem, self.entries, self.count = problem, entries, count
+        self.levels = np.full(count, np.inf)
 
     @abstractmethod
     def over(self, forms: Forms, count: int) -> Bounds:
@@ -87,7 +90,7 @@ class Number(ABC):
 
     @abstractmethod
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the values (P, K) at closed points (P, n) of the design, or of machines."""
+        """Return the values (P, K) at closed points (P, n)."""
 
     @cached_property
     def examiner(self) -> Examiner:
@@ -96,7 +99,7 @@ class Number(ABC):
         Raises:
             UncoveredError: an expression holds an operation without a rule.
         """
-        return Examiner(self.problem, self, self.family)
+        return Examiner(self.problem, self)
 
     def examine(self, forms: Forms, f: int) -> Tested:
         """Return the lower bounds (B, K) of boxes; none is regular."""
@@ -112,21 +115,18 @@ class Number(ABC):
         return Tested(nothing.astype(bool), np.zeros((count, f)), np.full((count, self.count), -np.inf), nothing)
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """Return lower bounds (B, K) over boxes (B, n) without dependent coordinates."""
-        return self.examiner.examine(LoopBoxes(lower, upper, lower, np.ones(len(lower), dtype=bool))).smallest
+        """Return lower bounds (B, K) over boxes (B, n) of the design, without dependent coordinates."""
+        tolerance = np.full((len(lower), len(self.problem.of_errors)), self.problem.tolerance)
+        ends = np.hstack([lower, -tolerance]), np.hstack([upper, tolerance])
+        return self.examiner.examine(LoopBoxes(*ends, ends[0], np.ones(len(lower), dtype=bool))).smallest
 
     def near(self, boxes: LoopBoxes, which: NDArray[np.intp]) -> FloatArray:  # noqa: ARG002 - for numbers with slopes
         """Return points (S, P, n) at which number ``which[k]`` may be small in box k of P, closed or NaN."""
         return self.closed(boxes.centre)[None]
 
-    @cached_property
-    def loops(self) -> Loops:
-        """Loop equations as functions of the coordinates of points."""
-        return self.problem.loops
-
     def closed(self, z: FloatArray) -> FloatArray:
         """Return points (P, n) with closed loops near points; one that does not close is NaN."""
-        return self.loops.all_closed(z.T, list(self.problem.dependent)).T if self.problem.dependent else z
+        return self.problem.loops.all_closed(z.T, list(self.problem.dependent)).T if self.problem.dependent else z
 
 
 class Minimum(NamedTuple):
@@ -199,7 +199,7 @@ class SmallestValues(LoopRule):
     def __init__(self, number: Number, goals: Sequence[Goal], recorder: TreeRecord | None = None) -> None:
         super().__init__(number.problem, number.examiner, recorder)
         self._number, self._goals, self.block = number, goals, _BLOCK if number.problem.dependent else 2 * _BLOCK
-        self._best = _Best(np.full(len(goals), np.inf), np.tile(number.start, (len(goals), 1)))
+        self._best = _Best(np.full(len(goals), np.inf), np.tile(number.problem.start, (len(goals), 1)))
         self._closed = np.full(len(goals), np.inf)
         if not self._problem.dependent:
             self._start_from_poses()

@@ -22,7 +22,7 @@ from ...enclosure.forms import Forms
 from ...statement.machine import INSIDE
 from ..ranks.krawczyk import ROUNDING, by_centres, inverses
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.tolerance_model import ToleranceModel
+from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 
 #: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
@@ -51,45 +51,43 @@ class Expressions(Number):
     """Expressions of machines.
 
     Args:
-        family: the machines.
-        expressions: (K, 1) in their coordinates.
+        problem: the design, or all machines that are meant.
+        expressions: (K, 1) in its coordinates.
     """
 
-    def __init__(self, family: ToleranceModel, expressions: SX) -> None:
-        super().__init__(family.problem, expressions, family, expressions.numel())
-        self.start, self.loops, self._tolerance, self._size = family.start, family.loops, family.tolerance, family.size
-        slopes = ca.densify(ca.jacobian(expressions, family.coordinates))
-        self._values = ca.Function("values", [family.coordinates], [ca.densify(expressions)])
-        self._slopes = ca.Function("slopes", [family.coordinates], [slopes])
+    def __init__(self, problem: Problem, expressions: SX) -> None:
+        super().__init__(problem, expressions, expressions.numel())
+        slopes = ca.densify(ca.jacobian(expressions, problem.z))
+        self._values = ca.Function("values", [problem.z], [ca.densify(expressions)])
+        self._slopes = ca.Function("slopes", [problem.z], [slopes])
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
         # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
         shares = np.abs(forms.a[:, :, :count]) + forms.r[:, :, None] / max(count, 1)
-        return Bounds(ranges(forms, self.errors)[0], shares)
+        return Bounds(ranges(forms, len(self.problem.of_errors))[0], shares)
 
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the values (P, K) at closed points (P, n + 3 m)."""
+        """Return the values (P, K) at closed points (P, n)."""
         return np.asarray(self._values(z.T).full().reshape(self.count, len(z)).T)
 
     def slopes(self, z: FloatArray, which: NDArray[np.intp]) -> FloatArray:
-        """Return derivatives (P, n + 3 m) of an expression each at points; those by dependent coordinates are 0."""
+        """Return derivatives (P, n) of an expression each at points; those by dependent coordinates are 0."""
         found: FloatArray = self._slopes(z.T).full().reshape(self.count, len(z), -1)[which, np.arange(len(z))]
-        D = list(self.problem.dependent)
+        D, size = list(self.problem.dependent), self.problem.size
         if D:
-            whole = self.loops.slopes(z.T) * self._size
-            found = found * self._size
+            whole = self.problem.loops.slopes(z.T) * size
+            found = found * size
             found -= (found[:, None, D] @ inverses(whole[:, :, D]) @ whole)[:, 0]
-            found = found / self._size
+            found = found / size
             found[:, D] = 0.0
         return found
 
     def near(self, boxes: LoopBoxes, which: NDArray[np.intp]) -> FloatArray:
-        """Return points (2, P, n + 3 m) with errors along the gradient, at the middle of boxes and at a corner."""
-        n = boxes.lower.shape[1]
-        z = self.closed(np.hstack([boxes.centre, np.zeros((len(which), self.errors))]))
+        """Return points (2, P, n) with errors along the gradient, at the middle of boxes and at a corner."""
+        z, errors = self.closed(boxes.centre), self.problem.of_errors
         slopes = self.slopes(z, which)
-        z[:, n:] = self._steepest(slopes[:, n:])
+        z[:, errors] = self._steepest(slopes[:, errors])
         moved = self._at_corner(z, slopes, boxes)
         return np.stack([self.closed(each) for each in (z, moved)])
 
@@ -98,7 +96,7 @@ class Expressions(Number):
         parts = slopes.reshape(len(slopes), -1, 3)
         sizes = np.linalg.norm(parts, axis=2, keepdims=True)
         unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > _FLAT * _sizes(sizes))
-        return np.asarray((-INSIDE * self._tolerance * unit).reshape(slopes.shape))
+        return np.asarray((-INSIDE * self.problem.tolerance * unit).reshape(slopes.shape))
 
     def _at_corner(self, z: FloatArray, slopes: FloatArray, boxes: LoopBoxes) -> FloatArray:
         """Return points with the pose in the corner of a box that the derivatives point to."""

@@ -34,7 +34,6 @@ from ...enclosure.forms import Forms
 from ...statement.machine import LEGS, JointErrors, Legs
 from ..ranks.krawczyk import by_centres, inverses
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import ToleranceModel
 from ..tolerance.leg_errors import change_of_rows, worst_rows
 from .bound_search import Bounds, Number
 
@@ -99,16 +98,15 @@ class _RowsNumber(Number):
     """A number of J.
 
     Args:
-        problem: the robot.
+        problem: the design, or all machines that are meant.
         length: by which moments about the platform's origin are divided.
-        family: all machines that are meant; None for the design alone.
     """
 
-    def __init__(self, problem: Problem, length: float, family: ToleranceModel | None = None) -> None:
-        meant = problem.scaled if family is None else family.scaled
-        super().__init__(problem, ca.vertcat(ca.vec(ca.densify(meant.rows)), meant.sizes), family)
+    def __init__(self, problem: Problem, length: float) -> None:
+        scaled = problem.scaled
+        super().__init__(problem, ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes))
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
-        self._jacobian = ca.Function("J", [problem.z], [ca.densify(problem.scaled.jacobian)])
+        self._jacobian = ca.Function("J", [problem.z], [ca.densify(scaled.jacobian)])
 
     def jacobian(self, z: FloatArray) -> FloatArray:
         """Return J (P, m, 6) at points (P, n)."""
@@ -127,20 +125,19 @@ class _RowsNumber(Number):
             rest = r[:, : 6 * m].reshape(B, 6, m).transpose(0, 2, 1) * self._scale * unit[:, :, None]
             bend, slack = a[:, 6 * m :].transpose(0, 2, 1) * unit[:, None], r[:, 6 * m :] * unit
         slack = slack * (1 + ROUNDING) + ROUNDING
-        return _Rows(A, terms, rest * (1 + ROUNDING), bend, slack, count, self.errors)
+        return _Rows(A, terms, rest * (1 + ROUNDING), bend, slack, count, len(self.problem.of_errors))
 
 
 class SingularValues(_RowsNumber):
     """Smallest singular value of J, or minus its condition number.
 
-    Bounds are those of all machines that are meant. Values are those of the design; with legs, of the machine that is
-    worst to first order at each point.
+    With legs, bounds are those of all machines within their tolerance, and values those of the machine that is worst to
+    first order at each point.
 
     Args:
-        problem: the robot.
+        problem: the design, or all machines that are meant, whose errors count entry by entry.
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
-        family: all machines that are meant, whose errors count entry by entry; None for the design alone.
         legs: joint centres of six straight legs with the tolerance that is meant; None for another robot.
         shortest: no leg of any machine is shorter over the workspace; used with a tolerance of legs alone.
     """
@@ -151,11 +148,10 @@ class SingularValues(_RowsNumber):
         length: float,
         *,
         is_condition: bool,
-        family: ToleranceModel | None = None,
         legs: Legs | None = None,
         shortest: float = 0.0,
     ) -> None:
-        super().__init__(problem, length, family)
+        super().__init__(problem, length)
         self._length, self._is_condition = length, is_condition
         self._legs = legs if legs is not None and legs.tolerance else None
         self._change = 0.0 if self._legs is None else change_of_rows(self._legs, length, shortest)

@@ -89,9 +89,13 @@ class Subject:
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
         """Return the smallest singular value of J, or minus its condition number."""
         # The change of J by errors of six straight legs has a bound of its own.
-        legs, family = (self.legs, None) if has_straight_legs(self.case.model) else (None, self.family)
+        has_legs, problem = has_straight_legs(self.case.model), self.problem
         return SingularValues(
-            self.problem, length, is_condition=is_condition, family=family, legs=legs, shortest=self.shortest
+            problem if has_legs else self.family or problem,
+            length,
+            is_condition=is_condition,
+            legs=self.legs if has_legs else None,
+            shortest=self.shortest,
         )
 
     def clearance(self, places: tuple[int, int]) -> Clearance:
@@ -180,7 +184,7 @@ def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float)
     A bound of the change of J is wider than its change in any one machine, and no smaller boxes make it less wide. The
     most at a few poses is taken.
     """
-    box, problem = subject.box, subject.problem
+    box, problem = subject.box, number.problem
     allowed = gap * (abs(float(number.values(problem.start[None])[0, 0])) or 1.0)
     if not subject.case.joint_centre_tolerance or problem.dependent:
         return allowed
@@ -188,4 +192,4 @@ def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float)
     points = box.random(_POINTS, rng)
     points = np.concatenate([points, box.clipped(np.where(rng.uniform(size=points.shape) < 0.5, box.lower, box.upper))])
     z = points[:, list(problem.free)]
-    return allowed + float(np.nanmax(number.values(z) - number.bounds(z, z), initial=0.0))
+    return allowed + float(np.nanmax(number.values(problem.exact(z)) - number.bounds(z, z), initial=0.0))

@@ -224,7 +224,7 @@ def shown_extremes(
 def _is_covered(machines: Machines, claim: Claim) -> bool:
     """Return whether a number has no operation without a rule."""
     try:
-        compile_tape(ca.Function("number", [machines.family.coordinates], [machines.number(claim.expression)]))
+        compile_tape(ca.Function("number", [machines.family.z], [machines.number(claim.expression)]))
     except UncoveredError:
         return False
     return True
@@ -290,7 +290,7 @@ class _Machine:
     def __init__(self, family: ToleranceModel, number: SX, sign: float) -> None:
         self._family, self._sign = family, sign
         slopes = ca.densify(ca.gradient(number, family.errors))
-        self._function = ca.Function("number", [family.coordinates], [number, slopes])
+        self._function = ca.Function("number", [family.z], [number, slopes])
 
     def first_order_change(self, z: FloatArray) -> float:
         """Return the first-order change at a pose (n,), of derivatives that are defined."""

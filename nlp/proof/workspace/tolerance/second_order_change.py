@@ -23,8 +23,7 @@ from .....models.arrays import first_largest
 from ...boxes.rows import WHOLE, Boxes
 from ...boxes.search import Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser
-from ..ranks.covering import in_workspace, whole_workspace
-from ..ranks.loop_boxes import LoopBoxes
+from ..ranks.loop_boxes import LoopBoxes, in_workspace, whole_workspace
 from ..robot.tolerance_model import ToleranceModel
 
 if TYPE_CHECKING:
