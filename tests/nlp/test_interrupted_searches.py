@@ -46,7 +46,7 @@ from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.tolerance.machine_number import MachineNumber
 from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
-from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
+from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
 from screwsynth.nlp.solver.certified import certify
 
 ROOT = Path(screwsynth.nlp.__file__).parent
@@ -103,7 +103,7 @@ def at_instruction(n: int, error: type[BaseException], watched: tuple[str, ...])
         sys.settrace(before)
 
 
-def from_regularity(found: Regularity) -> Claim:
+def from_regularity(found: RankVerdict) -> Claim:
     assert found.outcome is not Outcome.PROVED or (found.open, found.share) == (0, 0.0)
     return Claim(found.outcome is Outcome.PROVED, -found.share, found.reason == STOPPED)
 
@@ -127,7 +127,7 @@ def six_legs_problem() -> Problem:
     return build_problem(Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])]), model, box)
 
 
-def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> Regularity:
+def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> RankVerdict:
     """The verdict on the rank of the rows of these legs."""
     problem = six_legs_problem()
     refuter = SignRefuter(legs_and_box()[0], problem)

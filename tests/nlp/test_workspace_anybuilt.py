@@ -31,8 +31,7 @@ from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_c
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose

@@ -42,8 +42,7 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstError, with_rest
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box

@@ -29,7 +29,7 @@ from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Returns the errors of the machine that is worst at a pose, to first order, and its number as people read it.
 WorstMachine = Callable[[PoseNumbers], tuple[CentreErrors, float]]

@@ -40,7 +40,7 @@ from .extremes import Extreme
 from .left_inverse import left_inverses, rows_over
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Part of its size by which a computed bound is moved outwards: rounding.
 _ROUNDING = 1e-10

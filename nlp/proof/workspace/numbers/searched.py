@@ -31,7 +31,7 @@ from .extremes import CLOSE, Extreme, nothing_known, slack_of
 from .singular_values import SingularValues
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
 _NEAR_ZERO = 0.1

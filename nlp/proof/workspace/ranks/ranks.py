@@ -22,7 +22,7 @@ from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..robot.tolerance_model import ToleranceModel
-from ..verdict import Outcome, Regularity
+from ..verdict import Outcome, RankVerdict
 from .covering import APART, Followed, LoopRule, contracted_boxes, coordinates_to_split
 from .loop_boxes import Examiner, LoopBoxes
 from .rank_rule import RankTest
@@ -31,7 +31,7 @@ from .singular_pose import NewtonRefuter, Refuter, Singular, singular_at
 
 if TYPE_CHECKING:
     from ...boxes.tree import TreeRecord
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024
@@ -44,8 +44,8 @@ RankProgress = Callable[[float, int, int], None]
 class Ranks(NamedTuple):
     """Verdicts on J, and on the constraint wrenches; None for a robot without them."""
 
-    regular: Regularity
-    constraints: Regularity | None
+    regular: RankVerdict
+    constraints: RankVerdict | None
 
 
 def prove_ranks(
@@ -95,9 +95,9 @@ def _is_shown(
     return homes.is_singular(at.y, at.centres, constraints=constraints)
 
 
-def not_judged(box: PoseBox, reason: str) -> Regularity:
+def not_judged(box: PoseBox, reason: str) -> RankVerdict:
     """Return the verdict on a robot that no search covers."""
-    return Regularity(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
+    return RankVerdict(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
 
 
 def prove_rank(
@@ -110,7 +110,7 @@ def prove_rank(
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
     refuter: Refuter | None = None,
-) -> Regularity:
+) -> RankVerdict:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
     Args:
@@ -163,7 +163,7 @@ def prove_rank(
         y = problem.pose_of(np.where(np.isfinite(centre), centre, boxes.more.near[widest]))
     elif reason:
         outcome, y = Outcome.OPEN, problem.pose_of(problem.start)
-    return Regularity(
+    return RankVerdict(
         outcome=outcome,
         box=problem.box,
         y=None if y is None else frozen_array(y, (6,)),

@@ -48,7 +48,7 @@ from .machine_number import MachineNumber
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
