@@ -11,7 +11,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from hexapods import clearance, hexapod_text, over, subject_of
+from hexapods import bounds_of, clearance, hexapod_text, smallest, subject_of, values_of
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
@@ -28,7 +28,7 @@ from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_c
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
@@ -218,19 +218,19 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
     values = np.linalg.svd(machines.J[:20_000] / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
     subject = subject_of(robot, box, 15.0)
     spectra = [subject.spectrum(LENGTH, is_condition=is_condition) for is_condition in (False, True)]
-    checks = [
+    checks: list[tuple[Number, FloatArray]] = [
         (clearance(robot, box, 0, 1), machines.clearance(0, 1)),
         (clearance(robot, box, 0, 2), machines.clearance(0, 2)),
-        (over(subject, spectra[0]), values[:, -1]),
-        (over(subject, spectra[1]), -values[:, 0] / values[:, -1]),
+        (spectra[0], values[:, -1]),
+        (spectra[1], -values[:, 0] / values[:, -1]),
     ]
     rng = np.random.default_rng(1)
-    for oracle, sampled in checks:
-        assert oracle.bounds(box.lower[None], box.upper[None]).lower[0] <= sampled.min()
+    for number, sampled in checks:
+        assert bounds_of(number, box.lower[None], box.upper[None])[0] <= sampled.min()
         # At a point the bound and the value of the worst machine differ by the rest, and by the 2 % of the norm.
         points = box.random(50, rng)
-        at = oracle.bounds(points, points).lower
-        exact = oracle.values(points)
+        at = bounds_of(number, points, points)
+        exact = values_of(number, points)
         assert (at <= exact + 1e-12).all()
         assert (at >= exact - 0.05 * np.abs(exact)).all()
     for number in spectra:
@@ -242,12 +242,12 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
 def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> None:
     robot, box = legs(case), pose_box(workspace_of_case(case))
     for y in box.random(5, np.random.default_rng(3)):
-        wide = robot._replace(tolerance=float(clearance(robot, box, 0, 1).values(y[None])[0]))
-        assert clearance(wide, box, 0, 1).values(y[None])[0] == 0
+        wide = robot._replace(tolerance=float(values_of(clearance(robot, box, 0, 1), y[None])[0]))
+        assert values_of(clearance(wide, box, 0, 1), y[None])[0] == 0
         errors = subject_of(wide, box).nearest((0, 1), y)
         assert errors is not None
         made = errors.applied(wide)
-        assert clearance(made._replace(tolerance=0.0), box, 0, 1).values(y[None])[0] < 1e-9 * wide.tolerance
+        assert values_of(clearance(made._replace(tolerance=0.0), box, 0, 1), y[None])[0] < 1e-9 * wide.tolerance
 
 
 def test_errors_of_a_machine_that_is_singular_at_every_pose_have_no_value(case: Case) -> None:
@@ -404,10 +404,10 @@ def test_a_limit_is_refined_until_it_is_decided_whatever_the_gap_is(case: Case) 
         assert {outcome} <= {each.outcome for each in limited} <= {outcome, Outcome.PROVED}
     # The searches that are not those of certificates go on too, and end at a value that meets its limit.
     box = pose_box(workspace_of_case(case))
-    oracle = clearance(robot, box, 0, 1)
-    least = prove_minimum(oracle, box, gap=1e-4).value
+    number = clearance(robot, box, 0, 1)
+    least = smallest(number, Goal(1e-4)).value
     for limit, slack in ((least - 1e-6, 0.0), (least + 1e-10, 1e-9)):
-        found = prove_minimum(oracle, box, gap=1.0, limit=limit, slack=slack, time_limit=20)
+        found = smallest(number, Goal(1.0, limit=limit, slack=slack), time_limit=20)
         assert found.bound >= limit - slack, found
 
 

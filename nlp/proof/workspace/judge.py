@@ -19,15 +19,15 @@ from ..statement.machine import check_leg_error, joint_centres, legs_of, workspa
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
-from .numbers.extremes import GAP, Extreme, prove_extreme
-from .numbers.loop_limits import loop_extremes
+from .numbers.bound_search import Minimum
+from .numbers.extremes import GAP, Extreme, extreme_of, prove_extreme
 from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, asked_spectra_extremes, searched_limits
 from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import pose_box
 from .robot.posed_robot import NotJudgedError
-from .tolerance.machines import Machines, not_bounded
+from .tolerance.machines import Machines
 from .verdict import Outcome, RankVerdict
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ class _Numbers:
             model=self.closed.model,
             box=self.box,
             legs=joint_centres(self.case),
-            built=None if self.machines is None else (self.machines.built, self.machines.family),
+            family=None if self.machines is None else self.machines.family,
             unknown=self.unknown,
             shortest=shortest,
         )
@@ -226,7 +226,7 @@ class _Numbers:
         prove = partial(machines.extreme, jobs=self.jobs, paper=self.paper)
         yield from self._proved(reaches, prove)
         if any(each.fails for each in self.found):
-            yield from (not_bounded(claim, _OUT_OF_REACH) for claim in claims)
+            yield from (extreme_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
         else:
             yield from self._proved(claims, prove)
 
@@ -250,16 +250,16 @@ class _Numbers:
         Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is
         singular. The loops are followed here, and the design is the only machine within no tolerance.
         """
-        limited = loop_extremes(self.case, self.closed, self.box, gap=self.gap)
-        yield from (each for each in limited if each.outcome is not Outcome.OPEN)
         try:
-            alone = Machines(self.case, self.closed, self.box) if is_reached else None
+            alone = Machines(self.case, self.closed, self.box)
         except NotJudgedError:
             return
-        if alone is not None:
-            for claim in alone.symbols.claims(self.names, with_objective=self.with_objective)[1]:
-                if claim.limit is None:
-                    yield alone.extreme(claim, gap=self.gap, jobs=self.jobs)
+        claims = alone.symbols.claims(self.names, with_objective=self.with_objective)[1]
+        limited = alone.followed([claim for claim in claims if claim.limit is not None], gap=self.gap)
+        yield from (each for each in limited if each.outcome is not Outcome.OPEN)
+        for claim in claims if is_reached else ():
+            if claim.limit is None:
+                yield alone.extreme(claim, gap=self.gap, jobs=self.jobs)
 
     def _proved(
         self, claims: Sequence[Claim], prove: Callable[..., Extreme], decided: Iterable[Extreme] = ()

@@ -81,8 +81,8 @@ def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine) 
                 if extreme.bound == before.bound:
                     break
             extreme = _of_one_machine(kind, legs, i, extreme, (found[short], found[long]), refine)
-            centres = subject.centres(extreme.errors)
-            added.append(extreme if centres is None else replace(extreme, errors=None, centres=centres))
+            errors, centres = subject.shown(extreme.errors)
+            added.append(replace(extreme, errors=errors, centres=centres))
     return [*found, *added]
 
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .....models import FloatArray
+    from ...boxes.tree import TreeRecord
 
 #: Reason for which nothing is claimed although every box is closed.
 APART = "the assemblies in two neighbouring boxes are not proved to be the same"
@@ -102,13 +103,15 @@ class LoopRule(Rule[Followed]):
     Args:
         problem: the robot.
         examiner: follows the dependent coordinates, and has the test.
+        recorder: records the boxes for a proof.
 
     Attributes:
         whole: (n,) widths of the whole workspace along independent coordinates; 0 for others.
     """
 
-    def __init__(self, problem: Problem, examiner: Examiner) -> None:
+    def __init__(self, problem: Problem, examiner: Examiner, recorder: TreeRecord | None = None) -> None:
         self._problem, self._examiner, self._independent = problem, examiner, list(problem.independent)
+        self._recorder = recorder
         self._start = whole_workspace(problem)
         self.whole: FloatArray = np.zeros(len(problem.start))
         self.whole[self._independent] = (self._start.upper - self._start.lower)[0, self._independent]
@@ -124,6 +127,9 @@ class LoopRule(Rule[Followed]):
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
         """Return the parts of boxes, with their dependent coordinates."""
+        if self._recorder is not None:
+            along = np.array(self._problem.free)[boxes.split]
+            self._recorder.cuts(*self._poses(boxes.lower, boxes.upper), along)
         parts = self.parts(boxes)
         shape = (len(parts.split) // max(len(boxes.split), 1), 1)
         sides = 1.0 * (parts.lower > np.tile(boxes.lower, shape)) - 1.0 * (parts.upper < np.tile(boxes.upper, shape))
@@ -144,8 +150,22 @@ class LoopRule(Rule[Followed]):
         return found
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
-        """Return boxes contracted to the workspace."""
-        return in_workspace(self._problem, boxes)
+        """Return boxes contracted to the workspace, and record where they lead."""
+        found, kept, beyond = contracted_boxes(self._problem, boxes)
+        if self._recorder is not None:
+            before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
+            self._recorder.contractions(before, after, ~kept)
+            self._recorder.lacks_boxes |= bool(beyond.any())
+        return some(found, kept)
+
+    def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
+        box, free = self._problem.box, self._problem.free
+        low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
+        for j in self._independent:
+            if j < len(free):
+                low[:, free[j]], high[:, free[j]] = lower[:, j], upper[:, j]
+        return low, high
 
     def boxes_of(self, found: Examined, bound: FloatArray, split: NDArray[np.intp]) -> Boxes[Followed]:
         """Return examined boxes, with bounds (B,) and places (B,) among the independent coordinates to bisect."""

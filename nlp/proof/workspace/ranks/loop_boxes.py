@@ -84,6 +84,7 @@ class Examined(NamedTuple):
         is_regular: (B,) whether the matrix has full rank at every pose of the box.
         shares: (B, f) share of each independent coordinate in the bounds.
         smallest: (B,) smallest singular value at the middle, in parts of the largest; infinite where it is not known.
+            Of K numbers: (B, K) their bounds.
         signs: (B,) those of :class:`~.rank_rule.Tested`.
     """
 
@@ -103,6 +104,9 @@ class Test(Protocol):
     """
 
     entries: ca.SX
+
+    def unknown(self, count: int, f: int) -> Tested:
+        """Return the results for boxes of which nothing is known."""
 
     def examine(self, forms: Forms, f: int) -> Tested:
         """Return the results for boxes from forms of the entries in f independent coordinates, then errors."""
@@ -134,7 +138,7 @@ class Examiner:
         self._rank: RankTest | None = None
         self.second: Encloser | None = None
         self._change: EntryChange | None = None
-        if isinstance(test, RankTest) and not problem.dependent and n <= MOST_VARIABLES:
+        if not problem.dependent and n <= MOST_VARIABLES:
             self._use_second_order(test)
         if self.second is None:
             _ = self._encloser  # refuses an operation without a rule at once
@@ -153,24 +157,29 @@ class Examiner:
         # A last entry that is not used, for a matrix that is constant.
         return Encloser(coordinates, ca.vertcat(equations, own, self._test.entries, z[0]))
 
-    def _use_second_order(self, test: RankTest) -> None:
-        """Examine by forms of second order; with errors, of polynomials alone."""
-        family = self._family
-        if family is not None and not is_polynomial(test.entries, family.coordinates):
+    def _use_second_order(self, test: Test) -> None:
+        """Examine by forms of second order; with errors, of the polynomials of a matrix alone."""
+        family, entries = self._family, test.entries
+        if isinstance(test, RankTest):
+            if family is not None and not is_polynomial(entries, family.coordinates):
+                return
+            self._rank, self._change = test, None if family is None else EntryChange(family, entries)
+        elif family is not None:
             return
-        self._rank, self._change = test, None if family is None else EntryChange(family, test.entries)
-        self.second = Encloser(self.problem.z, test.entries if self._change is None else self._change.exact)
+        self.second = Encloser(self.problem.z, entries if self._change is None else self._change.exact)
 
     def examine(self, boxes: LoopBoxes) -> Examined:
         """Examine boxes."""
         B, f, k = len(boxes.lower), len(self.of.independent), len(self.of.dependent)
         relation = no_relation(B, self.of)
-        if self.second is not None and self._rank is not None and B:
+        if self.second is not None and B:
             ends = boxes.lower.T, boxes.upper.T
+            if self._rank is None:
+                return Examined(boxes, relation, *self._test.examine(self.second.second(*ends).as_terms(), f))
             change = None if self._change is None else self._change.over(*ends)
             return Examined(boxes, relation, *self._rank.examine_second(self.second, *ends, change))
         lower, upper, near, known = some(boxes, np.arange(B))
-        tested = Tested(np.zeros(B, dtype=bool), np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=np.int32))
+        tested = self._test.unknown(B, f)
         columns: tuple[NDArray[Any], ...] = (*relation, *tested)
         new = np.flatnonzero(~known)
         if new.size:

@@ -109,6 +109,11 @@ class RankTest:
         encloser.module.rank(n, encloser.tape.head, self._head, found, count, change)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
 
+    def unknown(self, count: int, f: int) -> Tested:
+        """Return the results for boxes of which nothing is known."""
+        nothing = np.zeros(count, dtype=np.int32)
+        return Tested(nothing.astype(bool), np.zeros((count, f)), np.full(count, np.inf), nothing)
+
     def examine(self, forms: Forms, f: int) -> Tested:
         """Return the verdict on boxes from forms of first order of the entries, whose first f terms are no errors."""
         (middle, slope, rest), (rows, columns) = forms, self._at

@@ -23,8 +23,8 @@ from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..robot.tolerance_model import ToleranceModel
 from ..verdict import Outcome, RankVerdict
-from .covering import APART, Followed, LoopRule, contracted_boxes, coordinates_to_split
-from .loop_boxes import Examiner, LoopBoxes
+from .covering import APART, Followed, LoopRule, coordinates_to_split
+from .loop_boxes import Examiner
 from .rank_rule import RankTest
 from .signs import SignRefuter
 from .singular_pose import NewtonRefuter, Refuter, Singular, singular_at
@@ -202,16 +202,9 @@ class _RankRule(LoopRule):
         test = RankTest(matrix, problem.z, problem.start)
         if family is not None:
             test = RankTest(family.matrix(matrix), family.coordinates, family.start)
-        super().__init__(problem, Examiner(problem, test, family))
+        super().__init__(problem, Examiner(problem, test, family), recorder)
         self.singular: Singular | None = None
-        self._recorder, self._refuter, self._examined = recorder, refuter, 0
-
-    def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes."""
-        if self._recorder is not None:
-            along = np.array(self._problem.free)[boxes.split]
-            self._recorder.cuts(*self._ends(boxes.lower, boxes.upper), along)
-        return super().divided(boxes)
+        self._refuter, self._examined = refuter, 0
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes over which the rank is not proved to be full."""
@@ -223,21 +216,3 @@ class _RankRule(LoopRule):
         found = some(found, np.flatnonzero(~found.is_regular))
         split = coordinates_to_split(found.shares, self.widths(found))
         return Verdicts(self.boxes_of(found, np.zeros(len(split)), split), 0.0, count)
-
-    def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
-        """Return boxes contracted to the workspace, and record where they lead."""
-        found, kept, beyond = contracted_boxes(self._problem, boxes)
-        if self._recorder is not None:
-            before, after = (self._ends(each.lower, each.upper) for each in (boxes, found))
-            self._recorder.contractions(before, after, ~kept)
-            self._recorder.lacks_boxes |= bool(beyond.any())
-        return some(found, kept)
-
-    def _ends(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
-        box, free = self._problem.box, self._problem.free
-        low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
-        for j in self._independent:
-            if j < len(free):
-                low[:, free[j]], high[:, free[j]] = lower[:, j], upper[:, j]
-        return low, high

@@ -96,7 +96,9 @@ class _ChangeRule(Rule[FloatArray]):
         self._problem, self._tolerance, self.whole = family.problem, family.tolerance, whole_workspace(family.problem)
         places = [3 * j + k for j in centres for k in range(3)]
         lower, self._count = ca.tril(H[places, places]), len(centres)
-        self._encloser = Encloser(ca.vertcat(self._problem.z, family.errors[places]), ca.vertcat(*lower.nonzeros()))
+        self._encloser = Encloser(
+            ca.vertcat(self._problem.z, family.errors[places]), ca.vertcat(*[lower.nz[k] for k in range(lower.nnz())])
+        )
         rows, columns = (np.array(each, dtype=int) for each in lower.sparsity().get_triplet())
         self._block: NDArray[np.int64] = rows // 3 * self._count + columns // 3
         # An entry below the diagonal of a block on the diagonal stands for two of this block.
