@@ -46,8 +46,8 @@ from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel
 from screwsynth.nlp.proof.workspace.scale import largest_scale
-from screwsynth.nlp.proof.workspace.tolerance.machines import design_alone, machines_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
+from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
 from screwsynth.nlp.solver.certified import certify
 
 ROOT = Path(screwsynth.nlp.__file__).parent
@@ -103,7 +103,7 @@ def at_instruction(n: int, error: type[BaseException], watched: tuple[str, ...])
         sys.settrace(before)
 
 
-def from_regularity(found: Regularity) -> Claim:
+def from_regularity(found: RankVerdict) -> Claim:
     assert found.outcome is not Outcome.PROVED or (found.open, found.share) == (0, 0.0)
     return Claim(found.outcome is Outcome.PROVED, -found.share, found.reason == STOPPED)
 
@@ -127,7 +127,7 @@ def six_legs_problem() -> Problem:
     return build_problem(Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])]), model, box)
 
 
-def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> Regularity:
+def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> RankVerdict:
     """The verdict on the rank of the rows of these legs."""
     problem = six_legs_problem()
     return prove_rank(problem, problem.locked, most_boxes=most_boxes, progress=progress)
@@ -205,10 +205,10 @@ def planar() -> Case:
 
 def loops() -> Claim:
     case = planar()
-    alone = design_alone(case, closed_form(case.model), pose_box(workspace_of_case(case)))
+    alone = Machines(case, closed_form(case.model), pose_box(workspace_of_case(case)))
     claims = [each for each in alone.symbols.claims(())[1] if each.key.endswith("max")]
     found = smallest_values(
-        Expressions(alone.family, -ca.vertcat(*[alone.number(each.expression) for each in claims])),
+        Expressions(alone.family, ca.vertcat(*map(alone.number, claims))),
         [goal_of(each, part=0.2) for each in claims],
     )
     assert found
@@ -223,12 +223,12 @@ def loops() -> Claim:
 @cache
 def family() -> ToleranceModel:
     case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
-    return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case))).family
+    return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case))).family
 
 
 def machines() -> Claim:
     built = family()
-    number = Expressions(built, ca.sumsqr(built.coordinates) + built.coordinates[0])
+    number = Expressions(built, ca.sumsqr(built.z) + built.z[0])
     found = smallest(number, Goal(part=0.2))
     assert not found.value < found.bound
     return Claim(not found.reason, found.bound, found.reason == STOPPED)

@@ -31,7 +31,7 @@ from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, sca
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.slices.slices import Region, slices_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
+from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
@@ -76,7 +76,7 @@ def legs(case: Case) -> Legs:
     return found
 
 
-def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> Regularity:
+def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> RankVerdict:
     """The verdict on the rank of the rows of six legs."""
     problem = build_problem(case_of_legs(robot), HEXAPOD, box)
     return prove_rank(problem, problem.locked, most_boxes=most_boxes)

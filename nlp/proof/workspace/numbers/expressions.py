@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
-from ...statement.machine import INSIDE
 from ..ranks.krawczyk import ROUNDING, by_centres, inverses
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.posed_robot import Problem
+from ..robot.tolerance_model import steepest
 from .bound_search import Bounds, Number
 
-#: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
-_INSIDE = 1e-13
 #: Slope, as a part of the largest at a point, that is rounding error.
 _FLAT = 1e-9
 
@@ -85,32 +83,30 @@ class Expressions(Number):
 
     def near(self, boxes: LoopBoxes, which: NDArray[np.intp]) -> FloatArray:
         """Return points (2, P, n) with errors along the gradient, at the middle of boxes and at a corner."""
-        z, errors = self.closed(boxes.centre), self.problem.of_errors
+        z = self.closed(boxes.centre)
         slopes = self.slopes(z, which)
-        z[:, errors] = self._steepest(slopes[:, errors])
+        z = self.worst(z, slopes)
         moved = self._at_corner(z, slopes, boxes)
         return np.stack([self.closed(each) for each in (z, moved)])
 
-    def _steepest(self, slopes: FloatArray) -> FloatArray:
-        """Return errors (P, 3 m) as large as the tolerance, against the derivatives by them."""
-        parts = slopes.reshape(len(slopes), -1, 3)
+    def worst(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return the machines (P, n) with the smallest values to first order, from derivatives of the design."""
+        parts = slopes[:, self.problem.of_errors].reshape(len(z), -1, 3)
         sizes = np.linalg.norm(parts, axis=2, keepdims=True)
-        unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > _FLAT * _sizes(sizes))
-        return np.asarray((-INSIDE * self.problem.tolerance * unit).reshape(slopes.shape))
+        z = z.copy()
+        errors = steepest(np.where(sizes > _FLAT * _sizes(sizes), -parts, 0.0), self.problem.tolerance)
+        z[:, self.problem.of_errors] = errors.reshape(len(z), -1)
+        return z
 
     def _at_corner(self, z: FloatArray, slopes: FloatArray, boxes: LoopBoxes) -> FloatArray:
         """Return points with the pose in the corner of a box that the derivatives point to."""
-        own, free, box = list(self.problem.independent), list(self.problem.free), self.problem.box
+        own, free = list(self.problem.independent), list(self.problem.free)
         z = z.copy()
         change = slopes[:, own] * (boxes.upper - boxes.lower)[:, own]
         # A slope that is rounding error points to the upper end.
         z[:, own] = np.where(change > _FLAT * _sizes(change), boxes.lower[:, own], boxes.upper[:, own])
-        # Ends of rotations are rounded outwards, and are no poses of the workspace.
-        room = np.where(box.upper > box.lower, _INSIDE * np.maximum(np.abs(box.lower), np.abs(box.upper)), 0.0)
-        room[:3] = 0.0
-        inside = np.clip(box.clipped(self.problem.pose_of(z)), box.lower + room, box.upper - room)[:, free]
         of_pose = [j for j in own if j < len(free)]
-        z[:, of_pose] = inside[:, of_pose]
+        z[:, of_pose] = self.problem.box.clipped(self.problem.pose_of(z))[:, free][:, of_pose]
         return z
 
 

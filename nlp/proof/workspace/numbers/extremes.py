@@ -29,7 +29,7 @@ from ..verdict import Outcome
 from .bound_search import Goal, Minimum
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Returns the errors of the machine that is worst at a pose, to first order, and the value of its expression.
 WorstMachine = Callable[[PoseNumbers], tuple[CentreErrors, float]]
@@ -153,7 +153,6 @@ def prove_extreme(
     jobs: int | None = None,
     machine: WorstMachine | None = None,
     paper: PaperRecord | None = None,
-    again: bool = False,
 ) -> Extreme:
     """Prove the smallest or the largest value of a number over a workspace.
 
@@ -167,7 +166,6 @@ def prove_extreme(
         jobs: threads.
         machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
         paper: records the search for a proof.
-        again: whether the record takes the place of an earlier one of the same number.
     """
     sign = 1.0 if claim.sense is Sense.MAX else -1.0
     if is_requested():
@@ -182,7 +180,7 @@ def prove_extreme(
     else:
         try:
             with one_search(time_limit):
-                found, x = _search(nlp, claim, gap, jobs, paper, again=again)
+                found, x = _search(nlp, claim, gap, jobs, paper)
         except UncoveredError as error:
             return extreme_of(claim, Minimum(reason=str(error)))
     pose = None if x is None else _pose(nlp, x)
@@ -193,7 +191,7 @@ def prove_extreme(
 
 
 def _search(
-    nlp: Nlp, claim: Claim, gap: float, jobs: int | None, paper: PaperRecord | None, *, again: bool
+    nlp: Nlp, claim: Claim, gap: float, jobs: int | None, paper: PaperRecord | None
 ) -> tuple[Minimum, FloatArray | None]:
     """Return the bound of an expression, to the gap or as fine as its limit needs, and the point of its best value.
 
@@ -215,7 +213,7 @@ def _search(
     if found.status is CertificateStatus.INFEASIBLE:
         return Minimum(boxes=boxes, seconds=seconds, reason="the robot has no pose there"), None
     if paper is not None and writer is not None:
-        paper.program(claim, found, writer, again=again)
+        paper.program(claim, found, writer)
     # A search that ends early has a bound too, which may be as good as asked for.
     is_met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
     value = math.inf if math.isnan(found.incumbent) else -sign * found.incumbent

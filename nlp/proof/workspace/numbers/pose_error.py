@@ -35,7 +35,7 @@ from .extremes import Extreme, extreme_of
 from .jacobian_numbers import WorstError
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Part of its size by which a computed bound is moved outwards: rounding.
 _ROUNDING = 1e-10

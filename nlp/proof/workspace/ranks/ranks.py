@@ -21,14 +21,14 @@ from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..tolerance.leg_errors import of_legs
-from ..verdict import Outcome, Regularity
+from ..verdict import Outcome, RankVerdict
 from .loop_boxes import APART, Examiner, Followed, LoopRule, coordinates_to_split
 from .rank_rule import RankTest
 from .singular_pose import Refuter, Singular, SingularSearch
 
 if TYPE_CHECKING:
     from ...boxes.tree import TreeRecord
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024
@@ -41,8 +41,8 @@ RankProgress = Callable[[float, int, int], None]
 class Ranks(NamedTuple):
     """Verdicts on J, and on the constraint wrenches; None for a robot without them."""
 
-    regular: Regularity
-    constraints: Regularity | None
+    regular: RankVerdict
+    constraints: RankVerdict | None
 
 
 def prove_ranks(
@@ -82,16 +82,16 @@ def prove_ranks(
     return Ranks(found[0], found[1] if len(found) > 1 else None)
 
 
-def _refuted(verdict: Regularity, at: Singular | None) -> Regularity:
+def _refuted(verdict: RankVerdict, at: Singular | None) -> RankVerdict:
     """Return a verdict that a singular pose refutes; the same without one."""
     if at is None:
         return verdict
     return replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, sides=at.sides, centres=at.centres)
 
 
-def not_judged(box: PoseBox, reason: str) -> Regularity:
+def not_judged(box: PoseBox, reason: str) -> RankVerdict:
     """Return the verdict on a robot that no search covers."""
-    return Regularity(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
+    return RankVerdict(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
 
 
 def prove_rank(
@@ -103,7 +103,7 @@ def prove_rank(
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
     refuter: Refuter | None = None,
-) -> Regularity:
+) -> RankVerdict:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
     Args:
@@ -145,7 +145,7 @@ def prove_rank(
         y = problem.pose_of(np.where(np.isfinite(centre), centre, boxes.more.near[widest]))
     elif reason:
         y = problem.pose_of(problem.start)
-    verdict = Regularity(
+    verdict = RankVerdict(
         outcome=Outcome.PROVED if y is None else Outcome.OPEN,
         box=problem.box,
         y=None if y is None else frozen_array(y, (6,)),
