@@ -14,11 +14,9 @@ from ..statement.claims import REACH, asked_name, one_machine_name
 from ..statement.machine import Legs, legs_of
 from ..statement.tolerance import second_order_name
 from .proof_record import PaperRecord
-from .singular_sides import singular_sides
 from .verdict import Outcome, Regularity
 
 if TYPE_CHECKING:
-    from ....models import Model
     from .judge import Judgement
     from .numbers.extremes import Extreme
 
@@ -73,7 +71,7 @@ def paper_of(
             continue
         extremes = first if each.kind == "number" else last
         is_rank = each.kind in _RANKS
-        found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
+        found = _rank(each, judged, record) if is_rank else _number(each, extremes, record, proved)
         is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind in _OF_ROWS)
         if is_of_lengths and not _has_lengths(judged, proved):
             found = _NO_LENGTHS
@@ -151,7 +149,7 @@ def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
     return _Robot(robot_claims(judged.case, judged.workspace, proved), len(proved) < len(reaches) or proved == on_paper)
 
 
-def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Model) -> ProofClaim | str:
+def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord) -> ProofClaim | str:
     """Return the claim that J, or the constraint wrenches, keep their rank, or why it has no proof."""
     found = judged.regularity if each.kind == "regular" else judged.constraints
     if found is None:
@@ -160,11 +158,11 @@ def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Mo
         own = record.own(each.name)
         return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree(with_open=True))
     if found.outcome is Outcome.REFUTED:
-        return _refuted(each, found, judged, model)
+        return _refuted(each, found, judged)
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
 
 
-def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: Model) -> ProofClaim | str:
+def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement) -> ProofClaim | str:
     """Return the opposite of a claim about a rank with its proof, or why it has no proof."""
     if found.sides is not None:
         return ProofClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
@@ -172,13 +170,9 @@ def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: M
     if found.errors is not None and found.y is not None and legs is not None:
         machine = found.errors.applied(legs)
         return ProofClaim(each.name, "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
-    why = "a computed pose has no proof"
-    if each.kind == "regular" and found.y is not None and legs is None:
-        sides = singular_sides(judged.case, model, judged.workspace, found.y)
-        if not isinstance(sides, str):
-            return ProofClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
-        why = sides
-    return f"{found.outcome.value}: {found.reason}; {why}"
+    if not found.reason:
+        return f"{found.outcome.value}: the check has no rule for a singular machine of this robot"
+    return f"{found.outcome.value}: {found.reason}; a computed pose has no proof"
 
 
 def _number(
