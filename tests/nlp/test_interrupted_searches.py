@@ -222,7 +222,7 @@ def family() -> ToleranceModel:
 
 def machines() -> Claim:
     built = family()
-    found = smallest_of_machines(built, ca.sumsqr(built.coordinates) + built.coordinates[0], gap=0.2)
+    found = smallest_of_machines(built, ca.sumsqr(built.z) + built.z[0], gap=0.2)
     assert not found.value < found.bound
     return Claim(not found.reason, found.bound, found.reason == STOPPED)
 
