@@ -7,17 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ....models import FloatArray, Model
+from ....models import FloatArray
 from ...case.task import Sense
 from ..boxes.tree import TreeRecord
 from ..certificate.certificate import CertificateStatus
 from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, workspace_numbers
 from ..checker.tree import Node
-from ..checker.workspace.pose_boxes import pose_root
-from ..checker.workspace.ranks import rank_claim
 from ..checker.workspace.statement import ERRORS, ExpectedClaim, expected_claims, robot_claims
 from ..statement.claims import REACH, REGULAR, one_machine_name
 from ..statement.machine import Legs, legs_of
@@ -51,10 +47,7 @@ _ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on pa
 _BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
-_NO_SIGNS = "a computed singular pose has a proof for robots with six rows, without loops, alone"
-_ONE_SIGN = "the determinant is not found to change its sign at the computed singular pose"
-#: Distances from a singular pose, in parts of the workspace, and number of poses that are tried at each.
-_DISTANCES, _TRIED, _SEED = (1e-4, 1e-3, 1e-2, 1e-1), 256, 2
+_NO_MACHINES = "the check has no rule for a singular machine of this robot"
 
 
 @dataclass(eq=False)
@@ -198,40 +191,15 @@ class _Writer:
         return ProofClaim(name, "", "regular", tree=tree.tree(with_open=True))
 
     def _singular(self, name: str, found: RankVerdict, y: FloatArray) -> ProofClaim:
-        """Return the opposite of a claim about a rank, from a singular pose (6,)."""
-        legs, sides = legs_of(self._case), found.sides
-        if sides is None and legs is not None and found.errors is not None:
+        """Return the opposite of a claim about a rank, which is refuted at a pose (6,)."""
+        if found.sides is not None:
+            return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+        legs = legs_of(self._case)
+        if found.errors is not None and legs is not None:
             machine = found.errors.applied(legs)
             return ProofClaim(name, "", "singular machine", sides=(tuple(y.tolist()), *_numbers_of(machine)))
-        if sides is None and (name != REGULAR or legs is not None):
-            raise ProofError(f"{_words(found)}; a computed pose has no proof")
-        try:
-            sides = self._sides(y, self.robot.model) if sides is None else sides
-        except ProofError as error:
-            raise ProofError(f"{_words(found)}; {error}") from None
-        return ProofClaim(name, "", "singular", sides=tuple(map(tuple, sides.tolist())))
-
-    def _sides(self, y: FloatArray, model: Model) -> FloatArray:
-        """Return two poses (2, 6) at which determinants have opposite signs, near a computed singular pose (6,)."""
-        root, rng = pose_root(self._judged.workspace), np.random.default_rng(_SEED)
-        claim = rank_claim(self._case, model, root, REGULAR)
-        if not claim.is_square:
-            raise ProofError(_NO_SIGNS)
-        for distance in _DISTANCES:
-            way = distance * (root.upper - root.lower)
-            points = y + way * rng.uniform(-1, 1, (_TRIED, 6))
-            points = np.clip(points, root.lower + 1e-3 * way, root.upper - 1e-3 * way)
-            points = points[[root.holds(each) for each in points]]
-            if not len(points):
-                continue
-            values = np.nan_to_num(np.linalg.det(claim.values_at(points)))
-            sides = points[[values.argmin(), values.argmax()]]
-            try:
-                claim.show_sign_change(root, *sides)
-            except ProofError:
-                continue
-            return np.asarray(sides)
-        raise ProofError(_ONE_SIGN)
+        why = "a computed pose has no proof" if found.reason else _NO_MACHINES
+        raise ProofError(f"{_words(found)}; {why}")
 
     def _program(self, found: Extreme) -> ProofClaim:
         """Return a claim with a tree of the search of ``certify``."""

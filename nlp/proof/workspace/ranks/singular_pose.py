@@ -19,6 +19,7 @@ Source: 1. M. Frank, P. Wolfe, *An algorithm for quadratic programming*, Naval R
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -65,15 +66,15 @@ _POSES, _TRIED, _SEED = 2048, 8, 0
 #: Steps toward machines with smaller singular values, and number of boxes after which the first ones are made; later
 #: ones after twice as many each.
 _MACHINES, _FIRST = 6, 64
-#: Random poses from which those with determinants of either sign are looked for, number that are kept, steps from each,
-#: and distance of poses from which derivatives are taken, in parts of the workspace.
+#: Random poses whose determinants are computed at once; of those with the largest ones of either sign, the number from
+#: which larger ones are looked for, and of steps; distance for derivatives, in parts of the workspace.
 _SAMPLES, _KEPT, _DESCENTS, _APART = 256, 8, 6, 1e-4
-#: Number of poses of each sign whose sign is to be proved in one call.
-_SIGNED = 4
+#: Number of poses of each sign that are kept, and of points on the way between two that are tried first.
+_SIGNED, _ON_WAY = 4, 64
 #: Distances from a computed singular pose, in parts of the workspace, at which both signs are looked for.
 _DISTANCES = (1e-4, 1e-3, 1e-2, 1e-1)
 #: Halvings between two points: more than a double has digits; and largest number of parts of the way between them.
-_HALVINGS, _PARTS = 60, 4096
+_HALVINGS, _PARTS = 60, 1024
 #: Part of a sum of products of a row and a column by which it may be off.
 _PRODUCT = 2.0**-48
 
@@ -177,11 +178,11 @@ class SingularPose:
             return None
         left, _, right = np.linalg.svd(M)
         _, _, by_z, turned = (each.full() for each in self._equations(z, right[self._rank - 1]))
-        found: FloatArray = np.asarray(left[:, self._rank - 1] @ turned)
+        found: FloatArray = left[:, self._rank - 1] @ turned
         dependent = list(self._problem.dependent)
         if dependent:
             found -= found[dependent] @ np.linalg.pinv(by_z[:, dependent]) @ by_z
-        return found if bool(np.isfinite(found).all()) else None
+        return found if np.isfinite(found).all() else None
 
     def is_singular(self, z: FloatArray) -> bool:
         """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
@@ -242,10 +243,13 @@ class DeterminantSigns:
         return _sign_of_determinant(C[0]) if is_known[0] else 0
 
     def change(self, one: FloatArray, other: FloatArray) -> FloatArray | None:
-        """Return a point (n,) next to where the sign changes between two points that have opposite ones.
+        """Return a point (n,) next to where the sign changes between two points; it has the sign of the other one.
 
-        It has the sign of the other one. None where the rows are not proved to have values along the whole way.
+        None where their signs are not proved to be opposite, or the rows to have values along the whole way.
         """
+        values = self.computed(one + np.linspace(0, 1, _ON_WAY)[:, None] * (other - one))
+        if not (values.all() and values[0] * values[-1] < 0 and self.proved(one) * self.proved(other) < 0):
+            return None
         waiting, parts = [(one, other)], 0
         while waiting:
             begin, end = waiting.pop()
@@ -263,42 +267,46 @@ class DeterminantSigns:
             low, high = (low, share) if is_beyond else (share, high)
         # Very near to the change no sign is proved.
         shares = np.minimum(high + 2.0 ** np.arange(-52, 1), 1.0)
-        return next(z for z in (one + share * (other - one) for share in shares) if self.proved(z) == sign)
+        points = (one + share * (other - one) for share in shares)
+        return next((z for z in points if self.proved(z) == sign), other)
 
     def extremes(self) -> FloatArray:
         """Return points (K, n) with the smallest and the largest determinants that few steps from random poses find.
 
         The determinant changes little but linearly over a box: each step tries corners that its derivatives point to.
         """
-        box, free = self._problem.box, list(self._problem.free)
+        box = self._problem.box
         width, parts = box.upper - box.lower, np.array([1.0, 0.5, 0.25])[:, None, None]
         every = box.random(_SAMPLES, np.random.default_rng(_SEED))
 
         def values(y: FloatArray) -> FloatArray:
             """Return the determinants (...) at poses (..., 6)."""
-            return self.computed(self._problem.exact(y.reshape(-1, 6)[:, free])).reshape(y.shape[:-1])
+            return self.computed(self._points(y.reshape(-1, 6))).reshape(y.shape[:-1])
 
-        start, found = values(every), []
-        for sign in (-1.0, 1.0):
-            y = every[np.argsort(sign * start)[:_KEPT]]
-            for _ in range(_DESCENTS):
-                slopes = sign * (values(y + _APART * width * np.eye(6)[:, None]) - values(y)).T
-                end = np.where(slopes > 0, box.lower, box.upper)
-                if box.ball < np.inf:
-                    size = np.linalg.norm(slopes[:, 3:], axis=1, keepdims=True)
-                    end[:, 3:] = -slopes[:, 3:] / np.maximum(size, np.finfo(float).tiny) * np.sqrt(box.ball)
-                tried = np.concatenate([y[None], y + parts * (end - y)])
-                tried = box.clipped(tried.reshape(-1, 6)).reshape(tried.shape)
-                y = tried[np.argmin(sign * values(tried), axis=0), np.arange(len(y))]
-            found.append(y)
-        return self._problem.exact(np.concatenate(found)[:, free])
+        order = np.argsort(values(every))
+        y, sign = every[np.r_[order[:_KEPT], order[-_KEPT:]]], np.repeat([1.0, -1.0], _KEPT)
+        for _ in range(_DESCENTS):
+            # Derivatives, times the sign with which the determinant is to fall.
+            near = sign * values(y + _APART * width * np.eye(7, 6)[:, None])
+            slopes = (near[:6] - near[6]).T
+            end = np.where(slopes > 0, box.lower, box.upper)
+            if box.ball < np.inf:
+                size = np.linalg.norm(slopes[:, 3:], axis=1, keepdims=True)
+                end[:, 3:] = -slopes[:, 3:] / np.maximum(size, np.finfo(float).tiny) * np.sqrt(box.ball)
+            tried = np.concatenate([y[None], y + parts * (end - y)])
+            y = tried[np.argmin(sign * values(tried), axis=0), np.arange(len(y))]
+        return self._points(y)
 
     def around(self, z: FloatArray) -> Iterator[FloatArray]:
         """Yield points (K, n) of the design around a point, farther and farther away."""
         rng, box = np.random.default_rng(_SEED), self._problem.box
         for distance in _DISTANCES:
-            y = self._problem.pose_of(z) + distance * (box.upper - box.lower) * rng.uniform(-1, 1, (_SAMPLES, 6))
-            yield self._problem.exact(box.clipped(y)[:, list(self._problem.free)])
+            way = distance * (box.upper - box.lower)
+            yield self._points(self._problem.pose_of(z) + way * rng.uniform(-1, 1, (_SAMPLES, 6)))
+
+    def _points(self, y: FloatArray) -> FloatArray:
+        """Return the points (K, n) of the design at poses (K, 6) moved into the workspace."""
+        return self._problem.exact(self._problem.box.clipped(y)[:, list(self._problem.free)])
 
 
 def _sign_of_determinant(matrix: FloatArray) -> int:
@@ -349,8 +357,8 @@ class SingularSearch:
         self._problem, self._matrix, self._is_shown = problem, matrix, is_shown
         has_signs = matrix.matrix.shape == (6, 6) and not (matrix.nullity or problem.dependent)
         self._signs = DeterminantSigns(problem, matrix) if has_signs else None
-        # A pose with each sign of the determinant.
-        self._signed: dict[int, FloatArray] = {}
+        # Poses with each sign of the determinant.
+        self._signed: dict[int, list[FloatArray]] = {1: [], -1: []}
         self._is_sampled = False
         self._attempts, self._last, self._due = 0, _SMALL, _FIRST
 
@@ -398,15 +406,16 @@ class SingularSearch:
     ) -> Singular | None:
         """Return a singular pose between points (K, n) with computed determinants (K,), and those known before."""
         problem = self._problem
-        for sign in {-1, 1} - self._signed.keys():
-            for k in np.flatnonzero(np.sign(values) == sign)[:_SIGNED]:
-                if problem.box.holds(problem.pose_of(points[k])) and signs.proved(points[k]) == sign:
-                    self._signed[sign] = points[k]
-                    break
-        if len(self._signed) < 2:
-            return None
-        ends = self._signed[1], self._signed[-1]
-        return self._shown(signs.change(*ends), "", frozen_array(problem.pose_of(np.stack(ends)), (2, 6)))
+        for sign, known in self._signed.items():
+            new = points[np.sign(values) == sign][:_SIGNED]
+            held = [each for each in new if problem.box.holds(problem.pose_of(each))]
+            known[:] = [*held, *known][:_SIGNED]
+        for ends in itertools.product(*self._signed.values()):
+            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
+            shown = self._shown(signs.change(*ends), "", sides)
+            if shown is not None:
+                return shown
+        return None
 
     def _by_newton(self, found: Examined, worst: Sequence[int]) -> Singular | None:
         """Return a singular pose from the boxes whose matrices are nearest to a singular one."""
@@ -443,8 +452,7 @@ class SingularSearch:
             if signs is None:
                 found = self._shown(self._newton.search(machine), BY_NEWTON)
             else:
-                is_other = is_held and signs.proved(z) * signs.proved(machine) < 0
-                found = self._shown(signs.change(z, machine) if is_other else None, "")
+                found = self._shown(signs.change(z, machine) if is_held else None, "")
             if found is not None:
                 return found
         return None
