@@ -255,7 +255,7 @@ def test_errors_of_a_machine_that_is_singular_at_every_pose_have_no_value(case: 
     robot = legs(case)
     similar, box = Legs(robot.base, 0.5 * robot.base), pose_box(Workspace((0.0, 0.0, Free(19.0, 21.0)), Turns()))
     with within(2.0):
-        found = list(pose_errors(similar, subject_of(similar, box).problem, 1e-3, 10.0))
+        found = list(pose_errors(subject_of(similar, box, 10.0), 1e-3))
     for each in found:
         assert each.outcome is Outcome.OPEN
         assert (each.bound, each.pose) == (math.inf, None)
