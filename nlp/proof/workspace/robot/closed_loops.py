@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property
+
 import casadi as ca
 import numpy as np
 from casadi import SX
@@ -26,14 +29,27 @@ class Loops:
         equations: (k, 1) expressions that are 0 where the loops are closed.
         every: all equations, those that follow from others too.
         signs: (s, 1) expressions that are positive in home's assembly.
-        size: (n,) sizes of the coordinates.
+        size: (n,) by which coordinates are comparable: of the order of their ranges.
     """
 
     def __init__(self, z: SX, equations: SX, every: SX, signs: SX, size: FloatArray) -> None:
-        self.count, self.size = int(equations.numel()), size
-        slopes = ca.jacobian(equations, z)
-        self._function = ca.Function("loops", [z], [ca.densify(equations), ca.densify(slopes)])
-        self._every = ca.Function("every", [z], [ca.densify(every), ca.densify(signs)])
+        self.z, self.equations, self.every, self.signs, self.size = z, equations, every, signs, size
+        self.count = int(equations.numel())
+
+    def some(self, which: Sequence[int]) -> Loops:
+        """Return some of the equations."""
+        return Loops(
+            self.z, ca.vertcat(SX(0, 1), *[self.equations[k] for k in which]), self.every, self.signs, self.size
+        )
+
+    @cached_property
+    def _function(self) -> ca.Function:
+        slopes = ca.jacobian(self.equations, self.z)
+        return ca.Function("loops", [self.z], [ca.densify(self.equations), ca.densify(slopes)])
+
+    @cached_property
+    def _every(self) -> ca.Function:
+        return ca.Function("every", [self.z], [ca.densify(self.every), ca.densify(self.signs)])
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the left sides (B, k) at points (n, B)."""

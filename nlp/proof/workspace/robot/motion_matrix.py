@@ -51,7 +51,7 @@ class Limbs:
         actuators: actuated joints.
         loops: (m, k) each, the equations of nested loops in the rates of a member's passive joints.
         position: (3, 1) the platform's origin, length.
-        length: by which rotations are multiplied, length.
+        length: by which rotations are multiplied.
     """
 
     wrenches: Sequence[Wrench]
@@ -76,6 +76,18 @@ class Limbs:
         loops = [each[list(kept), :] for each, kept in zip(self.loops, rows, strict=True)]
         return replace(self, members=members, loops=loops, length=length)
 
+    def about_platform(self, row: Wrench) -> SX:
+        """Return the force and the moment (1, 6) of a row about the platform's origin, divided by the length."""
+        return ca.horzcat(row.force.T, (row.moment - ca.cross(self.position, row.force)).T / self.length)
+
+    def twists(self, screws: SX) -> SX:
+        """Return twists (6, k), angular velocity, then velocity at the world's origin, as ``(v, length omega)``."""
+        found = [
+            ca.vertcat(screws[3:, j] + ca.cross(screws[:3, j], self.position), self.length * screws[:3, j])
+            for j in range(screws.shape[1])
+        ]
+        return ca.horzcat(SX(6, 0), *found)
+
 
 def locked_matrix(limbs: Limbs) -> SX:
     """Return M, with the actuators locked."""
@@ -87,47 +99,32 @@ def free_matrix(limbs: Limbs) -> SX:
     if limbs.actuators:
         return _matrix(limbs, limbs.actuators)
     couples = [row for row in limbs.wrenches if row.kind is WrenchKind.COUPLE]
-    return _matrix(Limbs(couples, (), (), (), limbs.position, limbs.length), [])
+    return _matrix(replace(limbs, wrenches=couples, members=(), loops=()), [])
 
 
 def _matrix(limbs: Limbs, driven: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), sparse, with one column for each driven joint at its end."""
-    p, length = limbs.position, limbs.length
-    rates = sum(member.screws.shape[1] for member in limbs.members)
-    columns, blocks, at = 6 + rates + len(driven), [], 6
-    for row in limbs.wrenches:
-        moment = row.moment - ca.cross(p, row.force)
-        left = ca.horzcat(row.force.T, moment.T / length)
-        block = SX(1, columns)
-        block[0, :6] = left
-        for k, actuator in enumerate(driven):
-            screw = actuator.screw_in(row.label.member)
-            if screw is not None:
-                block[0, 6 + rates + k] = -left @ _twist(screw, p, length)
-        blocks.append(block)
+    # What rows and members see of the platform's twist, and the passive screws that they see it less.
+    parts = [(row.label.member, limbs.about_platform(row), SX(6, 0)) for row in limbs.wrenches]
     for member in limbs.members:
-        screws = member.screws
-        count = screws.shape[1]
-        own = [_twist(screws[:, j], p, length) for j in range(count)]
         # A pinned member sees the velocity of its centre alone: v + omega x (centre - p).
-        arm = (member.centre - p) / length
+        arm = (member.centre - limbs.position) / limbs.length
         seen = ca.horzcat(SX.eye(3), -ca.skew(arm)) if member.is_pinned else SX.eye(6)
-        block = SX(member.size, columns)
-        block[:, :6] = seen
-        for j, twist in enumerate(own):
-            block[:, at + j] = -seen @ twist
-        for k, actuator in enumerate(driven):
-            screw = actuator.screw_in(member.label)
-            if screw is not None:
-                block[:, 6 + rates + k] = -seen @ _twist(screw, p, length)
-        blocks.append(block)
-        at += count
+        parts.append((member.label, seen, member.screws))
+    by_drives = [
+        ca.horzcat(SX(seen.shape[0], 0), *[_rate(limbs, seen, each.screw_in(label)) for each in driven])
+        for label, seen, _ in parts
+    ]
+    motions = ca.horzcat(
+        ca.vertcat(SX(0, 6), *[seen for _, seen, _ in parts]),
+        ca.diagcat(SX(0, 0), *[-seen @ limbs.twists(screws) for _, seen, screws in parts]),
+        ca.vertcat(SX(0, len(driven)), *by_drives),
+    )
     relations = rate_relations(driven)
-    blocks.append(ca.horzcat(SX(relations.shape[0], columns - len(driven)), relations))
-    return ca.sparsify(ca.diagcat(ca.vertcat(*blocks), *[each.T for each in limbs.loops if each.shape[0]]))
+    motions = ca.vertcat(motions, ca.horzcat(SX(relations.shape[0], motions.shape[1] - len(driven)), relations))
+    return ca.sparsify(ca.diagcat(motions, *[each.T for each in limbs.loops if each.shape[0]]))
 
 
-def _twist(screw: SX, position: SX, length: float) -> SX:
-    """Return a twist (6, 1), angular velocity, then velocity at the world's origin, as ``(v, length omega)``."""
-    omega, v = screw[:3], screw[3:]
-    return ca.vertcat(v + ca.cross(omega, position), length * omega)
+def _rate(limbs: Limbs, seen: SX, screw: SX | None) -> SX:
+    """Return the column (k, 1) of a driven joint; zeros where it does not move what is seen."""
+    return SX(seen.shape[0], 1) if screw is None else -seen @ limbs.twists(screw)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
@@ -80,17 +81,22 @@ class PoseBox:
         """Indices of the coordinates that vary."""
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
 
+    @cached_property
+    def _inner(self) -> tuple[FloatArray, FloatArray, float]:
+        """Ends, and the largest squared size of a Cayley vector, of poses that are surely those of the workspace.
+
+        Ends of rotations are about 4 roundings outwards; the ball's square as many again.
+        """
+        slack = np.where(
+            self.upper > self.lower, 8 * _TANGENT * np.maximum(np.abs(self.lower), np.abs(self.upper)), 0.0
+        )
+        slack[:3] = 0.0
+        return self.lower + slack, self.upper - slack, self.ball * (1 - 16 * _TANGENT)
+
     def holds(self, y: FloatArray) -> bool:
         """Return whether a point (6,) is surely a pose of the workspace, and not only of the box rounded outwards."""
-        lower, upper = self._inner
-        return bool(((y >= lower) & (y <= upper)).all()) and float(y[3:] @ y[3:]) <= self.ball * (1 - 16 * _TANGENT)
-
-    @property
-    def _inner(self) -> tuple[FloatArray, FloatArray]:
-        """Ends (6,) that are surely those of the workspace, and not only of the box rounded outwards."""
-        # Ends of rotations are about 4 roundings outwards; the ball's square as many again.
-        slack = np.array([0.0, 0.0, 0.0, *(8 * _TANGENT * np.abs(self.upper[3:]))]) * (self.upper > self.lower)
-        return self.lower + slack, self.upper - slack
+        lower, upper, ball = self._inner
+        return bool(((y >= lower) & (y <= upper)).all()) and float(y[3:] @ y[3:]) <= ball
 
     def quaternions(self, points: FloatArray) -> FloatArray:
         """Return quaternions (K, 4) of the rotations at points (K, 6), of any size."""
@@ -152,11 +158,12 @@ class PoseBox:
 
     def clipped(self, points: FloatArray) -> FloatArray:
         """Return points (K, 6) moved into the workspace."""
-        points = np.clip(points, *self._inner)
-        sizes = np.sqrt((points[:, 3:] ** 2).sum(axis=1, keepdims=True))
-        # A little inside, so that rounding leaves no point outside.
-        radius = math.sqrt(self.ball) * (1 - 16 * _TANGENT)
-        if math.isfinite(radius):
+        lower, upper, ball = self._inner
+        points = np.clip(points, lower, upper)
+        if math.isfinite(ball):
+            # A little inside, so that rounding leaves no point outside.
+            radius = math.sqrt(ball) * (1 - _TANGENT)
+            sizes = np.sqrt((points[:, 3:] ** 2).sum(axis=1, keepdims=True))
             points[:, 3:] *= np.minimum(1.0, radius / np.maximum(sizes, radius))
         return np.asarray(points)
 
@@ -164,7 +171,7 @@ class PoseBox:
         """Return random points (count, 6) of the workspace, those of rotations within the ball."""
         points = rng.uniform(self.lower, self.upper, (count, 6))
         while math.isfinite(self.ball):
-            outside = np.flatnonzero((points[:, 3:] ** 2).sum(axis=1) > self.ball * (1 - 16 * _TANGENT))
+            outside = np.flatnonzero((points[:, 3:] ** 2).sum(axis=1) > self._inner[2])
             if not outside.size:
                 break
             points[outside] = rng.uniform(self.lower, self.upper, (outside.size, 6))
