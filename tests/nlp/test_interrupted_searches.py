@@ -44,8 +44,8 @@ from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel
 from screwsynth.nlp.proof.workspace.scale import largest_scale
-from screwsynth.nlp.proof.workspace.tolerance.machine_number import smallest_of_machines
-from screwsynth.nlp.proof.workspace.tolerance.machines import machines_of
+from screwsynth.nlp.proof.workspace.tolerance.machine_number import MachineNumber
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
 from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
 from screwsynth.nlp.solver.certified import certify
 
@@ -219,12 +219,12 @@ def loops() -> Claim:
 @cache
 def family() -> ToleranceModel:
     case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
-    return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case))).family
+    return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case))).family
 
 
 def machines() -> Claim:
     built = family()
-    found = smallest_of_machines(built, ca.sumsqr(built.coordinates) + built.coordinates[0], gap=0.2)
+    found = MachineNumber(built, ca.sumsqr(built.coordinates) + built.coordinates[0]).minimum(gap=0.2)
     assert not found.value < found.bound
     return Claim(not found.reason, found.bound, found.reason == STOPPED)
 
@@ -308,8 +308,8 @@ def test_an_interrupted_search_claims_no_more_than_a_complete_one(search: Search
 @each_search
 @pytest.mark.parametrize("watched", [LOOPS, WATCHED], ids=["loops", "all"])
 def test_searches_are_interrupted_at_many_instructions(search: Search, watched: tuple[str, ...]) -> None:
-    assert interrupted(search, KeyboardInterrupt, watched, 60, 2) >= (5 if watched == LOOPS else 0)
-    assert interrupted(search, MemoryError, watched, 6, 3) == 0
+    assert interrupted(search, KeyboardInterrupt, watched, 30, 2) >= (2 if watched == LOOPS else 0)
+    assert interrupted(search, MemoryError, watched, 3, 3) == 0
 
 
 def interrupting(calls: int, real: Callable[..., Any]) -> Callable[..., Any]:

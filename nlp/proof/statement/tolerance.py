@@ -56,14 +56,18 @@ class BuiltModel(NamedTuple):
     reaches: tuple[Reach, ...]
 
 
-def built_model(model: Model) -> BuiltModel:
+def built_model(model: Model, *, extended: bool = False) -> BuiltModel:
     """Return a robot with errors of its joint centres.
+
+    Args:
+        model: the robot.
+        extended: whether closed forms have values out of reach too.
 
     Raises:
         RobotError: its joint centres are not known, or it cannot be put together with errors.
     """
     displaced = _displaced(model)
-    closed = closed_form(displaced.model)
+    closed = closed_form(displaced.model, extended=extended)
     if _kinds_of(closed_form(model).model) != _kinds_of(closed.model):
         raise RobotError("", "errors of joint centres take freedoms from the robot: its limbs or loops change")
     return BuiltModel(closed.model, tuple(each.name for each in displaced.centres), closed.reaches)

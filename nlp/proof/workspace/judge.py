@@ -16,7 +16,7 @@ from ...interruption import is_requested, one_call, within
 from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.machine import Legs, check_leg_error, has_straight_legs, joint_centres, legs_of, workspace_of_case
+from ..statement.machine import Legs, check_leg_error, joint_centres, legs_of, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
@@ -28,8 +28,7 @@ from .numbers.strokes import Refine, with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import PoseBox, pose_box
 from .robot.posed_robot import NotJudgedError
-from .tolerance.leg_errors import of_legs
-from .tolerance.machines import Machines, Proving, machine_extreme, machine_extremes, machines_of, shown_extremes
+from .tolerance.machines import Machines, not_bounded
 from .verdict import Outcome, Regularity
 
 if TYPE_CHECKING:
@@ -41,6 +40,8 @@ TIME_LIMIT = 60.0
 _PART = 0.5
 #: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
 _AS_NEEDED = 1.0
+#: Reason for numbers of a robot that does not have all poses.
+_OUT_OF_REACH = "not every machine within the tolerance is proved to reach every pose"
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +154,7 @@ def _machines(case: Case, closed: ClosedForm, box: PoseBox) -> tuple[Machines | 
     if not case.joint_centre_tolerance:
         return None, ""
     try:
-        return machines_of(case, closed.model, box), ""
+        return Machines(case, closed, box), ""
     except NotJudgedError as error:
         return None, str(error)
 
@@ -201,10 +202,14 @@ class _Numbers:
         names = [name for name in quantities if name not in SPECTRAL]
         refine: Refine
         if machines is not None:
-            proving = Proving(self.gap, self.jobs, self.progress, self.paper)
-            extremes = machine_extremes(machines, names, proving, with_objective=with_objective)
-            yield from _add(found, map(partial(_of_legs, machines), extremes))
-            refine = partial(_refined_machines, machines, proving)
+            reaches, claims = machines.symbols.claims(names, with_objective=with_objective)
+            prove = partial(machines.extreme, jobs=self.jobs, paper=self.paper)
+            yield from self._add_proved(found, prove, reaches)
+            if any(each.fails for each in found):
+                yield from _add(found, (not_bounded(claim, _OUT_OF_REACH) for claim in claims))
+            else:
+                yield from self._add_proved(found, prove, claims)
+            refine = partial(_refined_machines, machines, prove, self.paper)
         else:
             refine = yield from self._add_design(found, names, with_objective=with_objective)
         lengths = [each for each in found if each.name.startswith("leg_length limb ") and each.sense is Sense.MIN]
@@ -236,7 +241,8 @@ class _Numbers:
         is_reached = True
         if self.closed.reaches:
             place, reaches = reach_claims(case, self.closed, self.workspace)
-            yield from self._add_proved(found, place, [replace(each, uncovered=self.unknown) for each in reaches])
+            reaches = tuple(replace(each, uncovered=self.unknown) for each in reaches)
+            yield from self._add_proved(found, self._prove(place), reaches)
             is_reached = not any(each.fails for each in found)
         # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
         is_closed = self.closed.reaches and is_reached
@@ -250,38 +256,50 @@ class _Numbers:
                 each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
             ]
             if is_reached:
-                proving = Proving(self.gap, self.jobs)
-                decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
-        yield from self._add_proved(found, layout, claims, decided)
-        return partial(_refined, partial(prove, paper=self.paper, again=True), claims)
+                decided += self._in_home(names, with_objective=with_objective)
+        yield from self._add_proved(found, prove, claims, decided)
+        return partial(_refined, prove, claims)
+
+    def _in_home(self, names: Sequence[str], *, with_objective: bool) -> Iterator[Extreme]:
+        """Yield the extremes of numbers without a limit of a design with loops, in the assembly of home.
+
+        Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is
+        singular. None is yielded of a robot without loops, or one whose loops cannot be followed.
+        """
+        if not self.closed.model.unknowns:
+            return
+        try:
+            alone = Machines(self.case, self.closed, pose_box(self.workspace))
+        except NotJudgedError:
+            return
+        for claim in alone.symbols.claims(names, with_objective=with_objective)[1]:
+            if claim.limit is None:
+                yield alone.extreme(claim, gap=self.gap, jobs=self.jobs)
 
     def _prove(self, layout: Layout) -> Callable[..., Extreme]:
         """Return the function that proves a claim to a gap."""
-        return partial(prove_extreme, layout, jobs=self.jobs)
+        return partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper)
 
     def _add_proved(
-        self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()
+        self,
+        found: list[Extreme],
+        prove: Callable[..., Extreme],
+        claims: Sequence[Claim],
+        decided: Sequence[Extreme] = (),
     ) -> Iterator[Extreme]:
         """Add the extremes of claims, and yield them; those that are decided are searched again for the paper alone."""
-        prove, known = self._prove(layout), {(each.name, each.sense, each.key): each for each in decided}
+        known = {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(claims):
             if self.progress is not None:
                 self.progress(claim.name, done, len(claims))
             own = known.get((claim.name, claim.sense, claim.key))
             is_limit = own is not None and own.limit is not None
             if own is None or (self.paper is not None and not (is_limit and own.outcome is not Outcome.PROVED)):
-                again = prove(claim, gap=_AS_NEEDED if is_limit else self.gap, paper=self.paper)
+                again = prove(claim, gap=_AS_NEEDED if is_limit else self.gap)
                 if is_limit and self.paper is not None and again.outcome is not Outcome.PROVED:
                     self.paper.elsewhere.add((claim.name, claim.sense.value))
                 own = own or again
             yield from _add(found, [own])
-
-
-def _of_legs(machines: Machines, each: Extreme) -> Extreme:
-    """Return an extreme with the errors of its machine as those of six straight legs, if it has these."""
-    if not has_straight_legs(machines.case.model):
-        return each
-    return replace(each, errors=None if each.centres is None else of_legs(each.centres), centres=None)
 
 
 def _refined(
@@ -298,7 +316,13 @@ def _refined(
 
 
 def _refined_machines(
-    machines: Machines, proving: Proving, leg: int, sense: Sense, gap: float, about: Directions | None
+    machines: Machines,
+    prove: Callable[..., Extreme],
+    paper: PaperRecord | None,
+    leg: int,
+    sense: Sense,
+    gap: float,
+    about: Directions | None,
 ) -> Extreme | None:
     """Return the same of all machines, less the part of their errors in these directions, which no pose changes."""
     claims = (
@@ -306,11 +330,9 @@ def _refined_machines(
         if about is None
         else [length_of_one_machine(machines.symbols, leg, sense, about)]
     )
-    if about is not None and proving.paper is not None:
-        proving.paper.directions[claims[0].name] = about
-    prove = partial(machine_extreme, machines, again=True)
-    found = _refined(lambda claim, *, gap: prove(claim, proving._replace(gap=gap)), claims, leg, sense, gap, about)
-    return None if found is None else _of_legs(machines, found)
+    if about is not None and paper is not None:
+        paper.directions[claims[0].name] = about
+    return _refined(prove, claims, leg, sense, gap, about)
 
 
 def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..boxes.tree import TreeRecord
 from ..certificate.certificate import CertificateStatus
+from ..checker.premises import fingerprint
 from ..checker.tree import Node
 
 if TYPE_CHECKING:
@@ -65,21 +66,20 @@ class PaperRecord:
         tree = bytes([Node.BOUNDED])
         self._keep(claim, ProgramRecord(nlp, bound + _FOLDED * abs(bound), tree))
 
-    def program(self, claim: Claim, found: Certificate, writer: TreeRecord, *, again: bool = False) -> None:
-        """Record a search of a number, or a finer one again, of which the better one is kept."""
+    def program(self, claim: Claim, found: Certificate, writer: TreeRecord) -> None:
+        """Record a search of a number."""
         has_bound = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE) and math.isfinite(
             found.bound
         )
         tree = writer.tree(with_open=True) if has_bound else None
-        bound = -found.nlp.sign * found.bound
-        record = ProgramRecord(found.nlp, bound, tree)
-        key = claim.name, claim.sense.value
-        before = self.programs.get(key)
-        if again and (before is None or before.tree is None or (tree is not None and bound <= before.bound)):
-            self.programs[key] = record
-        else:
-            self._keep(claim, record)
+        self._keep(claim, ProgramRecord(found.nlp, -found.nlp.sign * found.bound, tree))
 
     def _keep(self, claim: Claim, record: ProgramRecord) -> None:
-        """Keep the record of a number; of two of one name that of the first, as in :mod:`.expected`."""
-        self.programs.setdefault((claim.name, claim.sense.value), record)
+        """Keep the record of a number: the better one of two of one program, else the first of two of one name."""
+        key = claim.name, claim.sense.value
+        before = self.programs.get(key)
+        is_same = before is not None and fingerprint(before.nlp) == fingerprint(record.nlp)
+        if before is None or (
+            is_same and (before.tree is None or (record.tree is not None and record.bound <= before.bound))
+        ):
+            self.programs[key] = record

@@ -127,7 +127,7 @@ class OverPoses:
         ends = np.hstack([lower[:, self._free], -errors]).T, np.hstack([upper[:, self._free], errors]).T
         if not len(ends[0]):
             ends = np.zeros((1, len(lower))), np.zeros((1, len(lower)))
-        return self._encloser(*ends) if errors.size else self._encloser.second(*ends).as_terms()
+        return self._encloser(*ends) if errors.size else self._encloser.second(*ends)
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
         """Return lower bounds over boxes (B, 6)."""

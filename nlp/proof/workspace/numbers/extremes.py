@@ -106,7 +106,6 @@ def prove_extreme(
     jobs: int | None = None,
     machine: WorstMachine | None = None,
     paper: PaperRecord | None = None,
-    again: bool = False,
 ) -> Extreme:
     """Prove the smallest or the largest value of a number over a workspace.
 
@@ -120,7 +119,6 @@ def prove_extreme(
         jobs: threads.
         machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
         paper: records the search for a proof.
-        again: whether the record takes the place of an earlier one of the same number.
     """
     if is_requested():
         return _extreme(claim, _Found(reason=why_stopped()), machine)
@@ -130,19 +128,11 @@ def prove_extreme(
         if paper is not None:
             paper.constant(claim, nlp, value)
         return _extreme(claim, _Found(value, value, _pose(nlp, nlp.start), is_met=True), machine)
-    record = None if paper is None else _Record(paper, again)
     try:
         with one_search(time_limit):
-            return _extreme(claim, _search(nlp, claim, gap, jobs, record), machine)
+            return _extreme(claim, _search(nlp, claim, gap, jobs, paper), machine)
     except UncoveredError as error:
         return _extreme(claim, _Found(reason=str(error)), machine)
-
-
-class _Record(NamedTuple):
-    """Where a search is recorded, and whether in the place of an earlier one of the same number."""
-
-    paper: PaperRecord
-    again: bool
 
 
 class _Found(NamedTuple):
@@ -167,7 +157,7 @@ def _search(
     claim: Claim,
     gap: float,
     jobs: int | None,
-    record: _Record | None,
+    paper: PaperRecord | None,
 ) -> _Found:
     """Return the bound of an expression, to the gap or, where that leaves its limit open, as fine as the limit needs.
 
@@ -175,11 +165,11 @@ def _search(
         UncoveredError: the expression holds an operation without a rule.
     """
     # A program of a claim has one function, and its search is that of certify with or without a record.
-    writer = None if record is None else TreeRecord()
+    writer = None if paper is None else TreeRecord()
     found = certify_program(nlp, gap=gap, jobs=jobs, recorder=writer)
     boxes, seconds = found.boxes, found.seconds
     while (finer := _finer_gap(nlp, claim, found)) is not None and not is_requested():
-        finer_writer = None if record is None else TreeRecord()
+        finer_writer = None if paper is None else TreeRecord()
         again = certify_program(nlp, found.x, gap=finer, jobs=jobs, recorder=finer_writer)
         boxes, seconds = boxes + again.boxes, seconds + again.seconds
         sign = 1.0 if claim.sense is Sense.MAX else -1.0
@@ -188,8 +178,8 @@ def _search(
         else:
             again = replace(again, bound=found.bound)
         found = again
-    if record is not None and writer is not None and found.status is not CertificateStatus.INFEASIBLE:
-        record.paper.program(claim, found, writer, again=record.again)
+    if paper is not None and writer is not None and found.status is not CertificateStatus.INFEASIBLE:
+        paper.program(claim, found, writer)
     if found.status is CertificateStatus.INFEASIBLE:
         return _Found(boxes=boxes, seconds=seconds, reason="the robot has no pose there")
     # A search that ends early has a bound too, which may be as good as asked for.

@@ -82,13 +82,15 @@ class PoseBox:
 
     def holds(self, y: FloatArray) -> bool:
         """Return whether a point (6,) is surely a pose of the workspace, and not only of the box rounded outwards."""
+        lower, upper = self._inner
+        return bool(((y >= lower) & (y <= upper)).all()) and float(y[3:] @ y[3:]) <= self.ball * (1 - 16 * _TANGENT)
+
+    @property
+    def _inner(self) -> tuple[FloatArray, FloatArray]:
+        """Ends (6,) that are surely those of the workspace, and not only of the box rounded outwards."""
         # Ends of rotations are about 4 roundings outwards; the ball's square as many again.
-        slack = np.array([0.0, 0.0, 0.0, *(8 * _TANGENT * np.abs(self.upper[3:]))])
-        fixed = self.upper == self.lower
-        inside = (y >= self.lower + slack) & (y <= self.upper - slack)
-        return bool((inside | (fixed & (y == self.lower))).all()) and float(y[3:] @ y[3:]) <= self.ball * (
-            1 - 16 * _TANGENT
-        )
+        slack = np.array([0.0, 0.0, 0.0, *(8 * _TANGENT * np.abs(self.upper[3:]))]) * (self.upper > self.lower)
+        return self.lower + slack, self.upper - slack
 
     def quaternions(self, points: FloatArray) -> FloatArray:
         """Return quaternions (K, 4) of the rotations at points (K, 6), of any size."""
@@ -150,7 +152,7 @@ class PoseBox:
 
     def clipped(self, points: FloatArray) -> FloatArray:
         """Return points (K, 6) moved into the workspace."""
-        points = np.clip(points, self.lower, self.upper)
+        points = np.clip(points, *self._inner)
         sizes = np.sqrt((points[:, 3:] ** 2).sum(axis=1, keepdims=True))
         # A little inside, so that rounding leaves no point outside.
         radius = math.sqrt(self.ball) * (1 - 16 * _TANGENT)

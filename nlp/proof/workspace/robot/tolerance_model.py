@@ -105,6 +105,13 @@ class ToleranceModel:
         return Loops(self.coordinates, self.equations, self.every, self.signs, self.size)
 
 
+def steepest(slopes: FloatArray, tolerance: float) -> FloatArray:
+    """Return errors (..., 3) as large as a tolerance along derivatives by them; none along derivatives of zero."""
+    sizes = np.linalg.norm(slopes, axis=-1, keepdims=True)
+    # A sum with zero has no negative zero.
+    return np.asarray(INSIDE * tolerance * slopes / np.maximum(sizes, np.finfo(float).tiny) + 0.0)
+
+
 def family_of(case: Case, built: BuiltModel, problem: Problem, tolerance: float) -> ToleranceModel:
     """Return all machines within a tolerance on joint centres.
 

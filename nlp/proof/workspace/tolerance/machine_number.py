@@ -1,4 +1,4 @@
-"""Smallest value of a number over all machines within a tolerance, at every pose of a workspace: bisection.
+"""Number of all machines within a tolerance: bounds over boxes of poses, and values of single machines.
 
 Over a box of poses, and for all machines, an expression has a form ``g + a e_I + b e_D + d e_E + [-r, r]``. With the
 dependent coordinates replaced by their relation, no machine at a pose of the box has a smaller value than
@@ -18,23 +18,32 @@ from casadi import SX
 from .....models import FloatArray
 from ....interruption import one_search
 from ...enclosure.forms import Forms
-from ...statement.machine import INSIDE
 from ..numbers.bound_search import Bounds, FollowedRule, Goal, Minimum, Value
 from ..ranks.krawczyk import ROUNDING, by_centres, inverses
 from ..ranks.loop_boxes import LoopBoxes, are_between
-from ..robot.tolerance_model import ToleranceModel
+from ..robot.tolerance_model import ToleranceModel, steepest
 
-#: Part of themselves by which rotations stay inside of their ends: more than the rounding of these.
-_INSIDE = 1e-13
 #: Slope, as a part of the largest at a point, that is rounding error.
 _FLAT = 1e-9
 
 
-class _Expression:
-    """Bounds of an expression (1, 1) in the coordinates of a family."""
+class MachineNumber:
+    """A number of all machines, whose smallest value is meant.
 
-    def __init__(self, expression: SX) -> None:
+    Args:
+        family: the machines.
+        expression: (1, 1) in their coordinates.
+
+    Attributes:
+        entries: the expression.
+    """
+
+    def __init__(self, family: ToleranceModel, expression: SX) -> None:
         self.entries: SX = expression
+        self._family, self._problem, self._loops = family, family.problem, family.loops
+        gradient = ca.densify(ca.gradient(expression, family.coordinates))
+        self._function = ca.Function("number", [family.coordinates], [ca.densify(expression), gradient])
+        self._dependent, self._count = list(family.problem.dependent), len(family.problem.start)
 
     def over(self, forms: Forms, count: int, errors: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`~..numbers.bound_search.Number.over`."""
@@ -47,54 +56,23 @@ class _Expression:
         shares = np.abs(by_pose) + r[:, None] / max(count, 1)
         return Bounds(np.where(np.isfinite(lower), lower, -np.inf), shares)
 
+    def minimum(
+        self, *, gap: float, limit: float | None = None, slack: float = 0.0, time_limit: float | None = None
+    ) -> Minimum:
+        """Prove the smallest value over all machines and poses.
 
-def smallest_of_machines(
-    family: ToleranceModel,
-    expression: SX,
-    *,
-    gap: float,
-    limit: float | None = None,
-    slack: float = 0.0,
-    time_limit: float | None = None,
-) -> Minimum:
-    """Prove the smallest value of an expression over all machines and poses.
+        Args:
+            gap: allowed distance of the bound from the smallest value known, as a part of it.
+            limit: the search ends once the bound is at least this, or a smaller value is known.
+            slack: how far a value may be below the limit and still count as on it.
+            time_limit: seconds after which the search stops with the bound reached.
 
-    Args:
-        family: the machines.
-        expression: (1, 1) in their coordinates.
-        gap: allowed distance of the bound from the smallest value known, as a part of it.
-        limit: the search ends once the bound is at least this, or a smaller value is known.
-        slack: how far a value may be below the limit and still count as on it.
-        time_limit: seconds after which the search stops with the bound reached.
-
-    Raises:
-        UncoveredError: the expression holds an operation without a rule.
-    """
-    goal = Goal(gap, limit, slack, is_relative=True)
-    with one_search(time_limit):
-        points = _MachinePoints(family, expression)
-        return FollowedRule(family.problem, family, _Expression(expression), points.smallest_in, goal).minimum()
-
-
-class _MachinePoints:
-    """An expression at single points of a family.
-
-    Args:
-        family: the machines.
-        expression: (1, 1) in their coordinates.
-    """
-
-    def __init__(self, family: ToleranceModel, expression: SX) -> None:
-        self._family, problem = family, family.problem
-        gradient = ca.densify(ca.gradient(expression, family.coordinates))
-        self._function = ca.Function("number", [family.coordinates], [ca.densify(expression), gradient])
-        self._loops = family.loops
-        self._independent, self._dependent = list(problem.independent), list(problem.dependent)
-        self._count, self._free = len(problem.start), list(problem.free)
-
-    def closed(self, z: FloatArray) -> FloatArray:
-        """Return points (K, n + 3 m) with closed loops near points; one that does not close is NaN."""
-        return self._loops.all_closed(z.T, self._dependent).T if self._dependent else z
+        Raises:
+            UncoveredError: the expression holds an operation without a rule.
+        """
+        goal = Goal(gap, limit, slack, is_relative=True)
+        with one_search(time_limit):
+            return FollowedRule(self._problem, self._family, self, self.smallest_in, goal).minimum()
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (K,) at closed points (K, n + 3 m)."""
@@ -113,6 +91,18 @@ class _MachinePoints:
             found[:, D] = 0.0
         return found
 
+    def change(self, z: FloatArray) -> FloatArray:
+        """Return the largest changes (K,) by errors to first order, of derivatives that are defined."""
+        parts = self.slopes(z)[:, self._count :].reshape(len(z), -1, 3)
+        return np.asarray(self._family.tolerance * np.nan_to_num(np.linalg.norm(parts, axis=2)).sum(axis=1))
+
+    def worst(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return the machines (K, n + 3 m) with the smallest values to first order, from derivatives of the design."""
+        parts = slopes[:, self._count :].reshape(len(z), -1, 3)
+        sizes = np.linalg.norm(parts, axis=2, keepdims=True)
+        errors = steepest(np.where(sizes > _FLAT * _largest(sizes), -parts, 0.0), self._family.tolerance)
+        return np.hstack([z[:, : self._count], errors.reshape(len(z), -1)])
+
     def smallest_in(self, boxes: LoopBoxes) -> Value | None:
         """Return the smallest value at few points of boxes; None where no loops close in them.
 
@@ -120,56 +110,38 @@ class _MachinePoints:
         points to.
         """
         best: Value | None = None
-        centre = boxes.centre
+        design = np.hstack([boxes.centre, np.zeros((len(boxes.centre), self._family.errors.numel()))])
         with np.errstate(all="ignore"):
-            z = self.closed(np.hstack([centre, np.zeros((len(centre), self._family.errors.numel()))]))
-            slopes = self.slopes(z)
-            errors = self._steepest(slopes[:, self._count :])
-            for moves_pose in (False, True):
-                moved = z.copy()
-                moved[:, self._count :] = errors
-                if moves_pose:
-                    moved = self._at_corner(moved, slopes, boxes)
-                moved = self.closed(moved)
-                values = np.where(self._are_inside(moved, boxes), self.values(moved), np.nan)
+            design = self._closed(design)
+            slopes = self.slopes(design)
+            worst = self.worst(design, slopes)
+            for tried in (worst, self._at_corner(worst, slopes, boxes)):
+                z = self._closed(tried)
+                inside = are_between(z, boxes, self._dependent)
+                inside &= np.array([self._problem.box.holds(each) for each in self._problem.pose_of(z)])
+                values = np.where(inside, self.values(z), np.nan)
                 if np.isfinite(values).any():
                     k = int(np.nanargmin(values))
                     if best is None or values[k] < best.value:
-                        best = Value(float(values[k]), moved[k])
+                        best = Value(float(values[k]), z[k])
         return best
 
-    def _steepest(self, slopes: FloatArray) -> FloatArray:
-        """Return errors (K, 3 m) as large as the tolerance, against the derivatives by them."""
-        parts = slopes.reshape(len(slopes), -1, 3)
-        sizes = np.linalg.norm(parts, axis=2, keepdims=True)
-        unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > _FLAT * _sizes(sizes))
-        return np.asarray((-INSIDE * self._family.tolerance * unit).reshape(slopes.shape))
+    def _closed(self, z: FloatArray) -> FloatArray:
+        """Return points (K, n + 3 m) with closed loops near points; one that does not close is NaN."""
+        return self._loops.all_closed(z.T, self._dependent).T if self._dependent else z
 
     def _at_corner(self, z: FloatArray, slopes: FloatArray, boxes: LoopBoxes) -> FloatArray:
         """Return points with the pose in the corner of a box that the derivatives point to."""
-        own, count, problem = self._independent, len(self._free), self._family.problem
+        problem, own, free = self._problem, list(self._problem.independent), list(self._problem.free)
         z = z.copy()
         change = slopes[:, own] * (boxes.upper - boxes.lower)[:, own]
         # A slope that is rounding error points to the upper end.
-        z[:, own] = np.where(change > _FLAT * _sizes(change), boxes.lower[:, own], boxes.upper[:, own])
-        # Ends of rotations are rounded outwards, and are no poses of the workspace.
-        box = problem.box
-        room = np.where(box.upper > box.lower, _INSIDE * np.maximum(np.abs(box.lower), np.abs(box.upper)), 0.0)
-        room[:3] = 0.0
-        clipped = np.clip(box.clipped(problem.pose_of(z)), box.lower + room, box.upper - room)[:, self._free]
-        of_pose = [j for j in own if j < count]
-        z[:, of_pose] = clipped[:, of_pose]
+        z[:, own] = np.where(change > _FLAT * _largest(change), boxes.lower[:, own], boxes.upper[:, own])
+        of_pose = [j for j in own if j < len(free)]
+        z[:, of_pose] = problem.box.clipped(problem.pose_of(z))[:, free][:, of_pose]
         return z
 
-    def _are_inside(self, z: FloatArray, boxes: LoopBoxes) -> FloatArray:
-        """Return whether points are in the workspace, with closed loops in the assembly of their boxes."""
-        D, problem = self._dependent, self._family.problem
-        own = are_between(z, boxes, D)
-        return np.array(
-            [bool(good) and problem.box.holds(problem.pose_of(each)) for good, each in zip(own, z, strict=True)]
-        )
 
-
-def _sizes(values: FloatArray) -> FloatArray:
+def _largest(values: FloatArray) -> FloatArray:
     """Return the largest size of the values at each of K points, with the shape (K, 1, ...)."""
     return np.asarray(np.nan_to_num(np.abs(values)).max(axis=tuple(range(1, values.ndim)), keepdims=True, initial=0.0))
