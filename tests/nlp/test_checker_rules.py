@@ -13,7 +13,8 @@ from screwsynth.nlp.proof.checker.bisection import Shown
 from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
 from screwsynth.nlp.proof.checker.polymodels import Tilts
 from screwsynth.nlp.proof.checker.tree import Node
-from screwsynth.nlp.proof.checker.workspace.tolerance import change_of_jacobian, change_of_rows
+from screwsynth.nlp.proof.checker.workspace.number_claims import change_of_jacobian
+from screwsynth.nlp.proof.checker.workspace.ranks import change_of_rows
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm
 

@@ -398,7 +398,7 @@ def wrongly_shown(name: str, tolerance: float, covered: float) -> tuple[int, int
         for _ in range(8):
             errors = rng.normal(size=(len(rows), len(built.names), 3))
             errors *= tolerance / np.linalg.norm(errors, axis=2, keepdims=True)
-            y = rng.uniform(lower[rows], upper[rows])[:, claim._free]
+            y = rng.uniform(lower[rows], upper[rows])[:, claim.free]
             machine = assembly.moved(design, np.hstack([y, errors.reshape(len(rows), -1)]))
             assert np.isfinite(machine).all()
             wrong += int((np.linalg.det(C @ matrices(machine)) <= 0).sum())

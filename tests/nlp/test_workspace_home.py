@@ -22,7 +22,7 @@ from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.checker.proof_file import ProofError, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import posed_robot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
@@ -266,8 +266,8 @@ def test_the_check_begins_in_the_working_mode_of_home() -> None:
             build_problem(case, model, pose_box(case.workspace))
         except NotJudgedError:
             with pytest.raises(ProofError, match="in the assembly of home"):
-                start_of(posed_robot(case, model, pose_root(case.workspace)))
+                start_of(PosedRobot(case, model, pose_root(case.workspace)))
             tried += 1
         else:
-            start_of(posed_robot(case, model, pose_root(case.workspace)))
+            start_of(PosedRobot(case, model, pose_root(case.workspace)))
     assert 0 < tried < 6

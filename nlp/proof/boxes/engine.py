@@ -17,7 +17,7 @@ from ..enclosure.engine import kernel
 from ..enclosure.forms import QuadraticModel
 from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows, tangent_rows
 from ..enclosure.tape import Tape, compile_tape
-from ..statement.piecewise_derivatives import refuse_jumps
+from ..statement.form import refuse_jumps
 from ..statement.standard_form import StandardForm
 
 if TYPE_CHECKING:

@@ -65,9 +65,9 @@ class Incumbent:
         """Whether the search has found a better point than the one given."""
         return self.value > self._given + _BETTER * self._form.nlp.objective_size
 
-    def program_point(self) -> FloatArray:
-        """Return the point (n,) in the program's variables; zeros without one."""
-        return self._with_level(np.zeros(self._form.n) if self.x is None else self.x, self.value)
+    def program_point(self) -> FloatArray | None:
+        """Return the point (n,) in the program's variables; None without one."""
+        return None if self.x is None else self._with_level(self.x, self.value)
 
     def start(self, x: FloatArray | None, claimed: float | None) -> None:
         """Begin with a given point, or with the best of a few.

@@ -3,31 +3,36 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
+from ....models import FloatArray
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
-from ..checker.workspace.statement import ERRORS, ExpectedClaim, RobotClaims, expected_claims, robot_claims
-from ..statement.claims import REACH, asked_name, one_machine_name
-from ..statement.machine import Legs, legs_of
+from ..checker.workspace.statement import (
+    ERRORS,
+    ExpectedClaim,
+    RobotClaims,
+    expected_claims,
+    legs_numbers,
+    robot_claims,
+)
+from ..statement.claims import REACH, REGULAR, asked_name, one_machine_name
+from ..statement.machine import INSIDE, legs_of
 from ..statement.tolerance import second_order_name
 from .proof_record import PaperRecord
 from .singular_sides import singular_sides
 from .verdict import Outcome, Regularity
 
 if TYPE_CHECKING:
-    from ....models import Model
     from .judge import Judgement
     from .numbers.extremes import Extreme
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
-#: Kinds of claims about ranks.
-_RANKS = ("regular", "constraints")
-#: Kinds of claims that rest on the shortest lengths of legs where machines are meant.
-_OF_ROWS = ("singular value", "condition")
 #: Reason of claims about machines within a tolerance that are not known.
 _AS_BUILT = "the robot cannot be put together with errors of its joint centres"
 #: Reason of numbers of machines whose coordinates follow from others, or that have kinks.
@@ -72,9 +77,9 @@ def paper_of(
             unproved.append(Unproved(each.name, each.sense, _NO_REACH))
             continue
         extremes = first if each.kind == "number" else last
-        is_rank = each.kind in _RANKS
-        found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
-        is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind in _OF_ROWS)
+        is_rank = each.kind == "rank"
+        found = _rank(each, judged, record, robot) if is_rank else _number(each, extremes, record, proved)
+        is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind == "singular value")
         if is_of_lengths and not _has_lengths(judged, proved):
             found = _NO_LENGTHS
         if found == _NO_BOUND and judged.case.joint_centre_tolerance and each.key not in record.programs:
@@ -103,11 +108,6 @@ def paper_of(
         tolerance=judged.case.joint_centre_tolerance or 0.0,
         lemmas=tuple(_lemmas(record, proved)),
     )
-
-
-def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
-    """Return joint centres (12, 3), base before platform; none for a robot that is not six straight legs."""
-    return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
 
 def _key(judged: Judgement, each: Extreme) -> tuple[str, str]:
@@ -151,34 +151,34 @@ def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
     return _Robot(robot_claims(judged.case, judged.workspace, proved), len(proved) < len(reaches) or proved == on_paper)
 
 
-def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Model) -> ProofClaim | str:
+def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, robot: RobotClaims) -> ProofClaim | str:
     """Return the claim that J, or the constraint wrenches, keep their rank, or why it has no proof."""
-    found = judged.regularity if each.kind == "regular" else judged.constraints
+    found = judged.regularity if each.name == REGULAR else judged.constraints
     if found is None:
         return "it was not judged"
     if found.outcome is Outcome.PROVED:
         own = record.own(each.name)
         return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree(with_open=True))
     if found.outcome is Outcome.REFUTED:
-        return _refuted(each, found, judged, model)
+        return _refuted(each, found, judged, robot)
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
 
 
-def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: Model) -> ProofClaim | str:
+def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, robot: RobotClaims) -> ProofClaim | str:
     """Return the opposite of a claim about a rank with its proof, or why it has no proof."""
+    sides: Iterable[FloatArray] | str = "a computed pose has no proof"
     if found.sides is not None:
-        return ProofClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
-    legs = legs_of(judged.case)
-    if found.errors is not None and found.y is not None and legs is not None:
-        machine = found.errors.applied(legs)
-        return ProofClaim(each.name, "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
-    why = "a computed pose has no proof"
-    if each.kind == "regular" and found.y is not None and legs is None:
-        sides = singular_sides(judged.case, model, judged.workspace, found.y)
-        if not isinstance(sides, str):
-            return ProofClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
-        why = sides
-    return f"{found.outcome.value}: {found.reason}; {why}"
+        sides = found.sides
+    elif found.errors is not None and found.y is not None and robot.machines is not None:
+        # The determinant has the other sign for the largest errors in these directions too, and is farther from 0.
+        errors = found.errors.of_centres(robot.machines.symbols.built.names).vectors
+        errors *= INSIDE * robot.machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
+        sides = [np.concatenate([found.y, each]) for each in (np.zeros(errors.size), errors.ravel())]
+    elif each.name == REGULAR and found.y is not None and robot.legs is None:
+        sides = singular_sides(judged.case, robot.model, judged.workspace, found.y)
+    if isinstance(sides, str):
+        return f"{found.outcome.value}: {found.reason}; {sides}"
+    return ProofClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
 
 
 def _number(
@@ -195,7 +195,7 @@ def _number(
         return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
     if each.kind == "number":
         return _program(each, record)
-    if each.kind in ("stroke", "dead length"):
+    if each.kind == "lengths":
         directions = record.directions.get(one_machine_name(each.name))
         if directions is not None:
             sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())

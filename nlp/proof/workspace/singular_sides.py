@@ -44,7 +44,7 @@ def singular_sides(
         values = np.nan_to_num(np.linalg.det(claim.values_at(points)))
         one, other = points[values.argmin()], points[values.argmax()]
         try:
-            claim.show_sign_change(root, one, other)
+            claim.show_sign_change(root, (one.tolist(), other.tolist()))
         except ProofError:
             continue
         return one, other
