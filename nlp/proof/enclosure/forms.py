@@ -195,14 +195,14 @@ class QuadraticModel:
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
         bound = np.empty(self.middle.size)
-        kernel().models(len(self.b), self._arrays(), bound.size, bound)
+        kernel().models(len(self.b), (*self._arrays(), bound, None, None, None), bound.size)
         return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
         low, high, levels = np.empty(self.b.shape), np.empty(self.b.shape), np.empty(self.middle.size)
         levels[:] = level
-        kernel().models(len(self.b), self._arrays(), levels.size, levels, low, high)
+        kernel().models(len(self.b), (*self._arrays(), None, levels, low, high), levels.size)
         return Ends(low, high)
 
     def _arrays(self) -> tuple[FloatArray, ...]:

@@ -82,13 +82,9 @@ class RankTest:
                 entries.append(entry)
         self.entries: SX = ca.vertcat(SX(0, 1), *entries)
         self._constant *= self._scale[:, None]
-        self._head = (
-            *whole.shape,
-            matrix.nullity,
-            np.ascontiguousarray(np.array(self._at, dtype=np.int32).T),
-            np.ascontiguousarray(self._scale[self._at[0]]),
-            np.ascontiguousarray(self._constant),
-        )
+        at = np.ascontiguousarray(np.array(self._at, dtype=np.int32).T)
+        parts = at, np.ascontiguousarray(self._scale[self._at[0]]), np.ascontiguousarray(self._constant)
+        self._head = (*whole.shape, matrix.nullity, parts)
 
     def examine_second(
         self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray | None = None
@@ -105,8 +101,8 @@ class RankTest:
         regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
         shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        found = (*ends, regular, shares, smallest, signs)
-        encloser.module.rank(n, encloser.tape.head, self._head, found, count, change)
+        found = (*ends, regular, shares, smallest, signs, change)
+        encloser.module.rank(n, encloser.tape.head, self._head, found, count)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
 
     def examine(self, forms: Forms, f: int) -> Tested:
