@@ -15,9 +15,9 @@ import numpy as np
 from ...errors import UncoveredError
 from ..enclosure.engine import kernel
 from ..enclosure.forms import QuadraticModel
-from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows, tangent_rows
+from ..enclosure.squared_quotients import Rows, search_rows, tangent_rows
 from ..enclosure.tape import Tape, compile_tape
-from ..statement.form import refuse_jumps
+from ..statement.form import refuse_jumps, without_ties
 from ..statement.standard_form import StandardForm
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ class Engine:
             form.n,
             len(form.functions),
             len(rows.quotients),
-            0 if squares is None else len(squares.functions),
+            0 if squares is None else len(squares.quotients),
             parts,
             tape.head,
             None if values is None else values.head,
@@ -264,7 +264,7 @@ class Engine:
         )
 
 
-def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short: bool = True) -> Tape:
+def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool = True) -> Tape:
     """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
 
     Equal parts are written once with ``is_short``; looking for them cannot be stopped, and takes as long as the rest.
@@ -275,13 +275,14 @@ def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short:
     try:
         rows = search_rows(form, apart=False) if rows is None else rows
         refuse_jumps(rows.expressions, form.x)
-        results = [rows.expressions, rows.jacobian.T]
+        jacobian = ca.densify(without_ties(ca.jacobian(rows.expressions, form.x), form.x))
+        results = [rows.expressions, jacobian.T]
         return compile_tape(ca.Function("search", [form.x], ca.cse(results) if is_short else results))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
 
 
-def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | None:
+def value_tape(form: StandardForm, rows: Rows | None = None) -> Tape | None:
     """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
 
     None is returned for a form with too many variables for a first pass.

@@ -208,27 +208,12 @@ static PyObject *rank(PyObject *module, PyObject *args)
     return finish_call(&all, room);
 }
 
+/* The arguments are those of borrow and of the calls of PyArg_ParseTuple above; the package has one caller of each. */
 static PyMethodDef methods[] = {
-    {"rank", rank, METH_VARARGS,
-     "rank(n, tape, (rows, columns, nullity, (at, scale, constant)),\n"
-     "     (lower, upper, regular, shares, smallest, sign, change or None), B)\n\n"
-     "Judge the rank of a matrix over B boxes: arrays (n, B), (B,) of int, (n, B), (B,) and (B,) of int; (entries, B)."},
-    {"models", models, METH_VARARGS,
-     "models(n, (middle, b, H, w, slope_lo, slope_hi, rounding, bound, None, None, None), B)\n"
-     "models(n, (..., None, level, low, high), B)\n\n"
-     "Write upper bounds (B,) of B quadratic models, or the ends (n, B) of points that can reach levels (B,)."},
-    {"enclose", enclose, METH_VARARGS,
-     "enclose(n, tape, (lower, upper, c, p, q, s, lo, hi, a), B, order)\n\n"
-     "Write forms and ranges of the results of a tape over B boxes: arrays (n, B), (R, B), and (R, n, B) for a, which has\n"
-     "the coefficients of pairs of variables too with order 2."},
-    {"examine", examine, METH_VARARGS,
-     "examine((n, functions, quotients, tangents, (equation, depends, low, high, whose, squared), tape, values, objective),\n"
-     "        arrays, B, begin, finish, threshold, shared)\n\n"
-     "Examine the boxes begin <= i < finish of B; a tape is ((code, constants), instructions, registers, results).\n"
-     "values is the tape of the expressions without their gradients and the rows for tangents to squares, whose functions\n"
-     "are in squared, or None; objective that of the functions and their gradients where conditions are evaluated only if\n"
-     "needed, or None. The last arrays are models, least and tilts, or None: with models the first variables are shared\n"
-     "with other limbs, whose tilts the part without variables of its own gets."},
+    {"rank", rank, METH_VARARGS, "Judge the rank of a matrix over B boxes."},
+    {"models", models, METH_VARARGS, "Write upper bounds of B quadratic models, or the ends of points that can reach levels."},
+    {"enclose", enclose, METH_VARARGS, "Write forms and ranges of the results of a tape over B boxes."},
+    {"examine", examine, METH_VARARGS, "Examine the boxes begin <= i < finish of B."},
     {NULL, NULL, 0, NULL},
 };
 
