@@ -184,9 +184,7 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
     faults: list[BindingPose | None] = []
     regular = judged.regularity
     if regular is not None and regular.outcome is not Outcome.PROVED:
-        faults.append(
-            None if regular.y is None else BindingPose("regular", regular.box.pose(regular.y), None, regular.errors)
-        )
+        faults.append(None if regular.pose is None else BindingPose("regular", regular.pose, None, regular.errors))
     if judged.constraints is not None and judged.constraints.outcome is not Outcome.PROVED:
         faults.append(None)
     by_name = {(each.name, each.sense): each for each in judged.extremes}

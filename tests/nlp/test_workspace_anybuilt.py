@@ -31,16 +31,16 @@ from screwsynth.nlp.proof.enclosure.forms import Forms
 from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers import expressions
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
-from screwsynth.nlp.proof.workspace.tolerance import machine_number
 from screwsynth.nlp.proof.workspace.tolerance import machines as tolerance
-from screwsynth.nlp.proof.workspace.tolerance.machines import Machines, Proving, machine_extremes, machines_of
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
 from screwsynth.nlp.results.schema import result_schema
@@ -82,7 +82,7 @@ def case_of(name: str) -> Case:
 
 
 def machines(case: Case) -> Machines:
-    return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
+    return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case)))
 
 
 @dataclass(frozen=True)
@@ -234,10 +234,8 @@ SAMPLED: dict[str, Callable[[], Sampled]] = {"3-rps": ThreeRps, "6-rus": SixRus,
 
 def wanted(found: Machines, names: tuple[str, ...], gap: float) -> list[Extreme]:
     """Return the smallest and largest value of each of these numbers."""
-    proving = Proving(gap, 1)
-    quantities = [each.name for each in found.built.model.quantities]
-    every = machine_extremes(found, quantities, proving, with_objective=True, only=names)
-    return [each for each in every if each.name in names]
+    every = found.symbols.claims([each.name for each in found.built.model.quantities])[1]
+    return [found.extreme(each, gap=gap, jobs=1) for each in every if each.name in names]
 
 
 def samples(robot: Sampled, box: PoseBox, tolerance: float, more: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -303,11 +301,21 @@ def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
 
 
 def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    spread = machine_number.by_centres
+    spread = expressions.by_centres
     monkeypatch.setattr(tolerance, "_OUTWARDS", 0.8)
-    monkeypatch.setattr(machine_number, "by_centres", lambda slopes: 0.8 * spread(slopes))
+    monkeypatch.setattr(expressions, "by_centres", lambda slopes: 0.8 * spread(slopes))
     for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
         assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
+
+
+def test_errors_that_do_not_matter_are_zero_without_a_sign() -> None:
+    family = machines(case_of("3-rps")).family
+    free = family.z[family.problem.independent[0]]
+    (found,) = smallest_values(expressions.Expressions(family, free - family.errors[2]), [Goal(part=0.1)])
+    errors = family.errors_of(found.at).vectors
+    assert errors[0, 2] == pytest.approx(1e-3, rel=1e-9)
+    assert np.count_nonzero(errors) == 1
+    assert not np.signbit(errors).any()
 
 
 def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:

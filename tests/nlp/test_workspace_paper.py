@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hexapods import clearance, hexapod_text, over, subject_of
+from hexapods import clearance, hexapod_text, subject_of, values_of
 
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Free, Task
@@ -40,10 +40,10 @@ from screwsynth.nlp.proof.checker.workspace.pose_boxes import BoxClaim, PoseRoot
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import Oracle
-from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, WorstError, with_rest
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Number
+from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
+from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, with_rest
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
@@ -407,7 +407,7 @@ def test_the_root_holds_the_searched_box(kind: TurnKind) -> None:
 
 @pytest.mark.parametrize("kind", list(TurnKind))
 def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, kind: TurnKind) -> None:
-    """Boxes against the values of the search's oracles at samples, which the check does not use."""
+    """Boxes against the values of the search's numbers at samples, which the check does not use."""
     rng = np.random.default_rng(4)
     workspace = turned(kind, 20)
     root, box = pose_root(workspace), pose_box(workspace)
@@ -415,10 +415,10 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
     points = lower + rng.uniform(0, 1, (30, 120, 6)).round(1) * (upper - lower)
     flat = points.reshape(-1, 6)
     subject = subject_of(robot, box)
-    oracles: list[tuple[Oracle, float, float]] = [
-        (over(subject, subject.spectrum(11.5, is_condition=False)), 1.0, 0.9),
-        (over(subject, subject.spectrum(11.5, is_condition=True)), -1.0, 2.0),
-        (over(subject, WorstError(subject.problem, is_rotation=False)), -1.0, 2.0),
+    numbers: list[tuple[Number, float, float]] = [
+        (subject.spectrum(11.5, is_condition=False), 1.0, 0.9),
+        (subject.spectrum(11.5, is_condition=True), -1.0, 2.0),
+        (WorstError(subject.problem, is_rotation=False), -1.0, 2.0),
         (clearance(robot, box, 0, 2), 1.0, 15.0),
     ]
     legs = posed(root, robot)
@@ -428,8 +428,8 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
         ErrorClaim(legs, 2.0, is_rotation=False),
         ClearanceClaim(legs, (0, 2), 15.0),
     ]
-    for (oracle, sign, bound), each in zip(oracles, claims, strict=True):
-        least = oracle.values(flat).reshape(30, 120).min(axis=0)
+    for (number, sign, bound), each in zip(numbers, claims, strict=True):
+        least = values_of(number, flat).reshape(30, 120).min(axis=0)
         holds = each.attempt(lower, upper).holds
         assert not holds[least < sign * bound].any()
         # Most boxes on which the number is 6 % better than claimed are shown at once.

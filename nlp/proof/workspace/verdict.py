@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ....models import FloatArray
 from ..statement.machine import CentreErrors, JointErrors
-from .robot.pose_box import PoseBox
+from .robot.pose_box import PoseBox, PoseNumbers
 
 
 class Outcome(enum.Enum):
@@ -19,8 +19,8 @@ class Outcome(enum.Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Regularity:
-    """Verdict on the claim that J has full rank at every pose.
+class RankVerdict:
+    """Verdict on the claim that J, or the constraint wrenches, keep their rank at every pose.
 
     Attributes:
         outcome: the verdict.
@@ -52,3 +52,13 @@ class Regularity:
     reason: str
     errors: JointErrors | None = None
     centres: CentreErrors | None = None
+
+    @property
+    def pose(self) -> PoseNumbers | None:
+        """The pose with the coordinates ``y``; None without them."""
+        return None if self.y is None else self.box.pose(self.y)
+
+    @property
+    def fails(self) -> bool:
+        """Whether the claim is not proved."""
+        return self.outcome is not Outcome.PROVED

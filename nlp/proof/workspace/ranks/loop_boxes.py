@@ -38,6 +38,8 @@ from .rank_rule import EntryChange, RankTest, Tested, is_polynomial
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ...boxes.tree import TreeRecord
+
 #: Factors by which widths of dependent coordinates are made wider: the first guess, from slopes at the middle of a box,
 #: and later ones, from the relation that was found with the guess before.
 _WIDER, _AGAIN = 1.1, 1.05
@@ -86,7 +88,7 @@ class Examined(NamedTuple):
         boxes: the boxes, with dependent coordinates where they are known.
         relation: of these; its rest is infinite where they are not known.
         is_regular, shares, smallest, signs: those of :class:`~.rank_rule.Tested`; nothing is known of ``smallest``
-            where it is infinite.
+            where it is infinite. Of K numbers it is (B, K), their lower bounds.
     """
 
     boxes: LoopBoxes
@@ -105,6 +107,9 @@ class Test(Protocol):
     """
 
     entries: SX
+
+    def unknown(self, count: int, f: int) -> Tested:
+        """Return the results for boxes of which nothing is known."""
 
     def examine(self, forms: Forms, f: int) -> Tested:
         """Return the results for boxes from forms of the entries in f independent coordinates, then errors."""
@@ -133,10 +138,10 @@ class Examiner:
         self._rank: RankTest | None = None
         self._change: EntryChange | None = None
         is_short = not problem.dependent and len(problem.independent) <= MOST_VARIABLES
-        # With errors, forms of second order are those of polynomials.
-        is_meant = is_short and (not problem.names or is_polynomial(test.entries, problem.z))
-        if isinstance(test, RankTest) and is_meant:
-            self._rank = test
+        # With errors, forms of second order are those of the polynomials of a matrix alone.
+        is_rank = isinstance(test, RankTest)
+        if is_short and (not problem.names or (is_rank and is_polynomial(test.entries, problem.z))):
+            self._rank = test if isinstance(test, RankTest) else None
             self._change = EntryChange(problem, test.entries) if problem.names else None
             exact = test.entries if self._change is None else self._change.exact
             self.second = Encloser(problem.problem.z, exact)
@@ -156,12 +161,14 @@ class Examiner:
         """Examine boxes."""
         B, f, k = len(boxes.lower), len(self.of.independent), len(self.of.dependent)
         relation = no_relation(B, self.of)
-        if self.second is not None and self._rank is not None and B:
+        if self.second is not None and B:
             ends = boxes.lower.T[:f], boxes.upper.T[:f]
+            if self._rank is None:
+                return Examined(boxes, relation, *self._test.examine(self.second.second(*ends).as_terms(), f))
             change = None if self._change is None else self._change.over(*ends)
             return Examined(boxes, relation, *self._rank.examine_second(self.second, *ends, change))
         lower, upper, near, known = some(boxes, np.arange(B))
-        tested = Tested(np.zeros(B, dtype=bool), np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=np.int32))
+        tested = self._test.unknown(B, f)
         columns: tuple[NDArray[Any], ...] = (*relation, *tested)
         new = np.flatnonzero(~known)
         if new.size:
@@ -372,13 +379,15 @@ class LoopRule(Rule[Followed]):
     Args:
         problem: the robot.
         examiner: follows the dependent coordinates, and has the test.
+        recorder: records the boxes for a proof.
 
     Attributes:
         whole: (n,) widths of the whole workspace along independent coordinates; 0 for others.
     """
 
-    def __init__(self, problem: Problem, examiner: Examiner) -> None:
+    def __init__(self, problem: Problem, examiner: Examiner, recorder: TreeRecord | None = None) -> None:
         self._problem, self._examiner, self._independent = problem, examiner, list(problem.independent)
+        self._recorder = recorder
         self._start = whole_workspace(problem)
         self.whole: FloatArray = np.zeros(len(problem.start))
         self.whole[self._independent] = (self._start.upper - self._start.lower)[0, self._independent]
@@ -394,6 +403,9 @@ class LoopRule(Rule[Followed]):
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
         """Return the parts of boxes, with their dependent coordinates."""
+        if self._recorder is not None:
+            along = np.array(self._problem.free)[boxes.split]
+            self._recorder.cuts(*self._poses(boxes.lower, boxes.upper), along)
         parts = self.parts(boxes)
         shape = (len(parts.split) // max(len(boxes.split), 1), 1)
         sides = 1.0 * (parts.lower > np.tile(boxes.lower, shape)) - 1.0 * (parts.upper < np.tile(boxes.upper, shape))
@@ -414,8 +426,22 @@ class LoopRule(Rule[Followed]):
         return found
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
-        """Return boxes contracted to the workspace."""
-        return in_workspace(self._problem, boxes)
+        """Return boxes contracted to the workspace, and record where they lead."""
+        found, kept, beyond = contracted_boxes(self._problem, boxes)
+        if self._recorder is not None:
+            before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
+            self._recorder.contractions(before, after, ~kept)
+            self._recorder.lacks_boxes |= bool(beyond.any())
+        return some(found, kept)
+
+    def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
+        box, free = self._problem.box, self._problem.free
+        low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
+        for j in self._independent:
+            if j < len(free):
+                low[:, free[j]], high[:, free[j]] = lower[:, j], upper[:, j]
+        return low, high
 
     def boxes_of(self, found: Examined, bound: FloatArray, split: NDArray[np.intp]) -> Boxes[Followed]:
         """Return examined boxes, with bounds (B,) and places (B,) among the independent coordinates to bisect."""

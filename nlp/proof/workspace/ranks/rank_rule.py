@@ -27,7 +27,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ...enclosure.forms import Encloser, Forms
-from ..robot.motion_matrix import RankMatrix
+from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from .krawczyk import ROUNDING, are_contractions, by_centres
 
@@ -113,6 +113,11 @@ class RankTest:
         found = (*ends, regular, shares, smallest, signs)
         encloser.module.rank(n, encloser.tape.head, self._head, found, count, change)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
+
+    def unknown(self, count: int, f: int) -> Tested:
+        """Return the results for boxes of which nothing is known."""
+        nothing = np.zeros(count, dtype=np.int32)
+        return Tested(nothing.astype(bool), np.zeros((count, f)), np.full(count, np.inf), nothing)
 
     def examine(self, forms: Forms, f: int) -> Tested:
         """Return the verdict on boxes from forms of first order of the entries, whose first f terms are no errors."""

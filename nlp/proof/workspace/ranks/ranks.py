@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .....models import FloatArray, Model, frozen_array
+from .....models import Model, frozen_array
 from ....errors import UncoveredError
 from ....interruption import one_search
 from ...boxes.rows import Boxes, joined, some
@@ -17,18 +17,18 @@ from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ...statement.machine import has_straight_legs
 from ..home_poses import Homes
-from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
+from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..tolerance.leg_errors import of_legs
-from ..verdict import Outcome, Regularity
-from .loop_boxes import APART, Examiner, Followed, LoopBoxes, LoopRule, contracted_boxes, coordinates_to_split
+from ..verdict import Outcome, RankVerdict
+from .loop_boxes import APART, Examiner, Followed, LoopRule, coordinates_to_split
 from .rank_rule import RankTest
 from .singular_pose import Refuter, Singular, SingularSearch
 
 if TYPE_CHECKING:
     from ...boxes.tree import TreeRecord
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024
@@ -41,8 +41,8 @@ RankProgress = Callable[[float, int, int], None]
 class Ranks(NamedTuple):
     """Verdicts on J, and on the constraint wrenches; None for a robot without them."""
 
-    regular: Regularity
-    constraints: Regularity | None
+    regular: RankVerdict
+    constraints: RankVerdict | None
 
 
 def prove_ranks(
@@ -82,16 +82,16 @@ def prove_ranks(
     return Ranks(found[0], found[1] if len(found) > 1 else None)
 
 
-def _refuted(verdict: Regularity, at: Singular | None) -> Regularity:
+def _refuted(verdict: RankVerdict, at: Singular | None) -> RankVerdict:
     """Return a verdict that a singular pose refutes; the same without one."""
     if at is None:
         return verdict
     return replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, sides=at.sides, centres=at.centres)
 
 
-def not_judged(box: PoseBox, reason: str) -> Regularity:
+def not_judged(box: PoseBox, reason: str) -> RankVerdict:
     """Return the verdict on a robot that no search covers."""
-    return Regularity(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
+    return RankVerdict(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
 
 
 def prove_rank(
@@ -103,7 +103,7 @@ def prove_rank(
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
     refuter: Refuter | None = None,
-) -> Regularity:
+) -> RankVerdict:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
     Args:
@@ -145,7 +145,7 @@ def prove_rank(
         y = problem.pose_of(np.where(np.isfinite(centre), centre, boxes.more.near[widest]))
     elif reason:
         y = problem.pose_of(problem.start)
-    verdict = Regularity(
+    verdict = RankVerdict(
         outcome=Outcome.PROVED if y is None else Outcome.OPEN,
         box=problem.box,
         y=None if y is None else frozen_array(y, (6,)),
@@ -173,16 +173,9 @@ class _RankRule(LoopRule):
     block = _BLOCK
 
     def __init__(self, problem: Problem, matrix: RankMatrix, recorder: TreeRecord | None, refuter: Refuter) -> None:
-        super().__init__(problem, Examiner(problem, RankTest(matrix, problem.z, problem.start)))
+        super().__init__(problem, Examiner(problem, RankTest(matrix, problem.z, problem.start)), recorder)
         self.singular: Singular | None = None
-        self._recorder, self._refuter, self._examined = recorder, refuter, 0
-
-    def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes."""
-        if self._recorder is not None:
-            along = np.array(self._problem.free)[boxes.split]
-            self._recorder.cuts(*self._ends(boxes.lower, boxes.upper), along)
-        return super().divided(boxes)
+        self._refuter, self._examined = refuter, 0
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes over which the rank is not proved to be full."""
@@ -194,21 +187,3 @@ class _RankRule(LoopRule):
         found = some(found, np.flatnonzero(~found.is_regular))
         split = coordinates_to_split(found.shares, self.widths(found))
         return Verdicts(self.boxes_of(found, np.zeros(len(split)), split), 0.0, count)
-
-    def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
-        """Return boxes contracted to the workspace, and record where they lead."""
-        found, kept, beyond = contracted_boxes(self._problem, boxes)
-        if self._recorder is not None:
-            before, after = (self._ends(each.lower, each.upper) for each in (boxes, found))
-            self._recorder.contractions(before, after, ~kept)
-            self._recorder.lacks_boxes |= bool(beyond.any())
-        return some(found, kept)
-
-    def _ends(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
-        box, free = self._problem.box, self._problem.free
-        low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
-        for j in self._independent:
-            if j < len(free):
-                low[:, free[j]], high[:, free[j]] = lower[:, j], upper[:, j]
-        return low, high

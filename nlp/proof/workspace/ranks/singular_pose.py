@@ -29,9 +29,9 @@ import numpy as np
 
 from .....models import FloatArray, frozen_array
 from ...enclosure.forms import Encloser
-from ...statement.machine import INSIDE, CentreErrors
-from ..robot.motion_matrix import RankMatrix
-from ..robot.posed_robot import Problem
+from ...statement.machine import CentreErrors
+from ..robot.posed_model import RankMatrix
+from ..robot.posed_robot import Problem, steepest
 from .krawczyk import are_contractions, inverses
 from .loop_boxes import Examined
 from .rank_rule import RankTest
@@ -199,10 +199,8 @@ class SingularPose:
             slopes = None if closed is None else self.slopes(closed)
             if closed is None or slopes is None:
                 return
-            parts, machine = slopes[errors].reshape(-1, 3), closed.copy()
-            sizes = np.linalg.norm(parts, axis=1, keepdims=True)
-            unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > 0)
-            machine[errors] += 2 / (step + 2) * (-INSIDE * problem.tolerance * unit.ravel() - machine[errors])
+            machine, end = closed.copy(), steepest(-slopes[errors].reshape(-1, 3), problem.tolerance).ravel()
+            machine[errors] += 2 / (step + 2) * (end - machine[errors])
             yield machine
 
 
