@@ -22,7 +22,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -295,12 +295,11 @@ class DeterminantSigns:
             y = tried[np.argmin(sign * values(tried), axis=0), np.arange(len(y))]
         return self._points(y)
 
-    def around(self, z: FloatArray) -> Iterator[FloatArray]:
-        """Yield points (K, n) of the design around a point, farther and farther away."""
-        rng, box = np.random.default_rng(_SEED), self._problem.box
-        for distance in _DISTANCES:
-            way = distance * (box.upper - box.lower)
-            yield self._points(self._problem.pose_of(z) + way * rng.uniform(-1, 1, (_SAMPLES, 6)))
+    def around(self, z: FloatArray) -> FloatArray:
+        """Return random points (K, n) of the design around one, at several distances."""
+        y, box = self._problem.pose_of(z), self._problem.box
+        away = np.random.default_rng(_SEED).uniform(-1, 1, (len(_DISTANCES), _SAMPLES, 6)) * (box.upper - box.lower)
+        return self._points((y + np.array(_DISTANCES)[:, None, None] * away).reshape(-1, 6))
 
     def _points(self, y: FloatArray) -> FloatArray:
         """Return the points (K, n) of the design at poses (K, 6) moved into the workspace."""
@@ -328,18 +327,6 @@ def _sign_of_determinant(matrix: FloatArray) -> int:
     return sign * ((last > 0) - (last < 0))
 
 
-class Refuter(Protocol):
-    """Search for a singular pose."""
-
-    def look(self, found: Examined, boxes: int) -> Singular | None:
-        """Return a singular pose, or None.
-
-        Args:
-            found: the boxes that were examined last.
-            boxes: number of all that were examined.
-        """
-
-
 class SingularSearch:
     """Search for a singular pose from boxes: by signs where the matrix has six rows, else by Newton's method.
 
@@ -365,7 +352,7 @@ class SingularSearch:
         return SingularPose(self._problem, self._matrix)
 
     def look(self, found: Examined, boxes: int) -> Singular | None:
-        """Return a singular pose from these boxes; the first time from random poses too."""
+        """Return a singular pose from the boxes that were examined last, of so many; at first from random poses too."""
         worst = np.argsort(np.where(found.is_regular, np.inf, found.smallest))[:2].tolist()
         singular = self._by_newton(found, worst) if self._signs is None else self._by_signs(self._signs, found)
         if singular is not None or not self._problem.names or boxes < self._due or found.is_regular.all():
@@ -380,12 +367,9 @@ class SingularSearch:
         points = problem.exact(y[:, list(problem.free)])
         values = np.array([self._newton.smallest(each) for each in points])
         worst = [points[k] for k in np.argsort(values)[:_TRIED] if np.isfinite(values[k])]
-        for search in (self._pose, self._machine) if problem.names else (self._pose,):
-            for point in worst:
-                found = search(point)
-                if found is not None:
-                    return found
-        return None
+        found = (self._pose(point) for point in worst)
+        machines = (self._machine(point) for point in worst if problem.names)
+        return next((each for each in itertools.chain(found, machines) if each is not None), None)
 
     def _by_signs(self, signs: DeterminantSigns, found: Examined) -> Singular | None:
         """Return a singular pose between two with opposite signs: random ones, and the centres of boxes."""
@@ -432,16 +416,14 @@ class SingularSearch:
 
     def _pose(self, z: FloatArray) -> Singular | None:
         """Return a singular pose of the design near a point, between two poses of opposite signs if there are any."""
-        near, signs = self._newton.search(z, self._count), self._signs
-        shown = self._shown(near, BY_NEWTON)
-        if shown is not None and near is not None and signs is not None:
-            for points in signs.around(near):
-                values = signs.computed(points)
-                order = np.argsort(values)[[0, -1]]
-                between = self._between(signs, points[order], values[order])
-                if between is not None:
-                    return between
-        return shown
+        near = self._newton.search(z, self._count)
+        if near is None:
+            return None
+        between = None
+        if self._signs is not None:
+            points = self._signs.around(near)
+            between = self._between(self._signs, points, self._signs.computed(points))
+        return between or self._shown(near, BY_NEWTON)
 
     def _machine(self, z: FloatArray) -> Singular | None:
         """Return a singular machine at a point of the design, or near it."""

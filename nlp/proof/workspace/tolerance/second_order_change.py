@@ -20,10 +20,10 @@ from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
-from ...boxes.rows import WHOLE, Boxes
+from ...boxes.rows import WHOLE, Boxes, some
 from ...boxes.search import Order, Rule, Search, Verdicts
 from ...enclosure.forms import Encloser
-from ..ranks.loop_boxes import LoopBoxes, in_workspace, whole_workspace
+from ..ranks.loop_boxes import LoopBoxes, contracted_boxes, whole_workspace
 from ..robot.posed_robot import Problem
 
 if TYPE_CHECKING:
@@ -106,7 +106,8 @@ class _ChangeRule(Rule[FloatArray]):
     def examine(self, boxes: Boxes[FloatArray]) -> Verdicts[FloatArray]:
         """Return bounds of boxes."""
         known = np.ones(len(boxes.split), dtype=bool)
-        now = in_workspace(self._problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
+        now, kept, _ = contracted_boxes(self._problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
+        now = some(now, kept)
         errors = np.full((len(now.lower), 3 * self._count), self._tolerance)
         forms = self._encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
         with np.errstate(all="ignore"):
