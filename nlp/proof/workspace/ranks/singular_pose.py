@@ -28,6 +28,7 @@ import casadi as ca
 import numpy as np
 
 from .....models import FloatArray, frozen_array
+from .....models.arrays import first_largest
 from ...enclosure.forms import Encloser
 from ...statement.machine import CentreErrors
 from ..robot.posed_model import RankMatrix
@@ -381,7 +382,7 @@ class SingularSearch:
         between = self._between(signs, points, values)
         if between is not None or not self._problem.names:
             return between
-        return self._machine(points[np.argmin(np.abs(values))])
+        return self._machine(points[first_largest(-np.abs(values)[None])[0]])
 
     def _between(
         self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
