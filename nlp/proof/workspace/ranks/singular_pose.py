@@ -382,7 +382,8 @@ class SingularSearch:
         between = self._between(signs, points, values)
         if between is not None or not self._problem.names:
             return between
-        return self._machine(points[first_largest(-np.abs(values)[None])[0]])
+        nearest = first_largest(1 / np.where(values, np.abs(values), np.inf))
+        return self._machine(points[nearest])
 
     def _between(
         self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
