@@ -13,7 +13,7 @@ from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
-from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, OwnBoxes, bound_limb, first_largest_of_lists
+from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, bound_limb, first_largest_of_lists
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
@@ -166,8 +166,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
 
     def careless(*given: object) -> LimbBound:
         found = bound_limb(*given)  # type: ignore[arg-type]
-        own = given[3]
-        assert isinstance(own, OwnBoxes)
+        own = found.own
         reached = found.reached + part * np.abs(found.reached)
         bounds = np.where(found.bounds < reached[own.of], -np.inf, found.bounds)
         best = np.maximum.reduceat(bounds, own.starts)

@@ -22,8 +22,8 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.machine import Legs
-from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
 from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box

@@ -17,8 +17,8 @@ import numpy as np
 
 from ....models import FloatArray
 from ...program.nlp import Nlp
+from ..statement.form import refuse_jumps
 from ..statement.limb_separation import separate
-from ..statement.piecewise_derivatives import refuse_jumps
 from ..statement.standard_form import StandardForm, standard_form
 from .bisection import show
 from .optimum import Claims, rule_of

@@ -3,9 +3,8 @@
  * The tape is interpreted over LANES boxes at once, so that an instruction is fetched once for all of them and its
  * loops become vector instructions; the boxes are then examined one by one. docs/certificate.md explains the formulas.
  * tests/reference has them in NumPy, in the same order, in the modules that the headers name. The headers of kernel/ have
- * an idea each and belong to this one translation unit, so that the compiler sees all of it: values, univariate,
- * enclosure, quadratic, quotients, contraction, examination, secondorder, firstpass, tangents, blocks, enclosed, models,
- * rank.
+ * an idea each and belong to this one translation unit, so that the compiler sees all of it: values, univariate, forms,
+ * runs, rank; quadratic, contraction, models, quotients, examination, tangents, firstpass, blocks.
  *
  * Rounding is to nearest. Never compile this with -ffast-math, which would drop the tests for NaN that keep boxes open;
  * nor with contraction to fused operations, which would make it differ from the reference.
@@ -14,7 +13,7 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
-#include "kernel/enclosed.h"
+#include "kernel/blocks.h"
 #include "kernel/models.h"
 #include "kernel/rank.h"
 
@@ -33,7 +32,6 @@ typedef struct {
 
 #define READ(to, items) {&(to), items, sizeof *(to), 0}
 #define WRITE(to, items) {&(to), items, sizeof *(to), 1}
-#define COUNT(arrays) (int)(sizeof(arrays) / sizeof *(arrays))
 
 /* Borrows the memory of one object, which must be contiguous. 0 with an exception where it is not as expected. */
 static int borrow(Borrowed *all, PyObject *object, Array array)
@@ -51,13 +49,11 @@ static int borrow(Borrowed *all, PyObject *object, Array array)
 }
 
 /* Borrows the objects of a tuple. */
-static int borrow_all(Borrowed *all, PyObject *tuple, const Array *arrays, int count)
+static int borrow_all(Borrowed *all, PyObject *tuple, const Array *arrays, size_t count)
 {
-    int good = PyTuple_Size(tuple) == count;
-    if (!good && !PyErr_Occurred())
-        PyErr_SetString(PyExc_ValueError, "the kernel got another number of arrays than it expects");
-    for (int i = 0; good && i < count; i++)
-        good = borrow(all, PyTuple_GetItem(tuple, i), arrays[i]);
+    int good = PyTuple_Size(tuple) == (Py_ssize_t)count;
+    for (size_t i = 0; good && i < count; i++)
+        good = borrow(all, PyTuple_GetItem(tuple, (Py_ssize_t)i), arrays[i]);
     return good;
 }
 
@@ -77,26 +73,35 @@ static int read_tape(Borrowed *all, PyObject *tuple, Tape *tape)
            borrow(all, constants, (Array)READ(tape->k, tape->length));
 }
 
-/* Memory of so many numbers, all 0, for a call whose arguments are good; NULL with an exception otherwise. */
-static double *memory_of_call(int good, size_t count)
+/* Gets the memory that was counted, for a call whose arguments are good; 0 with an exception otherwise. */
+static int is_ready(int good, Room *room)
 {
-    double *memory = good ? calloc(count, sizeof(double)) : NULL;
-    if (good && !memory)
+    *room = (Room){good ? calloc(room->used, sizeof(double)) : NULL, 0};
+    if (good && !room->at)
         PyErr_NoMemory();
     else if (!good && !PyErr_Occurred())
         PyErr_SetString(PyExc_ValueError, "the kernel got parts that do not belong together, or no boxes");
-    return memory;
+    return room->at != NULL;
 }
 
+/* Makes a call where its arguments are good: counts its memory first. */
+#define CALL(good, call)                                                                                               \
+    if (good)                                                                                                          \
+        call;                                                                                                          \
+    if (is_ready(good, &room)) {                                                                                       \
+        Py_BEGIN_ALLOW_THREADS                                                                                         \
+        call;                                                                                                          \
+        Py_END_ALLOW_THREADS                                                                                           \
+    }
+
 /* Returns what a call borrowed, and its result. */
-static PyObject *finish_call(Borrowed *all, double *memory)
+static PyObject *finish_call(Borrowed *all, Room room)
 {
-    int done = memory != NULL;
-    free(memory);
     for (int i = 0; i < all->count; i++)
         PyBuffer_Release(&all->buffers[i]);
-    if (!done)
+    if (!room.at)
         return NULL;
+    free(room.at);
     Py_RETURN_NONE;
 }
 
@@ -109,6 +114,7 @@ static PyObject *examine(PyObject *module, PyObject *args)
     Py_ssize_t begin, finish;
     double threshold;
     Borrowed all = {.count = 0};
+    Room room = {0};
     (void)module;
     if (!PyArg_ParseTuple(args, "(iiOOOOOO!OOO)O!nnnd|iOOO", &form.n, &form.functions, &equation, &depends, &low, &high,
                           &whose, &PyTuple_Type, &tape, &values, &objective, &squared, &PyTuple_Type, &arrays, &report.B,
@@ -134,23 +140,15 @@ static PyObject *examine(PyObject *module, PyObject *args)
     good = good && (least == Py_None || borrow(&all, least, (Array)READ(report.least, B)));
     good = good && (tilts == Py_None || (models && report.shared == n && borrow(&all, tilts, (Array)READ(report.tilts, (3 + n + n * n) * B))));
     report.shared = models ? report.shared : 0;
-    good = good && form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && finish <= B;
+    good = good && form.functions <= R && form.tape.outputs == rows_of(&form) * (n + 1) && begin >= 0 && begin <= finish && finish <= B;
     for (int k = 0; good && k < form.quotients; k++)
         good = form.whose[2 * k] >= 0 && form.whose[2 * k] < form.functions;
     for (int k = 0; good && k < form.tangents; k++)
         good = form.squared[k] >= 0 && form.squared[k] < form.functions;
     good = good && (values == Py_None || (form.values.outputs == R + rows_of_tangents(&form) && n <= MOST_VARIABLES));
     good = good && (objective == Py_None || form.objective.outputs == form.functions * (n + 1));
-    /* The list of boxes that are open after the first pass, and the scores of their variables, come last. */
-    size_t count = finish > begin ? (size_t)(finish - begin) : 1, needed = good ? memory_needed(&form) : 0;
-    double *memory = memory_of_call(good, needed + count + (form.objective.length ? count * (size_t)n : 1));
-    if (memory) {
-        Kept kept = {(Py_ssize_t *)(memory + needed), memory + needed + count};
-        Py_BEGIN_ALLOW_THREADS
-        examine_range(&form, &report, begin, finish, threshold, memory, &kept);
-        Py_END_ALLOW_THREADS
-    }
-    return finish_call(&all, memory);
+    CALL(good, examine_range(&form, &report, begin, finish, threshold, &room))
+    return finish_call(&all, room);
 }
 
 static PyObject *enclose(PyObject *module, PyObject *args)
@@ -160,6 +158,7 @@ static PyObject *enclose(PyObject *module, PyObject *args)
     Enclosed found = {.order = 1};
     int n;
     Borrowed all = {.count = 0};
+    Room room = {0};
     (void)module;
     if (!PyArg_ParseTuple(args, "iO!O!n|i", &n, &PyTuple_Type, &tuple, &PyTuple_Type, &arrays, &found.B, &found.order))
         return NULL;
@@ -169,13 +168,8 @@ static PyObject *enclose(PyObject *module, PyObject *args)
                     WRITE(found.q, all_rows), WRITE(found.s, all_rows), WRITE(found.lo, all_rows), WRITE(found.hi, all_rows),
                     WRITE(found.a, all_rows * (Py_ssize_t)terms_of_order(n, found.order))};
     good = good && borrow_all(&all, arrays, each, COUNT(each));
-    double *memory = memory_of_call(good, good ? memory_of_run(&tape, n, found.order) : 0);
-    if (memory) {
-        Py_BEGIN_ALLOW_THREADS
-        enclose_all(&tape, n, &found, memory);
-        Py_END_ALLOW_THREADS
-    }
-    return finish_call(&all, memory);
+    CALL(good, enclose_all(&tape, n, &found, &room))
+    return finish_call(&all, room);
 }
 
 static PyObject *models(PyObject *module, PyObject *args)
@@ -183,6 +177,7 @@ static PyObject *models(PyObject *module, PyObject *args)
     PyObject *arrays, *first, *low = NULL, *high = NULL;
     Models found = {0};
     Borrowed all = {.count = 0};
+    Room room = {0};
     (void)module;
     if (!PyArg_ParseTuple(args, "iO!nO|OO", &found.n, &PyTuple_Type, &arrays, &found.B, &first, &low, &high))
         return NULL;
@@ -195,16 +190,8 @@ static PyObject *models(PyObject *module, PyObject *args)
                borrow(&all, high, (Array)WRITE(found.high, n * B));
     else if (good)
         good = borrow(&all, first, (Array)WRITE(found.bound, B));
-    double *memory = memory_of_call(good, good ? memory_for_models(found.n) : 0);
-    if (memory) {
-        Py_BEGIN_ALLOW_THREADS
-        if (found.bound)
-            bound_models(&found, memory);
-        else
-            reach_models(&found, memory);
-        Py_END_ALLOW_THREADS
-    }
-    return finish_call(&all, memory);
+    CALL(good, use_models(&found, &room))
+    return finish_call(&all, room);
 }
 
 static PyObject *rank(PyObject *module, PyObject *args)
@@ -215,6 +202,7 @@ static PyObject *rank(PyObject *module, PyObject *args)
     Ranks found = {0};
     int n;
     Borrowed all = {.count = 0};
+    Room room = {0};
     (void)module;
     if (!PyArg_ParseTuple(args, "iO!(iiiOOO)O!n|O", &n, &PyTuple_Type, &tuple, &matrix.rows, &matrix.columns,
                           &matrix.nullity, &at, &scale, &constant, &PyTuple_Type, &arrays, &found.B, &change))
@@ -232,13 +220,8 @@ static PyObject *rank(PyObject *module, PyObject *args)
     for (Py_ssize_t e = 0; good && e < E; e++)
         good = matrix.at[2 * e] >= 0 && matrix.at[2 * e] < matrix.rows && matrix.at[2 * e + 1] >= 0 &&
                matrix.at[2 * e + 1] < matrix.columns;
-    double *memory = memory_of_call(good, good ? memory_for_ranks(&tape, &matrix, n) : 0);
-    if (memory) {
-        Py_BEGIN_ALLOW_THREADS
-        rank_all(&tape, &matrix, n, &found, memory);
-        Py_END_ALLOW_THREADS
-    }
-    return finish_call(&all, memory);
+    CALL(good, rank_all(&tape, &matrix, n, &found, &room))
+    return finish_call(&all, room);
 }
 
 static PyMethodDef methods[] = {

@@ -128,30 +128,6 @@ class Forms(NamedTuple):
         return np.asarray(np.abs(self.c) + np.abs(self.a).sum(axis=2) + self.r)
 
 
-class SecondForms(NamedTuple):
-    """R expressions over B boxes, with ``Q_ij e_i e_j`` for each pair i <= j, row by row.
-
-    Attributes:
-        c: (B, R) values at the centres, and middles of the terms of higher order.
-        a: (B, R, n) linear parts.
-        Q: (B, R, n (n + 1) / 2) terms of second order.
-        r: (B, R) bounds of the rest; infinite where a value may be undefined.
-    """
-
-    c: FloatArray
-    a: FloatArray
-    Q: FloatArray
-    r: FloatArray
-
-    def as_terms(self) -> Forms:
-        """Return forms whose linear parts go on with the products of two coordinates, a square being 1/2 +- 1/2."""
-        n = self.a.shape[2]
-        squares = np.cumsum([0, *range(n, 1, -1)])
-        Q = self.Q.copy()
-        Q[:, :, squares] *= 0.5
-        return Forms(self.c + Q[:, :, squares].sum(axis=2), np.concatenate([self.a, Q], axis=2), self.r)
-
-
 class Encloser:
     """Forms of expressions.
 
@@ -172,11 +148,10 @@ class Encloser:
         """Return the forms over boxes with ends (n, B)."""
         return forms_of(enclose(self.tape, lower, upper, self.module))
 
-    def second(self, lower: FloatArray, upper: FloatArray) -> SecondForms:
-        """Return the forms of second order over boxes with ends (n, B)."""
-        n = len(lower)
-        c, terms, r = forms_of(enclose(self.tape, lower, upper, self.module, 2))
-        return SecondForms(c, terms[:, :, :n], terms[:, :, n:], r)
+    def second(self, lower: FloatArray, upper: FloatArray) -> Forms:
+        """Return the forms of second order over boxes with ends (n, B): ``e_i e_j``, i <= j, follow row by row."""
+        found = forms_of(enclose(self.tape, lower, upper, self.module, 2))
+        return halve_squares(found, len(lower))
 
 
 def forms_of(found: Enclosures) -> Forms:
@@ -184,6 +159,14 @@ def forms_of(found: Enclosures) -> Forms:
     middle, half = 0.5 * (found.p + found.q), 0.5 * (found.q - found.p)
     rest = half + found.s + 4 * ULP * (half + np.abs(found.c) + np.abs(middle))
     return Forms((found.c + middle).T, found.a.transpose(2, 0, 1), rest.T)
+
+
+def halve_squares(forms: Forms, n: int) -> Forms:
+    """Return forms of second order in n coordinates with 1/2 + 1/2 e for each ``e_i^2``: e in [-1, 1]."""
+    squares = n + np.cumsum([0, *range(n, 1, -1)])
+    a = forms.a.copy()
+    a[:, :, squares] *= 0.5
+    return Forms(forms.c + a[:, :, squares].sum(axis=2), a, forms.r)
 
 
 class Ends(NamedTuple):

@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import casadi as ca
 from casadi import SX
 
+from ..statement.form import without_ties
 from ..statement.limb_separation import terms_of
-from ..statement.piecewise_derivatives import without_ties
 
 if TYPE_CHECKING:
     from ..statement.standard_form import StandardForm

@@ -29,7 +29,7 @@ from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
 from .claims import Claim, claims_of, one_machine_name
-from .machine import leg_joints
+from .machine import joint_centres
 from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
 #: Part of a derivative below which its size is smoothed, and place of the pose in its ranges at which it is taken.
@@ -56,18 +56,19 @@ class BuiltModel(NamedTuple):
     reaches: tuple[Reach, ...]
 
 
-def built_model(model: Model) -> BuiltModel:
+def built_model(model: Model, *, extended: bool = False) -> BuiltModel:
     """Return a robot with errors of its joint centres.
 
     Args:
         model: the robot.
+        extended: whether closed forms have values out of reach too.
 
     Raises:
         RobotError: its joint centres are not known, or it cannot be put together with errors.
     """
     exact = closed_form(model).model
     displaced = _displaced(model)
-    closed = closed_form(displaced.model)
+    closed = closed_form(displaced.model, extended=extended)
     built = closed.model
     unknowns = [[item.name for item in each.unknowns] for each in (exact, built)]
     members = [[(item.rank, item.screws.shape, item.is_pinned) for item in each.members] for each in (exact, built)]
@@ -207,12 +208,13 @@ def machine_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoor
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
     """Return a limit on angles of joints with the mounting axes of the design as numbers; another one as it is."""
-    if not (isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
+    legs = joint_centres(case)
+    if legs is None or not (isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
         return limit
-    home, (base, platform) = limit.about, leg_joints(case)
+    home = limit.about
     axis = SX(unit_axes((home.axis,), 1)[0].tolist())
     R = np.array(ca.evalf(matrix_from_axis_angle(axis, SX(home.angle))))
-    n = np.array(home.position) + platform @ R.T - base
+    n = np.array(home.position) + legs.platform @ R.T - legs.base
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     own = n if isinstance(limit, BaseJointAngle) else n @ R
     return replace(limit, about=tuple((float(x), float(y), float(z)) for x, y, z in own))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,14 +14,14 @@ from ...case.workspace import Workspace
 from ...interruption import is_requested, one_call, within
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.machine import check_leg_error, joint_centres, legs_of, workspace_of_case
+from ..statement.machine import check_leg_error, has_straight_legs, joint_centres, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
 from .numbers.bound_search import Minimum
 from .numbers.extremes import GAP, Extreme, extreme_of, prove_extreme
 from .numbers.pose_error import pose_errors
-from .numbers.searched import Subject, asked_spectra_extremes, searched_limits
+from .numbers.searched import Subject, searched_extremes
 from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import pose_box
@@ -213,12 +212,9 @@ class _Numbers:
         whole = with_strokes(subject, self.found, self._finer)
         self.found, strokes = whole[:count], whole[count:]
         yield from strokes
-        yield from searched_limits(subject, gap=self.gap, paper=self.paper)
-        yield from asked_spectra_extremes(subject, self.quantities, gap=self.gap, paper=self.paper)
-        legs, eps = legs_of(self.case), self.leg_error + 2 * (self.case.joint_centre_tolerance or 0.0)
-        if legs is not None and self.with_objective and eps > 0:
-            exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
-            yield from pose_errors(legs, subject.problem, eps, exact, paper=self.paper)
+        yield from searched_extremes(subject, self.quantities, gap=self.gap, paper=self.paper)
+        if has_straight_legs(self.case.model) and self.with_objective:
+            yield from pose_errors(subject, self.leg_error, paper=self.paper)
 
     def _of_machines(self, machines: Machines) -> Iterator[Extreme]:
         """Yield the extremes of expressions over all machines."""

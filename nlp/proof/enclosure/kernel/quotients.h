@@ -141,7 +141,7 @@ static double add_square(Box *x, const Ratio *ratio, int j, int sign, double *ma
             across += fabs(H), added += fabs(square), whole += fabs(entry);
         }
         w += SUM * (fabs(b) + across + w);
-        remainder[i] += is_defined ? w : INFINITY, x->a[j * n + i] += sign * b;
+        remainder[i] += is_defined ? w : INFINITY;
         x->gb[j * n + i] += sign * b;
         whole += 2 * w;
     }
@@ -161,9 +161,10 @@ static double add_square(Box *x, const Ratio *ratio, int j, int sign, double *ma
 }
 
 /* Adds the ends of a quotient's gradient to row j; those that are not times a radius are for points that matter. */
-static void add_slopes(Box *x, const Ratio *ratio, int j, int sign, const double *radius, const double *least)
+static void add_slopes(Box *x, const Ratio *ratio, int j, int sign, const double *least)
 {
     int n = x->n;
+    const double *radius = x->radius;
     double p_lo = ratio->lo, p_hi = ratio->hi;
     if (least)
         where_it_matters(&p_lo, &p_hi, &ratio->D, sign, *least);
@@ -188,7 +189,7 @@ static Ratio empty_ratio(const Box *x)
 }
 
 /* Adds the quotients to the rows of their functions. */
-static void add_quotients(const Form *form, Box *x, const double *radius, const double *least)
+static void add_quotients(const Form *form, Box *x, const double *least)
 {
     int n = x->n;
     if (!form->quotients)
@@ -201,7 +202,7 @@ static void add_quotients(const Form *form, Box *x, const double *radius, const 
         read_row(x, row, &ratio.N), read_row(x, row + 1, &ratio.D);
         take_ratio(x, &ratio);
         x->q[j] += add_square(x, &ratio, j, sign, x->sH + (size_t)j * n * n, x->sw + j * n);
-        add_slopes(x, &ratio, j, sign, radius, form->quotients == 1 ? least : NULL);
+        add_slopes(x, &ratio, j, sign, form->quotients == 1 ? least : NULL);
     }
 }
 

@@ -2,7 +2,7 @@
 #ifndef RANK_H
 #define RANK_H
 
-#include "blocks.h"
+#include "runs.h"
 
 /* Part of the sum of the sizes of all terms by which a computed sum of products may be off: fewer than 400 roundings. */
 #define PRODUCTS 1e-13
@@ -188,24 +188,17 @@ static int is_contracting(const double *B, int c, double *v, double *w)
     return 0;
 }
 
-static size_t memory_of_rank(const Matrix *m, int n)
-{
-    size_t rows = (size_t)(m->rows + m->nullity), c = (size_t)m->columns;
-    return LANES * (rows * c + (1 + (size_t)n) * c * c + 2 * c + 3 * (size_t)m->entries) + 3 * rows * c + c * c + 7 * (rows + c);
-}
-
-static RankParts carve_rank(const Matrix *m, int n, double *memory)
+static RankParts lay_parts(const Matrix *m, int n, Room *room)
 {
     size_t rows = (size_t)(m->rows + m->nullity), c = (size_t)m->columns, E = (size_t)m->entries;
-    double *rest = memory;
     RankParts x;
-    x.C = (Lane *)carve(&rest, rows * c * LANES), x.bound = (Lane *)carve(&rest, c * c * LANES);
-    x.linear = (Lane *)carve(&rest, (size_t)n * c * c * LANES), x.row = (Lane *)carve(&rest, c * LANES);
-    x.turn = (Lane *)carve(&rest, c * LANES);
-    x.middle = (Lane *)carve(&rest, E * LANES), x.rest = (Lane *)carve(&rest, E * LANES);
-    x.size = (Lane *)carve(&rest, E * LANES);
-    x.A = carve(&rest, rows * c), x.inverse = carve(&rest, rows * c), x.work = carve(&rest, rows * c + 2 * (rows + c));
-    x.B = carve(&rest, c * c), x.v = carve(&rest, rows + c), x.w = carve(&rest, rows + c), x.t = carve(&rest, c);
+    x.C = (Lane *)carve(room, rows * c * LANES), x.bound = (Lane *)carve(room, c * c * LANES);
+    x.linear = (Lane *)carve(room, (size_t)n * c * c * LANES), x.row = (Lane *)carve(room, c * LANES);
+    x.turn = (Lane *)carve(room, c * LANES);
+    x.middle = (Lane *)carve(room, E * LANES), x.rest = (Lane *)carve(room, E * LANES);
+    x.size = (Lane *)carve(room, E * LANES);
+    x.A = carve(room, rows * c), x.inverse = carve(room, rows * c), x.work = carve(room, rows * c + 2 * (rows + c));
+    x.B = carve(room, c * c), x.v = carve(room, rows + c), x.w = carve(room, rows + c), x.t = carve(room, c);
     return x;
 }
 
@@ -214,18 +207,17 @@ static RankParts carve_rank(const Matrix *m, int n, double *memory)
 static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py_ssize_t start, RankParts x)
 {
     for (int e = 0; e < m->entries; e++) {
-        Form2 *form = form2_of(out, e);
-        const Value *v = &form->v;
-        const Lane *terms = terms_of_form2(form);
+        const Value *v = value_of(out, e);
+        const Lane *terms = terms_of(v);
         double scale = m->scale[e];
         double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
         EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        EACH_OF(i, 0, form->terms.linear)
+        EACH_OF(i, 0, v->terms.linear)
         {
             EACH size[l] += fabs(terms[i][l]);
-            EACH_OF(j, i, form->terms.pairs[i])
+            EACH_OF(j, i, v->terms.pairs[i])
             {
-                const double *term = terms[n + row_of(n, i) + j];
+                const double *term = terms[row_of(n, i) + j];
                 if (i == j)
                     EACH middle[l] += 0.5 * term[l], size[l] += 0.5 * fabs(term[l]);
                 else
@@ -343,10 +335,10 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
                 double part = a >= n && b == a - n ? 0.5 : 1.0;
                 memset(x.row, 0, (size_t)c * sizeof(Lane));
                 for (int e = 0; e < m->entries; e++) {
-                    Form2 *v = form2_of(out, e);
+                    const Value *v = value_of(out, e);
                     if (!((a < n ? v->terms.linear >> a : v->terms.pairs[a - n] >> b) & 1))
                         continue;
-                    const double *term = terms_of_form2(v)[t], *by = C[m->at[2 * e]];
+                    const double *term = terms_of(v)[t], *by = C[m->at[2 * e]];
                     double *to = x.row[m->at[2 * e + 1]], scale = part * m->scale[e];
                     EACH to[l] += by[l] * (term[l] * scale);
                 }
@@ -386,15 +378,14 @@ static int judge_lane(const Matrix *m, int n, int l, RankParts x, double *shares
     return good;
 }
 
-static size_t memory_for_ranks(const Tape *tape, const Matrix *m, int n) { return memory_of_run(tape, n, 2) + memory_of_rank(m, n); }
-
-static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, double *memory)
+/* Judges boxes; without memory, what they need of it is counted only. */
+static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, Room *room)
 {
-    Run run = prepare(tape, n, 2, memory);
-    RankParts parts = carve_rank(m, n, memory + memory_of_run(tape, n, 2));
+    Run run = prepare(tape, n, 2, room);
+    RankParts parts = lay_parts(m, n, room);
     /* V makes what does not become small with the box larger. */
     double near = found->change ? 0 : NEAR_SINGULAR;
-    for (Py_ssize_t start = 0; start < found->B; start += LANES) {
+    for (Py_ssize_t start = 0; room->at && start < found->B; start += LANES) {
         run_block(&run, found->lower, found->upper, found->B, NULL, start, found->B);
         middles_of(m, n, run.out, found, start, parts);
         int ready[LANES] = {0};

@@ -18,8 +18,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ....interruption import one_search
-from ...boxes.rows import Boxes, joined, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
 from ...enclosure.forms import Forms
 from ..ranks.loop_boxes import (
     APART,
@@ -223,8 +222,11 @@ class SmallestValues(LoopRule):
         done = found.boxes.is_known & (found.smallest >= self._levels()).all(axis=1)
         self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
         left = some(found, np.flatnonzero(~done))
-        width = self.widths(left)
-        split = coordinates_to_split(left.shares, width)
+        width, shares = self.widths(left), left.shares
+        if self._problem.dependent:
+            # Relations over long and narrow boxes are wide.
+            shares = shares * np.sqrt(width / width.max(axis=1, keepdims=True))
+        split = coordinates_to_split(shares, width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split)
         parts = parts._replace(more=parts.more._replace(more=left.smallest))
         return Verdicts(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))

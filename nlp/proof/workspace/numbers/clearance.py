@@ -99,7 +99,7 @@ class Clearance(Number):
         """Return upper bounds (B,) of the distance over boxes (B, n), of the design; infinite with open loops."""
         if self.examiner.second is None:
             return np.full(len(lower), np.inf)
-        forms = self.examiner.second.second(lower.T, upper.T).as_terms()
+        forms = self.examiner.second.second(lower.T, upper.T)
         ends, moved, rest, (least_scale, rest_of_scale), rounding = _ends_over(forms)
         rest += np.abs(ends) * rest_of_scale[:, None, None]
         farthest = np.linalg.norm(np.abs(moved).sum(axis=3) + rest, axis=2) / least_scale[:, None]

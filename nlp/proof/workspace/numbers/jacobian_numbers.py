@@ -74,26 +74,6 @@ class _Rows(NamedTuple):
         return np.asarray(np.abs(linear[:, :t]).sum(axis=1) + by_centres(np.moveaxis(linear[:, t:], 1, -1)))
 
 
-class _LeftInverses(NamedTuple):
-    """Left inverses over B boxes: ``fixed + linear.e + [-rest, rest]`` with ``|e_i| <= 1``.
-
-    Attributes:
-        fixed: (B, 6, m) position, then rotation times a length, for unit values of the rows.
-        linear: (B, f, 6, m) for each coordinate the change over half of the box.
-        rest: (B, 6, m) infinite where no bound is known.
-        shares: (B, 1, f) share of each coordinate in the width.
-    """
-
-    fixed: FloatArray
-    linear: FloatArray
-    rest: FloatArray
-    shares: FloatArray
-
-    def at_corners(self, rows: slice) -> FloatArray:
-        """Return the affine part at the corners of the boxes, (B, 2^f, rows, m), of some rows."""
-        return self.fixed[:, None, rows] + _at_corners(self.linear[:, :, rows])
-
-
 class _RowsNumber(Number):
     """A number of J.
 
@@ -181,15 +161,15 @@ class SingularValues(_RowsNumber):
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
         rows = self.rows(forms, count)
-        inverse = _left_inverses(rows)
+        fixed, linear, rest, shares = _left_inverses(rows)
         with np.errstate(all="ignore"):
-            norm = _schatten(inverse.at_corners(slice(0, 6))) + _frobenius(inverse.rest)
+            norm = _schatten(_at_corners(fixed, linear)) + _frobenius(rest)
             found = least = np.maximum(1 / norm - self._change, 0.0) if self._change else 1 / norm
             if self._is_condition:
                 largest = _largest(rows) + self._change
                 found = -largest / least if self._change else -largest * norm
         floor = -np.inf if self._is_condition else 0.0
-        return Bounds(np.where(np.isfinite(found), found, floor)[:, None], inverse.shares)
+        return Bounds(np.where(np.isfinite(found), found, floor)[:, None], shares)
 
 
 class WorstError(_RowsNumber):
@@ -218,15 +198,22 @@ class WorstError(_RowsNumber):
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
-        inverse = _left_inverses(self.rows(forms, count))
+        fixed, linear, rest, shares = _left_inverses(self.rows(forms, count))
         with np.errstate(all="ignore"):
-            worst = np.linalg.norm(inverse.at_corners(self._part) @ _ERRORS, axis=2).max(axis=(1, 2))
-            worst += np.linalg.norm(inverse.rest[:, self._part].sum(axis=2), axis=1)
-        return Bounds(np.where(np.isfinite(worst), -worst * (1 + ROUNDING), -np.inf)[:, None], inverse.shares)
+            corners = _at_corners(fixed[:, self._part], linear[:, :, self._part])
+            worst = np.linalg.norm(corners @ _ERRORS, axis=2).max(axis=(1, 2))
+            worst += np.linalg.norm(rest[:, self._part].sum(axis=2), axis=1)
+        return Bounds(np.where(np.isfinite(worst), -worst * (1 + ROUNDING), -np.inf)[:, None], shares)
 
 
-def _left_inverses(rows: _Rows) -> _LeftInverses:
-    """Return left inverses of J over boxes."""
+def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return left inverses ``fixed + linear.e + [-rest, rest]`` of J over B boxes, with ``|e_i| <= 1``.
+
+    Returns:
+        (B, 6, m) fixed: position, then rotation times a length, for unit values of the rows; (B, f, 6, m) linear: for
+        each coordinate the change over half of the box; (B, 6, m) rest, infinite where no bound is known; (B, 1, f)
+        shares of coordinates in the width.
+    """
     known = np.asarray(np.isfinite(rows.A).all(axis=(1, 2)) & np.isfinite(rows.terms).all(axis=(1, 2, 3)))
     A = np.where(known[:, None, None], rows.A, np.eye(rows.A.shape[1], 6))
     f, eye = rows.coordinates, np.eye(6)
@@ -249,8 +236,8 @@ def _left_inverses(rows: _Rows) -> _LeftInverses:
         rest += (far @ size + E @ E @ X) * (1 + d)[:, None] + first @ size * d[:, None]
         rest += ROUNDING * (size + rows.spread(change))
     rest = np.where(known[:, None, None] & np.isfinite(rest), rest, np.inf)
-    shares = np.nan_to_num((slopes[:, :f] ** 2).sum(axis=(2, 3)))[:, None]
-    return _LeftInverses(C, change[:, :f], rest, shares)
+    shares = (slopes[:, :f] ** 2).sum(axis=(2, 3))[:, None]
+    return C, change[:, :f], rest, shares
 
 
 def _solutions(matrices: FloatArray, right: FloatArray) -> FloatArray:
@@ -261,11 +248,11 @@ def _solutions(matrices: FloatArray, right: FloatArray) -> FloatArray:
     return found
 
 
-def _at_corners(linear: FloatArray) -> FloatArray:
-    """Return the sums (B, 2^f, r, m) of linear parts (B, f, r, m) at the corners of boxes."""
+def _at_corners(fixed: FloatArray, linear: FloatArray) -> FloatArray:
+    """Return matrices (B, 2^f, r, m) at the corners of boxes, from the middles and linear parts (B, f, r, m)."""
     f = linear.shape[1]
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=f))).reshape(2**f, f)
-    return np.asarray(np.einsum("sf,bfij->bsij", signs, linear))
+    return np.asarray(fixed[:, None] + np.einsum("sf,bfij->bsij", signs, linear))
 
 
 def _schatten(matrices: FloatArray) -> FloatArray:
@@ -288,7 +275,7 @@ def _largest(rows: _Rows) -> FloatArray:
     rest = rows.rest / room[..., None] + (rows.spread(rows.terms) * (d / room)[..., None])
     rest += np.abs(rows.A) * (rows.slack + d * d / room)[..., None]
     rest += rows.spread(linear[:, rows.coordinates :])
-    corners = rows.A[:, None] + _at_corners(linear[:, : rows.coordinates])
+    corners = _at_corners(rows.A, linear[:, : rows.coordinates])
     known = np.asarray(np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2)))
     values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
     return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)

@@ -29,10 +29,10 @@ from ....case.task import Sense
 from ...statement.claims import Claim
 from ...statement.machine import Legs
 from ..robot.pose_box import PoseBox
-from ..robot.posed_robot import Problem
 from .bound_search import Goal, Minimum, smallest_values
 from .extremes import Extreme, extreme_of
 from .jacobian_numbers import WorstError
+from .searched import Subject
 
 if TYPE_CHECKING:
     from ..proof_writer import PaperRecord
@@ -56,18 +56,21 @@ _CLAIMS = (
 _TOO_LARGE = "the errors are too large for a bound of their terms of second order"
 
 
-def pose_errors(
-    legs: Legs, problem: Problem, eps: float, shortest: float, *, paper: PaperRecord | None = None
-) -> Iterator[Extreme]:
+def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None = None) -> Iterator[Extreme]:
     """Yield the largest errors of the platform's position and rotation, for every machine within its tolerances.
 
+    None is yielded without tolerances.
+
     Args:
-        legs: joint centres.
-        problem: the robot.
-        eps: largest error of a leg's length, those of its joint centres included, length.
-        shortest: proven shortest length of a leg over the poses.
+        subject: six straight legs.
+        leg_error: largest error of a leg's length, length.
         paper: records the searches for a proof.
     """
+    legs, shortest = subject.legs, subject.shortest
+    eps = leg_error + 2 * (0.0 if legs is None else legs.tolerance)
+    if legs is None or not eps > 0:
+        return
+    problem = subject.problem
     searches: list[tuple[WorstError, Minimum]] = []
     for claim in _CLAIMS:
         number = WorstError(problem, is_rotation=claim.reading.dimension is Dimension.ANGLE)
@@ -79,7 +82,9 @@ def pose_errors(
             paper.firsts[claim.name] = -found.bound
     first = PoseErrors(*(-eps * found.bound for _, found in searches))
     reach = float(np.linalg.norm(legs.platform, axis=1).max())
-    whole = with_rest(first, eps, shortest, reach)
+    # The design's legs may be longer than those of every machine.
+    exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
+    whole = with_rest(first, eps, exact, reach)
     for k, (claim, (number, found)) in enumerate(zip(_CLAIMS, searches, strict=True)):
         y, worst = problem.pose_of(found.at), eps * number.worst(found.at)
         # To first order both signs give the same error.

@@ -104,25 +104,13 @@ class Subject:
         return Clearance(self.problem, posed, self.model, places, legs=self.legs)
 
 
-def searched_limits(subject: Subject, *, gap: float, paper: PaperRecord | None = None) -> Iterator[Extreme]:
-    """Yield the extremes of the case's limits that have searches of their own.
-
-    Args:
-        subject: the robot.
-        gap: allowed distance of a bound from the best value known, as a part of it.
-        paper: records the searches for a proof.
-    """
-    for limit in subject.case.limits:
-        for question in questions(subject, limit):
-            yield _answer(subject, question, gap, paper)
-
-
-def asked_spectra_extremes(
+def searched_extremes(
     subject: Subject, names: Sequence[str], *, gap: float, paper: PaperRecord | None = None
 ) -> Iterator[Extreme]:
-    """Yield the smallest singular value, or the largest condition number, where the case does not limit them.
+    """Yield the extremes of the case's limits that have searches of their own, and of measures of singular values.
 
-    Moments about the platform's origin are divided by the case's characteristic length.
+    The smallest singular value, or the largest condition number, is yielded where it is asked for and the case does not
+    limit it; moments about the platform's origin are then divided by the case's characteristic length.
 
     Args:
         subject: the robot.
@@ -130,8 +118,10 @@ def asked_spectra_extremes(
         gap: allowed distance of a bound from the best value known, as a part of it.
         paper: records the searches for a proof.
     """
-    for name in asked_spectra(subject.case, names):
-        question = _spectral(subject, name, subject.case.characteristic_length, asked_name(subject.case, name))
+    case, length = subject.case, subject.case.characteristic_length
+    of_limits = (question for limit in case.limits for question in questions(subject, limit))
+    asked = (_spectral(subject, name, length, asked_name(case, name)) for name in asked_spectra(case, names))
+    for question in (*of_limits, *asked):
         yield _answer(subject, question, gap, paper)
 
 

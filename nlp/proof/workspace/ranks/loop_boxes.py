@@ -19,8 +19,7 @@ from casadi import SX
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ...boxes.engine import MOST_VARIABLES
-from ...boxes.rows import Boxes, bisected, joined, some
-from ...boxes.search import Rule
+from ...boxes.search import Boxes, Rule, bisected, joined, some
 from ...enclosure.forms import Encloser, Forms
 from ..robot.posed_robot import Problem
 from .krawczyk import (
@@ -164,7 +163,7 @@ class Examiner:
         if self.second is not None and B:
             ends = boxes.lower.T[:f], boxes.upper.T[:f]
             if self._rank is None:
-                return Examined(boxes, relation, *self._test.examine(self.second.second(*ends).as_terms(), f))
+                return Examined(boxes, relation, *self._test.examine(self.second.second(*ends), f))
             change = None if self._change is None else self._change.over(*ends)
             return Examined(boxes, relation, *self._rank.examine_second(self.second, *ends, change))
         lower, upper, near, known = some(boxes, np.arange(B))

@@ -11,8 +11,7 @@ import numpy as np
 from .....models import Model, frozen_array
 from ....errors import UncoveredError
 from ....interruption import one_search
-from ...boxes.rows import Boxes, joined, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
 from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ...statement.machine import has_straight_legs

@@ -20,8 +20,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
-from ...boxes.rows import WHOLE, Boxes, some
-from ...boxes.search import Order, Rule, Search, Verdicts
+from ...boxes.search import WHOLE, Boxes, Order, Rule, Search, Verdicts, some
 from ...enclosure.forms import Encloser
 from ..ranks.loop_boxes import LoopBoxes, contracted_boxes, whole_workspace
 from ..robot.posed_robot import Problem
