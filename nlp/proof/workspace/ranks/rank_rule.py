@@ -27,7 +27,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ...enclosure.forms import Encloser, Forms
-from ..robot.motion_matrix import RankMatrix
+from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from .krawczyk import ROUNDING, are_contractions, by_centres
 
