@@ -13,7 +13,7 @@ from random_graphs import random_boxes, random_function
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.boxes.engine import search_tape
-from screwsynth.nlp.proof.enclosure.forms import Enclosures, enclose, midpoints
+from screwsynth.nlp.proof.enclosure.forms import Encloser, Enclosures, enclose, midpoints
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape, compile_tape
 from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.standard_form import standard_form
@@ -102,6 +102,13 @@ def test_a_power_without_a_rule_is_refused(power: float) -> None:
     x = ca.SX.sym("x", 1)
     with pytest.raises(UncoveredError, match="the power"):
         compile_tape(ca.Function("f", [x], [x**power]))
+
+
+def test_no_expression_has_no_bounds() -> None:
+    """The terms of second order of a robot whose rows change in proportion to errors are no expression at all."""
+    z = ca.SX.sym("z", 2)
+    found = Encloser(z, ca.SX(0, 1))(-np.ones((2, 3)), np.ones((2, 3)))
+    assert (found.c.shape, found.r.shape) == ((3, 0), (3, 0))
 
 
 @pytest.mark.parametrize("bad", ["sqrt(x - 2)", "1 / x", "log(x)"])
