@@ -146,15 +146,15 @@ class _Search:
     def run(self, recorder: TreeRecord | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text.
 
-        Limbs that were closed before a better point was known may leave too little of the gap for the others. Then the
-        search begins again with that point.
+        Before a better point was known, limbs may have been closed that leave too little of the gap for the others, or
+        boxes divided until they were too small. Then the search begins again with that point.
         """
         while not (reason := reason_to_stop(self._effort.seconds)):
             self._boxes_before += self._method.boxes
             self._method, first = self._new_method(recorder), self.incumbent.value
             reason = self._effort.run(self._method, self._ending, lambda: self._threshold)
-            is_decided = self._has_counterexample() or self._method.bound == -math.inf or self._is_met()
-            if reason or self._method.left or is_decided or self.incumbent.value <= first:
+            is_short = reason == TOO_SMALL or not (reason or self._method.bound == -math.inf or self._is_met())
+            if not is_short or self._has_counterexample() or self.incumbent.value <= first:
                 return reason
             if recorder is not None:
                 recorder.clear()
