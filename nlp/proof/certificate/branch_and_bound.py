@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from ....models import FloatArray, frozen_array
@@ -21,7 +20,6 @@ from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
 from ...interruption import one_search, reason_of, reason_to_stop
 from ...program.nlp import Nlp
-from ..boxes.engine import Engine
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search
@@ -138,7 +136,7 @@ class _Search:
         self._form, self._gap, self._above, self._jobs, self._progress = form, gap, above, jobs, progress
         self._effort, self.incumbent = replace(effort, progress=self._report), Incumbent(form)
         # The method in use takes the place of this one: what it sets up can be stopped.
-        self._method: Search[Any] | IndependentSearch = optimum_search(form, partial(Engine, form), self.incumbent)
+        self._method: Search[Any] | IndependentSearch = optimum_search(form, self.incumbent, jobs, None)
         # (seconds, bound, incumbent) in the program's own sense, and the boxes that methods before this one examined.
         self._history: list[tuple[float, float, float]] = []
         self._boxes_before = 0
@@ -163,16 +161,14 @@ class _Search:
     def _new_method(self, recorder: TreeRecord | None) -> Search[Any] | IndependentSearch:
         """Return the search for the form: by limbs where it separates, else of the whole box.
 
-        A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to
-        squares, which its checker does not have.
+        A proof covers the whole box where mirrors would leave a part of it.
         """
         form, jobs = halved(self._form) if recorder is None else self._form, self._jobs
         separation = separate(form)
         if separation is not None and not separation.shared:
             return IndependentSearch(separation, self.incumbent, jobs, recorder)
         if separation is None or form.n <= _WHOLE_BOX:
-            build = partial(Engine, form, jobs, tangents=recorder is None)
-            return optimum_search(form, build, self.incumbent, recorder)
+            return optimum_search(form, self.incumbent, jobs, recorder)
         return shared_search(form, separation, self.incumbent, jobs, recorder)
 
     @property
