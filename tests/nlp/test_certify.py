@@ -17,8 +17,8 @@ from screwsynth.nlp import Case, Free, Rotation, Solution, Task, case_from_table
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
+from screwsynth.nlp.proof.boxes import optimum
 from screwsynth.nlp.proof.boxes.engine import Engine, Examination, Verdict, search_tape
-from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.statement.standard_form import standard_form
@@ -166,7 +166,7 @@ def test_a_monotone_rule_that_forgets_the_ball_is_caught(monkeypatch: pytest.Mon
     solution = solve(case, starts=4)
     (ball,) = [side for side in solution.evidence.active if side.name == "angle"]  # type: ignore[union-attr]
     assert ball.bound == "max"
-    monkeypatch.setattr(branch_and_bound, "Engine", NumpyEngine)
+    monkeypatch.setattr(optimum, "Engine", NumpyEngine)
     sound = certify_program(solution.nlp, None, gap=1e-3)
     assert sound.status is CertificateStatus.PROVED
     assert sound.bound >= solution.F * (1 - 1e-12)
@@ -194,7 +194,7 @@ def test_the_random_problems_catch_a_monotone_rule_that_forgets_the_ball(monkeyp
         bound = certify_program(solution.nlp, None, gap=1e-2, time_limit=20).bound
         return bool(-solution.nlp.sign * (bound - solution.F) < -1e-6 * abs(solution.F))
 
-    monkeypatch.setattr(branch_and_bound, "Engine", NumpyEngine)
+    monkeypatch.setattr(optimum, "Engine", NumpyEngine)
     solutions = [solve(random_case(seed), starts=8, seed=1) for seed in range(10)]
     assert not any(map(is_caught, solutions))
     monkeypatch.setattr(NumpyEngine, "collapse_monotone", careless)

@@ -69,6 +69,13 @@ def test_what_replaces_unknowns_closes_the_loops_in_homes_mode(names: tuple[str,
             assert not form.keeps_signs(x), name
 
 
+def test_boxes_that_became_too_small_before_a_better_point_was_known_are_searched_again() -> None:
+    nlp = replace(formulate(at_home(robot_function("3-spr")())), in_home_mode=True)
+    found = certify_program(nlp, gap=1e-2)
+    assert found.status is CertificateStatus.PROVED
+    assert found.open == 0
+
+
 def test_bounds_are_those_of_the_search_with_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
     solution = solve(at_home(robot_function("6-rus")()), starts=2)
     nlp = replace(solution.nlp, in_home_mode=True)

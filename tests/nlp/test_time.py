@@ -106,14 +106,14 @@ def test_only_a_search_is_stopped_in_its_set_up(clock: Clock) -> None:
 def test_set_up_of_the_whole_box_ends_with_the_time(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
     nlp = formulate(load_case(CASE))
     compiled: list[str] = []
-    real = tape._write_operation
+    real = tape._TapeWriter.put_formula
 
     def counted(*arguments: Any) -> None:  # noqa: ANN401
         compiled.append("operation")
         clock.now = 10.0
         real(*arguments)
 
-    monkeypatch.setattr(tape, "_write_operation", counted)
+    monkeypatch.setattr(tape._TapeWriter, "put_formula", counted)
     monkeypatch.setattr(tape, "_LOOK", 8)
     found = certify_program(nlp, nlp.start, time_limit=5.0)
     assert (found.status, found.boxes, found.open) == (CertificateStatus.INCOMPLETE, 0, 1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -23,14 +22,11 @@ LEAST_WIDTHS = 2.0**-16, 2.0**-40
 
 
 def optimum_search(
-    form: StandardForm,
-    engine: Callable[[], Engine],
-    incumbent: Incumbent | LimbPoint,
-    recorder: TreeRecord | None = None,
+    form: StandardForm, incumbent: Incumbent | LimbPoint, jobs: int | None, recorder: TreeRecord | None
 ) -> Search[OptimumRule]:
     """Return the search of the box of a form: see :class:`OptimumRule`."""
     root = Boxes(form.lower[None], form.upper[None], np.array([np.inf]), np.array([WHOLE]), ())
-    rule = OptimumRule(form, engine, incumbent, recorder)
+    rule = OptimumRule(form, incumbent, jobs, recorder)
     return Search(rule, root, whole=form.upper - form.lower, least=LEAST_WIDTHS, order=Order.LARGEST_CHUNK)
 
 
@@ -39,10 +35,9 @@ class OptimumRule(Rule[tuple[()]]):
 
     Args:
         form: the form.
-        engine: returns the engine that examines boxes. It takes seconds for long expressions, and so is built by the
-            first step, which can be stopped.
         incumbent: the best point known, which the search improves.
-        recorder: records the search's tree for a proof.
+        jobs: threads.
+        recorder: records the search's tree for a proof, whose checker does not have tangents to squares.
 
     Attributes:
         incumbent: the best point known.
@@ -51,18 +46,16 @@ class OptimumRule(Rule[tuple[()]]):
     block = BLOCK
 
     def __init__(
-        self,
-        form: StandardForm,
-        engine: Callable[[], Engine],
-        incumbent: Incumbent | LimbPoint,
-        recorder: TreeRecord | None,
+        self, form: StandardForm, incumbent: Incumbent | LimbPoint, jobs: int | None, recorder: TreeRecord | None
     ) -> None:
         self.names, self.incumbent = form.names, incumbent
-        self._functions, self._build, self._recorder, self._turn = len(form.functions), engine, recorder, 0
+        self._form, self._jobs, self._recorder = form, jobs, recorder
+        self._functions, self._turn = len(form.functions), 0
 
     @cached_property
     def _engine(self) -> Engine:
-        return self._build()
+        """The engine, which takes seconds to build for long expressions: the first step does, which can be stopped."""
+        return Engine(self._form, self._jobs, tangents=self._recorder is None)
 
     def examine(self, boxes: Boxes[tuple[()]]) -> Verdicts[tuple[()]]:
         """Return bounds of boxes, and improve the incumbent."""

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from ....models import FloatArray, frozen_array
@@ -21,7 +20,6 @@ from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
 from ...interruption import one_search, reason_of, reason_to_stop
 from ...program.nlp import Nlp
-from ..boxes.engine import Engine
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search
@@ -138,7 +136,7 @@ class _Search:
         self._form, self._gap, self._above, self._jobs, self._progress = form, gap, above, jobs, progress
         self._effort, self.incumbent = replace(effort, progress=self._report), Incumbent(form)
         # The method in use takes the place of this one: what it sets up can be stopped.
-        self._method: Search[Any] | IndependentSearch = optimum_search(form, partial(Engine, form), self.incumbent)
+        self._method: Search[Any] | IndependentSearch = optimum_search(form, self.incumbent, jobs, None)
         # (seconds, bound, incumbent) in the program's own sense, and the boxes that methods before this one examined.
         self._history: list[tuple[float, float, float]] = []
         self._boxes_before = 0
@@ -146,15 +144,15 @@ class _Search:
     def run(self, recorder: TreeRecord | None) -> str:
         """Search until no box is open; return the reason for stopping earlier, or an empty text.
 
-        Limbs that were closed before a better point was known may leave too little of the gap for the others. Then the
-        search begins again with that point.
+        Before a better point was known, limbs may have been closed that leave too little of the gap for the others, or
+        boxes divided until they were too small. Then the search begins again with that point.
         """
         while not (reason := reason_to_stop(self._effort.seconds)):
             self._boxes_before += self._method.boxes
             self._method, first = self._new_method(recorder), self.incumbent.value
             reason = self._effort.run(self._method, self._ending, lambda: self._threshold)
-            is_decided = self._has_counterexample() or self._method.bound == -math.inf or self._is_met()
-            if reason or self._method.left or is_decided or self.incumbent.value <= first:
+            is_short = reason == TOO_SMALL or not (reason or self._method.bound == -math.inf or self._is_met())
+            if not is_short or self._has_counterexample() or self.incumbent.value <= first:
                 return reason
             if recorder is not None:
                 recorder.clear()
@@ -163,16 +161,14 @@ class _Search:
     def _new_method(self, recorder: TreeRecord | None) -> Search[Any] | IndependentSearch:
         """Return the search for the form: by limbs where it separates, else of the whole box.
 
-        A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to
-        squares, which its checker does not have.
+        A proof covers the whole box where mirrors would leave a part of it.
         """
         form, jobs = halved(self._form) if recorder is None else self._form, self._jobs
         separation = separate(form)
         if separation is not None and not separation.shared:
             return IndependentSearch(separation, self.incumbent, jobs, recorder)
         if separation is None or form.n <= _WHOLE_BOX:
-            build = partial(Engine, form, jobs, tangents=recorder is None)
-            return optimum_search(form, build, self.incumbent, recorder)
+            return optimum_search(form, self.incumbent, jobs, recorder)
         return shared_search(form, separation, self.incumbent, jobs, recorder)
 
     @property

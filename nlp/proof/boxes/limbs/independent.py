@@ -10,7 +10,6 @@ import math
 from functools import partial
 
 from ...statement.limb_separation import Separation
-from ..engine import Engine
 from ..incumbent import Incumbent, LimbPoint
 from ..optimum import optimum_search
 from ..symmetry import grouped
@@ -40,8 +39,8 @@ class IndependentSearch:
         self._searches = [
             optimum_search(
                 limbs[group[0]].form,
-                partial(Engine, limbs[group[0]].form, jobs, tangents=recorder is None),
                 LimbPoint([limbs[each] for each in group], incumbent),
+                jobs,
                 None if recorder is None else recorder.limb(partial(self._limb_bound, k)),
             )
             for k, group in enumerate(groups)
