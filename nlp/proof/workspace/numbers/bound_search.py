@@ -224,7 +224,8 @@ class SmallestValues(LoopRule):
         self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
         left = some(found, np.flatnonzero(~done))
         width = self.widths(left)
-        split = coordinates_to_split(left.shares, width)
+        # A coordinate that is already narrow counts for less.
+        split = coordinates_to_split(left.shares * np.sqrt(width / width.max(axis=1, keepdims=True)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split)
         parts = parts._replace(more=parts.more._replace(more=left.smallest))
         return Verdicts(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
