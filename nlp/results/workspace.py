@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..proof.workspace.numbers.extremes import Extreme
     from ..proof.workspace.robot.pose_box import PoseNumbers
     from ..proof.workspace.verdict import RankVerdict
-    from ..solver.exchange import WorkspaceProof
+    from ..solver.semi_infinite import WorkspaceProof
 
 
 class WorkspacePose(JsonObject):

@@ -11,6 +11,7 @@ import math
 import shutil
 import subprocess
 import sysconfig
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -184,12 +185,18 @@ def is_found(copy: Copy, meant: Problem) -> bool:
     return False
 
 
+@cache
+def attacked() -> tuple[list[Problem], Problem]:
+    """Robots over boxes of poses, and machines like the first one."""
+    problems = [hexapod(ALL_AXES, 30), hexapod(TURNS, 25), gallery("6-rus", 0.1, 20)]
+    return problems, family_of(CASE, built_model(CASE.model), problems[0], 0.5)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_planted_fault_is_found(fault: str, tmp_path: Path) -> None:
     copy = Copy(tmp_path, *FAULTS[fault])
-    problems = [hexapod(ALL_AXES, 30), hexapod(TURNS, 25), gallery("6-rus", 0.1, 20)]
-    machines = family_of(CASE, built_model(CASE.model), problems[0], 0.5)
+    problems, machines = attacked()
     found = any(is_found(copy, problem) for problem in problems) or is_found(copy, machines)
     assert found == (fault != "no fault")

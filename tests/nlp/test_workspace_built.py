@@ -340,7 +340,7 @@ def test_closed_forms_of_the_worst_machine(case: Case) -> None:
 @pytest.mark.parametrize("tolerance", [TOLERANCE, 0.2])
 def test_every_claim_holds_for_a_hundred_thousand_machines(case: Case, tolerance: float) -> None:
     built = replace(case, joint_centre_tolerance=tolerance)
-    judged = judge_workspace(built, gap=1e-3 if tolerance == TOLERANCE else 1e-2, quantities=["base_joint_angle"])
+    judged = judge_workspace(built, gap=1e-3 if tolerance == TOLERANCE else 5e-2, quantities=["base_joint_angle"])
     # Errors of the pose of the larger tolerance are too large for a bound of their terms of second order.
     left = [each for each in judged.extremes if each.outcome is not Outcome.PROVED]
     assert all(each.name.endswith(" error") for each in left), [(each.name, each.reason) for each in left]

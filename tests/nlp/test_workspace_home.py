@@ -22,7 +22,7 @@ from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.checker.proof_file import ProofError, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import posed_robot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
@@ -139,8 +139,9 @@ def check_agreement(name: str, part: float, degrees: float, limit: float) -> int
     again, _ = judged_on_paper(case)
     assert verdicts(judged) == verdicts(again)
     assert {each.outcome for each in judged.extremes if each.limit} <= {Outcome.PROVED, Outcome.REFUTED}
-    assert check_shown(case, again) == check_shown(case, judged)
-    return check_shown(case, judged)
+    count = check_shown(case, judged)
+    assert check_shown(case, again) == count
+    return count
 
 
 @pytest.mark.parametrize("name", ["3-prs", "five-bar"])
@@ -149,7 +150,7 @@ def test_limits_are_judged_alike_with_a_proof_and_without(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", gallery_names())
+@pytest.mark.parametrize("name", sorted({*gallery_names()} - {"3-prs", "five-bar"}))
 def test_limits_of_all_robots_are_judged_alike_with_a_proof_and_without(name: str) -> None:
     assert check_agreement(name, 0.02, 5, 0.01) >= 2 * len(build_model(name).quantities[0].owners)
 
@@ -201,9 +202,9 @@ def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
         problem,
         problem.locked,
         most_boxes=4000,
-        refuter=SingularSearch(
+        look=SingularSearch(
             problem, problem.locked, lambda at: homes.is_singular(at.y, at.centres, constraints=False)
-        ),
+        ).look,
     )
     assert found.outcome is Outcome.REFUTED
     assert found.y is not None
@@ -263,8 +264,8 @@ def test_the_check_begins_in_the_working_mode_of_home() -> None:
             build_problem(case, model, pose_box(case.workspace))
         except NotJudgedError:
             with pytest.raises(ProofError, match="in the assembly of home"):
-                start_of(posed_robot(case, model, pose_root(case.workspace)))
+                start_of(PosedRobot(case, model, pose_root(case.workspace)))
             tried += 1
         else:
-            start_of(posed_robot(case, model, pose_root(case.workspace)))
+            start_of(PosedRobot(case, model, pose_root(case.workspace)))
     assert 0 < tried < 6

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ....models import FloatArray
 from ...case.task import Sense
 from ..boxes.tree import TreeRecord
@@ -14,9 +16,9 @@ from ..certificate.certificate import CertificateStatus
 from ..checker.premises import fingerprint
 from ..checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, workspace_numbers
 from ..checker.tree import Node
-from ..checker.workspace.statement import ERRORS, ExpectedClaim, expected_claims, robot_claims
+from ..checker.workspace.statement import ERRORS, ExpectedClaim, expected_claims, legs_numbers, robot_claims
 from ..statement.claims import REACH, REGULAR, one_machine_name
-from ..statement.machine import Legs, legs_of
+from ..statement.machine import INSIDE, legs_of
 from ..statement.tolerance import second_order_name
 from .numbers.extremes import slack_of
 from .verdict import Outcome, RankVerdict
@@ -47,7 +49,6 @@ _ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on pa
 _BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
-_NO_MACHINES = "the check has no rule for a singular machine of this robot"
 
 
 @dataclass(eq=False)
@@ -124,7 +125,7 @@ def paper_of(
         case=text,
         name=judged.case.name,
         workspace=workspace_numbers(judged.workspace),
-        legs=_numbers_of(legs_of(judged.case)),
+        legs=legs_numbers(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
         claims=tuple(writer.proved.values()),
@@ -163,7 +164,7 @@ class _Writer:
         """
         if self._case.joint_centre_tolerance and self.robot.machines is None:
             raise ProofError(_AS_BUILT)
-        if each.kind in ("regular", "constraints"):
+        if each.kind == "rank":
             return self._rank(each.name)
         if each.key not in self.extremes:
             raise ProofError(_NOT_JUDGED)
@@ -172,7 +173,7 @@ class _Writer:
             raise ProofError(_words(found))
         if each.kind == "number":
             return self._program(found)
-        if each.kind in ("stroke", "dead length"):
+        if each.kind == "lengths":
             return self._of_lengths(found)
         return self._boxes(each, found)
 
@@ -194,12 +195,17 @@ class _Writer:
         """Return the opposite of a claim about a rank, which is refuted at a pose (6,)."""
         if found.sides is not None:
             return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
-        legs = legs_of(self._case)
-        if found.errors is not None and legs is not None:
-            machine = found.errors.applied(legs)
-            return ProofClaim(name, "", "singular machine", sides=(tuple(y.tolist()), *_numbers_of(machine)))
-        why = "a computed pose has no proof" if found.reason else _NO_MACHINES
-        raise ProofError(f"{_words(found)}; {why}")
+        machines = self.robot.machines
+        if machines is None or found.reason:
+            raise ProofError(f"{_words(found)}; a computed pose has no proof")
+        # The determinant has the other sign for the largest errors in these directions too, and is farther from 0.
+        centres = found.centres if found.errors is None else found.errors.of_centres(machines.symbols.built.names)
+        if centres is None:
+            raise ProofError(_words(found))
+        errors = centres.vectors.copy()
+        errors *= INSIDE * machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
+        sides = [np.concatenate([y, each.ravel()]) for each in (np.zeros_like(errors), errors)]
+        return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
 
     def _program(self, found: Extreme) -> ProofClaim:
         """Return a claim with a tree of the search of ``certify``."""
@@ -260,8 +266,3 @@ class _Writer:
 def _words(found: Extreme | RankVerdict) -> str:
     """Return an outcome and its reason."""
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
-
-
-def _numbers_of(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
-    """Return joint centres (12, 3), base before platform; none for a robot that is not six straight legs."""
-    return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))

@@ -18,8 +18,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ....interruption import one_search
-from ...boxes.rows import Boxes, joined, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
 from ...enclosure.forms import Forms
 from ..ranks.loop_boxes import (
     APART,
@@ -224,7 +223,7 @@ class SmallestValues(LoopRule):
         self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
         left = some(found, np.flatnonzero(~done))
         width = self.widths(left)
-        # A coordinate that is already narrow counts for less.
+        # Bounds over long and narrow boxes are wide, those of loops above all.
         split = coordinates_to_split(left.shares * np.sqrt(width / width.max(axis=1, keepdims=True)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split)
         parts = parts._replace(more=parts.more._replace(more=left.smallest))

@@ -18,7 +18,8 @@ import numpy as np
 from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
 from ...statement.machine import JointErrors, Legs
-from ..robot.posed_robot import PosedModel, Problem
+from ..robot.posed_model import PosedModel
+from ..robot.posed_robot import Problem
 from ..tolerance.leg_errors import along
 from .bound_search import Bounds, Number
 
@@ -98,7 +99,7 @@ class Clearance(Number):
         """Return upper bounds (B,) of the distance over boxes (B, n), of the design; infinite with open loops."""
         if self.examiner.second is None:
             return np.full(len(lower), np.inf)
-        forms = self.examiner.second.second(lower.T, upper.T).as_terms()
+        forms = self.examiner.second.second(lower.T, upper.T)
         ends, moved, rest, (least_scale, rest_of_scale), rounding = _ends_over(forms)
         rest += np.abs(ends) * rest_of_scale[:, None, None]
         farthest = np.linalg.norm(np.abs(moved).sum(axis=3) + rest, axis=2) / least_scale[:, None]

@@ -22,8 +22,7 @@ from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind
 from ....errors import CaseError, UncoveredError
-from ...boxes.rows import Boxes, bisected, joined, some
-from ...boxes.search import Order, Search, Verdicts
+from ...boxes.search import Boxes, Order, Search, Verdicts, bisected, joined, some
 from ...statement.machine import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
 from ..ranks.rank_rule import RankTest, is_polynomial
