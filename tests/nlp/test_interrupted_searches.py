@@ -44,7 +44,6 @@ from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
 from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
@@ -221,7 +220,7 @@ def loops() -> Claim:
 
 
 @cache
-def family() -> ToleranceModel:
+def family() -> Problem:
     case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
     return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case))).family
 

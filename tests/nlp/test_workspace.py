@@ -84,14 +84,7 @@ def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> RankVerdict:
 
 def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
     """Determinants of the legs' vectors and moments at points (K, 6), from rotation matrices."""
-    w, x, y, z = (quaternions := box.quaternions(points)).T / np.linalg.norm(quaternions, axis=1)
-    turn = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    ).transpose(2, 0, 1)
+    turn = np.array([box.pose(each).rotation for each in points])
     arm = np.einsum("kij,lj->kli", turn, robot.platform)
     span = points[:, None, :3] + arm - robot.base
     return np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2))

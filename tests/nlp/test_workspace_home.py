@@ -202,9 +202,9 @@ def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
         problem,
         problem.locked,
         most_boxes=4000,
-        refuter=SingularSearch(
+        look=SingularSearch(
             problem, problem.locked, lambda at: homes.is_singular(at.y, at.centres, constraints=False)
-        ),
+        ).look,
     )
     assert found.outcome is Outcome.REFUTED
     assert found.y is not None

@@ -49,7 +49,6 @@ _ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on pa
 _BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
-_NO_MACHINES = "the check has no rule for a singular machine of this robot"
 
 
 @dataclass(eq=False)
@@ -197,11 +196,13 @@ class _Writer:
         if found.sides is not None:
             return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
         machines = self.robot.machines
-        if machines is None or found.errors is None:
-            why = "a computed pose has no proof" if found.reason else _NO_MACHINES
-            raise ProofError(f"{_words(found)}; {why}")
+        if machines is None or found.reason:
+            raise ProofError(f"{_words(found)}; a computed pose has no proof")
         # The determinant has the other sign for the largest errors in these directions too, and is farther from 0.
-        errors = found.errors.of_centres(machines.symbols.built.names).vectors
+        centres = found.centres if found.errors is None else found.errors.of_centres(machines.symbols.built.names)
+        if centres is None:
+            raise ProofError(_words(found))
+        errors = centres.vectors.copy()
         errors *= INSIDE * machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
         sides = [np.concatenate([y, each.ravel()]) for each in (np.zeros_like(errors), errors)]
         return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))

@@ -27,8 +27,8 @@ class RankVerdict:
         box: the box of poses.
         y: (6,) coordinates of a singular pose where the claim is refuted, and of the centre of the widest open box
             where it is open; None where it is proved.
-        sides: (2, 6) two poses of the workspace at which the determinant of the rows has opposite signs, without
-            rounding, where the claim is refuted so.
+        sides: (2, 6) two poses of the workspace at which the determinant of the rows is proved to have opposite signs,
+            where the claim is refuted so.
         engine: ``c``, or ``none`` where no search was made.
         boxes: number of boxes examined.
         open: number of boxes left.

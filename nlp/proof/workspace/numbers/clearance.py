@@ -18,7 +18,8 @@ import numpy as np
 from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
 from ...statement.machine import JointErrors, Legs
-from ..robot.posed_robot import PosedModel, Problem
+from ..robot.posed_model import PosedModel
+from ..robot.posed_robot import Problem
 from ..tolerance.leg_errors import along
 from .bound_search import Bounds, Number
 

@@ -21,8 +21,7 @@ from .....models import FloatArray
 from ...enclosure.forms import Forms
 from ..ranks.krawczyk import ROUNDING, by_centres, inverses
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import steepest
+from ..robot.posed_robot import Problem, steepest
 from .bound_search import Bounds, Number
 
 #: Slope, as a part of the largest at a point, that is rounding error.

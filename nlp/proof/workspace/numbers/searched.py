@@ -22,8 +22,8 @@ from ....errors import UncoveredError
 from ...statement.claims import Claim, asked_name, asked_spectra
 from ...statement.machine import CentreErrors, JointErrors, Legs, has_straight_legs
 from ..robot.pose_box import PoseBox
-from ..robot.posed_robot import NotJudgedError, Problem, build_problem, posed_model
-from ..robot.tolerance_model import ToleranceModel
+from ..robot.posed_model import posed_model
+from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
 from .extremes import Extreme, extreme_of, goal_of
@@ -62,7 +62,7 @@ class Subject:
     model: Model
     box: PoseBox
     legs: Legs | None
-    family: ToleranceModel | None = None
+    family: Problem | None = None
     unknown: str = ""
     shortest: float = 0.0
     design: Problem | None = None

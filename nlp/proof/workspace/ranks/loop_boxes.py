@@ -328,18 +328,12 @@ def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDA
     lower, upper = problem.pose_of(boxes.lower), problem.pose_of(boxes.upper)
     lower, upper = np.where(np.isnan(lower), box.lower, lower), np.where(np.isnan(upper), box.upper, upper)
     beyond = np.asarray((lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1))
-    found = box.contracted(lower, upper)
+    lower, upper, outside = box.contracted(lower, upper)
     own = [j for j in problem.independent if j < len(free)]
     columns = [free[j] for j in own]
-    new_lower, new_upper = boxes.lower.copy(), boxes.upper.copy()
-    new_lower[:, own], new_upper[:, own] = found.lower[:, columns], found.upper[:, columns]
-    return boxes._replace(lower=new_lower, upper=new_upper), ~(beyond | found.outside), beyond
-
-
-def in_workspace(problem: Problem, boxes: LoopBoxes) -> LoopBoxes:
-    """Return the boxes that hold poses of the workspace, contracted to them."""
-    found, kept, _ = contracted_boxes(problem, boxes)
-    return some(found, kept)
+    found = boxes._replace(lower=boxes.lower.copy(), upper=boxes.upper.copy())
+    found.lower[:, own], found.upper[:, own] = lower[:, columns], upper[:, columns]
+    return found, ~(beyond | outside), beyond
 
 
 def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.intp]:

@@ -16,14 +16,14 @@ from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ...statement.machine import has_straight_legs
 from ..home_poses import Homes
-from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
+from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from ..tolerance.leg_errors import of_legs
 from ..verdict import Outcome, RankVerdict
-from .loop_boxes import APART, Examiner, Followed, LoopRule, coordinates_to_split
+from .loop_boxes import APART, Examined, Examiner, Followed, LoopRule, coordinates_to_split
 from .rank_rule import RankTest
-from .singular_pose import Refuter, Singular, SingularSearch
+from .singular_pose import Singular, SingularSearch
 
 if TYPE_CHECKING:
     from ...boxes.tree import TreeRecord
@@ -35,6 +35,8 @@ _BLOCK = 1024
 _LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Callback with seconds, number of boxes examined, and number of boxes open.
 RankProgress = Callable[[float, int, int], None]
+#: Search for a singular pose from the boxes that were examined last, and the number of all.
+Look = Callable[[Examined, int], Singular | None]
 
 
 class Ranks(NamedTuple):
@@ -69,10 +71,10 @@ def prove_ranks(
             def is_shown(at: Singular, *, constraints: bool = name == CONSTRAINTS) -> bool:
                 return homes.is_singular(at.y, at.centres, constraints=constraints)
 
-            recorder, refuter = None if paper is None else paper.own(name), SingularSearch(problem, matrix, is_shown)
-            verdict = prove_rank(problem, matrix, progress=progress, recorder=recorder, refuter=refuter)
+            recorder, search = None if paper is None else paper.own(name), SingularSearch(problem, matrix, is_shown)
+            verdict = prove_rank(problem, matrix, progress=progress, recorder=recorder, look=search.look)
             if name == REGULAR and verdict.outcome is Outcome.OPEN and not problem.dependent:
-                verdict = _refuted(verdict, refuter.from_random())
+                verdict = _refuted(verdict, search.from_random())
             if verdict.centres is not None and has_straight_legs(homes.case.model):
                 verdict = replace(verdict, errors=of_legs(verdict.centres), centres=None)
             found.append(verdict)
@@ -101,7 +103,7 @@ def prove_rank(
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
-    refuter: Refuter | None = None,
+    look: Look | None = None,
 ) -> RankVerdict:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
@@ -112,14 +114,14 @@ def prove_rank(
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
         recorder: records the boxes for a proof.
-        refuter: looks for singular poses.
+        look: looks for singular poses; a search of its own if left out.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
     effort = Effort(most_boxes)
     with one_search(time_limit):
-        rule = _RankRule(problem, matrix, recorder, refuter or SingularSearch(problem, matrix))
+        rule = _RankRule(problem, matrix, recorder, look or SingularSearch(problem, matrix).look)
         search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
 
         def ending() -> str | None:
@@ -163,7 +165,7 @@ class _RankRule(LoopRule):
     """Rule of the rank of a matrix.
 
     Args:
-        problem, matrix, recorder, refuter: as in :func:`prove_rank`.
+        problem, matrix, recorder, look: as in :func:`prove_rank`.
 
     Attributes:
         singular: a singular pose; None while none is known.
@@ -171,10 +173,10 @@ class _RankRule(LoopRule):
 
     block = _BLOCK
 
-    def __init__(self, problem: Problem, matrix: RankMatrix, recorder: TreeRecord | None, refuter: Refuter) -> None:
+    def __init__(self, problem: Problem, matrix: RankMatrix, recorder: TreeRecord | None, look: Look) -> None:
         super().__init__(problem, Examiner(problem, RankTest(matrix, problem.z, problem.start)), recorder)
         self.singular: Singular | None = None
-        self._refuter, self._examined = refuter, 0
+        self._look, self._examined = look, 0
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes over which the rank is not proved to be full."""
@@ -182,7 +184,7 @@ class _RankRule(LoopRule):
         count = len(found.is_regular)
         self._examined += count
         if count:
-            self.singular = self._refuter.look(found, self._examined)
+            self.singular = self._look(found, self._examined)
         found = some(found, np.flatnonzero(~found.is_regular))
         split = coordinates_to_split(found.shares, self.widths(found))
         return Verdicts(self.boxes_of(found, np.zeros(len(split)), split), 0.0, count)

@@ -22,16 +22,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from .....models import FloatArray, frozen_array
+from .....models.arrays import first_largest
 from ...enclosure.forms import Encloser
-from ...statement.machine import INSIDE, CentreErrors
-from ..robot.motion_matrix import RankMatrix
-from ..robot.posed_robot import Problem
+from ...statement.machine import CentreErrors
+from ..robot.posed_model import RankMatrix
+from ..robot.posed_robot import Problem, steepest
 from .krawczyk import are_contractions, inverses
 from .loop_boxes import Examined
 from .rank_rule import RankTest
@@ -199,10 +200,8 @@ class SingularPose:
             slopes = None if closed is None else self.slopes(closed)
             if closed is None or slopes is None:
                 return
-            parts, machine = slopes[errors].reshape(-1, 3), closed.copy()
-            sizes = np.linalg.norm(parts, axis=1, keepdims=True)
-            unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > 0)
-            machine[errors] += 2 / (step + 2) * (-INSIDE * problem.tolerance * unit.ravel() - machine[errors])
+            machine, end = closed.copy(), steepest(-slopes[errors].reshape(-1, 3), problem.tolerance).ravel()
+            machine[errors] += 2 / (step + 2) * (end - machine[errors])
             yield machine
 
 
@@ -297,12 +296,11 @@ class DeterminantSigns:
             y = tried[np.argmin(sign * values(tried), axis=0), np.arange(len(y))]
         return self._points(y)
 
-    def around(self, z: FloatArray) -> Iterator[FloatArray]:
-        """Yield points (K, n) of the design around a point, farther and farther away."""
-        rng, box = np.random.default_rng(_SEED), self._problem.box
-        for distance in _DISTANCES:
-            way = distance * (box.upper - box.lower)
-            yield self._points(self._problem.pose_of(z) + way * rng.uniform(-1, 1, (_SAMPLES, 6)))
+    def around(self, z: FloatArray) -> FloatArray:
+        """Return random points (K, n) of the design around one, at several distances."""
+        y, box = self._problem.pose_of(z), self._problem.box
+        away = np.random.default_rng(_SEED).uniform(-1, 1, (len(_DISTANCES), _SAMPLES, 6)) * (box.upper - box.lower)
+        return self._points((y + np.array(_DISTANCES)[:, None, None] * away).reshape(-1, 6))
 
     def _points(self, y: FloatArray) -> FloatArray:
         """Return the points (K, n) of the design at poses (K, 6) moved into the workspace."""
@@ -330,18 +328,6 @@ def _sign_of_determinant(matrix: FloatArray) -> int:
     return sign * ((last > 0) - (last < 0))
 
 
-class Refuter(Protocol):
-    """Search for a singular pose."""
-
-    def look(self, found: Examined, boxes: int) -> Singular | None:
-        """Return a singular pose, or None.
-
-        Args:
-            found: the boxes that were examined last.
-            boxes: number of all that were examined.
-        """
-
-
 class SingularSearch:
     """Search for a singular pose from boxes: by signs where the matrix has six rows, else by Newton's method.
 
@@ -367,7 +353,7 @@ class SingularSearch:
         return SingularPose(self._problem, self._matrix)
 
     def look(self, found: Examined, boxes: int) -> Singular | None:
-        """Return a singular pose from these boxes; the first time from random poses too."""
+        """Return a singular pose from the boxes that were examined last, of so many; at first from random poses too."""
         worst = np.argsort(np.where(found.is_regular, np.inf, found.smallest))[:2].tolist()
         singular = self._by_newton(found, worst) if self._signs is None else self._by_signs(self._signs, found)
         if singular is not None or not self._problem.names or boxes < self._due or found.is_regular.all():
@@ -382,12 +368,9 @@ class SingularSearch:
         points = problem.exact(y[:, list(problem.free)])
         values = np.array([self._newton.smallest(each) for each in points])
         worst = [points[k] for k in np.argsort(values)[:_TRIED] if np.isfinite(values[k])]
-        for search in (self._pose, self._machine) if problem.names else (self._pose,):
-            for point in worst:
-                found = search(point)
-                if found is not None:
-                    return found
-        return None
+        found = (self._pose(point) for point in worst)
+        machines = (self._machine(point) for point in worst if problem.names)
+        return next((each for each in itertools.chain(found, machines) if each is not None), None)
 
     def _by_signs(self, signs: DeterminantSigns, found: Examined) -> Singular | None:
         """Return a singular pose between two with opposite signs: random ones, and the centres of boxes."""
@@ -399,7 +382,8 @@ class SingularSearch:
         between = self._between(signs, points, values)
         if between is not None or not self._problem.names:
             return between
-        return self._machine(points[np.argmin(np.abs(values))])
+        nearest = first_largest(1 / np.where(values, np.abs(values), np.inf))
+        return self._machine(points[nearest])
 
     def _between(
         self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
@@ -434,16 +418,14 @@ class SingularSearch:
 
     def _pose(self, z: FloatArray) -> Singular | None:
         """Return a singular pose of the design near a point, between two poses of opposite signs if there are any."""
-        near, signs = self._newton.search(z, self._count), self._signs
-        shown = self._shown(near, BY_NEWTON)
-        if shown is not None and near is not None and signs is not None:
-            for points in signs.around(near):
-                values = signs.computed(points)
-                order = np.argsort(values)[[0, -1]]
-                between = self._between(signs, points[order], values[order])
-                if between is not None:
-                    return between
-        return shown
+        near = self._newton.search(z, self._count)
+        if near is None:
+            return None
+        between = None
+        if self._signs is not None:
+            points = self._signs.around(near)
+            between = self._between(self._signs, points, self._signs.computed(points))
+        return between or self._shown(near, BY_NEWTON)
 
     def _machine(self, z: FloatArray) -> Singular | None:
         """Return a singular machine at a point of the design, or near it."""

@@ -7,32 +7,25 @@ equations: all unknowns, and numbers of the pose that a robot with fewer freedom
 Where every machine within a tolerance on joint centres is meant, the errors of each centre are three further
 coordinates, with the design's choice of equations and screws. They are never bisected: an expression's linear part in
 the error of a centre, a vector, changes it by at most the vector's length times the tolerance.
-
-Rows that are linear in the rotation R, such as those of straight legs, are multiplied by the s of ``R = (s R) / s`` and
-so lose the division: their forms over a box are then exact but for terms of third order.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Model, Substitution, WrenchKind, frozen_array, jacobian
-from .....models.instance import homogenised, sizes_at
+from .....models import FloatArray, Model, frozen_array
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
-from ....case.pose import Free
 from ...statement.machine import INSIDE, CentreErrors
 from ...statement.tolerance import BuiltModel
 from .closed_loops import Loops, closed_from_home
-from .motion_matrix import Limbs, RankMatrix, free_matrix, locked_matrix
-from .pose_box import PoseBox, polynomial_rotation, rotation_of
+from .pose_box import PoseBox
+from .posed_model import Chosen, Limbs, PosedModel, RankMatrix, ScaledRows, free_matrix, posed_model
 
 #: Points of the workspace at which the equations that are needed are found, beside its middle, and number of machines
 #: in which those that were left out are tested.
@@ -49,127 +42,6 @@ _SEED = 0
 
 class NotJudgedError(ValueError):
     """Error of a robot whose loops or limbs are singular where a search begins; the message is a clause."""
-
-
-class ScaledRows(NamedTuple):
-    """J as rows divided by their sizes, moments about the platform's origin in parts of a length.
-
-    The row of a leg times its length is a polynomial of the pose, and so nearer to a linear function than the unit row.
-
-    Attributes:
-        rows: (m, 6) rows of any size.
-        sizes: (m, 1) positive.
-    """
-
-    rows: SX
-    sizes: SX
-
-    @property
-    def jacobian(self) -> SX:
-        """J, (m, 6)."""
-        return self.rows / ca.repmat(self.sizes, 1, 6)
-
-
-@dataclass(frozen=True, eq=False)
-class PosedModel:
-    """A model as expressions of the coordinates: Substitution's numbers put in.
-
-    Attributes:
-        loops: equations of order 1 in the coordinates.
-        free: indices of the pose's numbers, which are the first coordinates.
-        limbs: rows, members and actuators.
-        characteristic_length: by which couples are multiplied in J.
-        turned: the limbs with ``inverse * s R`` as the rotation.
-        inverse: symbol that stands for ``1 / s``.
-        scale: ``s``, a polynomial.
-        symbols: of the model: parameters, unknowns, rotation, position.
-        given: what is put in their place, plain and turned.
-    """
-
-    loops: Loops
-    free: tuple[int, ...]
-    limbs: Limbs
-    characteristic_length: float
-    turned: Limbs
-    inverse: SX
-    scale: SX
-    symbols: list[SX]
-    given: tuple[list[SX], list[SX]]
-
-    @property
-    def z(self) -> SX:
-        """Symbols (n, 1) of the coordinates."""
-        return self.loops.z
-
-    def values(self, expression: SX, z: FloatArray) -> FloatArray:
-        """Return a matrix of expressions at a point (n,)."""
-        return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
-
-    def reduced(self, chosen: Chosen) -> PosedModel:
-        """Return the model with the equations and screws that are chosen."""
-        limbs, turned = (each.reduced(*chosen[1:]) for each in (self.limbs, self.turned))
-        return replace(self, loops=self.loops.some(chosen.equations), limbs=limbs, turned=turned)
-
-    @property
-    def locked(self) -> RankMatrix:
-        """The matrix with locked actuators, rows that are linear in the rotation without a division."""
-        return RankMatrix(self.polynomial(locked_matrix(self.limbs), locked_matrix(self.turned)), 0)
-
-    @property
-    def scaled(self) -> ScaledRows:
-        """J with moments about the platform's origin divided by the length of the limbs."""
-
-        def wrenches(limbs: Limbs) -> SX:
-            """Return rows of forces and couples, and 1 in a last column: the factor that makes them polynomials."""
-            rows = [ca.horzcat(limbs.about_platform(row), 1) for row in limbs.wrenches]
-            return ca.vertcat(SX(0, 7), *rows)
-
-        L, limbs = SX(self.characteristic_length), self.limbs
-        rows = ca.densify(self.polynomial(wrenches(limbs), wrenches(self.turned)))
-        factors = [L if row.kind is WrenchKind.COUPLE else SX(1) for row in limbs.wrenches]
-        sizes = [rows[i, 6] * ca.sqrt(row.square) / factors[i] for i, row in enumerate(limbs.wrenches)]
-        of_members = ca.horzcat(*homogenised(jacobian([], L, limbs.members), limbs.position, limbs.length))
-        ones = SX.ones(of_members.shape[0])
-        return ScaledRows(ca.vertcat(rows[:, :6], of_members), ca.vertcat(SX(0, 1), *sizes, ones))
-
-    def scaled_points(self, points: SX) -> tuple[SX, SX]:
-        """Return points (3 k, 1) in the symbols of the model as expressions of the coordinates, and these times s."""
-        function = ca.Function("points", self.symbols, [points])
-        plain, turned = (ca.horzcat(function.call(each)[0], SX.ones(points.shape[0])) for each in self.given)
-        rows = self.polynomial(plain, turned)
-        scaled = [rows[i, 0] * (self.scale if rows[i, 1].is_one() else 1) for i in range(rows.shape[0])]
-        return plain[:, 0], ca.vertcat(SX(0, 1), *scaled)
-
-    def polynomial(self, plain: SX, turned: SX) -> SX:
-        """Return a matrix whose rows that are linear in the rotation are multiplied by its scale, without a division.
-
-        Args:
-            plain: (m, c).
-            turned: the same with ``inverse * s R`` as the rotation.
-        """
-        slopes = ca.reshape(ca.jacobian(ca.densify(turned), self.inverse), *turned.shape)
-        constant = ca.substitute(turned, self.inverse, 0)
-        found = [
-            plain[i, :] if ca.depends_on(slopes[i, :], self.inverse) else constant[i, :] * self.scale + slopes[i, :]
-            for i in range(plain.shape[0])
-        ]
-        return ca.sparsify(ca.vertcat(SX(0, plain.shape[1]), *found))
-
-
-class Chosen(NamedTuple):
-    """What is kept of a model where the rest follows from it.
-
-    Attributes:
-        equations: indices of the closure's equations.
-        columns: indices of the screws of each member.
-        rows: indices of the equations of each member's nested loops.
-        length: by which rotations are multiplied, of the order of the robot's.
-    """
-
-    equations: Sequence[int]
-    columns: Sequence[Sequence[int]]
-    rows: Sequence[Sequence[int]]
-    length: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,71 +237,6 @@ def _check_freedoms(family: Problem, limbs: Limbs) -> None:
             raise NotJudgedError("errors of joint centres take freedoms from the robot: its limbs change")
 
 
-def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, errors: SX | None = None) -> PosedModel:
-    """Return a model as expressions of the coordinates.
-
-    Args:
-        case: with fixed dimensions.
-        model: its robot; its parameters may be followed by errors of joint centres.
-        box: the poses.
-        z: (n, 1) symbols of the coordinates; new ones if left out.
-        errors: (3 m, 1) symbols in the place of the errors.
-    """
-    free, errors = box.free, SX(0, 1) if errors is None else errors
-    if z is None:
-        z = ca.vertcat(SX(0, 1), *[SX.sym(f"y{k}") for k in free], *[SX.sym(item.name) for item in model.unknowns])
-    y = SX((0.5 * box.lower + 0.5 * box.upper).tolist())
-    y[list(free)] = z[: len(free)]
-    position, turn = y[:3], y[3:]
-    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    numbers = ca.vertcat(SX(0, 1), *values, errors)
-    given = Substitution(numbers, z[len(free) :], rotation_of(box, turn), position)
-    every = (*model.closure, *model.loops)
-    outputs = [
-        *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *[each.loops[:, each.passive] for each in model.nested],
-        *[each.value for each in model.signs],
-        *[each.expression for each in every],
-    ]
-    symbols = Substitution.identity(model).all
-    function = ca.Function("model", symbols, outputs)
-
-    def limbs_of(following: Iterator[SX]) -> Limbs:
-        """Return the limbs from the first outputs."""
-        rows = [
-            replace(row, force=next(following), moment=next(following), square=next(following))
-            for row in model.wrenches
-        ]
-        members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-        driven = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
-        return Limbs(rows, members, driven, [next(following) for _ in model.nested], position, 1.0)
-
-    following = iter(function.call(given.all))
-    limbs, signs = limbs_of(following), [next(following) for _ in model.signs]
-    polynomial, scale = polynomial_rotation(box, turn)
-    inverse = SX.sym("inverse")
-    turned = replace(given, rotation=inverse * polynomial)
-    ones = SX.ones(len(every) + len(model.unknowns))
-    sizes = sizes_at(model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), ones)
-    scaled = [next(following) / sizes[k] for k in range(len(every))]
-    ranges = (0.5 * (box.upper - box.lower))[list(free)]
-    size = np.concatenate([ranges, np.array(ca.DM(sizes[len(every) :, :])).ravel()])
-    whole = ca.vertcat(SX(0, 1), *scaled)
-    return PosedModel(
-        loops=Loops(z, whole[: len(model.closure)], whole, ca.vertcat(SX(0, 1), *signs), size),
-        free=free,
-        limbs=limbs,
-        characteristic_length=case.characteristic_length,
-        turned=limbs_of(iter(function.call(turned.all))),
-        inverse=inverse,
-        scale=scale,
-        symbols=symbols,
-        given=(given.all, turned.all),
-    )
-
-
 def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     """Return the indices of the equations that do not follow from others in the workspace."""
     if not loops.count:
@@ -537,3 +344,10 @@ def _rank_of(values: FloatArray) -> int:
     """Return the rank of a matrix of numbers."""
     sizes = np.linalg.svd(values, compute_uv=False)
     return int(np.count_nonzero(sizes > _ZERO * sizes[0]))
+
+
+def steepest(slopes: FloatArray, tolerance: float) -> FloatArray:
+    """Return errors (..., 3) as large as a tolerance along derivatives by them; none along derivatives of zero."""
+    sizes = np.linalg.norm(slopes, axis=-1, keepdims=True)
+    # A sum with zero has no negative zero.
+    return np.asarray(INSIDE * tolerance * slopes / np.maximum(sizes, np.finfo(float).tiny) + 0.0)

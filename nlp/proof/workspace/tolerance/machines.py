@@ -45,8 +45,7 @@ from ..numbers.bound_search import Minimum, smallest_values
 from ..numbers.expressions import Expressions
 from ..numbers.extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
 from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
-from ..robot.posed_robot import NotJudgedError, build_problem
-from ..robot.tolerance_model import ToleranceModel, family_of
+from ..robot.posed_robot import NotJudgedError, Problem, build_problem, family_of
 from .leg_errors import of_legs
 from .second_order_change import second_order_change
 
@@ -83,7 +82,7 @@ class Machines:
             self.built = built_model(case.model) if tolerance else BuiltModel(closed.model, (), closed.reaches)
         except RobotError as error:
             raise NotJudgedError(str(error)) from None
-        self.family: ToleranceModel = family_of(case, self.built, build_problem(case, closed.model, box), tolerance)
+        self.family: Problem = family_of(case, self.built, build_problem(case, closed.model, box), tolerance)
         self.symbols: MachineLayout = machine_layout(case, self.built, tolerance, self._at)
         self._rests: dict[tuple[str, str], float] = {}
 

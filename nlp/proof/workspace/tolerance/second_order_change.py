@@ -20,10 +20,10 @@ from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
-from ...boxes.search import WHOLE, Boxes, Order, Rule, Search, Verdicts
+from ...boxes.search import WHOLE, Boxes, Order, Rule, Search, Verdicts, some
 from ...enclosure.forms import Encloser
-from ..ranks.loop_boxes import LoopBoxes, in_workspace, whole_workspace
-from ..robot.tolerance_model import ToleranceModel
+from ..ranks.loop_boxes import LoopBoxes, contracted_boxes, whole_workspace
+from ..robot.posed_robot import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,7 +36,7 @@ _SHARE, _NEAR = 0.02, 1.2
 _OUTWARDS = 1.02
 
 
-def second_order_change(family: ToleranceModel, expression: SX, first: float) -> float:
+def second_order_change(family: Problem, expression: SX, first: float) -> float:
     """Return a bound of the change of an expression beyond first order; infinite where none is found.
 
     Args:
@@ -90,7 +90,7 @@ class _ChangeRule(Rule[FloatArray]):
 
     block = _BLOCK
 
-    def __init__(self, family: ToleranceModel, H: SX, centres: list[int]) -> None:
+    def __init__(self, family: Problem, H: SX, centres: list[int]) -> None:
         self._problem, self._tolerance, self.whole = family.problem, family.tolerance, whole_workspace(family.problem)
         places = [3 * j + k for j in centres for k in range(3)]
         lower, self._count = ca.tril(H[places, places]), len(centres)
@@ -105,7 +105,8 @@ class _ChangeRule(Rule[FloatArray]):
     def examine(self, boxes: Boxes[FloatArray]) -> Verdicts[FloatArray]:
         """Return bounds of boxes."""
         known = np.ones(len(boxes.split), dtype=bool)
-        now = in_workspace(self._problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
+        now, kept, _ = contracted_boxes(self._problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
+        now = some(now, kept)
         errors = np.full((len(now.lower), 3 * self._count), self._tolerance)
         forms = self._encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
         with np.errstate(all="ignore"):
