@@ -27,7 +27,6 @@ from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace.ranks.krawczyk import Coordinates, no_relation
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import LoopBoxes
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
-from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.slices.slice_limits import UNDECIDED, LimitState, SliceLimits
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.results.workspace import WorkspaceResult
@@ -102,8 +101,8 @@ def test_limits_over_boxes_are_those_at_their_poses(limited: Path, kind: TurnKin
     box = pose_box(Workspace((Free(-12.0, 12.0), 0.0, Free(11.0, 29.0)), turns))
     chosen = (0, 3) if kind is TurnKind.AXIS else (3, 4)
     closed = closed_form(case.model)
-    problem = build_problem(case, closed.model, box)
-    cells, free = SliceLimits(case, closed, problem), list(problem.free)
+    cells = SliceLimits(case, closed, box)
+    free = list(cells.problem.free)
     lower = np.repeat(0.5 * (box.lower + box.upper)[None], BOXES, axis=0)
     upper = lower.copy()
     size = (box.upper - box.lower)[list(chosen)] * 2.0 ** -rng.integers(3, 8, size=(BOXES, 1))

@@ -93,7 +93,7 @@ class RankTest:
         self._constant *= scale[:, None]
         at = np.array(places, dtype=np.int32).reshape(-1, 2)
         self._at, self._scale = tuple(at.T), np.ascontiguousarray(scale[at[:, 0]])
-        self._head = (*whole.shape, matrix.nullity, at, self._scale, self._constant)
+        self._head = (*whole.shape, matrix.nullity, (at, self._scale, self._constant))
 
     def examine_second(
         self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray | None = None
@@ -110,8 +110,8 @@ class RankTest:
         regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
         shares, smallest = np.empty((n, count)), np.empty(count)
         ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        found = (*ends, regular, shares, smallest, signs)
-        encloser.module.rank(n, encloser.tape.head, self._head, found, count, change)
+        found = (*ends, regular, shares, smallest, signs, change)
+        encloser.module.rank(n, encloser.tape.head, self._head, found, count)
         return Tested(regular.astype(bool), shares.T, smallest, signs)
 
     def unknown(self, count: int, f: int) -> Tested:

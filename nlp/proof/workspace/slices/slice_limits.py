@@ -23,20 +23,18 @@ from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ...enclosure.forms import Encloser
-from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
 from ...statement.machine import joint_centres
-from ...statement.tolerance import BuiltModel, machine_layout
 from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
-from ..numbers.extremes import ON_LIMIT
+from ..numbers.extremes import slack_of
 from ..numbers.jacobian_numbers import SingularValues
 from ..numbers.searched import Subject, questions
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.pose_box import pose_coordinates
-from ..robot.posed_robot import Problem
+from ..robot.pose_box import PoseBox
+from ..tolerance.machines import Machines
 
 #: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
 KEPT, UNDECIDED = -1, -2
@@ -78,67 +76,50 @@ class SliceLimits:
     Args:
         case: with fixed dimensions.
         closed: its robot without unknowns in closed form.
-        problem: this robot over the workspace.
+        box: the workspace.
+
+    Attributes:
+        problem: the robot over the workspace.
+        uncovered: keys of limits that are not decided on boxes.
+        limits: the limits, one for each key.
 
     Raises:
+        NotJudgedError: the loops are not closed in the middle of the workspace.
         UncoveredError: a loop equation, or the reach of a limb, holds an operation without a rule.
     """
 
-    def __init__(self, case: Case, closed: ClosedForm, problem: Problem) -> None:
-        self._problem, self._reaches = problem, len(closed.reaches)
-        exact = replace(case, joint_centre_tolerance=None)
-        uncovered = self._take(exact, closed)
-        subject = Subject(exact, closed.model, problem.box, joint_centres(exact), design=problem)
+    def __init__(self, case: Case, closed: ClosedForm, box: PoseBox) -> None:
+        case = replace(case, joint_centre_tolerance=None)
+        alone = Machines(case, closed, box)
+        self.problem = problem = alone.family.problem
+        reaches, claims = alone.symbols.claims((), with_objective=False)
+        known = [claim for claim in claims if claim.limit is not None and alone.is_covered(claim)]
+        uncovered = dict.fromkeys(each.key for each in claims if each.limit is not None and each not in known)
         limits: dict[str, SliceLimit] = {}
-        for claim in self._claims:
+        for claim in known:
             limit = claim.reading.from_value(claim.limit or 0.0)
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
+        subject = Subject(case, closed.model, box, joint_centres(case), design=problem)
         self._others: list[_Other] = []
         for claim, make in (each for limit in case.limits for each in questions(subject, limit)):
-            number, value = make(), claim.limit or 0.0
+            number = make()
             if problem.dependent or not _is_covered(number):
                 uncovered[claim.key] = None
                 continue
             is_enclosed = isinstance(number, Clearance)
-            limits[claim.key] = SliceLimit(claim.key, value, claim.reading.dimension, is_enclosed=is_enclosed)
-            self._others.append(_Other(claim.key, number, value if claim.sense is Sense.MIN else -value))
-        keys = [*(each.key for each in self._claims), *(each.key for each in self._others)]
-        self._places = [list(limits).index(key) for key in keys]
-        #: Keys of limits that are not decided on boxes.
-        self.uncovered = tuple(uncovered)
-        #: The limits, one for each key.
-        self.limits = tuple(limits.values())
-
-    def _take(self, case: Case, closed: ClosedForm) -> dict[str, None]:
-        """Take the reach of limbs and the limits on expressions; return keys of those without bounds.
-
-        The numbers are those of the claims times their signs, so that all limits are largest values.
-        """
-        problem, uncovered = self._problem, dict[str, None]()
+            limits[claim.key] = SliceLimit(
+                claim.key, claim.limit or 0.0, claim.reading.dimension, is_enclosed=is_enclosed
+            )
+            self._others.append(_Other(claim.key, number, _least(claim)))
+        keys = [*(each.key for each in known), *(each.key for each in self._others)]
+        self._places, self._reaches = [list(limits).index(key) for key in keys], len(reaches)
+        self.uncovered, self.limits = tuple(uncovered), tuple(limits.values())
         self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
-        built, at = BuiltModel(closed.model, (), closed.reaches), pose_coordinates(problem.box)
-        symbols = machine_layout(case, built, 0.0, at)
-        reaches, claims = symbols.claims((), with_objective=False)
-        self._claims: list[Claim] = []
-        numbers, limits = [], []
-        for claim in (each for each in claims if each.limit is not None):
-            sign, limit = 1.0 if claim.sense is Sense.MAX else -1.0, claim.limit or 0.0
-            number = sign * symbols.of(claim.expression, SX(0, 1), problem.z)
-            try:
-                compile_tape(ca.Function("number", [problem.z], [number]))
-            except UncoveredError:
-                uncovered[claim.key] = None
-                continue
-            self._claims.append(claim)
-            numbers.append(number)
-            limits.append(sign * limit + ON_LIMIT * abs(limit))
-        self._limit = np.array(limits)
-        whole = ca.vertcat(SX(0, 1), *numbers)
-        reach = [symbols.of(each.expression, SX(0, 1), problem.z) for each in reaches]
+        self._leasts = np.array([_least(claim) for claim in (*reaches, *known)])
+        numbers = ca.vertcat(SX(0, 1), *map(alone.number, (*reaches, *known)))
         # A last entry that is not used, for a robot without any.
-        self._encloser = Encloser(problem.z, ca.vertcat(SX(0, 1), problem.equations, *reach, whole, problem.z[0]))
-        self._function = ca.Function("numbers", [problem.z], [ca.densify(whole)])
-        return uncovered
+        self._encloser = Encloser(problem.z, ca.vertcat(SX(0, 1), problem.equations, numbers, problem.z[0]))
+        self._function = ca.Function("numbers", [problem.z], [ca.densify(numbers)])
 
     @property
     def unknown(self) -> NDArray[np.int8]:
@@ -153,20 +134,17 @@ class SliceLimits:
             relation: of the dependent coordinates, to which it is set.
             known: (B, K) states over larger boxes.
         """
-        states, enclosed, k = known.copy(), self._reaches + len(self._claims), len(self._of.dependent)
+        states, enclosed, k = known.copy(), len(self._leasts), len(self._of.dependent)
         is_open = states == LimitState.OPEN
-        rows = np.flatnonzero(is_open[:, :enclosed].any(axis=1) | bool(self._problem.dependent))
+        rows = np.flatnonzero(is_open[:, :enclosed].any(axis=1) | bool(self.problem.dependent))
         if rows.size:
             forms = self._encloser(boxes.lower[rows].T, boxes.upper[rows].T)
-            own, r = relation_of(forms.part(slice(0, k)), self._of), self._reaches
+            own = relation_of(forms.part(slice(0, k)), self._of)
             for whole, part in zip(relation, own, strict=True):
                 whole[rows] = part
             lower, upper = ranges(with_relation(forms.part(slice(k, -1)), own, self._of))
-            kept = np.hstack([lower[:, :r] >= 0, upper[:, r:] <= self._limit])
-            violated = np.hstack([upper[:, :r] < 0, lower[:, r:] > self._limit])
-            states[rows, :enclosed] = np.where(
-                is_open[rows, :enclosed], _states_of(kept, violated), states[rows, :enclosed]
-            )
+            found = _states_of(lower >= self._leasts, upper < self._leasts)
+            states[rows, :enclosed] = np.where(is_open[rows, :enclosed], found, states[rows, :enclosed])
         for j, claim in enumerate(self._others, enclosed):
             rows = np.flatnonzero(is_open[:, j])
             if rows.size:
@@ -188,11 +166,20 @@ class SliceLimits:
         """Return whether each limit is violated at points (P, n) with closed loops: (M, P); not where it is NaN."""
         found = np.zeros((len(self.limits), len(z)), dtype=np.bool_)
         with np.errstate(all="ignore"):
-            numbers = self._function(z.T).full().reshape(len(self._claims), len(z))
-            claims = [*(numbers > self._limit[:, None]), *(each.violated(z) for each in self._others)]
+            numbers = self._function(z.T).full().reshape(len(self._leasts), len(z))
+            claims = [
+                *(numbers < self._leasts[:, None])[self._reaches :],
+                *(each.violated(z) for each in self._others),
+            ]
         for place, claim in zip(self._places, claims, strict=True):
             found[place] |= claim
         return found
+
+
+def _least(claim: Claim) -> float:
+    """Return the smallest value allowed of a claim's number, or of minus it for a largest one; 0 without a limit."""
+    limit = claim.limit or 0.0
+    return (limit if claim.sense is Sense.MIN else -limit) - slack_of(limit)
 
 
 def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
@@ -212,17 +199,17 @@ def _is_covered(number: Number) -> bool:
 class _Other:
     """A limit on a number with bounds of its own, and no dependent coordinates."""
 
-    def __init__(self, key: str, number: SingularValues | Clearance, limit: float) -> None:
-        self.key, self._number, self._limit = key, number, limit - ON_LIMIT * abs(limit)
+    def __init__(self, key: str, number: SingularValues | Clearance, least: float) -> None:
+        self.key, self._number, self._least = key, number, least
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
         """Return the states (B,) over boxes (B, n).
 
         A number that is bounded from below only is violated where it is so at the corners and the middle of a box.
         """
-        kept = self._number.bounds(lower, upper)[:, 0] >= self._limit
+        kept = self._number.bounds(lower, upper)[:, 0] >= self._least
         if isinstance(self._number, Clearance):
-            return _states_of(kept, self._number.most(lower, upper) < self._limit)
+            return _states_of(kept, self._number.most(lower, upper) < self._least)
         free = np.flatnonzero((upper > lower).any(axis=0))
         violated = self.violated(0.5 * lower + 0.5 * upper)
         for sides in itertools.product((False, True), repeat=len(free)):
@@ -234,7 +221,7 @@ class _Other:
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return whether it is violated at points (P, n): (P,)."""
-        return np.asarray(self._number.values(points)[:, 0] < self._limit)
+        return np.asarray(self._number.values(points)[:, 0] < self._least)
 
 
 class FirstViolated:

@@ -27,7 +27,7 @@ from ...statement.machine import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
 from ..ranks.rank_rule import RankTest, is_polynomial
 from ..robot.pose_box import PoseBox, pose_box, scaled
-from ..robot.posed_robot import NotJudgedError, build_problem
+from ..robot.posed_robot import NotJudgedError
 from ..scale import largest_factor
 from .slice_limits import POINTS, UNDECIDED, FirstViolated, SliceLimit, SliceLimits
 
@@ -140,8 +140,8 @@ class _Robot:
     def __init__(self, case: Case, box: PoseBox) -> None:
         closed = closed_form(case.model)
         try:
-            self.problem = problem = build_problem(case, closed.model, box)
-            self.limits = SliceLimits(case, closed, problem)
+            self.limits = SliceLimits(case, closed, box)
+            self.problem = problem = self.limits.problem
             matrices = [problem.locked, *([] if problem.unactuated is None else [problem.unactuated])]
             tests = [RankTest(each, problem.z, problem.start) for each in matrices]
             self.examiners = [Examiner(problem, each) for each in tests]

@@ -122,12 +122,12 @@ class Machines:
             claims: the limits, in the symbols of machines.
             gap: allowed distance of the bound from a value beyond its limit, as a part of it.
         """
-        covered = [claim for claim in claims if self._is_covered(claim)]
+        covered = [claim for claim in claims if self.is_covered(claim)]
         if covered:
             with suppress(UncoveredError):  # an equation of loops
                 yield from self._by_search(covered, gap, is_enough=True)
 
-    def _is_covered(self, claim: Claim) -> bool:
+    def is_covered(self, claim: Claim) -> bool:
         """Return whether a number has no operation without a rule."""
         try:
             compile_tape(ca.Function("number", [self.family.z], [self.number(claim)]))
