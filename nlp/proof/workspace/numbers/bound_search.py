@@ -222,11 +222,9 @@ class SmallestValues(LoopRule):
         done = found.boxes.is_known & (found.smallest >= self._levels()).all(axis=1)
         self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
         left = some(found, np.flatnonzero(~done))
-        width, shares = self.widths(left), left.shares
-        if self._problem.dependent:
-            # Relations over long and narrow boxes are wide.
-            shares = shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-        split = coordinates_to_split(shares, width)
+        width = self.widths(left)
+        # Bounds over long and narrow boxes are wide, those of loops above all.
+        split = coordinates_to_split(left.shares * np.sqrt(width / width.max(axis=1, keepdims=True)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split)
         parts = parts._replace(more=parts.more._replace(more=left.smallest))
         return Verdicts(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
