@@ -138,7 +138,7 @@ def six_legs() -> Claim:
 
 @cache
 def any_robot() -> Problem:
-    case = workspace_case("6-rss", "", width=0.9, turn=50)
+    case = workspace_case("6-rss", "", width=0.5, turn=30)
     assert case.workspace is not None
     return build_problem(case, closed_form(case.model).model, pose_box(case.workspace))
 

@@ -489,12 +489,18 @@ def test_a_machine_far_off_is_singular() -> None:
         '[robot]\nmodel = "6-ups"\nparameters = { rb = 1.0, rp = 0.45, base_half = 60, platform_half = 5, h = 0.8 }\n'
     )
     place = HEAD.replace("1.08", "0.78").replace("1.12", "0.82").replace("1e-3", "0.2")
-    case = case_from_tables(tomllib.loads(text + place + TURN), name="6-ups", source="6-ups.toml")
-    found = judge_workspace(case, with_limits=False).regularity
+    case, record = (
+        case_from_tables(tomllib.loads(text + place + TURN), name="6-ups", source="6-ups.toml"),
+        PaperRecord(),
+    )
+    judged = judge_workspace(case, with_limits=False, paper=record)
+    found = judged.regularity
     assert found.outcome is Outcome.REFUTED
     assert found.centres is not None
     assert found.y is not None
     assert np.linalg.norm(found.centres.vectors, axis=1).max() <= 0.2
+    (checked,) = check_workspace_proof(paper_of(judged, record, text + place + TURN), case).claims
+    assert checked.is_refuted
     # Six straight legs with these errors: the determinant of their unit rows vanishes.
     pose, e = found.box.pose(found.y), found.centres.vectors
     rows = []
