@@ -188,17 +188,16 @@ class QuadraticModel:
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
         bound = np.empty(self.middle.size)
-        kernel().models(len(self.b), (*self._arrays(), bound, None, None, None), bound.size)
+        self._call(bound, None, None, None)
         return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
-        low, high, levels = np.empty(self.b.shape), np.empty(self.b.shape), np.empty(self.middle.size)
-        levels[:] = level
-        kernel().models(len(self.b), (*self._arrays(), None, levels, low, high), levels.size)
+        low, high = np.empty(self.b.shape), np.empty(self.b.shape)
+        self._call(None, np.full(self.middle.size, level), low, high)
         return Ends(low, high)
 
-    def _arrays(self) -> tuple[FloatArray, ...]:
-        """Return the model as the kernel reads it."""
+    def _call(self, *results: FloatArray | None) -> None:
+        """Call the kernel, which writes results."""
         arrays = (self.middle, self.b, self.H, self.w, self.slope_lo, self.slope_hi, self.rounding)
-        return tuple(np.ascontiguousarray(each) for each in arrays)
+        kernel().models(len(self.b), (*(np.ascontiguousarray(each) for each in arrays), *results), self.middle.size)
