@@ -21,7 +21,7 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests" / "models")]
+sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("bench", "tests", "tests/models")]
 from limb_cases import poses  # noqa: E402 - the tests' cases
 from limbs import ANGLE, machine  # noqa: E402
 

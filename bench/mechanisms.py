@@ -14,7 +14,7 @@ import numpy as np
 
 from screwsynth.models.joints import RobotError
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / "models")]
+sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("tests", "tests/models")]
 from engine_comparison import compare  # noqa: E402 - the tests' comparison
 from random_mechanisms import random_mechanism  # noqa: E402
 

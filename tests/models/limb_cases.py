@@ -3,9 +3,10 @@
 import math
 
 import numpy as np
+from builders import case_from
 
 from screwsynth.models import hexapod
-from screwsynth.nlp import Case, Free, Rotation, case_from_tables, formulate, load_case
+from screwsynth.nlp import Case, Free, Rotation, formulate, load_case
 from screwsynth.nlp.proof.statement.limb_separation import Separation, separate
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 
@@ -54,7 +55,7 @@ def poses(seed: int) -> Case:
     }
     if seed % 4 > 1:
         tables["limits"] = {"leg_length": {"min": 24, "max": 34}, "base_joint_angle": 0.6, "footprint": {"base": 11}}
-    return case_from_tables(tables, name="poses", source="poses")
+    return case_from(tables, "poses")
 
 
 def separated(case: Case) -> tuple[StandardForm, Separation]:

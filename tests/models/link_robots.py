@@ -60,8 +60,7 @@ axis = "z"
 """
 CASE = """[robot]
 file = "robot.toml"
-[robot.parameters]
-s = { min = 0.9, max = 1.1 }
+parameters = { s = { min = 0.9, max = 1.1 } }
 [pose]
 position = [0, 1, 0]
 [[task]]

@@ -7,12 +7,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from builders import Array
 from mujoco_robots import column_space, left_null_space, null_space, scaled_twists
-from numpy.typing import NDArray
 
 from screwsynth.models.mechanism import Mechanism
 
-Array = NDArray[np.float64]
 Table = dict[str, Any]
 
 

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from builders import Array
 from numpy.typing import NDArray
 from robot_files import Robot
 from robot_mjcf import Loop, Writer
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 #: Singular values below this share of the largest count as zero: measured regular ones of the gallery are above 1e-3 of
@@ -281,20 +281,6 @@ class Oracle:
     def objective(self, chi: Array) -> float:
         """F in a twist, from the members."""
         return float(np.sum(self.member_objectives(chi)))
-
-    def objective_by_least_squares(self, chi: Array) -> float:
-        """F in a twist, from the whole mechanism: least squared mismatch of the loops over all passive rates.
-
-        No member, basis or projector is used. Coupled joints keep their coupling. For robots whose members meet the
-        platform in one joint each.
-        """
-        coupling = self.model.eq_type[self.row_constraint] == mujoco.mjtEq.mjEQ_JOINT
-        motions = self.J[:, self.passive]
-        if np.any(coupling):
-            motions = motions @ null_space(motions[coupling])
-        mismatch = (self.J[:, self.platform_dofs] @ self.platform_velocity(chi))[~coupling]
-        rates = np.linalg.lstsq(motions[~coupling], -mismatch, rcond=RANK_TOLERANCE)[0]
-        return float(np.sum((mismatch + motions[~coupling] @ rates) ** 2))
 
     def feasible_twists(self) -> Array:
         """Orthonormal basis (6, d), as plain vectors, of the platform's twists with all actuators free."""

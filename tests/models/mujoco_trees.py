@@ -12,9 +12,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from builders import Array
 
 #: Singular values below this part of the largest are zero: regular ones are above 1e-4 of it, rounding leaves 1e-14.
 ZERO = 1e-9

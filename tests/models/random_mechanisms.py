@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from builders import Array
 
-Array = NDArray[np.float64]
 Table = dict[str, Any]
 
 FREEDOMS = {"R": 1, "P": 1, "H": 1, "C": 2, "U": 2, "S": 3}

@@ -11,9 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from builders import Array
 
 CRANK, ROD = 0.04, 0.085
 

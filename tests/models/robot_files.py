@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from builders import Array, turn_about
 
-Array = NDArray[np.float64]
 Value = float | Array
 Table = Mapping[str, Any]
 
@@ -94,10 +93,6 @@ class Robot:
         """Number of actuated joints."""
         return sum(joint.actuated for limb in self.limbs for joint in every_joint(limb))
 
-    def moved(self, R: Array, t: Array) -> Robot:
-        """Return the robot after the displacement ``x -> R x + t``, base included."""
-        return replace(self, home=R @ self.home + t, limbs=tuple(moved_limb(limb, R, t) for limb in self.limbs))
-
 
 def every_joint(limb: Limb) -> tuple[Joint, ...]:
     return limb.stem + tuple(joint for branch in limb.branches for joint in branch)
@@ -114,13 +109,6 @@ def moved_limb(limb: Limb, R: Array, t: Array) -> Limb:
         tuple(tuple(moved_joint(joint, R, t) for joint in branch) for branch in limb.branches),
         None if limb.centre is None else R @ limb.centre + t,
     )
-
-
-def rotation(axis: Array, angle: float) -> Array:
-    """Rodrigues' formula."""
-    x, y, z = unit(np.asarray(axis, dtype=float))
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K))
 
 
 def value_of(expression: float | str, names: Mapping[str, Value]) -> Value:
@@ -203,7 +191,7 @@ def limb_copies(table: Table, numbers: Mapping[str, Value]) -> list[Limb]:
     through = vector_of(repeat.get("through", [0, 0, 0]), numbers)
     copies = []
     for angle in angles:
-        R = rotation(vector_of(repeat.get("axis", [0, 0, 1]), numbers), math.radians(angle))
+        R = turn_about(vector_of(repeat.get("axis", [0, 0, 1]), numbers), math.radians(angle))
         copies.append(moved_limb(limb, R, through - R @ through))
     return copies
 

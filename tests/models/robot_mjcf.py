@@ -11,10 +11,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from builders import Array
 from robot_files import Joint, Limb, Robot, every_joint
-
-Array = NDArray[np.float64]
 
 #: Axes that are nearer than this share of the robot's size meet; typed and derived coordinates are good to 1e-15.
 MEETING_TOLERANCE = 1e-9

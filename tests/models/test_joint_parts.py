@@ -1,20 +1,40 @@
-"""Parts of robots given joint by joint: projector, basis, displacements, expressions."""
+"""Parts of robots given joint by joint, their screws against loop equations, and robots by rows as ones by joints."""
 
 import math
 import re
+import tomllib
+from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array
 from casadi import SX
 
-from screwsynth.models import displacement, robot, screw_from_axis
+from screwsynth.models import (
+    Model,
+    Substitution,
+    Velocities,
+    constraint_rows,
+    displacement,
+    hexapod,
+    instantiate,
+    matrix_from_cayley,
+    rank_of_rows,
+    robot,
+    robot_function,
+    screw_from_axis,
+    stewart_gough,
+    three_upu,
+)
 from screwsynth.models.basis import basis_of_member
 from screwsynth.models.joints.expression import ExpressionError, evaluate
 from screwsynth.models.joints.motion import AxisKind, JointAxis, Motion
 from screwsynth.models.member import resisted_parts, scaled_twists
 from screwsynth.models.rows import column_groups
 from screwsynth.models.wrench import WrenchKind
+from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, formulate
+from screwsynth.nlp.evidence.kkt import close_equations
 
 NO_EXPRESSIONS = [
     *(
@@ -179,3 +199,255 @@ def test_columns_fall_into_the_smallest_groups_whose_ranks_add_up() -> None:
     pencils = [np.vstack([ca.skew(ca.DM(rng.normal(size=3))).full() @ axes, axes]) for _ in range(4)]
     flat = [np.hstack([each[:, :3], rng.normal(size=(6, 1))]) for each in pencils]
     assert column_groups(flat, 3) == ()
+
+
+# Screws against equations: motions that keep all loops closed are those in which the constraints do no work.
+
+THREE = "repeat = { count = 3 }\n"
+SIX = "repeat = { angles = [0, 60, 110, 170, 240, 300] }\n"
+CUBE = "repeat = { count = 3, axis = [1, 1, 1] }\n"
+R, S = '{ type = "R", at = "B", axis = "y" }', '{ type = "S", at = "A" }'
+P = '{ type = "P", at = "B", axis = "A - B", actuated = true }'
+SLIDE = '{ type = "P", at = "E", axis = "z + 0.2*x", actuated = true }'
+
+
+def joint(kind: str, at: str, rest: str) -> str:
+    return f'{{ type = "{kind}", at = "{at}", {rest} }}'
+
+
+#: Repetition, joints, and the freedoms that the robot has.
+LIMBS: dict[str, tuple[str, list[str], int]] = {
+    "SPR": (THREE, [joint("S", "B", "").replace(",  }", " }"), P, joint("R", "A", 'axis = "y"')], 3),
+    "RUU": (
+        THREE,
+        [
+            joint("R", "B", 'axis = "y", actuated = true'),
+            joint("U", "E", 'axes = ["y", "x"]'),
+            joint("U", "A", 'axes = ["x", "y"]'),
+        ],
+        3,
+    ),
+    "PCU": (
+        THREE,
+        [
+            joint("P", "B", 'axis = "z", actuated = true'),
+            joint("C", "B", 'axis = "y"'),
+            joint("U", "A", 'axes = ["x", "y"]'),
+        ],
+        3,
+    ),
+    "RHS": (THREE, [joint("R", "B", 'axis = "y", actuated = true'), joint("H", "E", 'axis = "y", pitch = 0.3'), S], 3),
+    "two actuators": (THREE, [R.replace(" }", ", actuated = true }"), P, S], 3),
+    "six hinges": (
+        THREE,
+        [
+            joint("R", "B", 'axis = "x", actuated = true'),
+            joint("R", "B", 'axis = "y"'),
+            joint("R", "E", 'axis = "y"'),
+            joint("R", "E + 0.2*z", 'axis = "x + 0.3*z"'),
+            joint("R", "A", 'axis = "z"'),
+            joint("R", "A + 0.1*x", 'axis = "x"'),
+        ],
+        6,
+    ),
+    "slide beside its rod": (SIX, [joint("U", "B", 'axes = ["x", "y"]'), SLIDE, S], 6),
+    "slide beside its line": (THREE, [R, SLIDE, S], 3),
+    "rod to the base": (
+        THREE,
+        [S.replace('"A"', '"B"'), joint("U", "E", 'axes = ["x", "y"]'), joint("R", "A", 'axis = "y", actuated = true')],
+        6,
+    ),
+    "slides alone": (
+        CUBE,
+        [
+            joint("P", "B", 'axis = "x", actuated = true'),
+            joint("P", "B", 'axis = "y"'),
+            joint("P", "B", 'axis = "z"'),
+        ],
+        3,
+    ),
+}
+
+
+def check_tangents(model: Model, freedoms: int) -> None:
+    """Check the tangents of all loop equations at a closed configuration away from home."""
+    rng = np.random.default_rng(0)
+    c, p, u = SX.sym("c", 3), SX.sym("p", 3), SX.sym("u", len(model.unknowns))
+    omega, v = SX.sym("omega", 3), SX.sym("v", 3)
+    R, position = (SX.eye(3) + ca.skew(omega)) @ matrix_from_cayley(c), p + v + ca.cross(omega, p)
+    typical = np.array([item.typical[0] for item in model.parameters])
+    dimensions = SX(typical) if typical.size else SX(0, 1)
+    here = instantiate(model, Substitution(dimensions, u, R, position), SX(0.7), [SX.zeros(6)])
+    quantities = ca.vertcat(SX(0, 1), *here.quantities)
+    moving = ca.vertcat(omega, v, u)
+    outputs = [here.loops, ca.jacobian(here.loops, moving), here.jacobian, here.driven, here.relations]
+    outputs += [ca.jacobian(quantities, moving)]
+    at = ca.vertcat(c, p, u)
+    function = ca.Function("here", [at, omega, v], [ca.densify(each) for each in outputs])
+    loops = here.loops
+    still = ca.substitute(loops, ca.vertcat(omega, v), SX.zeros(6))
+    closing = ca.Function("closing", [at], [ca.densify(still), ca.densify(ca.jacobian(still, at))])
+    size = max(1.0, float(np.abs(model.home).max()))
+    x = np.hstack([np.zeros(3), model.home, np.zeros(len(model.unknowns))])
+    assert np.abs(closing(x)[0].full()).max(initial=0.0) < 1e-12  # home is closed
+    x = x + 0.05 * np.hstack([rng.normal(size=3), size * rng.normal(size=3), rng.normal(size=len(model.unknowns))])
+    for _ in range(40):
+        residual, slopes = (each.full() for each in closing(x))
+        x = x - np.linalg.lstsq(slopes, residual.ravel(), rcond=1e-9)[0]
+    found = function(x, np.zeros(3), np.zeros(3))
+    residual, slopes, J, driven, relations, quantity_slopes = (each.full() for each in found)
+    assert np.abs(residual).max(initial=0.0) < 1e-12
+    values, right = np.linalg.svd(slopes)[1:] if slopes.size else (np.zeros(0), np.eye(moving.numel()))
+    tangents = right[int(np.count_nonzero(values > 1e-8 * values.max(initial=1e-300))) :]
+    constraints = constraint_rows(model, Velocities(J, driven, relations), x[3:6])
+    work = np.hstack([constraints[:, 3:], constraints[:, :3]])
+    assert np.abs(work @ tangents[:, :6].T).max(initial=0.0) < 1e-12
+    rank = rank_of_rows(constraints, x[3:6], size)
+    assert np.linalg.matrix_rank(tangents[:, :6], tol=1e-7) == 6 - rank == freedoms
+    assert model.generic is not None
+    assert 6 - model.generic.constraints == freedoms
+    owners = [owner for quantity in model.quantities for owner in quantity.owners]
+    for limb in dict.fromkeys(each.limb for each in model.actuators):
+        rows = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
+        own = [k for k, each in enumerate(model.actuators) if each.limb == limb]
+        resisted = J[rows] @ np.hstack([tangents[:, 3:6], tangents[:, :3]]).T
+        rates = np.linalg.lstsq(driven[np.ix_(rows, own)], resisted, rcond=None)[0]
+        expected = quantity_slopes[[owners.index(model.actuators[k].name) for k in own]] @ tangents.T
+        assert rates == pytest.approx(expected, abs=1e-10 * size)
+
+
+@pytest.mark.parametrize("name", LIMBS)
+def test_limbs_of_many_kinds(name: str) -> None:
+    repeat, joints, freedoms = LIMBS[name]
+    points = "points = { B = [1, 0, 0], A = [0.6, 0, 1.1], E = [1.2, 0.1, 0.5] }\n"
+    text = f"[[limb]]\n{repeat}{points}joints = [{', '.join(joints)}]\n"
+    home = (0, 0, 0) if repeat == CUBE else (0, 0, 1.1)
+    check_tangents(robot(name=name, home=home, **tomllib.loads(text)), freedoms)
+
+
+@pytest.mark.parametrize("name", ["3-upu", "6-rus", "delta", "delta-parallelogram", "planar-3-rrr", "spherical-3-rrr"])
+def test_robots_of_the_gallery(name: str) -> None:
+    check_tangents(robot_function(name)(), 6 if name == "6-rus" else 3)
+
+
+# The robots that are given by their rows equal their descriptions joint by joint: F and its gradient.
+
+Build = Callable[[], Model]
+TWIST = np.array([0.3, -0.5, 0.7, 4.0, 6.0, -2.0])
+POINTS = 20
+
+
+def program(model: Model, rotation: Rotation) -> Nlp:
+    """The program in which all dimensions and the pose are free about their typical values and home."""
+    parameters = {
+        item.name: [Free(value - 5.0, value + 5.0) for value in item.typical]
+        if item.dimension.value == "length"
+        else Free(item.typical[0] - 0.1, item.typical[0] + 0.1)
+        for item in model.parameters
+    }
+    position = [Free(value - 5.0, value + 5.0) for value in model.home]
+    return formulate(Case(model, parameters, position, [Task(TWIST)], rotation, characteristic_length=2.0))
+
+
+def legs(
+    sides: str, dimensions: dict[str, dict[str, object]], points: list[tuple[list[object], list[object]]]
+) -> Model:
+    """Legs between universal and ball joints at given points of base and platform."""
+    return robot(
+        sides,
+        home=[0, 0, 35],
+        dimensions=dimensions,
+        limb=[
+            {
+                "points": {"B": base, "A": [platform[0], platform[1], f"35 + {platform[2]}"]},
+                "joints": [
+                    {"type": "U", "at": "B", "axes": ["x", "y"]},
+                    {"type": "P", "at": "B", "axis": "A - B", "actuated": True},
+                    {"type": "S", "at": "A"},
+                ],
+            }
+            for base, platform in points
+        ],
+    )
+
+
+def six_six(offset: float, sign: int) -> Model:
+    """The 6-6 platform: pairs of joints on two circles, at ``-+x3`` and ``offset -+ sign*x4``."""
+    dimensions: dict[str, dict[str, object]] = {
+        "x1": {"typical": 12.0},
+        "x2": {"typical": 8.0},
+        "x3": {"typical": 20.0, "kind": "angle"},
+        "x4": {"typical": 8.0, "kind": "angle"},
+    }
+    points: list[tuple[list[object], list[object]]] = []
+    for k in range(3):
+        for side in (-1, 1):
+            b, a = f"({k}*2*pi/3 + {side}*x3)", f"({k}*2*pi/3 + {side}*({offset!r} + {sign}*x4))"
+            points.append(([f"x1*cos{b}", f"x1*sin{b}", 0], [f"x2*cos{a}", f"x2*sin{a}", 0]))
+    return legs("6-6", dimensions, points)
+
+
+def twelve_points() -> Model:
+    """Legs between twelve points, with the names of the hexapod's own parameters for their components."""
+    given = hexapod()
+    dimensions: dict[str, dict[str, object]] = {
+        name: {"typical": value}
+        for item in given.parameters
+        for name, value in zip(item.components, item.typical, strict=True)
+    }
+    names = [[list(item.components) for item in given.parameters if item.name.startswith(part)] for part in ("b", "p")]
+    return legs("12 points", dimensions, [(list(b), list(a)) for b, a in zip(*names, strict=True)])
+
+
+def upu() -> Model:
+    """The 3-UPU with tangential first axes at both ends of each limb."""
+    return robot(
+        "3-UPU",
+        home=[0, 0, 50],
+        dimensions={"base_radius": {"typical": 50.0}, "platform_radius": {"typical": 25.0}},
+        limb=[
+            {
+                "repeat": {"count": 3},
+                "points": {"B": ["base_radius", 0, 0], "A": ["platform_radius", 0, 50]},
+                "joints": [
+                    {"type": "U", "at": "B", "axes": ["y", "cross(y, A - B)"]},
+                    {"type": "P", "at": "B", "axis": "A - B", "actuated": True},
+                    {"type": "U", "at": "A", "axes": ["cross(y, A - B)", "y"]},
+                ],
+            }
+        ],
+    )
+
+
+def gradient(nlp: Nlp, x: Array, count: int) -> Array:
+    """Gradient of F by the first numbers, the unknowns behind them keeping the loops closed."""
+    found = nlp.program.kernels.derivatives(x, nlp.arguments)
+    slope, equal = found.gradient.ravel(), nlp.g_lower == nlp.g_upper
+    loops = found.jacobian[equal]
+    return slope[:count] - slope[count:] @ np.linalg.lstsq(loops[:, count:], loops[:, :count], rcond=1e-9)[0]
+
+
+@pytest.mark.parametrize(
+    ("by_rows", "by_joints", "rotation"),
+    [
+        (stewart_gough, lambda: six_six(0.0, 1), Rotation(None, Free(-1.0, 1.0))),
+        (lambda: stewart_gough(layout="octahedral"), lambda: six_six(math.pi / 3, -1), Rotation(None, Free(-1.0, 1.0))),
+        (hexapod, twelve_points, Rotation(None, Free(-1.0, 1.0))),
+        # The rows of the 3-UPU take the lower joints to be parallel to the upper ones: where the platform translates.
+        (lambda: three_upu(axes="tsai"), upu, Rotation()),
+    ],
+    ids=["stewart-gough", "octahedral", "hexapod", "three-upu"],
+)
+def test_f_and_its_gradient_are_those_of_the_rows(by_rows: Build, by_joints: Build, rotation: Rotation) -> None:
+    rows, joints = program(by_rows(), rotation), program(by_joints(), rotation)
+    names = [item.name for item in rows.program.variables]
+    assert [item.name for item in joints.program.variables][: len(names)] == names
+    rng = np.random.default_rng(14)
+    for _ in range(POINTS):
+        x = rows.centre + rows.scale * rng.uniform(-0.55, 0.55, rows.n)
+        closed = close_equations(joints, np.concatenate([x, joints.start[rows.n :]]))
+        assert closed[: rows.n] == pytest.approx(x, rel=0, abs=0)
+        F = rows.evaluate(x).F
+        assert pytest.approx(F, rel=1e-12) == joints.evaluate(closed).F
+        expected = rows.program.kernels.derivatives(x, rows.arguments).gradient.ravel()
+        assert gradient(joints, closed, rows.n) == pytest.approx(expected, rel=0, abs=1e-11 * max(1, *np.abs(expected)))

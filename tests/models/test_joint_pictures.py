@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from builders import Array
 from mujoco_robots import Oracle
-from numpy.typing import NDArray
 from robot_files import every_joint
-from robot_gallery import GALLERY, table
+from robot_gallery import GALLERY, RANKS, table
 from robot_mjcf import elementary
-from test_robot_gallery import RANKS, configurations
+from test_robot_gallery import configurations
 
 from screwsynth.models import Body, JointKind, LinkKind, Model, robot
 from screwsynth.nlp import Case, Task, result_of, solve
@@ -18,9 +18,6 @@ from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of
 from screwsynth.nlp.output.pictures.posture import Posture
 from screwsynth.nlp.output.report.report import report_of
-
-Array = NDArray[np.float64]
-
 
 #: Robots with every kind of limb; the others are slow tests.
 QUICK = (

@@ -1,5 +1,6 @@
 """Robots given joint by joint against reference numbers of an independent computation, and against published facts."""
 
+import copy
 import math
 import tomllib
 from collections.abc import Mapping
@@ -8,8 +9,9 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array, turn_about
 from casadi import SX
-from numpy.typing import NDArray
+from robot_gallery import CHI, LENGTH, RANKS, REFERENCE, UPS, table
 
 from screwsynth.models import (
     Model,
@@ -25,11 +27,6 @@ from screwsynth.models import (
     three_upu,
 )
 
-Array = NDArray[np.float64]
-
-CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
-LENGTH = 0.7
-
 RPS = """
 home = [0, 0, 1.1]
 [[limb]]
@@ -38,29 +35,6 @@ points = { B = [1, 0, 0], A = [0.6, 0, 1.1] }
 joints = [{ type = "R", at = "B", axis = "y" }, { type = "P", at = "B", axis = "A - B", actuated = true },
           { type = "S", at = "A" }]
 """
-UPU = """
-home = [0, 0, 0.7]
-[[limb]]
-repeat = { count = 3 }
-points = { B = [0.57735, 0, 0], A = [0.288675, 0, 0.7] }
-joints = [{ type = "U", at = "B", axes = ["FIRST", "cross(FIRST, A - B)"] },
-          { type = "P", at = "B", axis = "A - B", actuated = true },
-          { type = "U", at = "A", axes = ["cross(FIRST, A - B)", "FIRST"] }]
-"""
-DELTA = """
-home = [0, 0, -0.85]
-[[limb]]
-repeat = { count = 3 }
-points = { B = [0.4, 0, 0], E = "B + 0.45*(cos(0.4)*x - sin(0.4)*z)", A = [0.12, 0, -0.85] }
-joints = [{ type = "R", at = "B", axis = "y", actuated = true }REST
-"""
-RODS = """]
-branch = [{ joints = [{ type = "S", at = "E + 0.05*y" }, { type = "S", at = "A + 0.05*y" }] },
-          { joints = [{ type = "S", at = "E - 0.05*y" }, { type = "S", at = "A - 0.05*y" }] }]
-"""
-PARALLELOGRAM = """, { type = "R", at = "E", axis = "y" },
-          { type = "Pa", at = "E", to = "A", axis = "cross(y, A - E)" }, { type = "R", at = "A", axis = "y" }]
-"""
 PLANAR = """
 [[limb]]
 repeat = { count = 3 }
@@ -68,92 +42,27 @@ points = { B = [1, 0, 0], A = ["0.35*cos(0.2)", "0.35*sin(0.2)", 0], E = "(A + B
 joints = [{ type = "R", at = "B", axis = "z", actuated = true }, { type = "R", at = "E", axis = "z" },
           { type = "R", at = "A", axis = "z" }]
 """
-SPHERICAL = """
-[[limb]]
-repeat = { count = 3, axis = [1, 1, 1] }
-joints = [{ type = "R", at = "0*x", axis = "x", actuated = true }, { type = "R", at = "0*x", axis = "y" },
-          { type = "R", at = "0*x", axis = "z" }]
-"""
-
-
-def six_legs() -> str:
-    """Legs in the order of the reference: 120 floor(k/2) degrees, base -+ 0.35 rad, platform -+ 0.75 rad."""
-    limbs = []
-    for k in range(6):
-        sign = -1 if k % 2 == 0 else 1
-        b, a = (math.radians(120 * (k // 2)) + sign * part for part in (0.35, 0.75))
-        limbs.append(f"""
-[[limb]]
-points = {{ B = ["cos({b})", "sin({b})", 0], A = ["0.6*cos({a})", "0.6*sin({a})", 1.2] }}
-joints = [{{ type = "U", at = "B", axes = ["x", "y"] }}, {{ type = "P", at = "B", axis = "A - B", actuated = true }},
-          {{ type = "S", at = "A" }}]
-""")
-    return "home = [0, 0, 1.2]\n" + "".join(limbs)
-
-
-TRICEPT = """
-home = [0, 0, 1]
-[[limb]]
-repeat = { angles = [17.188733853924695, 137.1887338539247, 257.1887338539247] }
-points = { B = [0.8, 0, 0], A = [0.35, 0, 1] }
-joints = [{ type = "U", at = "B", axes = ["x", "y"] }, { type = "P", at = "B", axis = "A - B", actuated = true },
-          { type = "S", at = "A" }]
-[[limb]]
-joints = [{ type = "U", at = "0*x", axes = ["x", "y"] }, { type = "P", at = "0*x", axis = "z" }]
-"""
-
-
-class Reference(NamedTuple):
-    """Numbers of an independent computation from the Jacobians of the closed robot's bodies, at home."""
-
-    text: str
-    wrenches: tuple[int, ...]
-    constraints: int
-    F: float
-    F_feasible: float
-    rates: tuple[float, ...]
-    F_driven: float
-
-
-DELTA_RATES = (-0.355875, -0.216789, 1.581346)
-REFERENCES = {
-    "6-UPS": Reference(
-        six_legs(),
-        (1, 1, 1, 1, 1, 1),
-        0,
-        0.6775666447,
-        0.6775666447,
-        (-0.156067, 0.345771, -0.207255, -0.390167, -0.566661, -0.131767),
-        0.6896774965,
-    ),
-    "3-RPS": Reference(RPS, (2, 2, 2), 3, 0.9536868613, 0.2822638991, (0.051880, -0.095752, -0.520004), 0.9659029686),
-    "3-UPU": Reference(
-        UPU.replace("FIRST", "y"),
-        (2, 2, 2),
-        3,
-        0.7811721401,
-        0.2159301561,
-        (-0.337393, -0.306747, 0.089456),
-        0.7929893869,
-    ),
-    "Tricept": Reference(
-        TRICEPT, (1, 1, 1, 3), 3, 0.9213889813, 0.3712266112, (0.230770, -0.301242, -0.476681), 0.9286716318
-    ),
-    "Delta, rods": Reference(
-        DELTA.replace("REST", RODS), (2, 2, 2), 3, 2.5478782427, 0.9190027654, DELTA_RATES, 2.5578274323
-    ),
-    "Delta, parallelograms": Reference(
-        DELTA.replace("REST", PARALLELOGRAM), (3, 3, 3), 3, 2.2416295709, 0.4595013827, DELTA_RATES, 2.2466369256
-    ),
-    "planar 3-RRR": Reference(
-        PLANAR, (4, 4, 4), 3, 1.5138660321, 0.8315910321, (-1.653630, 0.169939, 0.704750), 1.5472838594
-    ),
-    "spherical 3-RRR": Reference(SPHERICAL, (4, 4, 4), 3, 2.0867, 0.4067, (0.3, -0.5, 0.7), 2.1008863285),
-}
 
 
 def written(text: str) -> Model:
     return robot(**{"name": "test", **tomllib.loads(text)})
+
+
+def gallery(name: str, dimensions: Mapping[str, float]) -> Model:
+    """A robot of the gallery whose typical dimensions are these."""
+    tables = copy.deepcopy(table(name))
+    for key, value in dimensions.items():
+        tables["dimensions"][key]["typical"] = value
+    return robot(**tables)
+
+
+def snu() -> Model:
+    """The 3-UPU with the first axes of its universal joints along the radius."""
+    tables = copy.deepcopy(table("3-upu"))
+    for k in (0, 2):
+        joint = tables["limb"][0]["joints"][k]
+        joint["axes"] = ["x" if axis == "y" else "cross(x, A - B)" for axis in joint["axes"]]
+    return robot(**tables)
 
 
 class Numbers(NamedTuple):
@@ -233,38 +142,40 @@ def actuator_rates(model: Model, here: Numbers) -> Array:
     return np.array(found)
 
 
-@pytest.mark.parametrize("name", REFERENCES)
+@pytest.mark.parametrize("name", REFERENCE)
 def test_robots_have_the_numbers_of_an_independent_computation(name: str) -> None:
-    reference = REFERENCES[name]
-    model = written(reference.text)
+    dimensions, F, F_feasible, rates, F_driven = REFERENCE[name]
+    model, ranks = gallery(name, dimensions), RANKS[name]
     here = Robot(model)
     home = here.at(here.home)
-    assert pytest.approx(reference.F, abs=1e-10) == home.F
+    assert pytest.approx(F, abs=1e-10) == home.F
     constraints = constraint_rows(model, home.velocities, home.position)
     _, values, right = np.linalg.svd(work(constraints))
     rank = int(np.count_nonzero(values > 1e-9))
-    assert rank == reference.constraints == rank_of_rows(constraints, np.zeros(3), 1.0)
+    assert rank == ranks.constraints == rank_of_rows(constraints, np.zeros(3), 1.0)
     feasible = right[rank:].T @ right[rank:] @ CHI
     moved = here.at(here.home, feasible)
-    assert pytest.approx(reference.F_feasible, abs=1e-10) == moved.F
-    assert actuator_rates(model, moved) == pytest.approx(np.array(reference.rates), abs=1e-6)
-    assert tuple(sum(row.limb == limb for row in model.rows) for limb in model.limbs) == reference.wrenches
+    assert pytest.approx(F_feasible, abs=1e-10) == moved.F
+    assert actuator_rates(model, moved) == pytest.approx(np.array(rates), abs=1e-6)
+    assert tuple(sum(row.limb == limb for row in model.rows) for limb in model.limbs) == (
+        ranks.W if name != "delta" else (2, 2, 2)
+    )
     driven = here.at(here.driven(np.full(len(model.actuators), 0.05)))
-    assert pytest.approx(reference.F_driven, abs=1e-10) == driven.F
+    assert pytest.approx(F_driven, abs=1e-10) == driven.F
     assert np.abs(driven.loops).max(initial=0.0) < 1e-12
     # The rows of results are a basis of the same wrenches: J'J and so F, singular values and rank are the same.
     for each in (home, driven):
         rows = reporting_matrix(model, each.velocities, each.position) @ each.J
-        assert len(rows) == sum(reference.wrenches)
+        assert len(rows) == sum(ranks.W)
         assert rows.T @ rows == pytest.approx(each.J.T @ each.J, abs=1e-12)
     assert model.generic is not None
-    assert (model.generic.jacobian, model.generic.constraints) == (6, reference.constraints)
+    assert (model.generic.jacobian, model.generic.constraints) == (6, ranks.constraints)
 
 
 def test_hexapod_and_three_upu_by_joints_are_those_by_rows() -> None:
     rng = np.random.default_rng(3)
-    legs = Robot(written(six_legs()))
-    angles = [math.radians(120 * (k // 2)) + (-1 if k % 2 == 0 else 1) * np.array([0.35, 0.75]) for k in range(6)]
+    legs = Robot(gallery("6-ups", UPS))
+    angles = [math.radians(120 * k) + side * np.array([0.35, 0.75]) for side in (-1, 1) for k in range(3)]
     base = np.array([[math.cos(b), math.sin(b), 0.0] for b, _ in angles])
     platform = np.array([[0.6 * math.cos(a), 0.6 * math.sin(a), 0.0] for _, a in angles])
     hexapod = robot_function("hexapod")()
@@ -277,7 +188,7 @@ def test_hexapod_and_three_upu_by_joints_are_those_by_rows() -> None:
     tsai = three_upu(axes="tsai")
     theirs = Substitution.identity(tsai)
     upu_rows = ca.Function("rows", [*theirs.all], [instantiate(tsai, theirs, SX(LENGTH), [SX(CHI)]).jacobian])
-    upu = Robot(written(UPU.replace("FIRST", "y")))
+    upu = Robot(gallery("3-upu", {}))
     for _ in range(4):
         pose = np.concatenate([rng.uniform(-0.2, 0.2, 3), np.array([0, 0, 1.2]) + rng.uniform(-0.2, 0.2, 3)])
         R = ca.Function("R", [], [matrix_from_cayley(SX(pose[:3]))])()["o0"].full()
@@ -289,21 +200,21 @@ def test_hexapod_and_three_upu_by_joints_are_those_by_rows() -> None:
 
 
 def test_published_facts_of_the_three_upu_hold() -> None:
-    tsai, snu = (Robot(written(UPU.replace("FIRST", first)), length=1.0) for first in ("y", "x"))
+    tsai, other = (Robot(model, length=1.0) for model in (gallery("3-upu", {}), snu()))
     about_z = np.array([0, 0, 1.0, 0, 0, 0])
     values = np.linalg.svd(tsai.at(tsai.home).J, compute_uv=False)[:6]
     assert values == pytest.approx(np.repeat([1.601235, 0.896811, 0.243109], 2), abs=1e-6)
     assert pytest.approx(2.563954, abs=1e-6) == tsai.at(tsai.home, about_z).F
-    here = snu.at(snu.home)
+    here = other.at(other.home)
     assert rank_of_rows(here.J, np.zeros(3), 1.0) == 4
     # Constraint singularity: the constraints have rank 1 where they have 3 elsewhere.
-    assert rank_of_rows(constraint_rows(snu.model, here.velocities, here.position), np.zeros(3), 1.0) == 1
-    assert snu.model.generic is not None
-    assert snu.model.generic.constraints == 3
-    assert pytest.approx(3.0, abs=1e-12) == snu.at(snu.home, about_z).F
+    assert rank_of_rows(constraint_rows(other.model, here.velocities, here.position), np.zeros(3), 1.0) == 1
+    assert other.model.generic is not None
+    assert other.model.generic.constraints == 3
+    assert pytest.approx(3.0, abs=1e-12) == other.at(other.home, about_z).F
     for angle in (0.0, 0.7, 2.0):
         line = np.array([math.cos(angle), math.sin(angle), 0.0])
-        assert snu.at(snu.home, np.hstack([line, np.cross([0, 0, 1.4], line)])).F < 1e-20
+        assert other.at(other.home, np.hstack([line, np.cross([0, 0, 1.4], line)])).F < 1e-20
 
 
 def test_rows_of_the_three_rps_are_those_of_joshi_and_tsai() -> None:
@@ -319,32 +230,22 @@ def test_rows_of_the_three_rps_are_those_of_joshi_and_tsai() -> None:
         assert rows.T @ rows == pytest.approx(expected.T @ expected, abs=1e-14)
 
 
-ABB = """
-dimensions = { sb = { typical = 0.567 }, sp = { typical = 0.076 } }
-derived = { wb = "sb/(2*sqrt(3))", up = "sp/sqrt(3)", h = "-sqrt(1.244^2 - (wb + 0.524 - up)^2)" }
-home = [0, 0, "h"]
-[[limb]]
-repeat = { angles = [-90, 30, 150] }
-points = { B = ["wb", 0, 0], E = ["wb + 0.524", 0, 0], A = ["up", 0, "h"] }
-joints = [{ type = "R", at = "B", axis = "y", actuated = true }REST
-"""
-
-
-@pytest.mark.parametrize("rest", [RODS.replace("0.05", "0.0655"), PARALLELOGRAM])
-def test_inverse_kinematics_of_the_delta_are_those_of_williams(rest: str) -> None:
-    """Williams, The Delta Parallel Robot: ABB FlexPicker IRB 360; angles from the horizontal, downwards."""
-    here = Robot(written(ABB.replace("REST", rest)))
+@pytest.mark.parametrize("name", ["delta", "delta-parallelogram"])
+def test_inverse_kinematics_of_the_delta_are_those_of_williams(name: str) -> None:
+    """Williams, The Delta Parallel Robot: ABB FlexPicker IRB 360; his first motor stands at azimuth -90 degrees."""
+    sides = {"rb": 0.567 / math.sqrt(12), "rp": 0.076 / math.sqrt(3), "tilt": 0.0}
+    here, turn = Robot(gallery(name, sides)), turn_about([0, 0, 1], math.pi / 2)
     for position, expected in (
         ((0.0, 0.0, -0.9), (-20.547, -20.547, -20.547)),
         ((0.3, 0.5, -1.1), (47.504, -11.569, 21.378)),
     ):
-        found = here.at(here.reached(np.array(position))).quantities
+        found = here.at(here.reached(turn @ position)).quantities
         assert np.degrees(found) == pytest.approx(np.array(expected), abs=1e-3)
 
 
 def test_isotropic_robots_are_isotropic() -> None:
     # Agile Eye: the actuators turn as the platform does, and F = l^2 |omega|^2 for a rotation.
-    eye = Robot(written(SPHERICAL))
+    eye = Robot(robot_function("spherical-3-rrr")())
     turning = eye.at(eye.home, np.hstack([CHI[:3], np.zeros(3)]))
     assert pytest.approx(LENGTH**2 * float(CHI[:3] @ CHI[:3]), abs=1e-14) == turning.F
     assert actuator_rates(eye.model, turning) == pytest.approx(CHI[:3], abs=1e-14)
@@ -382,7 +283,7 @@ joints = [{ type = "U", at = "0*x", axes = ["x", "y"] }, { type = "P", at = "0*x
         assert pytest.approx(F, abs=1e-14) == numbers.F
         assert pytest.approx(J.T @ J, abs=1e-13) == numbers.J.T @ numbers.J
     moved = Robot(written(wrist)).driven(np.full(3, 0.05))
-    assert pytest.approx(REFERENCES["3-RPS"].F_driven, abs=1e-10) == Robot(written(wrist)).at(moved).F
+    assert pytest.approx(REFERENCE["3-rps"][4], abs=1e-10) == Robot(written(wrist)).at(moved).F
 
 
 def test_a_twist_that_rides_along_with_the_whole_robot_has_the_same_f() -> None:

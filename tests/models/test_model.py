@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array, turn_about
 from casadi import SX
-from numpy.typing import NDArray
 
 from screwsynth.models import (
     Body,
@@ -34,8 +34,6 @@ from screwsynth.models import (
     three_upu,
 )
 from screwsynth.nlp import Case, Nlp, RobotState, Rotation, Task, evaluate, formulate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -251,12 +249,6 @@ def test_shipped_robots_draw_every_leg_between_its_own_joints(model: Model) -> N
             assert (points[link.start].body, points[link.end].body) == (Body.BASE, Body.PLATFORM)
 
 
-def turn(axis: Array, angle: float) -> Array:
-    x, y, z = axis / np.linalg.norm(axis)
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
-
-
 @dataclass(frozen=True)
 class Legs:
     """Six legs in numbers, and the same robot as a model whose legs' lengths are unknowns."""
@@ -308,7 +300,7 @@ def test_a_robot_given_by_closure_equations_is_the_direct_one_where_they_hold() 
         np.testing.assert_array_equal(nlp.lower, np.full(6, 1.0))
         np.testing.assert_array_equal(nlp.upper, np.full(6, 100.0))
 
-        lengths = legs.lengths(position, turn(axis, angle))
+        lengths = legs.lengths(position, turn_about(axis, angle))
         x = at(nlp, {f"t{i}": length for i, length in enumerate(lengths, start=1)})
         F, g = nlp.evaluate(x)
         state = evaluate(nlp, x)
@@ -377,7 +369,7 @@ def test_couple_rows_are_unit_couples_times_the_characteristic_length(axes: str)
             rng.uniform(-0.5, 0.5),
         )
         twist, length = rng.normal(size=6), float(rng.uniform(0.1, 10))
-        forces, couples = three_limb_rows(axes, position, turn(axis, angle))
+        forces, couples = three_limb_rows(axes, position, turn_about(axis, angle))
         state = state_of(model, twist, length, (position, axis, float(angle)))
         expected = np.empty((6, 6))
         expected[0::2], expected[1::2] = forces, length * couples

@@ -6,9 +6,9 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from screwsynth.models import (
     axis_angle_from_matrix,
@@ -16,8 +16,6 @@ from screwsynth.models import (
     matrix_from_cayley,
     matrix_from_quaternion_vector,
 )
-
-Array = NDArray[np.float64]
 
 many = settings(derandomize=True, deadline=None, max_examples=80)
 

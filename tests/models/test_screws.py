@@ -5,9 +5,9 @@ import warnings
 
 import numpy as np
 import pytest
+from builders import Array, turn_about
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from screwsynth.models import (
     Screw,
@@ -19,7 +19,6 @@ from screwsynth.models import (
     unit_vector,
 )
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 many = settings(derandomize=True, deadline=None, max_examples=50)
@@ -46,12 +45,6 @@ def unit(n: Array) -> Array:
 def perpendicular(n: Array) -> Array:
     """A unit vector square to ``n``."""
     return unit(np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))]))
-
-
-def turn(n: Array, angle: float) -> Array:
-    x, y, z = unit(n)
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
 
 
 def test_screw_of_finite_pitch_by_hand() -> None:
@@ -189,7 +182,7 @@ def test_work_rate_of_two_screws_from_distance_angle_and_pitches(
     # The second axis is a along the common normal from the first, and turned about it by alpha.
     s = unit(n)
     normal = perpendicular(s)
-    t = turn(normal, alpha) @ s
+    t = turn_about(normal, alpha) @ s
     # Any point of an axis will do.
     one, other = foot + slide[0] * s, foot + a * normal + slide[1] * t
     lines = reciprocal_product(screw_from_axis(s, one, 0), screw_from_axis(t, other, 0))
@@ -223,7 +216,7 @@ def test_reciprocal_product_pairs_force_with_velocity_and_moment_with_angular_ve
 def test_a_moved_screw_is_the_screw_of_the_moved_axis(
     n: Array, s0: Array, h: float, about: Array, angle: float, shift: Array
 ) -> None:
-    R = turn(about, angle)
+    R = turn_about(about, angle)
     moved = moved_screw(screw_from_axis(n, s0, h, 2), R, shift)
     np.testing.assert_allclose(moved, screw_from_axis(R @ n, R @ s0 + shift, h, 2), rtol=0, atol=5e-13)
     translation = moved_screw(screw_from_axis(n, s0, math.inf, 2), R, shift)
@@ -235,7 +228,7 @@ def test_a_moved_screw_is_the_screw_of_the_moved_axis(
 def test_moving_both_screws_keeps_their_work_rate(
     f: Triple, m: Triple, omega: Triple, v: Triple, about: Array, angle: float, shift: Array
 ) -> None:
-    R = turn(about, angle)
+    R = turn_about(about, angle)
     wrench, twist = np.array([*f, *m]), np.array([*omega, *v])
     before = float(reciprocal_product(wrench, twist))
     after = float(reciprocal_product(moved_screw(wrench, R, shift), moved_screw(twist, R, shift)))
@@ -247,7 +240,7 @@ def test_moves_compose() -> None:
     rng = np.random.default_rng(1)
     for _ in range(20):
         screw, t, u = rng.normal(size=6), rng.normal(size=3), rng.normal(size=3)
-        R, S = turn(rng.normal(size=3), rng.uniform(-3, 3)), turn(rng.normal(size=3), rng.uniform(-3, 3))
+        R, S = turn_about(rng.normal(size=3), rng.uniform(-3, 3)), turn_about(rng.normal(size=3), rng.uniform(-3, 3))
         twice = moved_screw(moved_screw(screw, R, t), S, u)
         np.testing.assert_allclose(twice, moved_screw(screw, S @ R, S @ t + u), rtol=0, atol=2e-14)
         back = moved_screw(moved_screw(screw, R, t), R.T, -R.T @ t)

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from builders import Array, turn_about
 
 from screwsynth.models import WrenchKind, three_upu
 from screwsynth.nlp import (
@@ -28,18 +28,10 @@ from screwsynth.nlp import (
     solve,
 )
 
-Array = NDArray[np.float64]
 Axes = Literal["free", "limb", "snu", "tsai"]
 AZIMUTHS = [2 * math.pi * k / 3 for k in range(3)]
 SYMMETRIC = {"base_radius": 0.57735, "platform_radius": 0.288675}
 ABOUT_Z = Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)
-
-
-def turn(axis: ArrayLike, angle: float) -> Array:
-    """Rodrigues' formula, with the test's own hands."""
-    x, y, z = np.array(axis, dtype=float) / np.linalg.norm(axis)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
 
 
 def on_circle(radius: float) -> Array:
@@ -80,7 +72,7 @@ class Drawn:
 
     @property
     def R(self) -> Array:  # noqa: N802 - the matrix's name
-        return turn(self.axis, self.angle)
+        return turn_about(self.axis, self.angle)
 
     def case(self, axes: Axes) -> Case:
         given: dict[str, float | list[float]] = {"base_radius": self.base, "platform_radius": self.platform}
@@ -230,7 +222,7 @@ def test_turning_the_axes_about_their_common_normal_changes_nothing(seed: int) -
     before = state(drawn.case("free"))
     for k, angle in enumerate(np.random.default_rng(seed).uniform(-3, 3, 3)):
         normal = np.cross(drawn.u1[k], drawn.u2[k])
-        drawn.u1[k], drawn.u2[k] = turn(normal, angle) @ drawn.u1[k], turn(normal, angle) @ drawn.u2[k]
+        drawn.u1[k], drawn.u2[k] = turn_about(normal, angle) @ drawn.u1[k], turn_about(normal, angle) @ drawn.u2[k]
     after = state(drawn.case("free"))
     assert pytest.approx(before.F, rel=1e-12) == after.F
     np.testing.assert_allclose(after.jacobian, before.jacobian, atol=1e-13 * np.abs(before.jacobian).max())
@@ -241,7 +233,7 @@ def test_turning_the_axes_about_their_common_normal_changes_nothing(seed: int) -
 def test_a_third_of_a_turn_only_renames_the_limbs(axes: Axes, seed: int) -> None:
     drawn = Drawn(300 + seed)
     before = state(drawn.case(axes))
-    Z = turn([0, 0, 1], 2 * math.pi / 3)
+    Z = turn_about([0, 0, 1], 2 * math.pi / 3)
     # The platform frame is turned with the world's: its joint of limb k lies where that of limb k + 1 was defined.
     drawn.p, drawn.axis = Z @ drawn.p, Z @ drawn.axis
     drawn.u1, drawn.u2 = np.roll(drawn.u1 @ Z.T, 1, axis=0), np.roll(drawn.u2 @ Z.T, 1, axis=0)
@@ -328,7 +320,7 @@ def test_a_direction_that_is_no_number_is_refused(bad: float) -> None:
 
 def test_fixed_axes_that_are_not_orthogonal_are_refused() -> None:
     drawn = Drawn(401)
-    tilted = turn(np.cross(drawn.u1[0], drawn.u2[0]), math.radians(80)) @ drawn.u2[0]
+    tilted = turn_about(np.cross(drawn.u1[0], drawn.u2[0]), math.radians(80)) @ drawn.u2[0]
     case = one_axis_given(tilted.tolist())
     with pytest.raises(CaseError) as refused:
         formulate(case)

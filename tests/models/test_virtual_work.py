@@ -13,12 +13,11 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array, turn_about
 
 from screwsynth.models import Model, hexapod, stewart_gough
 from screwsynth.nlp import Case, RobotState, Rotation, Task, evaluate, formulate
 
-Array = NDArray[np.float64]
 Joints = Mapping[str, tuple[Array, Array]]
 
 KINDS = ("aligned", "octahedral", "hexapod")
@@ -47,7 +46,7 @@ class Scene:
     @property
     def ends(self) -> Array:
         """World coordinates of the platform joints."""
-        return self.position + self.platform @ turn(self.axis, self.angle).T
+        return self.position + self.platform @ turn_about(self.axis, self.angle).T
 
     def top_speed(self, twist: Array) -> float:
         """Speed of the fastest platform joint: no leg's rate can be larger, so the natural scale of an error."""
@@ -57,12 +56,6 @@ class Scene:
     def reach(twist: Array) -> float:
         """Size of the terms that ``m . omega + f . v`` adds up, with arms of 60 length units at most."""
         return float(np.linalg.norm(twist[3:]) + 60 * np.linalg.norm(twist[:3]))
-
-
-def turn(axis: Array, angle: float) -> Array:
-    x, y, z = axis / np.linalg.norm(axis)
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
 
 
 def finite_motion(twist: Array, time: float) -> tuple[Array, Array]:
@@ -75,7 +68,7 @@ def finite_motion(twist: Array, time: float) -> tuple[Array, Array]:
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     theta = rate * time
     along = time * np.eye(3) + (1 - np.cos(theta)) / rate * K + (time - np.sin(theta) / rate) * (K @ K)
-    return turn(omega, theta), along @ v
+    return turn_about(omega, theta), along @ v
 
 
 def extrapolated_slope(f: Callable[[float], Array], step: float, levels: int = 5) -> Array:
@@ -168,7 +161,7 @@ def engine_rates(kind: str) -> tuple[tuple[Array, Array], ...]:
             data.qpos[:3], data.qpos[3], data.qpos[4:] = scene.position, np.cos(half), np.sin(half) * axis
             # A free joint's velocity: of the body's origin in world axes, then the angular one in the body's axes.
             data.qvel[:3] = v + np.cross(omega, scene.position)
-            data.qvel[3:] = turn(scene.axis, scene.angle).T @ omega
+            data.qvel[3:] = turn_about(scene.axis, scene.angle).T @ omega
             mujoco.mj_forward(model, data)
             velocities.append(np.array(data.ten_velocity))
         found.append((np.array(velocities), np.array(data.ten_length)))
@@ -249,7 +242,7 @@ def test_joint_angles_are_those_between_a_leg_and_the_plates(kind: str) -> None:
         spans = scene.ends - scene.base
         for name, normal in (
             ("base_joint_angle", np.array([0.0, 0.0, 1.0])),
-            ("platform_joint_angle", turn(scene.axis, scene.angle)[:, 2]),
+            ("platform_joint_angle", turn_about(scene.axis, scene.angle)[:, 2]),
         ):
             # atan2 is accurate at every angle; an arc cosine loses digits as 1e-16 / sin(angle) near 0.
             angles = np.arctan2(np.linalg.norm(np.cross(normal, spans), axis=1), spans @ normal)

@@ -17,6 +17,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Run
 from generated import COMPILERS, STRICT
 
 from screwsynth.nlp import Case, Nlp, load_case
@@ -25,17 +26,10 @@ from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.program.sampling import starting_points
 
-Run = Callable[..., tuple[int, str, str]]
-
-
 THREE_POSES = """
 [robot]
 model = "stewart-gough"
-[robot.parameters]
-x1 = 12
-x2 = 8
-x3 = 30
-x4 = { min = 5, max = 20 }
+parameters = { x1 = 12, x2 = 8, x3 = 30, x4 = { min = 5, max = 20 } }
 [[pose]]
 position = [0, 0, 30]
 [[pose]]

@@ -4,12 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array
 
 from screwsynth.models import axis_from_screw, three_upu
 from screwsynth.nlp import Case, Task, TaskAnalysis, analyse_tasks, evaluate, formulate
-
-Array = NDArray[np.float64]
 
 
 def random_jacobian(seed: int, rows: int = 6, arm: float = 10.0) -> Array:

@@ -2,11 +2,11 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from builders import Run, edited, refusal_of, saved
 
 from screwsynth.nlp import CaseError, InputError, formulate, load_case
 
@@ -62,10 +62,8 @@ because = "the printed angle is rounded"
 HEXAPOD = """\
 [units]
 length = "mm"
-
 [robot]
 model = "hexapod"
-
 [robot.parameters]
 base_1 = [113, -41, { min = -10, max = 10 }]
 base_2 = [113, 41, 0]
@@ -79,15 +77,12 @@ platform_3 = [21, 77, 0]
 platform_4 = [-77, 21, 0]
 platform_5 = [-77, -21, 0]
 platform_6 = [21, -77, 0]
-
 [pose]
 position = [0, 0, 350]
 rotation = { axis = [0, 0, 1], angle = 0 }
-
 [[task]]
 sense = "min"
 twist = [0, 0.5, 0, 1, 0, 0]
-
 [solve]
 starts = 2
 """
@@ -107,13 +102,6 @@ class Broken:
     content: bytes
     key: str
     gist: tuple[str, ...]
-
-
-def edited(base: str, *edits: tuple[str, str]) -> str:
-    for old, new in edits:
-        assert base.count(old) >= 1, f"{old!r} is not in the base text"
-        base = base.replace(old, new, 1)
-    return base
 
 
 def paper(name: str, old: str, new: str, key: str, *gist: str) -> Broken:
@@ -565,8 +553,6 @@ def not_finite() -> list[Broken]:
 
 BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *COMBINED, *LIMITS, *LINES, *LIMBS, *not_finite()]
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture
 def written(tmp_path: Path, broken: Broken) -> Path:
@@ -605,8 +591,7 @@ def test_the_ids_differ() -> None:
 
 @pytest.mark.parametrize("text", [PAPER, HEXAPOD], ids=["paper", "hexapod"])
 def test_the_texts_are_good_before_they_are_broken(tmp_path: Path, text: str) -> None:
-    path = tmp_path / NAME
-    path.write_text(text, encoding="utf-8")
+    path = saved(tmp_path / NAME, text)
     assert formulate(load_case(str(path))).n > 0
 
 
@@ -621,13 +606,7 @@ def test_the_library_refuses_with_an_input_error(broken: Broken, written: Path) 
 
 
 def check_refused(broken: Broken, folder: Path, ended: tuple[int, str, str]) -> None:
-    code, out, err = ended
-    assert code == 2
-    assert out == ""
-    assert err.startswith("screwsynth: ")
-    assert err.endswith("\n")
-    assert len(err.splitlines()) == 1
-    check_sentence(broken, err)
+    check_sentence(broken, refusal_of(ended))
     assert [path.name for path in folder.iterdir()] == [NAME]
 
 
@@ -654,11 +633,8 @@ def test_a_setting_beside_a_fault_is_still_one_sentence(broken: Broken, written:
 
 
 def test_json_to_standard_output_stays_empty_for_a_broken_case(tmp_path: Path, cli: Run) -> None:
-    path = tmp_path / NAME
-    path.write_text(edited(PAPER, ("x1 = 12", "x1 = -1")), encoding="utf-8")
-    code, out, err = cli("solve", str(path), "--json", "-")
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
+    path = saved(tmp_path / NAME, edited(PAPER, ("x1 = 12", "x1 = -1")))
+    refusal_of(cli("solve", str(path), "--json", "-"))
 
 
 def test_an_older_result_survives_a_broken_case(tmp_path: Path, cli: Run) -> None:
@@ -670,8 +646,7 @@ def test_an_older_result_survives_a_broken_case(tmp_path: Path, cli: Run) -> Non
 
 
 def test_only_a_positive_infinite_pitch_is_legal(tmp_path: Path) -> None:
-    path = tmp_path / NAME
-    path.write_text(edited(PAPER, ("point = [2, 3, 6]\npitch = 1", "pitch = +inf")), encoding="utf-8")
+    path = saved(tmp_path / NAME, edited(PAPER, ("point = [2, 3, 6]\npitch = 1", "pitch = +inf")))
     assert [float(number) for number in load_case(str(path)).tasks[0].twist] == pytest.approx(
         [0, 0, 0, 2 / 3, 2 / 3, 1 / 3]
     )
@@ -702,9 +677,7 @@ def test_what_is_no_file(
     (tmp_path / "file.txt").write_text("a file", encoding="utf-8")
     with pytest.raises(InputError) as refused:
         load_case(name)
-    code, out, err = cli("solve", name, "--json", "result.json")
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
+    err = refusal_of(cli("solve", name, "--json", "result.json"))
     for text in (str(refused.value), err):
         for word in words:
             assert word in text

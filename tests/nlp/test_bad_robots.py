@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from builders import Run, output_of, refusal_of, saved
+from link_robots import CASE as LINKS_CASE
+from link_robots import COUPLING
+from link_robots import ROBOT as LINKS
 
 from screwsynth.nlp import CaseError, load_case
-
-Run = Callable[..., tuple[int, str, str]]
 
 ROBOT = """name = "rps"
 home = [0, 0, "h"]
@@ -30,10 +31,7 @@ joints = [ { type = "R", at = "B", axis = "y" },
 """
 CASE = """[robot]
 file = "robot.toml"
-[robot.parameters]
-rb = 1
-rp = 0.6
-h = 1.1
+parameters = { rb = 1, rp = 0.6, h = 1.1 }
 [pose]
 position = [0, 0, { min = 0.9, max = 1.3 }]
 [[task]]
@@ -115,6 +113,10 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
     # Keys.
     ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, length_unit, home, dimensions, derived, limb"),
+    ("name =", "nme =", "nme: no such key; did you mean 'name'?"),
+    ("joints =", "joint =", "limb 1, joint: no such key; did you mean 'joints'?"),
+    ('axis = "A - B", ', "", "limb 1, joint 2 (P), axis: is missing"),
+    ('"A - B"', "3", "limb 1, joint 2, axis = 3: must be an expression in quotes or a list of 3"),
     (LAST, 'at = "A", friction = 1 }', "limb 1, joint 3, friction: no such key; allowed: type, name, at, axis"),
     ("typical = 1.0", "typical = 1.0, min = 0", "dimensions, rb, min: no such key; allowed: typical, kind, description"),
     ("repeat =", "mirror = true\nrepeat =", "limb 1, mirror: no such key; allowed: name, repeat, points, joints, branch"),
@@ -192,25 +194,75 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
 ]  # fmt: skip
 
 
+#: Of a robot of links and joints.
+LINK_FAULTS: list[tuple[str, str, str]] = [
+    ('links = ["base",', '[[limb]]\njoints = []\n#', "joint: cannot stand beside limb: give the robot by limbs, or by links and joints"),
+    ('links = ["base", "crank", "coupler", "rocker", "rod", "bar", "platform"]', "", "links: is missing; it must be a list of the names of all links"),
+    ('"bar", "platform"]', '"bar"]', "platform: is 'platform', which is no link; links are base, crank, coupler, rocker, rod"),
+    ("points =", 'base = "ground"\npoints =', "base: is 'ground', which is no link"),
+    ("points =", 'platform = "base"\npoints =', "platform: is 'base', which is the base; two links are needed"),
+    ('"bar", "platform"]', '"bar", "rod", "platform"]', "links, rod: is given twice"),
+    ('"bar", "platform"]', '"bar", "9x", "platform"]', "links, 9x: is '9x'; letters, digits and _ are allowed, a letter first"),
+    ('"bar", "platform"]', '"bar", "extra", "platform"]', "links, extra: has no joint"),
+    ('["base", "crank"]', '["base", "cranc"]', "joint motor, between: has 'cranc', which is no link"),
+    ('["base", "crank"]', '["crank", "crank"]', "joint motor, between: has the link 'crank' twice"),
+    ('["base", "crank"]', '["crank"]', "joint motor, between: must have 2 entries, got 1"),
+    ('between = ["base", "crank"]\n', "", "joint motor, between: is missing; it must be a list of two links, the base's side first"),
+    ('name = "motor"\n', "", "joint 1, name: is missing; it must be a text in quotes"),
+    ('name = "motor"', 'name = "a:1"', "joint 1, name: is 'a:1'; letters, digits and _ are allowed"),
+    ('name = "motor"', 'name = "knee"', "joint knee (R): is given twice"),
+    ('type = "R"', 'type = "X"', "joint motor, type = \"X\": must be one of 'R', 'P', 'H', 'C', 'U', 'S', 'Pa' or 'weld'"),
+    ('type = "R"', 'type = "weld"', "joint motor (weld), at: no such key; allowed are name, type"),
+    ('type = "R"', 'type = "S"', "joint motor (S), actuated: is not allowed"),
+    ('at = "A"\n', "", "joint motor (R), at: is missing"),
+    ('at = "A"', 'at = "Q"', "joint motor (R), at: is 'Q', which has the name 'Q', which is unknown"),
+    ('axis = "z"', "axis = [0, 0, 0]", "joint motor (R), axis: is [0, 0, 0], which is zero; a direction is needed"),
+    ('axis = "z"', 'axis = "z"\nfriction = 1', "joint motor, friction: no such key"),
+    ('axis = "z"', 'axis = "z"\npitch = 1', "joint motor (R), pitch: no such key"),
+    ("actuated = true", "actuated = 1", "joint motor, actuated = 1: must be true or false"),
+    ("points = {", "points = { s = [0, 0, 0],", "point s: has the name of a dimension"),
+    ("points = {", "points = { sin = [0, 0, 0],", "sin: is no name for a point: expressions use it for something else"),
+    ("name = ", "colour = 1\nname = ", "colour: no such key; allowed: name, description, length_unit, home"),
+    (LINKS[LINKS.index("[[joint]]") :], "", "joint: is missing; it must be one or more tables [[joint]]"),
+    (LINKS, LINKS.replace("actuated = true", ""), "actuated: is given at no joint of the robot; write actuated = true"),
+    (LINKS, LINKS + COUPLING.replace("pivot", "none"), "coupling 1, none: is no joint; joints are motor, knee"),
+    (LINKS, LINKS + '[[coupling]]\nfactors = { motor = 1 }\n', "coupling 1, factors: has 1 joints; a coupling needs 2 or more"),
+    (LINKS, LINKS + COUPLING.replace('"-s"', "0"), "coupling 1, pivot: is 0; a coupled joint needs another factor"),
+    (LINKS, LINKS + COUPLING.replace('"-s"', '"t"'), "coupling 1, pivot: is 't', which has the name 't', which is unknown"),
+    (LINKS, LINKS + "[[coupling]]\n", "coupling 1, factors: is missing; it must be a table with a factor for each joint"),
+    (LINKS[LINKS.index('[[joint]]\nname = "slide"') :], "", "links, rod: has no joint"),
+]  # fmt: skip
+
+
 def put(folder: Path, content: str | bytes, case: str = CASE) -> str:
     (folder / "robot.toml").write_bytes(content if isinstance(content, bytes) else content.encode())
-    path = folder / "case.toml"
-    path.write_text(case, encoding="utf-8")
-    return str(path)
+    return str(saved(folder / "case.toml", case))
 
 
-def test_every_broken_robot_file_is_refused_in_one_sentence(tmp_path: Path) -> None:
-    assert len(FAULTS) >= 60
-    for old, new, fault in FAULTS:
-        assert old in ROBOT
-        content = new if isinstance(new, bytes) else ROBOT.replace(old, new, 1)
+@pytest.mark.parametrize(
+    ("robot", "case", "faults"), [(ROBOT, CASE, FAULTS), (LINKS, LINKS_CASE, LINK_FAULTS)], ids=["limbs", "links"]
+)
+def test_every_broken_robot_file_is_refused_in_one_sentence(
+    robot: str, case: str, faults: list[tuple[str, str | bytes, str]], tmp_path: Path
+) -> None:
+    assert len(faults) >= 30
+    for old, new, fault in faults:
+        assert old in robot
+        content = new if isinstance(new, bytes) else robot.replace(old, new, 1)
         with pytest.raises(CaseError) as error:
-            load_case(put(tmp_path, content))
+            load_case(put(tmp_path, content, case))
         sentence = str(error.value)
         assert sentence.startswith("robot.toml: "), sentence
         assert fault in sentence
         assert sentence.isprintable()
         assert len(sentence) < 300
+
+
+def test_an_open_chain_of_links_is_refused(tmp_path: Path) -> None:
+    chain = LINKS[: LINKS.index('[[joint]]\nname = "pivot"')].replace(', "rod", "bar"', "")
+    chain += LINKS[LINKS.index('[[joint]]\nname = "hand"') : LINKS.index('[[joint]]\nname = "slide"')]
+    with pytest.raises(CaseError, match=r"platform: is at the end of an open chain \(motor, knee, wrist, hand\)"):
+        load_case(put(tmp_path, chain, LINKS_CASE))
 
 
 def test_a_robot_file_that_cannot_be_read_is_refused_with_status_2(tmp_path: Path, cli: Run) -> None:
@@ -234,10 +286,7 @@ def test_a_robot_file_that_cannot_be_read_is_refused_with_status_2(tmp_path: Pat
         (ROBOT.replace(AXIS, '"().__class__"'), CASE, "robot.toml: limb 1, joint 2 (P), axis: is"),
         (ROBOT.replace(", actuated = true", ""), CASE, "robot.toml: actuated: is given at no joint"),
     ):
-        status, out, err = cli("solve", put(tmp_path, content, case), "--json", str(tmp_path / "result.json"))
-        assert (status, out) == (2, "")
-        assert fault in err
-        assert err.count("\n") == 1
+        refusal_of(cli("solve", put(tmp_path, content, case), "--json", str(tmp_path / "result.json")), fault)
         assert not (tmp_path / "result.json").exists()
 
 
@@ -261,3 +310,25 @@ def test_axes_that_are_almost_parallel_and_idle_limbs_are_remarked_on(tmp_path: 
     status, out, _ = cli("evaluate", name, "--set", "p_z=1.1")
     assert status == 0
     assert "note  limb 1 carries nothing" in out
+
+
+def test_nested_loops_are_evaluated_and_solved_and_c_is_refused(tmp_path: Path, cli: Run) -> None:
+    name = put(tmp_path, LINKS, LINKS_CASE)
+    slides = {member.label: member.slide for member in load_case(name).model.members}
+    assert list(slides) == ["1", "2"]
+    # The centre of the nested loops is any point of the axis of their hinge at the platform.
+    assert str(slides["2"]) == "@1=0, [@1, @1, 1]"
+    assert slides["1"] is not None
+    out = output_of(cli("evaluate", name))
+    assert "freedoms  2 with free actuators" in out
+    assert "rates  1: " in out
+    assert "motor: " in out
+    refusal_of(
+        cli("codegen", name, "--out", str(tmp_path / "c")),
+        "robot: has joints that are no limb with branches (motor, knee, wrist, pivot, hand)",
+    )
+    assert not (tmp_path / "c").exists()
+    # With a coupling the rest is one network too.
+    status, out, err = cli("evaluate", put(tmp_path, LINKS + COUPLING.replace('pivot = "-s"', "slide = 2"), LINKS_CASE))
+    assert (status, err) == (0, ""), err
+    assert "freedoms  1 with free actuators" in out

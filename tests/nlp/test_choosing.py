@@ -17,12 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array, case_from
 
-from screwsynth.nlp import Case, RobotState, Solution, case_from_tables, evaluate, formulate, load_case, solve
+from screwsynth.nlp import Case, RobotState, Solution, evaluate, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
 
-Array = NDArray[np.float64]
 PAGE = (Path(__file__).parents[2] / "docs" / "choosing.md").read_text(encoding="utf-8")
 PROBLEMS = ("peg-in-hole", "drilling-spindle", "camera-mount", "free-wrist", "haptic-device", "flight-simulator")
 
@@ -233,7 +232,7 @@ def test_units_leave_f_of_a_translation_and_square_that_of_a_rotation() -> None:
             if key in tables["limits"]:
                 tables["limits"][key] = scaled(tables["limits"][key], 1e-3)
         assert "point" not in tables["task"][0] or not any(tables["task"][0]["point"])
-        found = solve(case_from_tables(tables, name=name, source=f"{name}.toml"))
+        found = solve(case_from(tables, name))
         assert pytest.approx(solved(name).F * 1e-3**power, rel=1e-7) == found.F
 
 
@@ -241,7 +240,7 @@ def test_a_twist_twice_as_fast_has_four_times_the_f() -> None:
     for per, factor in ((2.0, 4.0), (math.radians(1), math.radians(1) ** 2)):
         tables = tables_of("free-wrist")
         tables["task"][0] = {"sense": "min", "twist": [0, 0, per, 0, 0, 0]}
-        found = solve(case_from_tables(tables, name="wrist", source="wrist.toml"))
+        found = solve(case_from(tables, "wrist"))
         assert pytest.approx(solved("free-wrist").F * factor, rel=1e-7) == found.F
 
 
@@ -258,7 +257,7 @@ def test_the_characteristic_length_is_the_root_of_the_ratio_of_stiffnesses() -> 
         "pose": {"position": [0, 0, height]},
         "task": [{"sense": "max", "axis": [1, 2, 3], "point": [4, -3, 20], "pitch": 5}],
     }
-    case = case_from_tables(tables, name="upu", source="upu.toml")
+    case = case_from(tables, "upu")
     F, twist = solve(case).F, np.array(case.tasks[0].twist)
     azimuths = np.radians([0, 120, 240])
     radial = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros(3)])
@@ -365,7 +364,7 @@ def numbers_of_the_wrist() -> Iterator[tuple[str, str]]:
     ((legs, twist, F),) = answers("free-wrist")
     tables = tables_of("free-wrist")
     tables["task"][0]["sense"] = "max"
-    stiffest = solve(case_from_tables(tables, name="wrist", source="wrist.toml")).F
+    stiffest = solve(case_from(tables, "wrist")).F
     q = np.abs(rates(legs, twist))
     yield "smallest and largest F within the same limits, mm^2", f"{F:.1f} and {stiffest:.0f}"
     yield "way of each leg for one degree", f"{math.radians(1) * max(q) * 1000:.1f} um"

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from generated import COMPILERS, STRICT, made, needs_compiler, written
+from generated import COMPILERS, STRICT, made, needs_compiler, run, written
 
 from screwsynth.nlp import formulate, load_case, shipped_cases
 from screwsynth.nlp.case.task import Method
@@ -19,7 +19,6 @@ from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.embedding.subject import find_subject
 
-Run = Callable[..., tuple[int, str, str]]
 Embedded = Any
 
 #: An average optimises nothing: C is not generated for it.
@@ -31,22 +30,17 @@ CASES = [
 
 
 @needs_compiler
-@pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("name", CASES)
 def test_every_shipped_case_compiles_without_a_warning_and_passes_its_test(
-    name: str, compiler: str, tmp_path: Path, embedded: Callable[[str], Embedded]
+    name: str, tmp_path: Path, embedded: Callable[[str], Embedded]
 ) -> None:
-    # The first compiler has made the library with the strict flags and -O2. Those of clang warn at any level.
-    shared = embedded(name).folder
-    if compiler == COMPILERS[0]:
-        where, flags = Path(shutil.copytree(shared, tmp_path / "c")), f"{STRICT} -O2 -fPIC"
-    else:
-        where, flags = tmp_path, f"{STRICT} -O0"
-        for path in shared.iterdir():
-            if path.suffix not in {".o", ".a", ".so"}:
-                shutil.copy(path, where)
-    printed = made(where, f"CC={compiler}", f"CFLAGS={flags}", "all", "stack", "test")
-    assert (f"{identifier(name)}-casadi.o" in printed) == (compiler != COMPILERS[0])
+    # The first compiler has made the library with the strict flags and -O2. The others need not compile to warn.
+    where = Path(shutil.copytree(embedded(name).folder, tmp_path / "c"))
+    sources = {path.name for path in where.glob("*.c")} - {"sfunction.c", "realtime.c"}  # of other systems
+    for compiler in COMPILERS[1:]:
+        run(compiler, *STRICT.split(), "-fsyntax-only", *sources, where=where)
+    printed = made(where, f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O2 -fPIC", "all", "stack", "test")
+    assert f"{identifier(name)}-casadi.o" not in printed
     (counts,) = re.findall(r"^(\d+) passed, 0 failed$", printed, flags=re.MULTILINE)
     assert int(counts) >= 14
 
@@ -60,15 +54,17 @@ def test_what_clang_optimises_passes_the_test_too(
     for path in embedded(name).folder.iterdir():
         if path.suffix not in {".o", ".a", ".so"}:
             shutil.copy(path, tmp_path)
-    assert " passed, 0 failed" in made(tmp_path, "CC=clang", f"CFLAGS={STRICT} -O2", "test")
+    printed = made(tmp_path, "CC=clang", f"CFLAGS={STRICT} -O2", "all", "stack", "test")
+    assert f"{identifier(name)}-casadi.o" in printed
+    assert " passed, 0 failed" in printed
 
 
 @needs_compiler
 @pytest.mark.parametrize("name", CASES)
-def test_compiled_values_are_those_of_the_program_at_a_thousand_points(
+def test_compiled_values_are_those_of_the_program_at_random_points(
     name: str, embedded: Callable[[str], Embedded]
 ) -> None:
-    embedded(name).compare(find_subject(load_case(name)).nlp, 1000)
+    embedded(name).compare(find_subject(load_case(name)).nlp, 300)
 
 
 @needs_compiler

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from builders import case_from
 from generated import COMPILERS, STRICT, made, needs_compiler, written
 
-from screwsynth.nlp import Nlp, case_from_tables, formulate, solve
+from screwsynth.nlp import Nlp, formulate, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.program.sampling import starting_points
 
@@ -48,7 +49,7 @@ starts = 4
 
 def spectral(target: Path) -> tuple[Path, Nlp]:
     """The folder of a case with limits on singular values, and its program."""
-    case = case_from_tables(tomllib.loads(SPECTRA), name="spectra", source="spectra.toml")
+    case = case_from(SPECTRA, "spectra")
     return written(case, target), formulate(case)
 
 
@@ -57,7 +58,7 @@ def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_p
     tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8")) | {
         "limits": {"condition_number": {"max": 300, "length": 10}}
     }
-    written(case_from_tables(tables, name="alone", source="alone"), tmp_path)
+    written(case_from(tables, "alone"), tmp_path)
     for compiler in COMPILERS:
         command = [compiler, *STRICT.split(), "-O2", "-fsyntax-only", str(tmp_path / "screwsynth_alone-loops.c")]
         assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
@@ -108,7 +109,7 @@ def test_limits_on_singular_values_are_small_and_exact(tmp_path: Path) -> None:
 
 @needs_compiler
 def test_limits_on_singular_values_hold_where_the_solver_ends(embed: Callable[..., Embedded]) -> None:
-    case = case_from_tables(tomllib.loads(SPECTRA), name="spectra", source="spectra.toml")
+    case = case_from(SPECTRA, "spectra")
     solved, wanted = embed(case).solve(), solve(case)
     assert solved.status == 0
     assert abs(solved.F - wanted.F) <= 1e-6 * wanted.F

@@ -3,12 +3,12 @@
 import csv
 import io
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import Run, output_of, saved
 from jsonschema import Draft202012Validator
 
 from screwsynth.models import Displacement
@@ -31,19 +31,13 @@ from screwsynth.nlp.comparison.placed import placed
 from screwsynth.nlp.comparison.robots import read_robots
 from screwsynth.nlp.results.schema import result_schema
 
-Run = Callable[..., tuple[int, str, str]]
-
 # The twist is about an axis far from the origin, so that a frame that is moved wrongly shows.
 CASE = """
 [units]
 length = "mm"
 [robot]
 model = "stewart-gough"
-[robot.parameters]
-x1 = 120
-x2 = 60
-x3 = 10
-x4 = 10
+parameters = { x1 = 120, x2 = 60, x3 = 10, x4 = 10 }
 [pose]
 position = [30, -20, 150]
 [[task]]
@@ -61,9 +55,7 @@ ROUNDING = 1e-9
 
 @pytest.fixture
 def path(tmp_path: Path) -> str:
-    found = tmp_path / "case.toml"
-    found.write_text(CASE, encoding="utf-8")
-    return str(found)
+    return str(saved(tmp_path / "case.toml", CASE))
 
 
 def case() -> Case:
@@ -94,8 +86,7 @@ def circle(radius: float, half: float) -> np.ndarray:
 def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) -> None:
     files = {name: tmp_path / f"out.{name}" for name in ("json", "csv", "html")}
     options = [word for name, file in files.items() for word in (f"--{name}", str(file))]
-    code, out, err = cli("compare", path, "delta", "6-sps", "case", "--range", "0", "--starts", "1", *options)
-    assert (code, err) == (0, "")
+    out = output_of(cli("compare", path, "delta", "6-sps", "case", "--range", "0", "--starts", "1", *options))
     result = json.loads(files["json"].read_text())
     Draft202012Validator(result_schema()).validate(result)
     assert type(load_result(files["json"])).__name__ == "ComparisonResult"
@@ -204,9 +195,7 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
 
 def test_robots_that_keep_more_limits_come_first_and_what_others_lack_is_said(cli: Run) -> None:
     names = ["6-ups", "delta", "case"]
-    code, out, err = cli("compare", "hexapod-machining", *names, "--starts", "2", "--json", "-")
-    assert (code, err) == (0, "")
-    result = json.loads(out)
+    result = json.loads(output_of(cli("compare", "hexapod-machining", *names, "--starts", "2", "--json", "-")))
     kept = {each["name"]: (each["part"], each["limits_kept"], each["value"]) for each in result["robots"]}
     # The six legs given joint by joint resist the motion more, without all limits but one.
     assert kept["6-ups"][2] > kept["case"][2]

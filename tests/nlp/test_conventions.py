@@ -1,16 +1,14 @@
 """F by limb, actuation and constraints; the dependence of F on the characteristic length and on centres; remarks."""
 
-import tomllib
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from builders import starter
 
 from screwsynth.models import constraint_rows, robot, robot_function
 from screwsynth.nlp import Case, Free, Nlp, Task, evaluate, formulate, report, result_of, solve
-from screwsynth.nlp.case.reader import case_from_tables
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.conventions import dependence_of
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.paths import velocities_at
@@ -28,10 +26,6 @@ def at_home(name: str) -> Nlp:
     values = {item.name: item.typical[0] for item in model.parameters}
     length = 0.7 * float(np.linalg.norm(model.home)) or 0.7
     return formulate(Case(model, values, model.home, [Task(GENERAL)], characteristic_length=length))
-
-
-def starter(name: str) -> Case:
-    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
 
 
 def with_twist(nlp: Nlp, twist: np.ndarray) -> Nlp:

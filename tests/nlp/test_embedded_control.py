@@ -4,7 +4,6 @@ import ctypes
 import math
 import re
 import subprocess
-import tomllib
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -12,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import case_from
 from generated import COMPILERS, written
 
-from screwsynth.nlp import Case, Nlp, case_from_tables, formulate, load_case
+from screwsynth.nlp import Case, Nlp, formulate, load_case
 from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.program.sampling import starting_points
 
@@ -31,11 +31,7 @@ SMALL = """
 [robot]
 model = "stewart-gough"
 layout = "octahedral"
-[robot.parameters]
-x1 = { min = 300, max = 450 }
-x2 = { min = 120, max = 200 }
-x3 = 8
-x4 = 12
+parameters = { x1 = { min = 300, max = 450 }, x2 = { min = 120, max = 200 }, x3 = 8, x4 = 12 }
 [pose]
 position = [{ min = -150, max = 150 }, { min = -150, max = 150 }, { min = 450, max = 700 }]
 rotation = { angle = { min = -15, max = 15 } }
@@ -53,7 +49,7 @@ radius_ratio = { max = 0.5 }
 @pytest.fixture(scope="module")
 def limited(embed: Callable[[Case], Embedded]) -> tuple[Embedded, Nlp]:
     """The C of a case with limits and a free axis, and its program."""
-    case = case_from_tables(tomllib.loads(SMALL), name="limited", source="limited.toml")
+    case = case_from(SMALL, "limited")
     return embed(case), formulate(case)
 
 

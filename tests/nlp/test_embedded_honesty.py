@@ -13,12 +13,11 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from builders import case_from, starter_tables
 from generated import COMPILERS, written
 
-from screwsynth.models import robot_function
-from screwsynth.nlp import Case, CompiledCase, case_from_tables, load_case, load_compiled, shipped_cases
+from screwsynth.nlp import Case, CompiledCase, load_case, load_compiled, shipped_cases
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.case.starter import starter_case
 
 BENCH = Path(__file__).parents[2] / "bench" / "soak"
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT, BUDGET, OTHER_ASSEMBLY, RANGE_END = range(7)
@@ -44,9 +43,9 @@ def case_of(name: str) -> Case:
     if name in shipped_cases():
         return load_case(name)
     robot = name.removeprefix("worst of two, ")
-    starter = tomllib.loads(starter_case(robot_function(robot)()))
+    starter = starter_tables(robot)
     other = tomllib.loads(TWO_TASKS) if robot != name else {"task": []}
-    return case_from_tables(starter | other | {"task": other["task"] + starter["task"]}, name=robot, source=robot)
+    return case_from(starter | other | {"task": other["task"] + starter["task"]}, robot)
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +133,7 @@ def test_the_largest_of_other_tasks_to_be_minimised_is_theirs(tmp_path: Path, ti
     for task in tables["task"]:
         task["sense"] = "min"
     del tables["expect"]
-    own = load_compiled(written(case_from_tables(tables, name="camera-mount", source="c.toml"), tmp_path))
+    own = load_compiled(written(case_from(tables, "camera-mount"), tmp_path))
     robot, p = ticks.Robot(own, -1.0), tasks(own, 40, 4)
     p[:, robot.twists] *= 10
     found = own.solve(p=p)

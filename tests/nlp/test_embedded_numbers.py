@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import case_from, starter_tables
 from generated import COMPILERS, written
 
-from screwsynth.models import robot_function
-from screwsynth.nlp import CompiledCase, case_from_tables, formulate, load_compiled
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp import CompiledCase, formulate, load_compiled
 from screwsynth.nlp.embedding.held import held_by_fixed_numbers
 
 BENCH = Path(__file__).parents[2] / "bench" / "soak"
@@ -26,23 +25,15 @@ PLATE = """
 [robot]
 model = "stewart-gough"
 layout = "octahedral"
-
-[robot.parameters]
-x1 = 0.2
-x2 = { min = 0.05, max = 0.15 }
-x3 = 10
-x4 = { min = 3, max = 27 }
-
+parameters = { x1 = 0.2, x2 = { min = 0.05, max = 0.15 }, x3 = 10, x4 = { min = 3, max = 27 } }
 [pose]
 position = [0, 0, { min = 0.25, max = 0.4 }]
-
 [[task]]
 name = "turn"
 sense = "max"
 axis = [0, 1, 0]
 point = [0, 0, 0.22]
 pitch = 0
-
 [limits]
 joint_spacing = { min = 0.04 }
 """
@@ -50,7 +41,7 @@ joint_spacing = { min = 0.04 }
 
 def delta_tables() -> dict[str, Any]:
     """A Delta whose platform is held without rotation: three of its loop equations follow from the others."""
-    tables = tomllib.loads(starter_case(robot_function("delta")()))
+    tables = starter_tables("delta")
     tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": 0}
     tables["solve"]["starts"] = 2
     return tables
@@ -59,7 +50,7 @@ def delta_tables() -> dict[str, Any]:
 def compiled(tables: dict[str, Any], name: str, folder: Path) -> CompiledCase:
     if not COMPILERS:
         pytest.skip("no C compiler is installed")
-    return load_compiled(written(case_from_tables(tables, name=name, source=name), folder))
+    return load_compiled(written(case_from(tables, name), folder))
 
 
 def numbers(own: CompiledCase, **changed: float) -> np.ndarray:
@@ -115,7 +106,7 @@ def test_limits_on_fixed_numbers_are_judged(tmp_path: Path) -> None:
 
 def test_pairs_of_fixed_lengths_are_judged(tmp_path: Path) -> None:
     # Leg 1 alone is free. Of each other leg's 12 pairs of lengths, the tightest one of the case stands for all.
-    tables = tomllib.loads(starter_case(robot_function("hexapod")()))
+    tables = starter_tables("hexapod")
     heights = {"pose1_p_z": 35.0, "pose2_p_z": 36.0, "pose3_p_z": 37.0, "pose4_p_z": 38.0}
     tables["pose"] = [{"position": [0, 0, height]} for height in heights.values()]
     tables |= {"limits": {"actuator": {"stroke_max": 3.5}}, "combine": {"over_poses": "mean"}, "solve": {"starts": 2}}
@@ -145,7 +136,7 @@ def test_pairs_of_fixed_lengths_are_judged(tmp_path: Path) -> None:
 
 
 def test_what_fixed_numbers_make_hold_is_kept() -> None:
-    nlp = formulate(case_from_tables(delta_tables(), name="delta", source="delta"))
+    nlp = formulate(case_from(delta_tables(), "delta"))
     held = held_by_fixed_numbers(nlp)
     loops = [each.name for each in nlp.program.constraints if each.name.startswith("loop")]
     found = [each.constraint.name for each in held.items]

@@ -36,13 +36,13 @@ def kkt(nlp: Nlp, x: np.ndarray) -> tuple[float, float]:
 @pytest.mark.parametrize(
     "name", [name for name in shipped_cases() if name.startswith("paper-") and name != "paper-4.2"]
 )
-def test_a_thousand_random_starts_end_at_the_global_optimum(name: str, embedded: EmbeddedCase) -> None:
+def test_random_starts_end_at_the_global_optimum(name: str, embedded: EmbeddedCase) -> None:
     c, case = embedded(name), load_case(name)
     nlp = formulate(case)
     best = solve_program(nlp, case.search).F
     size = abs(best) if abs(best) > 1e-6 * nlp.objective_scale else nlp.objective_scale
     statuses: Counter[int] = Counter()
-    for k, x in enumerate(starting_points(nlp, 1001, 5)[1:] if nlp.n else [nlp.start] * 3):
+    for k, x in enumerate(starting_points(nlp, 401, 5)[1:] if nlp.n else [nlp.start] * 3):
         solved = c.solve(x0=x, seeds=0)
         statuses[solved.status] += 1
         if solved.status == OK:

@@ -12,14 +12,13 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array, case_from, turn_about
 from casadi import SX
 from generated import COMPILERS, written
-from numpy.typing import NDArray
 
 from screwsynth.nlp import (
     Case,
     Nlp,
-    case_from_tables,
     formulate,
     load_case,
     load_compiled,
@@ -31,8 +30,6 @@ from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.program.places import FreeRotation
 from screwsynth.nlp.program.repeated import without_repeated
 from screwsynth.nlp.program.sampling import starting_points
-
-Array = NDArray[np.float64]
 
 HOME = np.array([0, 0, 20.0])
 
@@ -102,12 +99,6 @@ def kept(nlp: Nlp, x: Array, p: Array) -> dict[str, float]:
     return {key: min(values) if key.endswith(".min") else max(values) for key, values in found.items()}
 
 
-def turn(axis: Array, angle: float) -> Array:
-    x, y, z = axis
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
-
-
 @pytest.mark.parametrize("name", ["hexapod-machining", "hexapod-workspace", "free-wrist", "drilling-spindle"])
 def test_constraints_judge_every_leg_at_any_numbers(name: str) -> None:
     # The arguments are numbers of the program like the variables: C sets them, and sensitivities vary them.
@@ -127,10 +118,10 @@ def test_constraints_judge_every_leg_at_any_numbers(name: str) -> None:
         if isinstance(rotation, FreeRotation):
             q = x[list(rotation.q)]
             size = float(np.linalg.norm(q))
-            R = turn(q / size, 2 * math.asin(size)) if size else np.eye(3)
+            R = turn_about(q / size, 2 * math.asin(size)) if size else np.eye(3)
         elif "axis_x" in names:
             axis = np.array([numbers[f"axis_{c}"] for c in "xyz"])
-            R = turn(axis / np.linalg.norm(axis), numbers["angle"])
+            R = turn_about(axis / np.linalg.norm(axis), numbers["angle"])
         else:
             R = np.eye(3)
         exact, own = measured(numbers, R, p[twist]), kept(nlp, x, p)
@@ -191,7 +182,7 @@ def limited(rng: np.random.Generator) -> Case:
     ]
     tables["solve"]["starts"] = 8
     tables.pop("expect", None)
-    return case_from_tables(tables, name="random", source="random")
+    return case_from(tables, "random")
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(12, marks=pytest.mark.slow)])

@@ -1,10 +1,9 @@
-"""The solved robot in other programs' formats: MuJoCo finds the same wrenches and rates, and an import the same J."""
+"""Solved robots in other formats: MuJoCo finds their wrenches and rates, nested loops too, and an import their J."""
 
 import csv
 import io
 import re
 import tomllib
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,8 +12,9 @@ import ezdxf
 import mujoco
 import numpy as np
 import pytest
+from builders import Array, case_from, starter
+from link_robots import CASE, COUPLING, ROBOT
 from mujoco_trees import Tree
-from numpy.typing import NDArray
 
 from screwsynth.models import WrenchKind, robot, robot_function
 from screwsynth.models.catalog import gallery_names
@@ -28,9 +28,9 @@ from screwsynth.nlp import (
     Nlp,
     QuantityLimit,
     Task,
-    case_from_tables,
     evaluate,
     formulate,
+    load_case,
 )
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.closing import closed_start
@@ -45,17 +45,10 @@ from screwsynth.nlp.exchange.writing.mjcf import mjcf_text
 from screwsynth.nlp.exchange.writing.numbers import quaternion, roll_pitch_yaw
 from screwsynth.nlp.exchange.writing.urdf import urdf_of
 
-Array = NDArray[np.float64]
-Run = Callable[..., tuple[int, str, str]]
-
 ROBOTS = (*gallery_names(), "stewart-gough", "hexapod", "three-upu")
 #: One of each kind of limb and of closing, for tests that build the robot again.
 SOME = ("3-rps", "delta-parallelogram", "three-upu")
 OTHERS = ("delta", "exechon", "spherical-3-rrr", "6-rss", "hexapod")
-
-
-def starter(name: str) -> Case:
-    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
 
 
 @cache
@@ -251,7 +244,7 @@ def test_ranges_count_from_the_pose_and_reach_the_actuators() -> None:
     text = starter_case(robot_function("3-rps")()).replace("actuator_length", "# actuator_length")
     tables = tomllib.loads(text)
     tables["limits"] = {"actuator_length": {"min": -0.4, "max": 0.5}, "joint": {"1:1": {"max": 30}}}
-    nlp = formulate(case_from_tables(tables, name="rps", source="rps"))
+    nlp = formulate(case_from(tables, "rps"))
     found = mechanism_of(nlp, closed_start(nlp))
     state = evaluate(nlp, closed_start(nlp))
     joints = {joint.name: joint for joint in found.mechanism.joints}
@@ -370,3 +363,49 @@ def test_a_driven_parallelogram_has_the_range_of_its_way_as_an_angle() -> None:
     assert 0.3 < words.coordinate < 0.5
     np.testing.assert_allclose(joint.range, np.array([-1.0, 1.5]) / rod - words.coordinate, atol=1e-12)
     assert Tree(mjcf_text(found.mechanism), found.size).open <= 1e-9
+
+
+# Nested loops and coupled joints in other programs' formats: MuJoCo finds the rates of the result, an import its J.
+
+
+@pytest.mark.parametrize("coupling", ["", COUPLING])
+def test_nested_loops_and_coupled_joints_are_exported(coupling: str, tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text(ROBOT + coupling, encoding="utf-8")
+    free = "{ min = -0.1, max = 0.1 }, { min = 0.9, max = 1.1 }, 0]\n"
+    free += "rotation = { axis = [0, 0, 1], angle = { min = -10, max = 10 } }"
+    limits = "[limits]\nactuator_angle = { min = -40, max = 50 }\n"
+    (tmp_path / "case.toml").write_text(CASE.replace("0, 1, 0]", free) + limits, encoding="utf-8")
+    nlp = formulate(load_case(tmp_path / "case.toml"))
+    start = closed_start(nlp)
+    x = close_equations(nlp, start + 0.05 * np.random.default_rng(1).uniform(-1, 1, nlp.n))
+    state = evaluate(nlp, x)
+    assert np.abs(state.position - [0, 1, 0]).max() > 1e-3
+    found = mechanism_of(nlp, x)
+    tree = Tree(mjcf_text(found.mechanism), found.size)
+    assert tree.open <= 1e-9
+    np.testing.assert_allclose(tree.data.body("platform").xpos, state.position, atol=1e-9)
+    J = wrenches_of(found.mechanism, nlp.case.characteristic_length).jacobian
+    np.testing.assert_allclose(work_rates(J), work_rates(state.jacobian), atol=1e-8)
+    angle = next(joint.coordinate for joint in found.joints if joint.name == "motor")
+    motor = next(joint for joint in found.mechanism.joints if joint.name == "motor")
+    assert motor.range is not None
+    assert angle is not None
+    np.testing.assert_allclose(motor.range, np.radians([-40, 50]) - angle, atol=1e-12)
+    basis = tree.feasible_twists()
+    assert basis.shape[1] == (1 if coupling else 2)
+    twist = basis @ basis.T @ np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
+    twisted = formulate(replace(nlp.case, tasks=[Task(tuple(twist))]))
+    mobility = mobility_of(twisted, x, evaluate(twisted, x))
+    assert mobility is not None
+    rates = [mobility.actuator_rates[joint.actuator] for joint in found.joints if joint.actuator]
+    np.testing.assert_allclose(tree.motion(twist)[0][tree.driven], rates, atol=1e-7)
+    (tmp_path / "robot.xml").write_text(mjcf_text(found.mechanism), encoding="utf-8")
+    again = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).mechanism
+    J = wrenches_of(again, nlp.case.characteristic_length).jacobian
+    np.testing.assert_allclose(work_rates(J), work_rates(state.jacobian), atol=1e-8)
+    # Another assembly of the four-bar has the same actuators, and is not reached from home.
+    flipped = x.copy()
+    index = [each.name for each in nlp.program.variables].index("q2_2")
+    flipped[index] += 0.5
+    with pytest.raises(InputError, match="leads to another assembly or pose than the answer's"):
+        mechanism_of(nlp, flipped)

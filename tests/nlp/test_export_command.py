@@ -1,27 +1,23 @@
 """The command ``export``: its files, cases that it takes and refuses, and results instead of a solve."""
 
 import json
-import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
 import pytest
 import yaml
+from builders import Run, case_from, output_of
 from mujoco_trees import Tree
 
 from screwsynth.models import robot, robot_function
-from screwsynth.nlp import Case, InputError, Task, case_from_tables, export_robot, formulate, load_case, solve
+from screwsynth.nlp import Case, InputError, Task, export_robot, formulate, load_case, solve
 from screwsynth.nlp.case.starter import starter_case
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Path, cli: Run) -> None:
     out = tmp_path / "robot"
     words = ("export", "paper-4.4-max", "--starts", "2", "--format", "mjcf", "--format", "csv", "--out", str(out))
-    status, said, wrong = cli(*words)
-    assert (status, wrong) == (0, "")
+    said = output_of(cli(*words))
     assert said.startswith("5 files in ")
     files = {path.name: path.read_bytes() for path in out.iterdir()}
     assert set(files) == {"README.md", "robot.xml", "joints.csv", "links.csv", "plates.csv", "screwsynth-files.txt"}
@@ -74,24 +70,25 @@ def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_pat
     assert status == 1
     assert "the solve is infeasible: nothing is exported" in wrong
     assert not out.exists()
-    nlp = formulate(case_from_tables(tomllib.loads(text), name="hexapod", source="hexapod"))
+    nlp = formulate(case_from(text, "hexapod"))
     fixed = [
         f"--set={each.name}={value}"
         for each, value in zip(nlp.program.variables, nlp.start, strict=True)
         if not each.name.startswith("q")
     ]
-    status, _, wrong = cli(
-        "export",
-        str(tmp_path / "case.toml"),
-        "--format",
-        "mjcf",
-        "--out",
-        str(out),
-        *fixed,
-        "--set=angle=0",
-        "--set=axis=0,0,1",
+    output_of(
+        cli(
+            "export",
+            str(tmp_path / "case.toml"),
+            "--format",
+            "mjcf",
+            "--out",
+            str(out),
+            *fixed,
+            "--set=angle=0",
+            "--set=axis=0,0,1",
+        )
     )
-    assert (status, wrong) == (0, "")
 
 
 def test_a_result_is_exported_without_a_solve(tmp_path: Path, cli: Run) -> None:

@@ -2,13 +2,13 @@
 
 import math
 import struct
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import Run, case_from, output_of, refusal_of, saved
 from casadi import SX
 from matplotlib.figure import Figure
 
@@ -18,7 +18,6 @@ from screwsynth.nlp import (
     InputError,
     Solution,
     Task,
-    case_from_tables,
     evaluate,
     load_case,
     plot,
@@ -37,8 +36,6 @@ from screwsynth.nlp.results.robottables import robot_table
 
 #: Robots whose functions say where their parameters are in a picture; a robot file does not.
 DRAWN_BY_HAND = [name for name in model_names() if name not in gallery_names()]
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 #: Shipped cases with an axis to draw; hexapod-workspace has the robot of hexapod-machining, and takes long to solve.
@@ -335,18 +332,17 @@ def test_a_font_that_has_the_letters_is_used(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_both_layouts_of_a_robot_are_drawn(tmp_path: Path, cli: Run) -> None:
-    code, _, err = cli("models", "stewart-gough", "--plot", str(tmp_path / "robot.svg"))
-    assert (code, err) == (0, "")
+    output_of(cli("models", "stewart-gough", "--plot", str(tmp_path / "robot.svg")))
     text = (tmp_path / "robot.svg").read_text(encoding="utf-8")
     assert "layout = aligned" in text
     assert "layout = octahedral" in text
-    code, _, err = cli("models", "stewart-gough", "--plot", str(tmp_path / "robot.png"))
+    output_of(cli("models", "stewart-gough", "--plot", str(tmp_path / "robot.png")))
     wide, high = struct.unpack(">II", (tmp_path / "robot.png").read_bytes()[16:24])
     assert wide > 1.5 * high
 
 
 def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run, three_poses: Callable[[str], str]) -> None:
-    case = case_from_tables(tomllib.loads(three_poses("max")), name="poses", source="poses.toml")
+    case = case_from(three_poses("max"), "poses")
     solution = solve(case)
     values = [evaluate(solution.nlp, solution.x, k).F for k in range(3)]
     drawn = [drawings_of(solution, k + 1)[0] for k in range(3)]
@@ -355,26 +351,19 @@ def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run, thre
         assert sum(row.rate**2 for row in robot.rows) == pytest.approx(values[k], rel=1e-9)
         assert f"pose {k + 1}, F = {values[k]:.7g} there" in robot.headline
         assert ("the worst" in robot.headline) == (values[k] == min(values))
-    file = tmp_path / "poses.toml"
-    file.write_text(three_poses("max"), encoding="utf-8")
-    code, _, err = cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "3")
-    assert (code, err) == (0, "")
-    code, out, err = cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "4")
-    assert (code, out) == (2, "")
-    assert "--pose 4" in err
-    assert "3 poses" in err
+    file = saved(tmp_path / "poses.toml", three_poses("max"))
+    output_of(cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "3"))
+    refusal_of(cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "4"), "--pose 4", "3 poses")
     with pytest.raises(InputError, match="pose 4 does not exist"):
         plot(solution, tmp_path / "pose.png", pose=4)
 
 
 def test_the_command_line_draws(tmp_path: Path, cli: Run) -> None:
     target = tmp_path / "pose.png"
-    code, out, err = cli("solve", "paper-4.2", "--starts", "2", "--plot", str(target))
-    assert (code, err) == (0, "")
+    out = output_of(cli("solve", "paper-4.2", "--starts", "2", "--plot", str(target)))
     assert "F" in out
     assert target.read_bytes()[:4] == b"\x89PNG"
-    code, _, err = cli("models", "three-upu", "--plot", str(tmp_path / "robot.svg"))
-    assert (code, err) == (0, "")
+    output_of(cli("models", "three-upu", "--plot", str(tmp_path / "robot.svg")))
     assert (tmp_path / "robot.svg").stat().st_size > 10_000
 
 
@@ -399,7 +388,4 @@ def test_a_failed_solve_is_drawn_as_what_it_is() -> None:
     ],
 )
 def test_what_cannot_be_drawn_is_told_before_the_work(arguments: tuple[str, ...], fault: str, cli: Run) -> None:
-    code, out, err = cli(*arguments)
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert fault in err
+    refusal_of(cli(*arguments), fault)

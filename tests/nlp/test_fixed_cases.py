@@ -1,16 +1,15 @@
 """Robots with loops in cases that leave nothing free, or fewer numbers than equations; working modes of optima."""
 
 import math
-import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import case_from
 from typer.testing import CliRunner
 
 from screwsynth.models import Model, robot_function
 from screwsynth.nlp import Case, Free, Rotation, Task, formulate, json_data, result_of, solve
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.assembly import assembly_over_poses
@@ -121,7 +120,7 @@ def test_planar_limbs_bent_the_other_way_are_found_too() -> None:
 
 def test_every_distinct_optimum_says_its_working_mode() -> None:
     text = starter_case(robot_function("6-rus")())
-    solution = solve(case_from_tables(tomllib.loads(text), name="6-rus", source="6-rus"), starts=16)
+    solution = solve(case_from(text, "6-rus"), starts=16)
     own = solution.outcomes[0].own
     brief = [found.assembly.brief for found in own.optima if found.assembly is not None]
     assert len(brief) == len(own.optima) > 1

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import Run, case_from, starter, starter_tables
 
 from screwsynth.models import robot_function
 from screwsynth.models.catalog import gallery_names
@@ -26,7 +26,6 @@ from screwsynth.nlp import (
     Sense,
     Status,
     Task,
-    case_from_tables,
     evaluate,
     formulate,
     sensitivities,
@@ -37,13 +36,7 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.evidence.state import loops_are_closed
 
-Run = Callable[..., tuple[int, str, str]]
-
 SIX = ("3-rps", "6-rus", "delta", "delta-parallelogram", "3-upu", "planar-3-rrr")
-
-
-def starter(name: str) -> Case:
-    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
 
 
 def narrow(case: Case) -> Case:
@@ -122,19 +115,19 @@ def test_sensitivities_are_those_of_solved_neighbours(names: tuple[str, ...]) ->
 
 def test_a_number_that_the_robot_has_no_choice_of_has_no_sensitivity() -> None:
     # A Delta does not turn: no sum of changes of the other numbers closes its loops where it is turned.
-    tables = tomllib.loads(starter_case(robot_function("delta")()))
+    tables = starter_tables("delta")
     tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": 0}
     tables["solve"]["starts"] = 1
-    solution = solve(case_from_tables(tables, name="delta", source="delta"))
+    solution = solve(case_from(tables, "delta"))
     rows = {row.name: row for row in sensitivities(solution.nlp, solution.x)}
     assert {name for name, row in rows.items() if row.derivative is None} == {"angle"}
     assert rows["angle"].hindrance is Hindrance.NO_CHOICE
     assert "fixed: the robot has no choice of it" in str(solution.table())
     # The planar robot has the choice of its rotation.
-    tables = tomllib.loads(starter_case(robot_function("planar-3-rrr")()))
+    tables = starter_tables("planar-3-rrr")
     tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": 3}
     tables["solve"]["starts"] = 1
-    solution = solve(case_from_tables(tables, name="planar", source="planar"))
+    solution = solve(case_from(tables, "planar"))
     rows = {row.name: row for row in sensitivities(solution.nlp, solution.x)}
     assert rows["angle"].derivative
 
@@ -185,7 +178,7 @@ def test_every_starter_of_the_gallery_is_solved_to_rank_six() -> None:
 def test_a_case_of_the_gallery_is_written_and_read_again() -> None:
     for name in SIX:
         case = starter(name)
-        again = case_from_tables(tomllib.loads(case.to_toml()), name=name, source="again")
+        again = case_from(case.to_toml(), name)
         assert again.model.name == name
         assert formulate(again).evaluate(formulate(again).start).F == formulate(case).evaluate(formulate(case).start).F
     assert isinstance(case.tasks[0], Task)

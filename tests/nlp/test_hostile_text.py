@@ -2,15 +2,13 @@
 
 import unicodedata
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from builders import Run, saved
 
 from screwsynth.nlp import generate_c, load_case
 from screwsynth.nlp.case.source import find_case
-
-Run = Callable[..., tuple[int, str, str]]
 
 # Colour, title of the window, bell, carriage return, newline, marks of direction, a space without width.
 EVIL = "\\u001b[31mred \\u001b]0;owned\\u0007 \\r\\nnew \\u202eright \\u2066 \\u200b \\u0085 \\u2028 \\u007f"
@@ -24,9 +22,7 @@ def case(tmp_path: Path) -> str:
     lines = [line for line in text.splitlines() if not line.startswith(("title", "name =", "length ="))]
     text = "\n".join(lines).replace("[units]", f'[units]\nlength = "{UNIT}"', 1)
     text = text.replace("[[task]]", f'[[task]]\nname = "{EVIL}"', 1)
-    path = tmp_path / "case.toml"
-    path.write_text(f'title = "{EVIL} 日本\u3000語"\n{text}\n[solve]\nstarts = 2\n', encoding="utf-8")
-    return str(path)
+    return str(saved(tmp_path / "case.toml", f'title = "{EVIL} 日本\u3000語"\n{text}\n[solve]\nstarts = 2\n'))
 
 
 def controls(text: str) -> list[str]:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from screwsynth.models import Model, robot
 from screwsynth.nlp import Case, Free, Limits, Task, evaluate, formulate, solve
@@ -21,7 +20,6 @@ from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.summary import case_summary
 
-Array = NDArray[np.float64]
 ALONG_X = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 

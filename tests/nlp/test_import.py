@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import reachy
+from builders import Array, Run, output_of, saved
 
 from screwsynth.models import Substitution, jacobian
 from screwsynth.models.joints import RobotError, robot
@@ -27,15 +28,11 @@ from screwsynth.nlp.exchange.reading.reduction import Ends
 from screwsynth.nlp.exchange.reading.urdf import read_urdf
 from screwsynth.nlp.exchange.reading.xmltext import read_xml
 
-Run = Callable[..., tuple[int, str, str]]
-Array = reachy.Array
-
 STEWARTS = tuple(f"stewart_{k}" for k in range(1, 7))
 
 
 def imported(folder: Path, text: str, name: str, ends: Ends, *, loops: str = "", closes: bool = True) -> Imported:
-    path = folder / name
-    path.write_text(text, encoding="utf-8")
+    path = saved(folder / name, text)
     path.with_suffix(".yaml").unlink(missing_ok=True)
     if loops:
         path.with_suffix(".yaml").write_text(loops, encoding="utf-8")
@@ -199,24 +196,24 @@ def test_files_defaults_angles_hinges_of_two_connects_and_gears(tmp_path: Path) 
 def test_suggestions_become_dimensions(tmp_path: Path, cli: Run) -> None:
     model, out = tmp_path / "head.xml", tmp_path / "robot.toml"
     model.write_text(reachy.mjcf(names=False), encoding="utf-8")
-    code, text, err = cli("import", str(model), "--platform", "head", "--close", "--suggest")
-    assert (code, err) == (0, "")
+    text = output_of(cli("import", str(model), "--platform", "head", "--close", "--suggest"))
     for words in ("circle1", "circle2", "circle3", "limbs 1, 3, 5; 2, 4, 6 are copies by 120 deg", "mirror"):
         assert words in text
-    code, text, err = cli(
-        "import",
-        str(model),
-        "--platform",
-        "nose",
-        "--close",
-        "--out",
-        str(out),
-        "--free",
-        "fold",
-        "circle3=rp",
-        "stewart_1.axis",
+    output_of(
+        cli(
+            "import",
+            str(model),
+            "--platform",
+            "nose",
+            "--close",
+            "--out",
+            str(out),
+            "--free",
+            "fold",
+            "circle3=rp",
+            "stewart_1.axis",
+        )
     )
-    assert (code, err) == (0, "")
     tables = tomllib.loads(out.read_text(encoding="utf-8"))
     assert tables["dimensions"]["rp"]["typical"] == pytest.approx(0.03, abs=1e-6)
     assert [limb["repeat"]["count"] for limb in tables["limb"]] == [3, 3]
@@ -228,9 +225,9 @@ def test_suggestions_become_dimensions(tmp_path: Path, cli: Run) -> None:
     np.testing.assert_allclose([np.hypot(*end[:2]) for end in ends], 0.035, atol=1e-6)
     assert platform.position[0] == pytest.approx(0.05, abs=1e-6)
     # Without copies and dimensions the robot is that of the model, to rounding; with them, to its decimals.
-    code, text, err = cli("import", str(model), "--platform", "head", "--close", "--out", "-")
-    assert (code, err) == (0, "")
-    plain = work_rates(tomllib.loads(text))
+    plain = work_rates(
+        tomllib.loads(output_of(cli("import", str(model), "--platform", "head", "--close", "--out", "-")))
+    )
     np.testing.assert_allclose(work_rates(tables), plain, rtol=0, atol=1e-4 * plain.max())
 
 
@@ -253,8 +250,7 @@ def test_a_slide_follows_the_joints_that_it_joins(tmp_path: Path, cli: Run) -> N
         f"<equality>{connects}</equality><actuator>{motors}</actuator></mujoco>",
         encoding="utf-8",
     )
-    code, _, err = cli("import", str(model), "--platform", "top", "--out", str(out), "--free", "a0=A", "b3")
-    assert (code, err) == (0, "")
+    output_of(cli("import", str(model), "--platform", "top", "--out", str(out), "--free", "a0=A", "b3"))
     text = out.read_text(encoding="utf-8")
     out.write_text("mine\n", encoding="utf-8")
     again = cli("import", str(model), "--platform", "top", "--out", str(out))
@@ -325,8 +321,7 @@ CLOSINGS = [
 
 
 def test_newton_closes_every_kind_of_joint(tmp_path: Path) -> None:
-    path = tmp_path / "all.urdf"
-    path.write_text(f'<robot name="all"><link name="base"/>{"".join(CLOSINGS)}</robot>', encoding="utf-8")
+    path = saved(tmp_path / "all.urdf", f'<robot name="all"><link name="base"/>{"".join(CLOSINGS)}</robot>')
     given = read_urdf(read_xml(path), path)
     before = {body.name: body.place for body in given.bodies}
     assert all(gap_of(each, before).distance > 0.01 for each in given.closures)
@@ -360,3 +355,43 @@ def test_newton_closes_every_kind_of_joint(tmp_path: Path) -> None:
 def place(body: str, frame: Frame, places: dict[str, Frame]) -> Array:
     """The axis z of a frame on a body, in the world."""
     return np.asarray((places[body] @ frame).rotation[:, 2])
+
+
+# Loops that Newton's method leaves open where a model stands: other starts, and loops that cannot close at all.
+
+
+def model(end: str) -> str:
+    """Two chains along x from the base: the end of the one, at (2, 0, 0), is joined to a place of the other's plate."""
+
+    def link(name: str, place: str, joint: str, inner: str) -> str:
+        hinge = f'<joint name="{joint}" axis="0 0 1"/><geom size="1"/>'
+        return f'<body name="{name}" pos="{place}">{hinge}{inner}</body>'
+
+    one = link("a1", "0 0 0", "a_root", link("a2", "1 0 0", "a_knee", '<site name="a_end" pos="1 0 0"/>'))
+    plate = link("plate", "1 0 0", "c_end", f'<site name="p" pos="{end}"/>')
+    other = link("c1", "-0.5 0 0", "c_root", plate)
+    equality = '<equality><connect name="shut" site1="a_end" site2="p"/></equality>'
+    motor = '<actuator><motor joint="c_root"/></actuator>'
+    return f"<mujoco><worldbody>{one}{other}</worldbody>{equality}{motor}</mujoco>"
+
+
+def test_a_straight_chain_is_closed_from_another_start(tmp_path: Path) -> None:
+    """Every joint moves the ends across x, along which they are apart: Newton's step is zero."""
+    found = imported(tmp_path, model("1 0 0"), "loop.xml", Ends("plate"))
+    place = {joint["name"]: np.array(joint["at"]) for limb in found.tables["limb"] for joint in limb["joints"]}
+    chain: list[Array] = [place["a_root"], place["a_knee"]]
+    for one, other in pairwise(chain):
+        assert np.linalg.norm(other - one) == pytest.approx(1.0, abs=1e-12)
+    assert np.linalg.norm(place["c_end"] - place["c_root"]) == pytest.approx(1.0, abs=1e-12)
+    assert any("Newton's method" in note for note in found.notes)
+
+
+def test_a_loop_that_cannot_close_is_named_with_its_least_gap(tmp_path: Path) -> None:
+    """All hinges are parallel to z, in which the ends differ by 0.25: no motion of any joint changes that."""
+    with pytest.raises(InputError, match="Newton's method, which came no closer") as fault:
+        imported(tmp_path, model("1 0.3 0.25"), "loop.xml", Ends("plate"))
+    words = str(fault.value)
+    assert "a loop stays open by parts of the size: shut by" in words
+    size = float(words.partition("robot's size ")[2].split()[0])
+    assert float(words.partition("shut by ")[2].split(";")[0]) * size == pytest.approx(0.25, rel=0.02)
+    assert "correct the frames" in words

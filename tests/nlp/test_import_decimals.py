@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from builders import Array, Run, output_of, refusal_of
 
 from screwsynth.models.joints import robot
 from screwsynth.models.mechanism import (
@@ -27,9 +27,6 @@ from screwsynth.nlp.exchange.reading.filetext import robot_file_text
 from screwsynth.nlp.exchange.reading.importing import Request, import_robot
 from screwsynth.nlp.exchange.reading.reduction import Ends
 from screwsynth.nlp.exchange.reading.snapping import near_misses, snapped
-
-Run = Callable[..., tuple[int, str, str]]
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 E = np.eye(3)
 
@@ -205,8 +202,7 @@ def test_snap_reads_legs_as_straight_ones(tmp_path: Path, cli: Run) -> None:
     pytest.importorskip("mujoco")
     model, out = tmp_path / "legs.xml", tmp_path / "legs.toml"
     model.write_text(legs_of_decimals(8e-7))
-    code, text, err = cli("import", str(model), "--platform", "top", "--out", str(out))
-    assert (code, err) == (0, "")
+    text = output_of(cli("import", str(model), "--platform", "top", "--out", str(out)))
     words = " ".join(text.split())
     assert "nearly meet: off by 8e-07" in words
     assert "they stay as they are; --snap" in words
@@ -216,9 +212,10 @@ def test_snap_reads_legs_as_straight_ones(tmp_path: Path, cli: Run) -> None:
     assert [[joint["type"] for joint in each["joints"]] for each in found.tables["limb"]] == [list("UPS")] * 6
     J = [wrenches_of(each.mechanism, 1.0).jacobian for each in (plain, found)]
     np.testing.assert_allclose(J[0].T @ J[0], J[1].T @ J[1], atol=1e-5)
-    code, text, err = cli("import", str(model), "--platform", "top", "--out", str(out), "--snap", "-1")
-    assert (code, text) == (2, "")
-    assert "--snap -1: must be finite and not negative" in err
+    refusal_of(
+        cli("import", str(model), "--platform", "top", "--out", str(out), "--snap", "-1"),
+        "--snap -1: must be finite and not negative",
+    )
 
 
 FIVE_BAR = """<robot name="bars"><link name="base"/>{links}

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import Array
 
 from screwsynth.models.mechanism import wrenches_of
 from screwsynth.nlp import InputError
@@ -22,7 +23,6 @@ from screwsynth.nlp.exchange.reading.reduction import Ends
 from screwsynth.nlp.exchange.reading.xmltext import read_xml
 
 mujoco = pytest.importorskip("mujoco")
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 INERTIA = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 JOINTS = ("hinge", "slide", "ball", "free", "hinge slide", "hinge hinge hinge", "slide hinge ball", "")

@@ -5,13 +5,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import reachy
-
-Run = Callable[..., tuple[int, str, str]]
+from builders import Run, refusal_of, saved
 
 HEAD = reachy.mjcf()
 URDF = reachy.urdf("constraints")
@@ -141,20 +139,19 @@ def test_the_extra_that_is_missing_is_named(tmp_path: Path, cli: Run, monkeypatc
     urdf.write_text(URDF, encoding="utf-8")
     monkeypatch.setitem(sys.modules, "mujoco", None)
     monkeypatch.setitem(sys.modules, "yaml", None)
-    code, shown, err = cli("import", str(model), *BODY, "--out", str(out))
-    assert (code, shown) == (2, "")
+    err = refusal_of(cli("import", str(model), *BODY, "--out", str(out)))
     assert err == "screwsynth: MJCF files need mujoco, which is not installed: pip install 'screwsynth[robots]'\n"
     # URDF needs neither, until a YAML file states its loops.
     assert cli("import", str(urdf), *ALL, "--out", str(out))[0] == 0
     urdf.with_suffix(".yaml").write_text(PAIRS, encoding="utf-8")
-    code, shown, err = cli("import", str(urdf), *ALL, "--out", str(tmp_path / "second.toml"))
-    assert (code, shown) == (2, "")
-    assert "YAML files of loops need pyyaml, which is not installed: pip install 'screwsynth[robots]'" in err
+    refusal_of(
+        cli("import", str(urdf), *ALL, "--out", str(tmp_path / "second.toml")),
+        "YAML files of loops need pyyaml, which is not installed: pip install 'screwsynth[robots]'",
+    )
 
 
 def test_inputs_are_not_written_over(tmp_path: Path, cli: Run) -> None:
-    model = tmp_path / "m.xml"
-    model.write_text(HEAD, encoding="utf-8")
+    model = saved(tmp_path / "m.xml", HEAD)
     code, _, err = cli("import", str(model), *BODY, "--out", str(model))
     assert code == 2
     assert "is the model that is read, which would be lost" in err

@@ -7,12 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import Case, Rotation, Task, evaluate, formulate, load_case, solve
-
-Array = NDArray[np.float64]
 
 PRINTED_PITCH_1, PRINTED_PITCH_0, PRINTED_4_3, PRINTED_4_4 = 400.3, 284.4, 524.7, 457.5
 

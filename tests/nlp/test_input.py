@@ -3,12 +3,12 @@
 import json
 import math
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from builders import Run, output_of, refusal_of, saved
 
 import screwsynth.cases
 from screwsynth.models import model_names
@@ -17,27 +17,20 @@ from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.case.tomltext import toml_text
 
 CASES = Path(screwsynth.cases.__file__).parent
-Run = Callable[..., tuple[int, str, str]]
 
 HEAD = """
 [units]
 length = "mm"
 [robot]
 model = "stewart-gough"
-[robot.parameters]
-x1 = { min = 10, max = 12 }
-x2 = 8
-x3 = 20
-x4 = 8
+parameters = { x1 = { min = 10, max = 12 }, x2 = 8, x3 = 20, x4 = 8 }
 """
 POSE = "[pose]\nposition = [1, 2, 30]\nrotation = {}\n"
 TASK = '[[task]]\nsense = "max"\naxis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1\n'
 
 
 def written(folder: Path, text: str, name: str = "case.toml") -> str:
-    path = folder / name
-    path.write_text(text, encoding="utf-8")
-    return str(path)
+    return str(saved(folder / name, text))
 
 
 def rotated(folder: Path, rotation: str) -> str:
@@ -45,9 +38,7 @@ def rotated(folder: Path, rotation: str) -> str:
 
 
 def data(cli: Run, *arguments: str) -> dict[str, Any]:
-    code, out, err = cli(*arguments, "--json", "-")
-    assert (code, err) == (0, "")
-    found: dict[str, Any] = json.loads(out)
+    found: dict[str, Any] = json.loads(output_of(cli(*arguments, "--json", "-")))
     return found
 
 
@@ -87,8 +78,7 @@ def test_solve_with_settings_solves_the_edited_case(tmp_path: Path, cli: Run) ->
 
 def test_a_proof_with_settings_is_of_the_case_with_them(tmp_path: Path, cli: Run) -> None:
     proof = str(tmp_path / "set.proof")
-    code, _, err = cli("certify", "paper-4.1-helical", "--set", "p_z=40", "--starts", "2", "--proof", proof)
-    assert (code, err) == (0, "")
+    output_of(cli("certify", "paper-4.1-helical", "--set", "p_z=40", "--starts", "2", "--proof", proof))
     code, out, _ = cli("verify-proof", proof)
     assert code == 0
     best = data(cli, "solve", "paper-4.1-helical", "--set", "p_z=40", "--starts", "4")["F"]
@@ -126,10 +116,7 @@ def test_pages_and_c_carry_the_case_with_its_settings(tmp_path: Path, cli: Run) 
 )
 def test_settings_that_are_refused(command: str, setting: str, words: str, tmp_path: Path, cli: Run) -> None:
     target = ("--out", str(tmp_path / "out")) if command in ("report", "codegen") else ()
-    code, out, err = cli(command, "paper-4.1-helical", "--set", setting, *target)
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert words in err
+    refusal_of(cli(command, "paper-4.1-helical", "--set", setting, *target), words)
     assert not (tmp_path / "out").exists()
 
 
@@ -219,11 +206,7 @@ def test_faults_of_a_csv_file_name_file_row_and_column(
     text: str, words: tuple[str, ...], tmp_path: Path, cli: Run
 ) -> None:
     written(tmp_path, text, "trajectory.csv")
-    code, out, err = cli("evaluate", written(tmp_path, 'poses = "trajectory.csv"\n' + HEAD + TASK))
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    for word in words:
-        assert word in err
+    refusal_of(cli("evaluate", written(tmp_path, 'poses = "trajectory.csv"\n' + HEAD + TASK)), *words)
 
 
 def test_faults_of_a_task_row(tmp_path: Path) -> None:
@@ -308,11 +291,7 @@ def test_forms_of_a_rotation_in_python() -> None:
     ],
 )
 def test_rotations_that_are_refused(rotation: str, words: tuple[str, ...], tmp_path: Path, cli: Run) -> None:
-    code, out, err = cli("evaluate", rotated(tmp_path, rotation))
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    for word in words:
-        assert word in err
+    refusal_of(cli("evaluate", rotated(tmp_path, rotation)), *words)
 
 
 def test_the_schema_knows_files_and_forms_of_rotations(tmp_path: Path, cli: Run) -> None:

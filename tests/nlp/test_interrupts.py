@@ -99,10 +99,10 @@ def case(tmp_path: Path) -> str:
 
 
 #: Seconds: imports, set-up, starts. The commands share the set-up, so each has every second moment, in turns.
-MOMENTS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.1, 1.4, 1.8, 2.2, 2.6, 3.5)
+MOMENTS = (0.0, 0.1, 0.3, 0.6, 1.0, 1.8)
 OPTIONS = {
-    "solve": (),
     "report": ("--out", "page.html"),
+    "solve": (),
     "certify": (),
     "check": (),
     "tradeoff": (*OVER, "--page", "page.html"),
@@ -122,18 +122,17 @@ def check_interrupted(ended: Ended, folder: Path) -> None:
         assert left["page.html"].read_text(encoding="utf-8").rstrip().endswith("</html>")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("command", "after"), [(each, t) for k, each in enumerate(OPTIONS) for t in MOMENTS[k % 2 :: 2]]
+    ("command", "after"),
+    [
+        pytest.param(each, t, marks=[pytest.mark.slow] if t > 0.1 or each != "solve" else [])
+        for k, each in enumerate(OPTIONS)
+        for t in (MOMENTS if each == "solve" else MOMENTS[k % 2 :: 2])
+    ],
 )
 def test_at_any_moment(command: str, after: float, case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(Path(case).parent)
     check_interrupted(interrupted(after, command, case, *OPTIONS[command]), Path(case).parent)
-
-
-@pytest.mark.parametrize("after", [0.0, 0.1])
-def test_at_the_beginning(after: float, case: str) -> None:
-    check_interrupted(interrupted(after, "solve", case), Path(case).parent)
 
 
 def test_children_of_these_tests_can_be_interrupted(children_can_be_interrupted: Callable[[], None]) -> None:

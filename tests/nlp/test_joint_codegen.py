@@ -2,15 +2,14 @@
 
 import math
 import re
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from builders import case_from, starter_tables
 
-from screwsynth.models import robot_function
 from screwsynth.nlp import (
     ActuatorRate,
     Case,
@@ -22,11 +21,9 @@ from screwsynth.nlp import (
     Pose,
     QuantityLimit,
     RateShare,
-    case_from_tables,
     formulate,
 )
 from screwsynth.nlp.case.limits.limit import Limit
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.embedding.calls import find_calls
 from screwsynth.nlp.embedding.loops import find_loops
 from screwsynth.nlp.embedding.runtimelimits import run_time_limits
@@ -42,7 +39,7 @@ LIMITS = (
 
 
 def starter(name: str, *limits: Limit[Any], poses: int = 1) -> Case:
-    case = case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
+    case = case_from(starter_tables(name), name)
     further = [Pose(case.position, case.rotation)] * (poses - 1)
     return replace(case, limits=Limits(*limits), further=further, over_poses=OverPoses.MEAN)
 

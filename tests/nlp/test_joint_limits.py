@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import pickle
-import tomllib
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array, Run, case_from, output_of, saved, starter_tables, turn_about
 
 from screwsynth.models import Model, Substitution, robot, stewart_gough
 from screwsynth.nlp import (
@@ -38,11 +36,8 @@ from screwsynth.nlp import (
     margins_of,
     solve,
 )
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
 
-Run = Callable[..., tuple[int, str, str]]
-Array = NDArray[np.float64]
 Place = tuple[Array, Array]
 
 B, E, A, M = [1.0, 0.1, 0.0], [1.1, -0.2, 0.5], [0.6, 0.2, 1.1], [0.8, 0.3, 0.6]
@@ -85,12 +80,6 @@ LIMBS = {
     ],
     "parallelogram": [R(B, [0, 1, 0], **DRIVEN), R(E, [0, 1, 0]), Pa(E, [1, 0, 0.3], to=A), R(A, [0, 1, 0.1])],
 }
-
-
-def turn_about(axis: list[float], angle: float) -> Array:
-    x, y, z = np.array(axis) / np.linalg.norm(axis)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K)
 
 
 def moved(each: dict[str, Any], q: Array) -> Place:
@@ -185,7 +174,7 @@ def rus_case(**limits: object) -> Case:
         "task": [{"name": "one", "sense": "max", "axis": [0, 0.3, 1], "point": [0.2, 0, 0], "pitch": 0.1}],
         "limits": limits,
     }  # fmt: skip
-    return case_from_tables(tables, name="rus", source="rus.toml")
+    return case_from(tables, "rus")
 
 
 def turned(limb: list[dict[str, Any]], Q: Array) -> list[dict[str, Any]]:
@@ -314,9 +303,7 @@ RPS_CASE = """
 length = "m"
 [robot]
 file = "robot.toml"
-[robot.parameters]
-rb = { min = 0.8, max = 1.2 }
-rp = { min = 0.4, max = 0.7 }
+parameters = { rb = { min = 0.8, max = 1.2 }, rp = { min = 0.4, max = 0.7 } }
 [pose]
 position = [{ min = -0.3, max = 0.3 }, { min = -0.3, max = 0.3 }, { min = 0.9, max = 1.3 }]
 rotation = { angle = { min = -30, max = 30 } }
@@ -332,16 +319,14 @@ slide = { min = -0.05, max = 0.08 }
 
 def put(folder: Path, limits: str, robot_text: str = RPS) -> str:
     (folder / "robot.toml").write_text(robot_text, encoding="utf-8")
-    path = folder / "case.toml"
-    path.write_text(RPS_CASE + limits, encoding="utf-8")
-    return str(path)
+    return str(saved(folder / "case.toml", RPS_CASE + limits))
 
 
 def test_an_active_limit_has_its_cost_and_a_case_file_of_its_own(tmp_path: Path) -> None:
     case = replace(load_case(put(tmp_path, '"1:1" = { min = -5 }\nball = { cone = 20 }\n')), search=Search(starts=3))
     slide, hinge = JointMotion("slide", min=-0.05, max=0.08), JointMotion("1:1", min=-math.radians(5))
     assert case.limits == Limits(slide, hinge, JointCone("ball", math.radians(20)))
-    again = case_from_tables(tomllib.loads(case.to_toml()), name="case", source="again")
+    again = case_from(case.to_toml(), "case")
     assert again.limits == case.limits
 
     def solved(step: float) -> float:
@@ -398,7 +383,7 @@ def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) ->
     two = RPS.replace('type = "R", at', 'type = "R", name = "slide", at')
     with pytest.raises(CaseError, match=r"robot\.toml: limb 1, joints: has two joints with the name 'slide'"):
         load_case(put(tmp_path, "", two))
-    legs = case_from_tables(tomllib.loads(starter_case(stewart_gough())), name="legs", source="legs.toml")
+    legs = case_from_tables(starter_tables(stewart_gough()), name="legs", source="legs.toml")
     for limit, key in ((JointMotion("1:1", max=1.0), "joint.1:1"), (LinkClearance(1.0), "link_clearance")):
         with pytest.raises(CaseError, match=rf"limits\.{key}: is nothing that 'stewart-gough' has; it has leg_length"):
             replace(legs, limits=Limits(limit))
@@ -408,7 +393,7 @@ def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) ->
 
 
 def test_rates_of_straight_legs_are_their_work_rates() -> None:
-    case = case_from_tables(tomllib.loads(starter_case(stewart_gough())), name="legs", source="legs.toml")
+    case = case_from_tables(starter_tables(stewart_gough()), name="legs", source="legs.toml")
     nlp = formulate(replace(case, limits=Limits(ActuatorRate(2.0))))
     rows = [row.value for row in margins_of(nlp, nlp.start, optimal=False)]
     assert sorted(rows) == pytest.approx(sorted(np.abs(evaluate(nlp, nlp.start).rates)), rel=1e-12)
@@ -421,8 +406,7 @@ def test_numbers_of_joints_are_set_on_the_command_line(tmp_path: Path, cli: Run)
         ("limits.joint.1:1.min=-7", "joint.1:1.min"),
         ("limits.joint.ball.cone=30", "joint.ball.cone"),
     ):
-        status, out, err = cli("evaluate", name, "--set", setting, "--set", "rb=1", "--set", "p_z=1.1")
-        assert (status, err) == (0, "")
+        out = output_of(cli("evaluate", name, "--set", setting, "--set", "rb=1", "--set", "p_z=1.1"))
         assert shown in out
 
 

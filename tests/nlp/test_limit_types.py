@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
+from builders import starter_tables
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import CaseError, LegLength, Limits, Status, case_from_tables, margins_of, solve
@@ -23,7 +24,6 @@ from screwsynth.nlp.case.limits.interval import IntervalLimit
 from screwsynth.nlp.case.limits.limit import PosedRobot
 from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
 from screwsynth.nlp.case.schema import Document
-from screwsynth.nlp.case.starter import starter_case
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
@@ -63,7 +63,7 @@ class Height(IntervalLimit):
 
 
 def test_a_limit_outside_of_the_registry_limits_a_case_made_in_python() -> None:
-    written = case_from_tables(tomllib.loads(starter_case(stewart_gough())), name="high", source="high.toml")
+    written = case_from_tables(starter_tables(stewart_gough()), name="high", source="high.toml")
     case = replace(written, limits=Limits(Height(min=36.5), LegLength(max=60.0)))
     assert [limit.name for limit in case.limits] == ["leg_length", "height"]
     solution = solve(case, starts=2)

@@ -15,10 +15,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Array, Run, case_from, saved
 from casadi import SX
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from screwsynth.models import Model, hexapod, robot_function, stewart_gough, three_upu
 from screwsynth.nlp import (
@@ -35,7 +35,6 @@ from screwsynth.nlp import (
     Solution,
     Status,
     Task,
-    case_from_tables,
     json_data,
     result_of,
 )
@@ -48,27 +47,20 @@ from screwsynth.nlp.solver.compromise import solution_of_one_task
 from screwsynth.nlp.solver.multistart import solve_program
 from screwsynth.nlp.solver.starts import StartStatus
 
-Array = NDArray[np.float64]
-Run = Any
-
 HEXAPOD = """
 [units]
 length = "cm"
-
 [robot]
 model = "stewart-gough"
 layout = "octahedral"
-
 [robot.parameters]
 x1 = { min = 8, max = 16 }
 x2 = { min = 4, max = 9 }
 x3 = { min = 2, max = 28 }
 x4 = { min = 2, max = 28 }
-
 [pose]
 position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 50 }]
 rotation = { angle = { min = -30, max = 30 } }
-
 [[task]]
 sense = "max"
 axis = [2, 2, 1]
@@ -100,7 +92,7 @@ def case_with(limits: dict[str, Any], text: str = HEXAPOD) -> Case:
     tables = tomllib.loads(text)
     if limits:
         tables["limits"] = copy.deepcopy(limits)
-    return case_from_tables(tables, name="hexapod", source="hexapod.toml")
+    return case_from(tables, "hexapod")
 
 
 def solved(case: Case, *first: Array, starts: int = 4) -> Solution:
@@ -287,9 +279,7 @@ THREE_UPU = """
 [robot]
 model = "three-upu"
 axes = "tsai"
-[robot.parameters]
-base_radius = { min = 20, max = 60 }
-platform_radius = { min = 10, max = 40 }
+parameters = { base_radius = { min = 20, max = 60 }, platform_radius = { min = 10, max = 40 } }
 [pose]
 position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 80 }]
 [[task]]
@@ -394,8 +384,7 @@ def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible()
 
 
 def test_evaluate_shows_margins_and_exits_with_1_outside_of_a_limit(cli: Run, tmp_path: Path) -> None:
-    path = tmp_path / "case.toml"
-    path.write_text(HEXAPOD + "[limits]\nleg_length = { max = 30 }\n", encoding="utf-8")
+    path = saved(tmp_path / "case.toml", HEXAPOD + "[limits]\nleg_length = { max = 30 }\n")
     code, out, _ = cli("evaluate", str(path))
     assert code == 1
     assert "violated: leg_length limb 1-" in out

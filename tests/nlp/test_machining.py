@@ -13,22 +13,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array, Run, case_from, saved
 
-from screwsynth.nlp import Case, Solution, Status, case_from_tables, formulate, json_data, result_of, solve
+from screwsynth.nlp import Case, Solution, Status, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.evidence.tolerance import BuiltRobot
 from screwsynth.nlp.solver.compromise import solution_of_one_task
 from screwsynth.nlp.solver.multistart import solve_program
 
-Array = NDArray[np.float64]
-Run = Any
 TABLES = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))
 
 
 def case_of(tables: dict[str, Any]) -> Case:
-    return case_from_tables(copy.deepcopy(tables), name="machine", source="machine.toml")
+    return case_from(tables, "machine")
 
 
 def changed(*path: str | int, to: Any) -> dict[str, Any]:  # noqa: ANN401 - whatever TOML can hold
@@ -192,8 +190,7 @@ def test_an_impossible_variant_names_the_limit_and_by_how_much(name: str) -> Non
 
 def test_the_command_says_what_would_make_it_possible(cli: Run, tmp_path: Path) -> None:
     text = find_case("hexapod-machining").read_text(encoding="utf-8")
-    path = tmp_path / "small.toml"
-    path.write_text(text.replace("base = 28", "base = 18"), encoding="utf-8")
+    path = saved(tmp_path / "small.toml", text.replace("base = 28", "base = 18"))
     code, out, _ = cli("solve", str(path), "--starts", "2")
     assert code == 1
     assert "would be feasible with footprint.base = 20 in instead of 18 in" in out

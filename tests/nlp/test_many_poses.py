@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-import tomllib
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array, case_from
 
-from screwsynth.nlp import Case, Solution, Status, case_from_tables, certify, formulate, json_data, result_of, solve
+from screwsynth.nlp import Case, Solution, Status, certify, formulate, json_data, result_of, solve
 from screwsynth.nlp.evidence.kkt import linearise
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.program import limits as program_limits
 from screwsynth.nlp.program.pairs import with_all_pairs, with_pairs_at
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.phase import Phase
-
-Array = NDArray[np.float64]
 
 
 def case_of(
@@ -45,7 +42,7 @@ def case_of(
     lines.append(f'[combine]\nover_poses = "{over}"\n[solve]\nstarts = {starts}')
     lines.append(f'[[task]]\nname = "drive"\nsense = "{sense}"\naxis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1')
     lines.append(f"[limits]\nactuator = {{ dead_length = 6, stroke_max = {stroke} }}")
-    return case_from_tables(tomllib.loads("\n".join(lines)), name="many", source="many.toml")
+    return case_from("\n".join(lines), "many")
 
 
 def lengths_of(solution: Solution) -> Array:
@@ -172,7 +169,7 @@ def test_a_worst_case_is_not_held_back_by_the_estimate_of_its_level() -> None:
     lines += [f"{plate}_{i} = [{free}, {free}, 0]" for plate in ("base", "platform") for i in range(1, 7)]
     lines += ["[[pose]]\nposition = [0, 0, 10]\n[[pose]]\nposition = [0, 1, 10]\n[combine]\nover_poses = 'worst'"]
     lines += ["[[task]]\nsense = 'max'\naxis = [0, 0, 1]\npoint = [0, 0, 0]\npitch = 0\n[solve]\nstarts = 2"]
-    solution = solve(case_from_tables(tomllib.loads("\n".join(lines)), name="wide", source="wide"))
+    solution = solve(case_from("\n".join(lines), "wide"))
     assert solution.status is Status.OPTIMAL
     assert solution.evidence is not None
     assert "level" not in [side.name for side in solution.evidence.active]

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from builders import Run, output_of, refusal_of, saved
 
 from screwsynth.models import model_names, robot_function, stewart_gough
 from screwsynth.models.catalog import AmbiguousModelError
 from screwsynth.nlp import Case, CaseError, Free, LegLength, Limits, Rotation, Search, Task, build_model, load_case
 from screwsynth.nlp.case.source import find_case
-
-Run = Callable[..., tuple[int, str, str]]
 
 TEXT = find_case("paper-4.1-helical").read_text(encoding="utf-8")
 PROGRAM = f"{sys.executable} -P -m screwsynth.nlp"
@@ -97,13 +96,8 @@ def test_a_byte_order_mark(tmp_path: Path, cli: Run) -> None:
 )
 @pytest.mark.parametrize("command", ["evaluate", "solve", "certify"])
 def test_constants_without_a_value(relation: str, words: str, command: str, tmp_path: Path, cli: Run) -> None:
-    path = tmp_path / "case.toml"
-    path.write_text(TEXT.replace("[[task]]", f'[limits]\ncustom = ["{relation}"]\n[[task]]', 1), encoding="utf-8")
-    code, out, err = cli(command, str(path))
-    assert (code, out) == (2, "")
-    assert len(err.splitlines()) == 1
-    assert "case.toml: limits.custom[0]" in err
-    assert words in err
+    path = saved(tmp_path / "case.toml", TEXT.replace("[[task]]", f'[limits]\ncustom = ["{relation}"]\n[[task]]', 1))
+    refusal_of(cli(command, str(path)), "case.toml: limits.custom[0]", words)
 
 
 def test_powers_that_stay(tmp_path: Path) -> None:
@@ -216,8 +210,7 @@ def test_a_broken_plug_in_beside_a_good_one(
     for name in ("broken", "good"):
         monkeypatch.syspath_prepend(str(tmp_path / name))
         monkeypatch.delitem(sys.modules, name, raising=False)
-    code, out, err = cli("models")
-    assert (code, err) == (0, "")
+    out = output_of(cli("models"))
     assert "walker" in out
     assert cli("models", "walker")[0] == 0
     code, out, err = cli("models", "broken")

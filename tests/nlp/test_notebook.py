@@ -5,12 +5,12 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from builders import Run
 
 from screwsynth.models import Model, hexapod, shown, stewart_gough, three_upu
 from screwsynth.nlp import (
@@ -33,8 +33,6 @@ from screwsynth.nlp import (
     solve_program,
 )
 from screwsynth.nlp.output.pictures import requirements
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -106,11 +104,15 @@ def test_a_notebook_shows_table_and_drawing(solution: Solution, certified: Certi
     assert html_of(3) is None
 
 
+#: The first shipped case of each robot, whose drawing is the same for the others.
+OF_ROBOT = {(case.model.name, str(case.model.options)): case.name for case in map(load_case, reversed(shipped_cases()))}
+
+
 @pytest.mark.parametrize("name", shipped_cases())
 def test_every_case_and_its_robot_are_drawn(name: str) -> None:
     pytest.importorskip("matplotlib")
     case = load_case(name)
-    for value in (case, case.model):
+    for value in (case, case.model) if name in OF_ROBOT.values() else (case,):
         assert image(value._repr_html_() or "").tag.endswith("svg")
 
 

@@ -1,16 +1,14 @@
 """Outputs never destroy inputs, one another, or files of another origin."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from builders import Run, output_of, saved
 
 from screwsynth.nlp import InputError
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.output.files import MANIFEST, write_folder
-
-Run = Callable[..., tuple[int, str, str]]
 
 TEXT = find_case("paper-4.1-helical").read_text(encoding="utf-8")
 # Each command with an output in the place of OUT.
@@ -29,9 +27,7 @@ COMMANDS = [
 
 @pytest.fixture
 def case(tmp_path: Path) -> Path:
-    path = tmp_path / "case.toml"
-    path.write_text(TEXT, encoding="utf-8")
-    return path
+    return saved(tmp_path / "case.toml", TEXT)
 
 
 def refused(answer: tuple[int, str, str], *words: str) -> None:
@@ -59,8 +55,7 @@ def test_an_output_that_is_the_case_file(command: tuple[str, ...], way: str, cas
 
 
 def test_a_picture_that_is_the_case_file(tmp_path: Path, cli: Run) -> None:
-    path = tmp_path / "case.svg"
-    path.write_text(TEXT, encoding="utf-8")
+    path = saved(tmp_path / "case.svg", TEXT)
     refused(cli("solve", str(path), "--starts", "1", "--plot", str(path)), "--plot", "is the case file")
     assert path.read_text(encoding="utf-8") == TEXT
 
@@ -71,11 +66,7 @@ poses = "poses.svg"
 tasks = "sub/tasks.svg"
 [robot]
 model = "stewart-gough"
-[robot.parameters]
-x1 = 12
-x2 = 8
-x3 = 30
-x4 = { min = 5, max = 20 }
+parameters = { x1 = 12, x2 = 8, x3 = 30, x4 = { min = 5, max = 20 } }
 """
 ROWS = {
     "poses.svg": "x,y,z\n0,0,30\n",
@@ -141,8 +132,7 @@ def test_two_outputs_in_one_file(command: tuple[str, ...], linked: bool, case: P
 
 
 def test_a_device_takes_two_outputs(case: Path, cli: Run) -> None:
-    code, _, err = cli("check", str(case), "--json", os.devnull, "--junit", os.devnull)
-    assert (code, err) == (0, "")
+    output_of(cli("check", str(case), "--json", os.devnull, "--junit", os.devnull))
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)

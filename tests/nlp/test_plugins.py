@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from builders import Run, edited, output_of, refusal_of, saved
 
 from screwsynth.models import model_names, robot_function
 from screwsynth.models.catalog import gallery_names
@@ -83,7 +84,6 @@ def hexapod() -> Model:
 CASE = """\
 [units]
 length = "cm"
-
 [robot]
 model = "tripod"
 legs = 6
@@ -92,25 +92,18 @@ drive = "fast"
 spread = 1.5
 brand = "any"
 characteristic_length = 5
-
-[robot.parameters]
-radius = { min = 8, max = 12 }
-small = 6
-
+parameters = { radius = { min = 8, max = 12 }, small = 6 }
 [pose]
 position = [0, 0, 30]
-
 [[task]]
 sense = "max"
 axis = [0, 1, 2]
 point = [1, 0, 30]
 pitch = 2
-
 [solve]
 starts = 3
 """
 
-Run = Callable[..., tuple[int, str, str]]
 Install = Callable[..., Path]
 
 
@@ -145,37 +138,20 @@ def tripod(install: Install) -> Path:
 
 
 def case_file(folder: Path, *edits: tuple[str, str]) -> str:
-    text = CASE
-    for old, new in edits:
-        assert old in text, f"{old!r} is not in the base text"
-        text = text.replace(old, new, 1)
-    path = folder / "case.toml"
-    path.write_text(text, encoding="utf-8")
-    return str(path)
-
-
-def check_refused(ended: tuple[int, str, str], *words: str) -> None:
-    code, out, err = ended
-    assert code == 2
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    for word in words:
-        assert word in err
+    return str(saved(folder / "case.toml", edited(CASE, *edits)))
 
 
 @pytest.mark.usefixtures("tripod")
 def test_it_is_listed_behind_the_shipped_ones(cli: Run) -> None:
     assert model_names() == ("stewart-gough", "hexapod", "three-upu", *gallery_names(), "tripod")
-    code, out, err = cli("models")
-    assert (code, err) == (0, "")
+    out = output_of(cli("models"))
     assert [line.split()[0] for line in out.splitlines() if not line.startswith(" ")] == ["robot", *model_names()]
     assert "legs and a joint" in out
 
 
 @pytest.mark.usefixtures("tripod")
 def test_it_is_shown_with_its_options(cli: Run) -> None:
-    code, out, err = cli("models", "tripod")
-    assert (code, err) == (0, "")
+    out = output_of(cli("models", "tripod"))
     for word in ("legs", "int", "twisted", "bool", '"fast", "slow"', '"slow"', "radius", "small", "couple", "joint"):
         assert word in out
 
@@ -194,20 +170,15 @@ def test_defaults_are_shown_as_a_case_writes_them(cli: Run) -> None:
 @pytest.mark.usefixtures("tripod")
 def test_it_is_solved_like_a_shipped_one(tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path)
-    code, out, err = cli("solve", path, "--json", "-")
-    assert (code, err) == (0, "")
-    result = json.loads(out)
+    result = json.loads(output_of(cli("solve", path, "--json", "-")))
     assert (result["model"], result["status"], len(result["rates"])) == ("tripod", "optimal", 7)
     assert result["limbs"] == [*(f"leg {i}" for i in range(1, 7)), "joint"]
     assert result["characteristic_length"] == 5
     assert sum(rate**2 for rate in result["rates"]) == pytest.approx(result["F"], rel=1e-12)
-    code, out, err = cli("solve", path)
-    assert (code, err) == (0, "")
+    out = output_of(cli("solve", path))
     assert "(optimal" in out
     assert "couple" in out
-    code, out, err = cli("evaluate", path, "--set", "radius=9", "--json", "-")
-    assert (code, err) == (0, "")
-    assert json.loads(out)["parameters"]["radius"] == 9
+    assert json.loads(output_of(cli("evaluate", path, "--set", "radius=9", "--json", "-")))["parameters"]["radius"] == 9
 
 
 def test_it_is_found_by_a_new_process(tripod: Path, tmp_path: Path) -> None:
@@ -264,16 +235,14 @@ def test_its_options_are_checked_against_its_signature(
     with pytest.raises(CaseError) as refused:
         load_case(path)
     assert refused.value.key == key
-    check_refused(cli("solve", path), "case.toml", key, *words)
+    refusal_of(cli("solve", path), "case.toml", key, *words)
 
 
 @pytest.mark.usefixtures("tripod")
 def test_a_new_case_for_it_solves(tmp_path: Path, cli: Run) -> None:
-    code, text, err = cli("new", "tripod")
-    assert (code, err) == (0, "")
+    text = output_of(cli("new", "tripod"))
     assert tomllib.loads(text)["robot"]["twisted"] is False
-    path = tmp_path / "mine.toml"
-    path.write_text(text, encoding="utf-8")
+    path = saved(tmp_path / "mine.toml", text)
     assert cli("solve", str(path), "--starts", "4")[0] == 0
 
 
@@ -301,8 +270,7 @@ def test_a_shipped_name_cannot_be_taken_over(install: Install, cli: Run) -> None
     assert model_names() == ("stewart-gough", "hexapod", "three-upu", *gallery_names(), "tripod")
     assert robot_function("hexapod").__module__ == "screwsynth.models.hexapod"
     assert build_model("stewart-gough").parameters[0].name == "x1"
-    code, out, err = cli("models")
-    assert (code, err) == (0, "")
+    out = output_of(cli("models"))
     assert sum(line.startswith("hexapod") for line in out.splitlines()) == 1
     assert cli("solve", "paper-4.1-helical", "--starts", "1")[0] == 0
 
@@ -323,13 +291,12 @@ def test_an_option_without_a_default(install: Install, tmp_path: Path, cli: Run)
     path = case_file(tmp_path, *edits)
     assert cli("solve", path)[0] == 0
     path = case_file(tmp_path, *edits, ("size = 6\n", ""))
-    check_refused(cli("solve", path), "case.toml", "robot.size", "missing", "'sized'")
+    refusal_of(cli("solve", path), "case.toml", "robot.size", "missing", "'sized'")
 
 
 def test_an_option_without_a_default_does_not_hide_the_other_robots(install: Install, cli: Run) -> None:
     install({"sized": "robots:sized"})
-    code, out, err = cli("models")
-    assert (code, err) == (0, "")
+    out = output_of(cli("models"))
     for name in ("stewart-gough", "hexapod", "sized"):
         assert name in out
     code, out, _ = cli("models", "sized")
@@ -349,8 +316,7 @@ def test_text_in_square_brackets_is_shown_as_it_is(install: Install, tmp_path: P
         (("models", "tripod"), "[leg0]"),
         (("evaluate", case_file(tmp_path)), "[leg0]"),
     ):
-        code, out, err = cli(*arguments)
-        assert (code, err) == (0, "")
+        out = output_of(cli(*arguments))
         assert word in out
 
 
@@ -380,8 +346,7 @@ each_faulty = pytest.mark.parametrize("faulty", FAULTY.values(), ids=FAULTY)
 def test_a_faulty_robot_is_a_sentence(faulty: tuple[str, str, str], install: Install, tmp_path: Path, cli: Run) -> None:
     module, target, words = faulty
     install({"tripod": target}, module)
-    path = tmp_path / "case.toml"
-    path.write_text(PLAIN, encoding="utf-8")
+    path = saved(tmp_path / "case.toml", PLAIN)
     with pytest.raises(InputError) as refused:
         load_case(str(path))
     for said in (str(refused.value), cli("solve", str(path))[2]):
@@ -389,7 +354,7 @@ def test_a_faulty_robot_is_a_sentence(faulty: tuple[str, str, str], install: Ins
         assert "tripod" in said
         assert words in said
     for arguments in (("solve", str(path)), ("models", "tripod"), ("new", "tripod")):
-        check_refused(cli(*arguments), "tripod", words)
+        refusal_of(cli(*arguments), "tripod", words)
 
 
 @each_faulty
@@ -413,8 +378,7 @@ def test_parameters_with_the_names_of_the_pose(install: Install, tmp_path: Path,
     relation = '[limits]\ncustom = ["robot.p_x - 2*p_x + 0*robot.angle + 0*angle <= 20"]\n\n[solve]'
     path = case_file(tmp_path, *edits, ("position = [0, 0, 30]", pose), ("[solve]", relation))
 
-    code, out, err = cli("solve", path)
-    assert (code, err) == (0, "")
+    out = output_of(cli("solve", path))
     rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
     for name, words in {
         "robot.p_x": ("8 .. 12", "F/cm"),
@@ -424,9 +388,7 @@ def test_parameters_with_the_names_of_the_pose(install: Install, tmp_path: Path,
     }.items():
         assert all(word in rows[name] for word in words), rows[name]
 
-    code, out, err = cli("solve", path, "--json", "-")
-    assert (code, err) == (0, "")
-    result = json.loads(out)
+    result = json.loads(output_of(cli("solve", path, "--json", "-")))
     assert set(result["parameters"]) == {"p_x", "angle"}
     sensitivity = {row["name"]: row for row in result["sensitivity"]}
     assert (sensitivity["robot.angle"]["value"], sensitivity["angle"]["value"]) == (6, 5)
@@ -435,15 +397,13 @@ def test_parameters_with_the_names_of_the_pose(install: Install, tmp_path: Path,
     assert set(held) <= {"robot.p_x", "p_x", "custom: robot.p_x - 2*p_x + 0*robot.angle + 0*angle <= 20"}
 
     settings = ("--set", "robot.p_x=9", "--set", "robot.angle=7", "--set", "p_x=0.5", "--set", "angle=3")
-    code, out, err = cli("evaluate", path, *settings, "--json", "-")
-    assert (code, err) == (0, "")
-    result = json.loads(out)
+    result = json.loads(output_of(cli("evaluate", path, *settings, "--json", "-")))
     assert result["parameters"] == {"p_x": 9, "angle": 7}
     assert (result["pose"]["position"], result["pose"]["angle"]) == ([0.5, 0, 30], 3)
 
-    check_refused(cli("evaluate", path, "--set", "robot.p_y=1"), "robot.p_y", "did you mean 'robot.p_x'", "robot.angle")
+    refusal_of(cli("evaluate", path, "--set", "robot.p_y=1"), "robot.p_y", "did you mean 'robot.p_x'", "robot.angle")
     wrong = case_file(tmp_path, *edits, ("[solve]", '[limits]\ncustom = ["robot.p_y >= 1"]\n\n[solve]'))
-    check_refused(cli("solve", wrong), "limits.custom[0]", "'robot.p_y' at position 1", "did you mean 'robot.p_x'")
+    refusal_of(cli("solve", wrong), "limits.custom[0]", "'robot.p_y' at position 1", "did you mean 'robot.p_x'")
 
 
 def test_a_parameter_is_held_by_its_own_bound_and_not_by_that_of_the_pose(

@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from builders import Array, Run, case_from, saved
 
 from screwsynth.models import matrix_from_axis_angle, screw_from_axis
 from screwsynth.nlp import (
@@ -20,7 +20,6 @@ from screwsynth.nlp import (
     CaseError,
     PointKind,
     Status,
-    case_from_tables,
     evaluate,
     formulate,
     json_data,
@@ -31,22 +30,13 @@ from screwsynth.nlp.case.pose import along_screw, over_grid
 from screwsynth.nlp.evidence.tolerance import BuiltRobot, tolerance_loss
 from screwsynth.nlp.program.formulation import formulate_each
 
-Array = NDArray[np.float64]
-Run = Any
-
 HEAD = """
 [units]
 length = "cm"
-
 [robot]
 model = "stewart-gough"
 layout = "octahedral"
-
-[robot.parameters]
-x1 = { min = 8, max = 16 }
-x2 = { min = 4, max = 9 }
-x3 = { min = 2, max = 28 }
-x4 = 20
+parameters = { x1 = { min = 8, max = 16 }, x2 = { min = 4, max = 9 }, x3 = { min = 2, max = 28 }, x4 = 20 }
 """
 TASK = """
 [[task]]
@@ -96,7 +86,7 @@ leg_clearance = { min = 3 }
 def case_of(poses: str, over: str = "sum", limits: str = "", sense: str = "max") -> Case:
     combine = f'[combine]\nover_poses = "{over}"\n'
     tables = tomllib.loads(HEAD + poses + TASK.replace("SENSE", sense) + combine + limits)
-    return case_from_tables(tables, name="poses", source="poses.toml")
+    return case_from(tables, "poses")
 
 
 def by_hand(result: dict[str, Any], pose: dict[str, Any], twist: Array) -> tuple[float, Array]:
@@ -196,7 +186,7 @@ def test_one_listed_pose_is_that_pose() -> None:
     one = LISTED.rpartition("[[pose]]")[0]
     tables = tomllib.loads(HEAD + one + TASK.replace("SENSE", "max"))
     alone = tomllib.loads(HEAD + one.replace("[[pose]]", "[pose]") + TASK.replace("SENSE", "max"))
-    first, second = (solve(case_from_tables(each, name="one", source="one.toml")) for each in (tables, alone))
+    first, second = (solve(case_from(each, "one")) for each in (tables, alone))
     assert first.F == second.F
     assert "poses" not in json_data(result_of(first))
 
@@ -224,7 +214,7 @@ def test_several_tasks_over_several_poses_are_brought_together() -> None:
         + TASK.replace("SENSE", "max")
     )
     tables = tomllib.loads(text.replace("count = 3", 'count = 3\ntask = "drive"'))
-    compromise = solve(case_from_tables(tables, name="two", source="two.toml"))
+    compromise = solve(case_from(tables, "two"))
     assert compromise.all_solved
     assert compromise.combination is not None
     assert compromise.combination.value == pytest.approx(sum(outcome.F for outcome in compromise.outcomes), rel=1e-9)
@@ -252,7 +242,7 @@ def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None
         second = first.partition("[solve]")[0].replace("drive", "lift").replace("pitch = 1", "pitch = 5")
         text = HEAD + ALONG.partition("[pose.along")[0] + '[combine]\nmethod = "weighted-sum"\n' + second + first
         tables = tomllib.loads(f"{text}\n[limits]\nleg_length = {{ max = {longest} }}\n")
-        result: dict[str, Any] = json_data(result_of(solve(case_from_tables(tables, name="two", source="two.toml"))))
+        result: dict[str, Any] = json_data(result_of(solve(case_from(tables, "two"))))
         return result["combined"]
 
     (row,) = together(40.0)["limits"]
@@ -271,8 +261,9 @@ def test_an_optimum_over_poses_has_its_evidence() -> None:
 
 
 def test_commands_and_generated_code_have_every_pose(cli: Run, tmp_path: Path) -> None:
-    path = tmp_path / "poses.toml"
-    path.write_text(HEAD + ALONG + TASK.replace("SENSE", "max") + '[combine]\nover_poses = "worst"\n', encoding="utf-8")
+    path = saved(
+        tmp_path / "poses.toml", HEAD + ALONG + TASK.replace("SENSE", "max") + '[combine]\nover_poses = "worst"\n'
+    )
     code, out, _ = cli("solve", str(path))
     assert code == 0
     assert "worst over 3 poses" in out
@@ -287,8 +278,7 @@ def test_commands_and_generated_code_have_every_pose(cli: Run, tmp_path: Path) -
 
 
 def test_numbers_of_each_listed_pose_can_be_set(cli: Run, tmp_path: Path) -> None:
-    path = tmp_path / "poses.toml"
-    path.write_text(HEAD + LISTED + TASK.replace("SENSE", "max"), encoding="utf-8")
+    path = saved(tmp_path / "poses.toml", HEAD + LISTED + TASK.replace("SENSE", "max"))
     words = ["--set", "pose2_p_z=33", "--set", "pose2_angle=7", "--set", "x1=11", "--set", "pose1_axis=0,1,0"]
     code, out, err = cli("evaluate", str(path), *words, "--json", "-")
     assert code == 0, err
@@ -309,4 +299,4 @@ def test_worst_over_poses_with_several_tasks_is_refused() -> None:
     tables = tomllib.loads(HEAD + LISTED + TASK.replace("SENSE", "max") + '[combine]\nover_poses = "worst"\n')
     tables["task"].append({**tables["task"][0], "name": "other"})
     with pytest.raises(CaseError, match=r"combine\.over_poses = \"worst\": must be 'sum' or 'mean'"):
-        case_from_tables(tables, name="two", source="two.toml")
+        case_from(tables, "two")

@@ -1,18 +1,17 @@
 """Cases held to expected and published values: the shipped ones hold, and nothing that does not hold passes."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree  # what is parsed here was written here
 
 import pytest
+from builders import Run, edited, saved
 
 from screwsynth.nlp import load_case, shipped_cases
 from screwsynth.nlp.output.checks import checks_as_junit, checks_as_markdown
 from screwsynth.nlp.results.regression import CaseCheck, check, check_case, decimals_of
 
 ROOT = Path(__file__).parents[2]
-Run = Callable[..., tuple[int, str, str]]
 
 # What Section 4 of the paper prints: (section, quantity, printed).
 PRINTED = [
@@ -126,18 +125,13 @@ def test_the_documented_table_is_what_the_check_prints(checks: dict[str, CaseChe
     assert fixed(shown) == fixed(checks_as_markdown(list(checks.values())))
 
 
-def edited(tmp_path: Path, name: str, *changes: tuple[str, str]) -> str:
+def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> str:
     text = (ROOT / "cases" / f"{name}.toml").read_text(encoding="utf-8")
-    for old, new in changes:
-        assert text.count(old) >= 1
-        text = text.replace(old, new, 1)
-    path = tmp_path / "mine.toml"
-    path.write_text(text, encoding="utf-8")
-    return str(path)
+    return str(saved(tmp_path / "mine.toml", edited(text, *changes)))
 
 
 def test_a_users_own_file_is_checked(tmp_path: Path, cli: Run) -> None:
-    code, out, _ = cli("check", edited(tmp_path, "paper-4.3-axis-x"))
+    code, out, _ = cli("check", changed(tmp_path, "paper-4.3-axis-x"))
     assert code == 0
     assert "all hold" in out
 
@@ -153,7 +147,7 @@ def test_a_users_own_file_is_checked(tmp_path: Path, cli: Run) -> None:
 )
 def test_an_expectation_that_does_not_hold_fails(tmp_path: Path, cli: Run, change: tuple[str, str]) -> None:
     extra = [("[expect]", "[solve]\nstarts = 32\n\n[expect]")] if change[0].startswith("starts") else []
-    code, out, _ = cli("check", edited(tmp_path, "paper-4.3-axis-x", *extra, change))
+    code, out, _ = cli("check", changed(tmp_path, "paper-4.3-axis-x", *extra, change))
     assert code == 1
     assert "mine" in out
 
@@ -171,13 +165,13 @@ def test_an_expectation_that_does_not_hold_fails(tmp_path: Path, cli: Run, chang
     ],
 )
 def test_a_published_number_marked_wrongly_fails(tmp_path: Path, cli: Run, name: str, change: tuple[str, str]) -> None:
-    code, out, _ = cli("check", edited(tmp_path, name, change))
+    code, out, _ = cli("check", changed(tmp_path, name, change))
     assert code == 1
     assert "newly changed" in out
 
 
 def test_json_and_junit(tmp_path: Path, cli: Run) -> None:
-    path = edited(tmp_path, "paper-4.3-axis-x", ("F = 407.0562", "F = 500"), ("value = 524.7", "value = 407.1"))
+    path = changed(tmp_path, "paper-4.3-axis-x", ("F = 407.0562", "F = 500"), ("value = 524.7", "value = 407.1"))
     data, junit = tmp_path / "check.json", tmp_path / "check.xml"
     code, _, _ = cli("check", path, "paper-4.2-rotation", "--json", str(data), "--junit", str(junit))
     assert code == 1
@@ -191,7 +185,7 @@ def test_json_and_junit(tmp_path: Path, cli: Run) -> None:
 
 
 def test_junit_escapes_what_a_case_says(tmp_path: Path) -> None:
-    path = edited(tmp_path, "paper-4.3-axis-x", ('source = "Section 4.3"', 'source = "<a> & b"'))
+    path = changed(tmp_path, "paper-4.3-axis-x", ('source = "Section 4.3"', 'source = "<a> & b"'))
     ElementTree.fromstring(checks_as_junit([check_case(path)]))
 
 

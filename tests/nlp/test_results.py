@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from builders import Run, edited, output_of
 from jsonschema import Draft202012Validator
 
 import screwsynth.cases
@@ -37,7 +38,6 @@ from screwsynth.nlp.results.summary import case_summary
 from screwsynth.nlp.results.text import Line, TextTable, Tone
 from screwsynth.nlp.solver import multistart, starts
 
-Run = Callable[..., tuple[int, str, str]]
 Json = dict[str, Any]
 
 CASES = Path(screwsynth.cases.__file__).parent
@@ -48,13 +48,6 @@ ROTATION = "rotation = { angle = { min = -30, max = 30 } }"
 FEW = "\n[solve]\nstarts = 2\n"
 PUSH = '\n[[task]]\nname = "push"\nsense = "max"\naxis = [0, 0, 1]\npitch = inf\n'
 OVER_POSES = '[pose.along_task]\nfirst = -15\nlast = 15\ncount = 3\n\n[combine]\nover_poses = "mean"\n'
-
-
-def edited(text: str, *edits: tuple[str, str]) -> str:
-    for old, new in edits:
-        assert old in text
-        text = text.replace(old, new, 1)
-    return text
 
 
 #: Cases of every kind of outcome, by name.
@@ -112,9 +105,7 @@ def case_path(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
 
 
 def test_the_schema_is_one(cli: Run, schema: Json) -> None:
-    code, out, err = cli("schema", "--result")
-    assert (code, err) == (0, "")
-    assert json.loads(out) == schema
+    assert json.loads(output_of(cli("schema", "--result"))) == schema
     Draft202012Validator.check_schema(schema)
     assert [each["$ref"] for each in schema["anyOf"]] == [f"#/$defs/{kind.__name__}" for kind in RESULTS]
     for name, each in schema["$defs"].items():
@@ -149,9 +140,11 @@ def test_certificates_keep_to_the_schema(name: str, cli: Run, schema: Json, case
 
 
 def test_checks_keep_to_the_schema(cli: Run, schema: Json) -> None:
-    code, out, err = cli("check", "paper-4.3-axis-x", "paper-4.2-rotation", "--json", "-")
-    assert (code, err) == (0, "")
-    hold(json.loads(out), schema, "ChecksResult")
+    hold(
+        json.loads(output_of(cli("check", "paper-4.3-axis-x", "paper-4.2-rotation", "--json", "-"))),
+        schema,
+        "ChecksResult",
+    )
 
 
 @pytest.mark.parametrize("name", ["tolerance", "poses", "worst-case", "infeasible"])

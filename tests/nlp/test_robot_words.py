@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import case_from
 
 import screwsynth.models
 from screwsynth.models import Dimension, robot, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, JointMotion, Limits, Task, evaluate, formulate
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robotfile.schema import check_form
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
@@ -53,7 +53,7 @@ def test_a_robot_in_python_is_written_and_read_again(name: str) -> None:
     assert written == tables
     check_form(written)
     if name == "delta":
-        again = case_from_tables(tomllib.loads(text), name=name, source=name)
+        again = case_from(text, name)
         assert again.to_toml() == text
         assert again.model.length_unit == "m"
 
@@ -66,7 +66,7 @@ def test_the_default_home_is_written_too() -> None:
     ]
     model = robot("legs", limb=({"repeat": {"count": 3}, "joints": tuple(joints)},))
     case = Case(model, {}, (0, 0, 0), [Task(np.array([0, 0, 0, 0, 0, 1.0]))], name="legs")
-    assert case_from_tables(tomllib.loads(case.to_toml()), name="legs", source="legs").model.home == (0, 0, 0)
+    assert case_from(case.to_toml(), "legs").model.home == (0, 0, 0)
 
 
 def test_a_driven_limb_that_resists_nothing_is_refused_in_one_sentence() -> None:

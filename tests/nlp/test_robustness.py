@@ -2,13 +2,13 @@
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Run, refusal_of, saved
 from casadi import SX
 
 from screwsynth.models import (
@@ -43,8 +43,6 @@ from screwsynth.nlp import (
     solve,
 )
 from screwsynth.nlp.evidence.kkt import close_equations, linearise
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 def moved_hexapod(away: float) -> Case:
@@ -187,9 +185,7 @@ def test_a_search_that_cannot_be_is_refused(key: str, value: int) -> None:
 
 
 def test_standard_output_takes_one_document(cli: Run) -> None:
-    code, out, err = cli("check", "paper-4.2-rotation", "--json", "-", "--markdown")
-    assert (code, out) == (2, "")
-    assert "standard output" in err
+    refusal_of(cli("check", "paper-4.2-rotation", "--json", "-", "--markdown"), "standard output")
 
 
 def test_a_failed_compromise_is_no_answer(tmp_path: Path, cli: Run) -> None:
@@ -197,8 +193,7 @@ def test_a_failed_compromise_is_no_answer(tmp_path: Path, cli: Run) -> None:
     task = text.index("[[task]]")
     hurried = text[:task] + "[solve]\nmax_iterations = 1\n\n" + text[task:].replace("average", "worst-case")
     hurried = hurried.replace("axis = [0, 0, 1]\npitch = inf", "axis = [1, 0, 3]\npoint = [9, 1, 0]\npitch = 2")
-    path = tmp_path / "two.toml"
-    path.write_text(hurried, encoding="utf-8")
+    path = saved(tmp_path / "two.toml", hurried)
     code, out, _ = cli("solve", str(path))
     if code == 0:
         pytest.skip("one iteration and a correction were enough here")

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import case_from
 
 from screwsynth.models import screw_from_axis
-from screwsynth.nlp import Case, CaseError, __version__, case_from_tables, formulate, generate_c, solve
+from screwsynth.nlp import Case, CaseError, __version__, formulate, generate_c, solve
 from screwsynth.nlp.case.limits.constraint import LENGTH
 from screwsynth.nlp.embedding.ctext import c_names
 from screwsynth.nlp.embedding.runtimelimits import RunTimeLimits, run_time_limits
@@ -70,7 +71,7 @@ CLEAR = "leg_clearance.min"
 
 
 def case_of(tables: dict[str, Any]) -> Case:
-    return case_from_tables(tables, name="limited", source="limited.toml")
+    return case_from(tables, "limited")
 
 
 def changed(tables: dict[str, Any], key: str, value: float) -> dict[str, Any]:

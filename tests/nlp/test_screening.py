@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import case_from, starter_tables
 
 from screwsynth.models import FloatArray
-from screwsynth.models.catalog import robot_function
 from screwsynth.nlp import (
     Case,
     Nlp,
@@ -21,14 +21,12 @@ from screwsynth.nlp import (
     Status,
     StopReason,
     Task,
-    case_from_tables,
     formulate,
     generate_c,
     load_case,
     solve,
 )
 from screwsynth.nlp.case.reader import find_case
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import FEASIBLE, STATIONARY, linearise, multipliers
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.program.sampling import starting_points
@@ -47,7 +45,7 @@ FEW = ("camera-mount", "drilling-spindle", "haptic-device", "paper-4.1-helical",
 
 
 def starter(name: str, starts: int) -> Case:
-    case = case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
+    case = case_from(starter_tables(name), name)
     return replace(case, search=replace(case.search, starts=starts))
 
 
@@ -213,7 +211,7 @@ def test_the_case_file_has_the_switch() -> None:
     assert load_case("paper-4.3").search.screen
     tables = tomllib.loads(text)
     tables.setdefault("solve", {})["screen"] = False
-    case = case_from_tables(tables, name="x", source="x.toml")
+    case = case_from(tables, "x")
     assert not case.search.screen
     assert "screen = false" in case.to_toml()
     assert not case.search.but(4, 1).screen

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Callable
 
 import numpy as np
 import pytest
+from builders import Run, case_from, starter_tables
 
-from screwsynth.models import Dimension, robot_function
-from screwsynth.nlp import Solution, case_from_tables, load_case, result_of, solve
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.models import Dimension
+from screwsynth.nlp import Solution, load_case, result_of, solve
 from screwsynth.nlp.output.pictures.figures import figure_of
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.units import Units, rate_unit, slope_unit
 
-Run = Callable[..., tuple[int, str, str]]
-
 
 @pytest.fixture(scope="module")
 def delta() -> Solution:
-    tables = tomllib.loads(starter_case(robot_function("delta")()))
+    tables = starter_tables("delta")
     tables["solve"]["starts"] = 2
     tables["limits"] = {"actuator_rate": {"max": 4.0}, "rate_share": {"max": 0.9}}
-    return solve(case_from_tables(tables, name="delta", source="delta"))
+    return solve(case_from(tables, "delta"))
 
 
 def test_every_rate_of_a_motor_has_the_unit_of_its_coordinate_and_of_the_motion(delta: Solution) -> None:

@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pytest
+from builders import Run, case_from
 
-from screwsynth.nlp import InputError, case_from_tables, certify, load_result
+from screwsynth.nlp import InputError, certify, load_result
 from screwsynth.nlp.embedding.folder import read_manifest
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim, Unproved, WorkspaceProof, read_proof
 from screwsynth.nlp.solver.certified import proof_of
 from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
 from screwsynth.nlp.system.strictjson import WrongValueError, json_tree, object_of, value_of
 
-Run = Callable[..., tuple[int, str, str]]
 #: What is put into files byte by byte.
 PIECES = [
     *(b"[", b"]", b"{", b"}", b",", b":", b'"', b"null", b"1e999", b"-1e999", b"NaN", b"Infinity", b"\\ud800"),
@@ -165,7 +165,7 @@ def readers(folder: Path, cli: Run) -> dict[str, tuple[bytes, Callable[[bytes], 
     if not result.exists():
         assert cli("evaluate", "paper-4.1-helical", "--set", "p_z=30", "--json", str(result))[0] in (0, 1)
         (folder / "n.c").write_text("int x;", encoding="utf-8")
-    case = case_from_tables(copy.deepcopy(PLATFORM), name="case", source="case")
+    case = case_from(PLATFORM, "case")
     proof = proof_of(certify(case, gap=1e-2, with_proof=True), "text").as_text().encode()
     claim = ProofClaim("F", "max", "program", 2.5, "graph", b"\x06", ((0.0, 1.0),))
     poses = (((0.0, 1.0),) * 3, "axis", ((0.0, 1.0),), (0.0, 0.0, 1.0))

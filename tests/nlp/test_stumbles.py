@@ -1,10 +1,10 @@
 """Small things that users met: each has a test here."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from builders import Run, output_of, saved
 
 from screwsynth.nlp import InputError, load_case
 from screwsynth.nlp.case.robotfile.reader import model_of_definition, read_definition
@@ -14,7 +14,6 @@ from screwsynth.nlp.output.pictures.sweeps import sweep_figure
 from screwsynth.nlp.output.sweeptable import TablePoint
 from screwsynth.nlp.sweeps.points import grid
 
-Run = Callable[..., tuple[int, str, str]]
 HEAD = Path(__file__).parents[2] / "cases" / "robots" / "reachy-mini-head.toml"
 
 #: A platform on six telescoping legs, 40 to 60 m from the middle, without dimensions.
@@ -35,8 +34,7 @@ joints = [ { type = "U", at = "B", axes = ["x", "y"] }, { type = "P", at = "B", 
 
 
 def test_a_robot_file_is_described(cli: Run, tmp_path: Path) -> None:
-    status, out, err = cli("models", str(HEAD))
-    assert (status, err) == (0, "")
+    out = output_of(cli("models", str(HEAD)))
     assert out.startswith("Reachy Mini head\n")
     assert "radius of the motors" in out
     status, _, err = cli("models", str(tmp_path / "none.toml"))
@@ -55,8 +53,7 @@ def test_numbers_that_can_be_set_are_all_named(cli: Run) -> None:
 
 
 def test_a_wrong_column_is_that_of_the_file_of_points(cli: Run, tmp_path: Path) -> None:
-    points = tmp_path / "points.csv"
-    points.write_text("x1,nope\n20,3\n", encoding="utf-8")
+    points = saved(tmp_path / "points.csv", "x1,nope\n20,3\n")
     status, _, err = cli("sweep", "paper-4.1-helical", "--points", str(points), "--out", str(tmp_path / "out.csv"))
     assert status == 2
     assert err.startswith(f"screwsynth: {points}: column nope: cannot be set")
@@ -66,8 +63,7 @@ def test_a_starter_follows_the_size_of_a_robot_without_dimensions(tmp_path: Path
     (tmp_path / "large.toml").write_text(LARGE, encoding="utf-8")
     model = model_of_definition(read_definition("large.toml", tmp_path), "large.toml")
     assert not model.parameters
-    path = tmp_path / "case.toml"
-    path.write_text(starter_case(model, "large.toml"), encoding="utf-8")
+    path = saved(tmp_path / "case.toml", starter_case(model, "large.toml"))
     z = load_case(str(path)).position[2]
     # A quarter of the distance of the joints on the base from its origin, sqrt(60^2 + 40^2).
     assert z.upper == pytest.approx(0.25 * (60**2 + 40**2) ** 0.5, rel=1e-4)  # type: ignore[union-attr]

@@ -5,24 +5,23 @@ import os
 import signal
 import subprocess
 import sys
-import time
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import Run, starter_tables
 
-from screwsynth.nlp import InputError, build_model, case_from_tables, load_case, load_result, solve
+from screwsynth.nlp import InputError, case_from_tables, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.many import Numbers, judge_many
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.results.sweep import SweepResult
+from screwsynth.nlp.sweeps import cluster
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
 from screwsynth.nlp.sweeps.journal import Journal
 from screwsynth.nlp.sweeps.points import Points, grid
@@ -30,8 +29,6 @@ from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
 from screwsynth.nlp.sweeps.source import CaseSource
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
-
-Run = Callable[..., tuple[int, str, str]]
 
 CASE = "paper-4.1-helical"
 #: Case files that say the same number in two ways are the same to this part.
@@ -184,7 +181,7 @@ def test_rows_with_certificates_are_taken_up(tmp_path: Path) -> None:
 
 
 def test_joints_are_no_design() -> None:
-    case = case_from_tables(tomllib.loads(starter_case(build_model("3-rps"))), name="mine", source="mine")
+    case = case_from_tables(starter_tables("3-rps"), name="mine", source="mine")
     found = run_in_python(case, {"task.pitch": (2,)}, starts=1)
     assert [name for name in found.design if name.startswith("q") and name[1:2].isdigit()] == []
     assert set(found.design) == {"rb", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z"}
@@ -313,31 +310,45 @@ def test_a_row_group_is_in_memory_at_once(sweep: Callable[..., Sweep], tmp_path:
     assert file.read(columns=["x1"]).to_pydict()["x1"] == one.points.values[:, 0].tolist()
 
 
-def _run(*arguments: str) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+#: A command that is killed in the middle of a row, in the block of rows whose number comes first.
+KILLED = """
+import os, signal, sys
+from screwsynth.nlp.cli.main import main
+from screwsynth.nlp.sweeps.journal import Journal
+from screwsynth.nlp.sweeps.rows import line_of
+
+append, left = Journal.append, [int(sys.argv.pop(1))]
+
+def append_or_die(journal, rows):
+    left[0] -= 1
+    rows = list(rows)
+    append(journal, rows if left[0] else rows[::2])
+    if not left[0]:
+        journal._file.write(line_of(rows[1]).encode()[:20])
+        journal._file.flush()
+        os.kill(os.getpid(), signal.SIGKILL)
+
+Journal.append = append_or_die
+main()
+"""
 
 
 @pytest.mark.slow
 def test_a_run_killed_three_times_has_the_same_table(tmp_path: Path, cli: Run) -> None:
-    over = ("--over", "task.pitch=0:2:30", "--over", "x1=10:14:100", "--starts", "4")
+    over = ("--over", "task.pitch=0:2:12", "--over", "x1=10:14:100", "--starts", "4")
     whole, parts = tmp_path / "whole.csv", tmp_path / "parts.csv"
     assert cli("sweep", CASE, *over, "--out", str(whole))[0] == 0
     journal, sizes = Path(f"{parts}.journal"), [0]
-    for _ in range(3):
-        process = _run("sweep", CASE, *over, "--out", str(parts))
-        # A kill where the journal has grown, at a moment that differs from run to run.
-        while process.poll() is None and not (journal.exists() and journal.stat().st_size > sizes[-1] + 1000):
-            time.sleep(0.003)
-        process.send_signal(signal.SIGKILL)
-        assert process.wait() == -signal.SIGKILL
+    for last in (1, 2, 1):
+        command = [sys.executable, "-P", "-c", KILLED, str(last), "sweep", CASE, *over, "--out", str(parts)]
+        assert subprocess.run(command, capture_output=True, check=False).returncode == -signal.SIGKILL
         sizes.append(journal.stat().st_size)
+        assert not journal.read_bytes().endswith(b"\n")
     assert sizes == sorted(sizes)
     assert not parts.exists()
-    assert _run("sweep", CASE, *over, "--out", str(parts)).wait() == 0
+    assert cli("sweep", CASE, *over, "--out", str(parts))[0] == 0
     found = answers(table(parts))
-    assert len(found) == 3000
+    assert len(found) == 1200
     assert found == answers(table(whole))
 
 
@@ -388,8 +399,9 @@ def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_an_unreachable_cluster(tmp_path: Path, cli: Run) -> None:
+def test_an_unreachable_cluster(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_WAIT", 0.2)
     out = tmp_path / "out.csv"
     code, _, err = cli("sweep", CASE, *OVER, "--dask", "tcp://127.0.0.1:9", "--out", str(out))
     assert (code, out.exists()) == (2, False)

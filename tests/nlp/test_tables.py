@@ -4,15 +4,15 @@ import csv
 import io
 import math
 import re
-import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import Run, case_from, refusal_of, starter_tables
 from rich.console import Console
 
 from screwsynth.models import model_names, three_upu
@@ -20,7 +20,6 @@ from screwsynth.nlp import Case, Free, Limits, Rotation, Task, build_model, load
 from screwsynth.nlp.case.limits.legs import LegLength
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import model_options
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output.report.report import report_of
@@ -42,7 +41,6 @@ from screwsynth.nlp.results.tables import limit_table, margin_table, optimum_tab
 from screwsynth.nlp.results.text import Line, TextTable, Tone
 from screwsynth.nlp.results.wording import certificate_lines, headline, motion_words, task_words
 
-Run = Callable[..., tuple[int, str, str]]
 WIDTHS = (60, 80, 100, 120)
 LIMB_NAMES = ("1", "2", "3", "4", "5", "6")
 
@@ -85,7 +83,7 @@ leg_clearance = { min = 30 }
 
 def eight() -> Case:
 
-    return case_from_tables(tomllib.loads(EIGHT), name="eight", source="eight.toml")
+    return case_from(EIGHT, "eight")
 
 
 def evaluated(case: Case) -> EvaluationResult:
@@ -94,10 +92,14 @@ def evaluated(case: Case) -> EvaluationResult:
     return evaluation_of(nlps, x, [evaluate(nlp, x) for nlp in nlps])
 
 
+def case_of(name: str) -> Case:
+    return eight() if name == "eight" else load_case(name)
+
+
 @cache
-def solved(name: str) -> tuple[Case, tuple[Line | TextTable, ...]]:
-    case = eight() if name == "eight" else load_case(name)
-    return case, tuple(case_summary(case, result_of(solve(case, starts=2))))
+def solved(name: str) -> tuple[Line | TextTable, ...]:
+    case = case_of(name)
+    return tuple(case_summary(case, result_of(solve(case, starts=2))))
 
 
 def printed(items: Iterable[Line | TextTable], width: int) -> str:
@@ -117,12 +119,12 @@ def check_widths(items: tuple[Line | TextTable, ...]) -> None:
 
 @pytest.mark.parametrize("name", ["eight", *shipped_cases()])
 def test_no_number_is_split_at_any_width(name: str) -> None:
-    check_widths(solved(name)[1])
+    check_widths(solved(name))
 
 
 @pytest.mark.parametrize("name", ["eight", *shipped_cases()])
 def test_no_number_of_an_evaluation_is_split_at_any_width(name: str) -> None:
-    case = solved(name)[0]
+    case = case_of(name)
     check_widths(tuple(evaluation_summary(case, evaluated(case))))
 
 
@@ -153,7 +155,7 @@ def test_no_rounding_noise_on_a_page() -> None:
 @pytest.mark.parametrize("name", [*shipped_cases()])
 def test_no_rounding_noise_in_an_evaluation(name: str) -> None:
     """Every number of the tables is 0, or at least a hundred-millionth of the largest one in its row or column."""
-    case = solved(name)[0]
+    case = case_of(name)
     tables = [item for item in evaluation_summary(case, evaluated(case)) if isinstance(item, TextTable)]
     for text in (cell for table in tables for row in table.rows for cell in row if isinstance(cell, str)):
         for found in re.findall(r"[-+]?\d\.?\d*e-\d+", text):
@@ -253,7 +255,7 @@ def test_without_such_limits_angles_are_from_the_normal() -> None:
 
 
 def test_free_and_active_numbers_come_first_and_fixed_ones_are_folded() -> None:
-    case, items = solved("eight")
+    case, items = eight(), solved("eight")
     design = next(item for item in items if isinstance(item, TextTable) and item.name == "design")
     ranges = [bool(row[3]) for row in design.rows]
     assert ranges == sorted(ranges, reverse=True)
@@ -300,9 +302,7 @@ def test_csv_that_cannot_be_is_refused_before_the_work(
     command: str, options: tuple[str, ...], words: str, tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    code, out, err = cli(command, "paper-4.1-helical", *options)
-    assert (code, out) == (2, "")
-    assert words in err
+    refusal_of(cli(command, "paper-4.1-helical", *options), words)
     assert not list(tmp_path.iterdir())
 
 
@@ -365,7 +365,7 @@ def test_a_singular_answer_that_nobody_asked_for_is_no_green_bar() -> None:
 @pytest.mark.parametrize("name", model_names())
 def test_every_starter_case_solves_to_rank_six(name: str) -> None:
 
-    case = case_from_tables(tomllib.loads(starter_case(build_model(name))), name=name, source=name)
+    case = case_from_tables(starter_tables(name), name=name, source=name)
     state = solve(case, starts=4).state
     assert state is not None
     assert state.rank == 6
@@ -374,7 +374,7 @@ def test_every_starter_case_solves_to_rank_six(name: str) -> None:
 @pytest.mark.parametrize("axes", ["free", "limb", "snu", "tsai"])
 def test_every_3_upu_has_a_starter_of_rank_six(axes: str) -> None:
 
-    case = case_from_tables(tomllib.loads(starter_case(three_upu(axes=axes))), name="upu", source="upu")  # type: ignore[arg-type]
+    case = case_from_tables(starter_tables(three_upu(axes=axes)), name="upu", source="upu")  # type: ignore[arg-type]
     state = solve(case, starts=4).state
     assert state is not None
     assert state.rank == 6

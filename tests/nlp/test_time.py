@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from builders import Run, saved
 from hexapods import SMALL
 
 from screwsynth.nlp import InputError, certify, interruption, load_case, solve
@@ -32,7 +33,6 @@ from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.solver.status import Status
 
 CASE = "paper-4.3"
-Run = Callable[..., tuple[int, str, str]]
 MEASURES = ("smallest_singular_value", "condition_number")
 #: Seconds from one look of a search at the clock to the next.
 STEP = 0.01
@@ -129,8 +129,7 @@ def test_set_up_of_the_whole_box_ends_with_the_time(clock: Clock, monkeypatch: p
 
 def test_all_searches_of_a_workspace_share_one_time(tmp_path: Path) -> None:
     """The clock counts steps of searches: together they take no more than the whole time, and a few steps."""
-    path = tmp_path / "case.toml"
-    path.write_text(SMALL, encoding="utf-8")
+    path = saved(tmp_path / "case.toml", SMALL)
     case = load_case(str(path))
     found = judge_workspace(case, time_limit=0.4, gap=1e-9, quantities=MEASURES, jobs=1)
     stopped = [each for each in found.extremes if "stopped after" in each.reason or each.reason == "the time is over"]

@@ -4,13 +4,13 @@ import enum
 import math
 import subprocess
 import sys
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
+from builders import case_from
 
 from screwsynth.models import Dimension, Displacement, Model, hexapod, screw_displacement, stewart_gough, three_upu
 from screwsynth.models.screws import Screw
@@ -44,7 +44,6 @@ from screwsynth.nlp import (
     Task,
     Units,
     along_screw,
-    case_from_tables,
     load_case,
     over_grid,
     shipped_cases,
@@ -55,7 +54,7 @@ ULP = 2.3e-16
 
 
 def read(text: str, case: Case) -> Case:
-    return case_from_tables(tomllib.loads(text), name=case.name, source=case.source or "written")
+    return case_from(text, case.name)
 
 
 def differences(one: Any, two: Any, slack: float, where: str = "case") -> list[str]:  # noqa: ANN401 - any value
@@ -220,10 +219,10 @@ def test_poses_are_written_as_they_were_stated() -> None:
     grid = "grid = { x = { min = -1, max = 3, count = 3 } }"
     stated = text.replace("rotation = { angle", f"{along}\nrotation = {{ angle")
     stated = stated.replace("[[task]]", '[combine]\nover_poses = "mean"\n\n[[task]]')
-    written = case_from_tables(tomllib.loads(stated), name="x", source="x").to_toml()
+    written = case_from(stated, "x").to_toml()
     assert 'along_task = { task = "drive the screw", first = -15, last = 15, count = 5 }' in written
     stated = stated.replace(along, grid)
-    written = case_from_tables(tomllib.loads(stated), name="x", source="x").to_toml()
+    written = case_from(stated, "x").to_toml()
     assert grid in written
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
 from typing import Any
@@ -12,15 +11,15 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from builders import case_from, starter_tables
 from numpy_engine.first_order import enclose
 from numpy_engine.quadratic_models import multipliers
 from numpy_engine.second_order import enclose_second
 
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED, gallery_names
-from screwsynth.nlp import Case, case_from_tables, certify, json_data, pareto, result_of, solve
+from screwsynth.nlp import Case, certify, json_data, pareto, result_of, solve
 from screwsynth.nlp.case.reader import read_case
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.front.goals import read_goals
@@ -58,7 +57,7 @@ NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:,\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?(?!\w
 
 def tables_of(model: Model, unit: str) -> Tables:
     """The starter of a robot, whose lengths are metres, in another unit."""
-    tables, f = tomllib.loads(starter_case(model)), UNITS[unit]
+    tables, f = starter_tables(model), UNITS[unit]
     tables["units"]["length"] = unit
     tables["solve"]["starts"] = 4
     for item in model.parameters:
@@ -134,7 +133,7 @@ def check(model: Model, make: Make, units: Iterable[str] = tuple(UNITS), within:
     """Hold the data and the text of a robot in each unit to those in metres."""
     found = {}
     for unit in units:
-        case = case_from_tables(tables_of(model, unit), name=model.name, source=model.name)
+        case = case_from(tables_of(model, unit), model.name)
         data, text = make(case)
         found[unit] = dict(leaves(data)), lines(text)
     for unit in [each for each in found if each != "m"]:
@@ -211,7 +210,7 @@ def test_a_workspace_is_the_same_in_every_unit(name: str) -> None:
         tables, f = fixed_over_box(model, case.units.length, 0.01, 1.0), UNITS[case.units.length]
         if model.legs:
             tables["limits"] = {"leg_length": {"min": 10 * f, "max": 90 * f}, "leg_clearance": {"min": 0.1 * f}}
-        held = case_from_tables(tables, name=name, source=name)
+        held = case_from(tables, name)
         found = workspace_of(judge_workspace(held))
         assert found.regular.outcome.name == "PROVED"
         return json_data(found), workspace_summary(held, found)
@@ -223,7 +222,7 @@ def test_a_workspace_is_the_same_in_every_unit(name: str) -> None:
 def test_the_search_for_singular_poses_takes_the_same_boxes_in_every_unit(name: str) -> None:
     model, counts = robot_function(name)(), set()
     for unit in UNITS:
-        case = case_from_tables(fixed_over_box(model, unit, 0.2, 25.0), name=name, source=name)
+        case = case_from(fixed_over_box(model, unit, 0.2, 25.0), name)
         found = judge_workspace(case, with_limits=False).regularity
         counts.add((found.outcome, found.boxes, found.open))
     assert len(counts) == 1
@@ -248,12 +247,12 @@ def test_a_certificate_takes_the_same_boxes_in_every_unit(name: str) -> None:
         if name not in TRANSLATIONS:
             tables["pose"]["rotation"] = {"angle": {"min": -1, "max": 1}}
         tables["robot"]["parameters"] = {key: less(value) for key, value in tables["robot"]["parameters"].items()}
-        case = case_from_tables(tables, name=name, source=name)
-        found = certify(case, gap=0.02, starts=2).tasks[0]
+        case = case_from(tables, name)
+        found = certify(case, gap=0.05, starts=2).tasks[0]
         assert found.status is CertificateStatus.PROVED, unit
         counts.add((standard_form(found.nlp).names, found.boxes))
         best = found.incumbent / f**2
-        assert best <= found.bound / f**2 <= 1.02 * best
+        assert best <= found.bound / f**2 <= 1.05 * best
         bounds.append(found.bound / f**2)
     assert len(counts) == 1
     assert bounds == pytest.approx([bounds[0]] * len(bounds), rel=1e-9)
@@ -279,7 +278,7 @@ def test_a_condition_whose_gradient_is_rounding_has_no_weight() -> None:
 
 def test_rounding_chooses_no_optimum() -> None:
     """Optima with the same F are named in the order of the starts."""
-    case = case_from_tables(tables_of(robot_function("tripteron")(), "m"), name="t", source="t")
+    case = case_from(tables_of(robot_function("tripteron")(), "m"), "t")
     solution = solve(case)
     best = solution.optima[0]
     first = next(each for each in solution.starts if abs(each.F - best.F) <= 1e-9 * best.F)
@@ -308,7 +307,7 @@ def with_other_task(model: Model, unit: str) -> Case:
     tables = tables_of(model, unit)
     task = tables["task"][0] | {"name": "task"}
     tables["task"] = [task, task | {"name": "other", "axis": [1, 0, 0]}]
-    return case_from_tables(tables, name=model.name, source=model.name)
+    return case_from(tables, model.name)
 
 
 def test_a_bound_of_F_on_a_front_is_of_the_same_size_in_every_unit() -> None:  # noqa: N802 - the objective's name
@@ -326,7 +325,7 @@ def test_a_bound_of_F_on_a_front_is_of_the_same_size_in_every_unit() -> None:  #
 @pytest.mark.parametrize("name", ["hexapod", "orthoglide", "five-bar"])
 def test_a_front_is_the_same_in_every_unit(name: str) -> None:
     fronts = []
-    for unit, f in UNITS.items():
+    for unit, f in ((unit, UNITS[unit]) for unit in units_of(name)):
         found = pareto(with_other_task(robot_function(name)(), unit), ["max F:task", "min F:other"], points=4, starts=4)
         fronts.append([point.values / f**2 for point in found.points])
     assert all(np.allclose(fronts[0], front, rtol=1e-6) for front in fronts)

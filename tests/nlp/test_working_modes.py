@@ -2,17 +2,17 @@
 
 import json
 import tomllib
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
+from builders import Run, case_from, output_of
 
 from screwsynth.models import robot, robot_function
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, case_from_tables, certify, formulate, solve
+from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, certify, formulate, solve
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
@@ -21,8 +21,6 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.statement.standard_form import Kind, is_in_home_mode, standard_form
 from screwsynth.nlp.solver.certified import proof_of
-
-Run = Callable[..., tuple[int, str, str]]
 
 DELTA = """
 title = "Delta"
@@ -51,7 +49,7 @@ starts = 2
 
 def delta() -> Case:
     """A Delta at a fixed pose; its arms can bend either way."""
-    return case_from_tables(tomllib.loads(DELTA), name="delta", source="delta")
+    return case_from(DELTA, "delta")
 
 
 def free_pose(name: str, part: float) -> Case:
@@ -156,16 +154,15 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
 def test_certify_names_the_limbs_with_unknowns_first(tmp_path: Path, cli: Run) -> None:
     path, proof = tmp_path / "delta.toml", tmp_path / "proof.json"
     path.write_text(DELTA, encoding="utf-8")
-    status, out, err = cli("certify", str(path), "--proof", str(proof))
-    assert (status, err) == (0, "")
+    out = output_of(cli("certify", str(path), "--proof", str(proof)))
     words = "limbs 1, 2, 3 need 1 joint position each and the loop equations, in"
     assert " ".join(out.split()).startswith(f"unknowns {words} home's working mode Delta certificate proved")
-    status, out, err = cli("verify-proof", str(proof))
-    assert (status, err) == (0, "")
+    out = output_of(cli("verify-proof", str(proof)))
     assert "within the limits of delta in home's working mode" in out
-    status, out, err = cli("certify", str(path), "--all-assemblies", "--json", "-")
-    assert (status, err) == (0, "")
-    assert json.loads(out)["certificate"]["status"] == "proved"
+    assert (
+        json.loads(output_of(cli("certify", str(path), "--all-assemblies", "--json", "-")))["certificate"]["status"]
+        == "proved"
+    )
     status, out, _ = cli("certify", str(path), "--all-assemblies", "--time", "1e-9")
     assert status == 1
     assert " ".join(out.split()).startswith(f"unknowns {words} every assembly Delta")

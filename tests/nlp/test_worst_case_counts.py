@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import re
 import subprocess
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from builders import starter
 
-from screwsynth.models import robot_function
-from screwsynth.nlp import Case, case_from_tables, load_case, shipped_cases
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp import load_case, shipped_cases
 from screwsynth.nlp.embedding import worstcase
 
 Embedded = Any
@@ -138,11 +136,6 @@ def count(embedded: Embedded, folder: Path, trials: int, iterations: int | None)
     done = subprocess.run(["./driver"], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
     return [float(each) for each in re.findall(r"[\d.e+-]+", done.stdout)]
-
-
-def starter(name: str) -> Case:
-    """A case of a robot with loops, of which a search that leaves home's assembly is made again within it."""
-    return case_from_tables(tomllib.loads(starter_case(robot_function(name)())), name=name, source=name)
 
 
 @pytest.mark.parametrize(

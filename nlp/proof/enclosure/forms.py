@@ -115,6 +115,11 @@ class Forms(NamedTuple):
         """Return the forms of some of the expressions."""
         return Forms(self.c[:, which], self.a[:, which], self.r[:, which])
 
+    @property
+    def sizes(self) -> FloatArray:
+        """Bounds (B, R) of the sizes of the expressions."""
+        return np.asarray(np.abs(self.c) + np.abs(self.a).sum(axis=2) + self.r)
+
 
 class Encloser:
     """Forms of expressions.

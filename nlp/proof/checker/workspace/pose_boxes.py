@@ -146,15 +146,15 @@ class BoxClaim(Protocol):
 
 def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, int]:
     """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined."""
-    reader, leaves = TreeReader(tree), list[tuple[int, FloatArray, FloatArray]]()
-    reader.walk(root.lower, root.upper, lambda kind, _, *box: leaves.append((kind, *box)), frozenset({Node.CUT}))
+    reader = TreeReader(tree)
+    leaves = list(reader.walk(root.lower, root.upper, frozenset({Node.CUT})))
     reader.finish()
-    for kind, low, high in leaves:
+    for kind, _, low, high in leaves:
         if kind not in (Node.BOUNDED, Node.OUTSIDE):
             raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
         if kind == Node.OUTSIDE and root.contracted(low[None], high[None])[2][0]:
             raise ProofError(f"the box {box_words(low, high)} is not outside of the workspace")
-    boxes = [box for kind, *box in leaves if kind == Node.BOUNDED]
+    boxes = [box for kind, _, *box in leaves if kind == Node.BOUNDED]
     rule = _PoseRule(claim, root, *np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0))
     return len(leaves), show(rule, rule.lower, rule.upper)
 

@@ -1,0 +1,83 @@
+"""What all tests build their cases with: case files, cases of texts and of tables, starters of robots, rotations."""
+
+from __future__ import annotations
+
+import copy
+import csv
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from screwsynth.models import Model, robot_function
+from screwsynth.nlp import Case, case_from_tables
+from screwsynth.nlp.case.starter import starter_case
+
+Array = NDArray[np.float64]
+#: The command line in this process: exit status, standard output, standard error.
+Run = Callable[..., tuple[int, str, str]]
+
+
+def case_from(given: str | Mapping[str, Any], name: str = "case") -> Case:
+    """The case of a case file's text, or of its tables, which stay as they are."""
+    tables = tomllib.loads(given) if isinstance(given, str) else copy.deepcopy(dict(given))
+    return case_from_tables(tables, name=name, source=f"{name}.toml")
+
+
+def starter_tables(robot: str | Model) -> dict[str, Any]:
+    """The tables of the case that ``new`` begins with."""
+    return tomllib.loads(starter_case(robot_function(robot)() if isinstance(robot, str) else robot))
+
+
+def starter(name: str) -> Case:
+    """The case that ``new`` begins with, of a robot by its name."""
+    return case_from(starter_tables(name), name)
+
+
+def saved(path: Path, text: str) -> Path:
+    """Write a file, and return its path."""
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def edited(text: str, *edits: tuple[str, str]) -> str:
+    """A text with words replaced once, each of which it must have."""
+    for old, new in edits:
+        assert old in text, f"{old!r} is not in the text"
+        text = text.replace(old, new, 1)
+    return text
+
+
+def rows_of(text: str) -> list[dict[str, str]]:
+    """Rows of a table as CSV."""
+    return list(csv.DictReader(text.splitlines()))
+
+
+def turn_about(axis: ArrayLike, angle: float) -> Array:
+    """Rotation matrix by Rodrigues' formula."""
+    x, y, z = np.array(axis, dtype=float) / np.linalg.norm(axis)
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K))
+
+
+def output_of(ended: tuple[int, str, str]) -> str:
+    """What a command printed, which has to have succeeded without a word of error."""
+    code, out, err = ended
+    assert (code, err) == (0, "")
+    return out
+
+
+def refusal_of(ended: tuple[int, str, str], *words: str) -> str:
+    """The one sentence, with some words, by which a command refused, having printed nothing else."""
+    code, out, err = ended
+    assert (code, out) == (2, "")
+    assert err.startswith("screwsynth: ")
+    assert err.endswith("\n")
+    assert len(err.splitlines()) == 1
+    for word in words:
+        assert word in err
+    return err
