@@ -9,14 +9,6 @@ order, and ``s`` bounds the rounding errors. The terms of second order shrink wi
 gradient's form along a ray has a third of their width. A value that may be undefined somewhere in the box, or that
 overflows, is *poisoned*: its ``s`` and its ends are infinite, and so are those of every value computed from it.
 ``docs/certificate.md`` has the rules and their sources.
-
-With ``h = r e``, ``|e_i| <= 1``, the forms of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the
-ray from the centre, give
-
-    L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
-    b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
-
-a quadratic model with a remainder of third order, without second derivatives.
 """
 
 from __future__ import annotations
