@@ -9,14 +9,6 @@ order, and ``s`` bounds the rounding errors. The terms of second order shrink wi
 gradient's form along a ray has a third of their width. A value that may be undefined somewhere in the box, or that
 overflows, is *poisoned*: its ``s`` and its ends are infinite, and so are those of every value computed from it.
 ``docs/certificate.md`` has the rules and their sources.
-
-With ``h = r e``, ``|e_i| <= 1``, the forms of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the
-ray from the centre, give
-
-    L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
-    b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
-
-a quadratic model with a remainder of third order, without second derivatives.
 """
 
 from __future__ import annotations
@@ -193,17 +185,16 @@ class QuadraticModel:
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
         bound = np.empty(self.middle.size)
-        kernel().models(len(self.b), (*self._arrays(), bound, None, None, None), bound.size)
+        self._call(bound, None, None, None)
         return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
-        low, high, levels = np.empty(self.b.shape), np.empty(self.b.shape), np.empty(self.middle.size)
-        levels[:] = level
-        kernel().models(len(self.b), (*self._arrays(), None, levels, low, high), levels.size)
+        low, high = np.empty(self.b.shape), np.empty(self.b.shape)
+        self._call(None, np.full(self.middle.size, level), low, high)
         return Ends(low, high)
 
-    def _arrays(self) -> tuple[FloatArray, ...]:
-        """Return the model as the kernel reads it."""
+    def _call(self, *results: FloatArray | None) -> None:
+        """Call the kernel, which writes results."""
         arrays = (self.middle, self.b, self.H, self.w, self.slope_lo, self.slope_hi, self.rounding)
-        return tuple(np.ascontiguousarray(each) for each in arrays)
+        kernel().models(len(self.b), (*(np.ascontiguousarray(each) for each in arrays), *results), self.middle.size)

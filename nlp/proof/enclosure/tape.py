@@ -133,10 +133,6 @@ def _constant(k: float) -> _Value:
     return _Value(Op.CONSTANT, k=k)
 
 
-def _twice(a: _Value) -> _Value:
-    return _Value(Op.SCALE, a, k=2.0)
-
-
 def _hypot(a: _Value, b: _Value) -> _Value:
     return _Value(Op.SQRT, _Value(Op.SQUARE, a) + _Value(Op.SQUARE, b))
 
@@ -181,22 +177,22 @@ _FORMULAS: dict[int, Callable[[_Value, _Value], _Value]] = {
     ca.OP_EXP: lambda a, _: _Value(Op.EXP, a),
     ca.OP_LOG: lambda a, _: _Value(Op.LOG, a),
     ca.OP_ATAN: lambda a, _: _Value(Op.ATAN, a),
-    ca.OP_TWICE: lambda a, _: _twice(a),
+    ca.OP_TWICE: lambda a, _: _Value(Op.SCALE, a, k=2.0),
     ca.OP_NEG: lambda a, _: _Value(Op.SCALE, a, k=-1.0),
     ca.OP_ASSIGN: lambda a, _: _Value(Op.SCALE, a, k=1.0),
     ca.OP_INV: lambda a, _: _constant(1.0) / a,
     ca.OP_TAN: lambda a, _: _Value(Op.SIN, a) / _Value(Op.COS, a),
     ca.OP_HYPOT: _hypot,
     ca.OP_ASIN: lambda a, _: _asin(a),
-    ca.OP_ACOS: lambda a, _: -_asin(a) + _twice(_Value(Op.ATAN, _constant(1.0))),
+    ca.OP_ACOS: lambda a, _: -_asin(a) + _Value(Op.ATAN, _constant(1.0)) * _constant(2.0),
     # Off the negative x-axis.
-    ca.OP_ATAN2: lambda a, b: _twice(_Value(Op.ATAN, a / (_hypot(a, b) + b))),
+    ca.OP_ATAN2: lambda a, b: _Value(Op.ATAN, a / (_hypot(a, b) + b)) * _constant(2.0),
     ca.OP_FMAX: _fmax,
     ca.OP_FMIN: lambda a, b: -_fmax(-a, -b),
     ca.OP_LE: lambda a, b: _Value(Op.STEP, b - a),
-    ca.OP_FABS: lambda a, _: _twice(_Value(Op.RAMP, a)) - a,
+    ca.OP_FABS: lambda a, _: _Value(Op.RAMP, a) * _constant(2.0) - a,
     # Where it is not 0.
-    ca.OP_SIGN: lambda a, _: _twice(_Value(Op.STEP, a)) + _constant(-1.0),
+    ca.OP_SIGN: lambda a, _: _Value(Op.STEP, a) * _constant(2.0) + _constant(-1.0),
     ca.OP_POW: _power,
     ca.OP_CONSTPOW: _power,
 }

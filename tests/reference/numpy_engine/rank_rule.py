@@ -1,4 +1,4 @@
-"""The rank of matrices without loops, from forms of second order of their entries, without the kernel's reflection."""
+"""The rank of matrices without loops, from forms of second order of their entries."""
 
 from __future__ import annotations
 

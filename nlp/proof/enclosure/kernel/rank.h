@@ -8,8 +8,6 @@
 #define PRODUCTS 1e-13
 #define RANK_POWERS 12
 #define NORM_POWERS 6
-/* Smallest singular value, in parts of the largest, below which the direction that it belongs to becomes a column. */
-#define NEAR_SINGULAR 0.01
 
 typedef struct {
     int rows, columns, nullity, entries;
@@ -26,12 +24,10 @@ typedef struct {
     Py_ssize_t B;
 } Ranks;
 
-/* Parts of LANES boxes, and of one of them: A has the middle and, below it, a basis of its null space. Near a singular
- * matrix it is that of A V, V = I - t t', whose columns have the direction in which A is nearly singular as one: the
- * bounds of |I - C A V| are then near the change of the smallest singular value. */
+/* Parts of LANES boxes, and of one of them: A has the middle and, below it, a basis of its null space. */
 typedef struct {
-    Lane *C, *bound, *linear, *row, *middle, *rest, *size, *turn;
-    double *A, *inverse, *work, *B, *v, *w, *t;
+    Lane *C, *bound, *linear, *row, *middle, *rest, *size;
+    double *A, *inverse, *work, *B, *v, *w;
 } RankParts;
 
 /* Applies the reflection in column k of a matrix (rows, columns), from row k on, to a vector with a step between entries. */
@@ -186,11 +182,10 @@ static RankParts lay_parts(const Matrix *m, int n, Room *room)
     RankParts x;
     x.C = (Lane *)carve(room, rows * c * LANES), x.bound = (Lane *)carve(room, c * c * LANES);
     x.linear = (Lane *)carve(room, (size_t)n * c * c * LANES), x.row = (Lane *)carve(room, c * LANES);
-    x.turn = (Lane *)carve(room, c * LANES);
     x.middle = (Lane *)carve(room, E * LANES), x.rest = (Lane *)carve(room, E * LANES);
     x.size = (Lane *)carve(room, E * LANES);
     x.A = carve(room, rows * c), x.inverse = carve(room, rows * c), x.work = carve(room, rows * c + 2 * (rows + c));
-    x.B = carve(room, c * c), x.v = carve(room, rows + c), x.w = carve(room, rows + c), x.t = carve(room, c);
+    x.B = carve(room, c * c), x.v = carve(room, rows + c), x.w = carve(room, rows + c);
     return x;
 }
 
@@ -228,44 +223,9 @@ static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py
     }
 }
 
-/* A row times V, or sizes times |V|. */
-static void turn_row(int c, const double *t, double *row, int sizes)
-{
-    double sum = 0;
-    for (int j = 0; j < c; j++)
-        sum += row[j] * (sizes ? fabs(t[j]) : -t[j]);
-    for (int j = 0; j < c; j++)
-        row[j] += sum * (sizes ? fabs(t[j]) : t[j]);
-}
-
-/* Writes t, and the inverse of A V in the place of that of A. V is a reflection of the direction w of the largest
- * singular value of the inverse to the axis that is nearest to it; I where this is not meant. */
-static void turn_columns(int rows, int c, RankParts x, int is_meant)
-{
-    double size = 0;
-    int axis = 0;
-    for (int i = 0; i < c; i++) {
-        x.t[i] = is_meant ? x.w[i] : 0.0, size += x.t[i] * x.t[i];
-        axis = fabs(x.t[i]) > fabs(x.t[axis]) * (1 + TIE) ? i : axis;
-    }
-    if (!(size > 0))
-        return;
-    x.t[axis] += x.t[axis] > 0 ? sqrt(size) : -sqrt(size);
-    double scale = 1 / sqrt(size + sqrt(size) * (fabs(x.t[axis]) - sqrt(size)));
-    for (int i = 0; i < c; i++)
-        x.t[i] *= scale;
-    for (int r = 0; r < rows; r++) {
-        double sum = 0;
-        for (int i = 0; i < c; i++)
-            sum += x.t[i] * x.inverse[i * rows + r];
-        for (int i = 0; i < c; i++)
-            x.inverse[i * rows + r] -= sum * x.t[i];
-    }
-}
-
 /* Whether the middle of lane l has a left inverse, which goes into C: the sign of left_inverse, or 0; how
  * singular it is. */
-static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest, double near)
+static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
 {
     int rows = m->rows + m->nullity, c = m->columns, known = 1;
     memcpy(x.A, m->constant, (size_t)(m->rows * c) * sizeof(double));
@@ -280,12 +240,9 @@ static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest, do
     if (good) {
         double largest = norm_of(x.A, rows, c, x.v, x.w), far = norm_of(x.inverse, c, rows, x.v, x.w);
         *smallest = 1 / (far * largest);
-        turn_columns(rows, c, x, *smallest < near);
     }
     for (int k = 0; k < rows * c; k++)
         x.C[k][l] = good ? x.inverse[k] : 0.0;
-    for (int k = 0; k < c; k++)
-        x.turn[k][l] = good ? x.t[k] : 0.0;
     if (!good)
         return 0;
     for (int i = 0; i < c; i++) {
@@ -295,7 +252,6 @@ static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest, do
         for (int r = 0; r < rows; r++)
             for (int j = 0; j < c; j++)
                 x.v[j] += Ci[r] * x.A[r * c + j], x.w[j] += fabs(Ci[r] * x.A[r * c + j]);
-        turn_row(c, x.t, x.v, 0), turn_row(c, x.t, x.w, 1);
         for (int j = 0; j < c; j++)
             x.bound[i * c + j][l] = fabs(x.v[j] - (i == j)) + PRODUCTS * (x.w[j] + (i == j));
     }
@@ -309,18 +265,11 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
     for (int i = 0; i < c; i++) {
         Lane *bound = x.bound + i * c;
         const Lane *C = (const Lane *)(x.C + i * rows);
-        Lane sum;
-        memset(x.row, 0, (size_t)c * sizeof(Lane));
         for (int e = 0; e < m->entries; e++) {
-            double *to = x.row[m->at[2 * e + 1]], *rest = x.rest[e], *size = x.size[e];
+            double *to = bound[m->at[2 * e + 1]], *rest = x.rest[e], *size = x.size[e];
             const double *by = C[m->at[2 * e]];
             EACH to[l] += fabs(by[l]) * (rest[l] + PRODUCTS * size[l]);
         }
-        EACH sum[l] = 0.0;
-        for (int j = 0; j < c; j++)
-            EACH sum[l] += x.row[j][l] * fabs(x.turn[j][l]);
-        for (int j = 0; j < c; j++)
-            EACH bound[j][l] += x.row[j][l] + sum[l] * fabs(x.turn[j][l]);
         for (int a = 0, t = 0; a < n + n; a++)
             for (int b = a < n ? n - 1 : a - n; b < n; b++, t++) {
                 /* First the terms of first order, then the pairs, row by row; the scales of a column are one number. */
@@ -334,15 +283,8 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
                     double *to = x.row[m->at[2 * e + 1]], scale = part * m->scale[e];
                     EACH to[l] += by[l] * (term[l] * scale);
                 }
-                EACH sum[l] = 0.0;
                 for (int j = 0; j < c; j++)
-                    EACH sum[l] += x.row[j][l] * x.turn[j][l];
-                for (int j = 0; j < c; j++)
-                    EACH
-                    {
-                        x.row[j][l] -= sum[l] * x.turn[j][l];
-                        bound[j][l] += fabs(x.row[j][l]);
-                    }
+                    EACH bound[j][l] += fabs(x.row[j][l]);
                 if (a < n)
                     for (int j = 0; j < c; j++)
                         EACH x.linear[(t * c + i) * c + j][l] = fabs(x.row[j][l]);
@@ -375,13 +317,11 @@ static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, Roo
 {
     Run run = prepare(tape, n, 2, room);
     RankParts parts = lay_parts(m, n, room);
-    /* V makes what does not become small with the box larger. */
-    double near = found->change ? 0 : NEAR_SINGULAR;
     for (Py_ssize_t start = 0; room->at && start < found->B; start += LANES) {
         run_block(&run, found->lower, found->upper, found->B, NULL, start, found->B);
         middles_of(m, n, run.out, found, start, parts);
         int ready[LANES] = {0};
-        EACH if (start + l < found->B) ready[l] = invert_lane(m, l, parts, found->smallest + start + l, near);
+        EACH if (start + l < found->B) ready[l] = invert_lane(m, l, parts, found->smallest + start + l);
         add_moving(m, n, run.out, parts);
         for (int l = 0; l < LANES && start + l < found->B; l++) {
             double shares[64] = {0};
