@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..proof.checker.proof_file import Unproved, WorkspaceProof
     from ..proof.checker.workspace.check import CheckedClaim
     from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.proof_record import PaperRecord
+    from ..proof.workspace.proof_writer import PaperRecord
 
 
 def paper_record(target: str | None, json_file: str | None) -> PaperRecord | None:
@@ -27,7 +27,7 @@ def paper_record(target: str | None, json_file: str | None) -> PaperRecord | Non
         InputError: both are standard output.
     """
     from ..errors import InputError
-    from ..proof.workspace.proof_record import PaperRecord
+    from ..proof.workspace.proof_writer import PaperRecord
 
     if target is None:
         return None

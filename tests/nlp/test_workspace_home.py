@@ -27,10 +27,9 @@ from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank, prove_ranks
-from screwsynth.nlp.proof.workspace.ranks.singular_pose import NewtonRefuter
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularSearch
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -203,11 +202,9 @@ def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
         problem,
         problem.locked,
         most_boxes=4000,
-        refuter=NewtonRefuter(
-            problem,
-            problem.locked,
-            is_shown=lambda z: homes.is_singular(problem.pose_of(z), None, constraints=False),
-        ),
+        look=SingularSearch(
+            problem, problem.locked, lambda at: homes.is_singular(at.y, at.centres, constraints=False)
+        ).look,
     )
     assert found.outcome is Outcome.REFUTED
     assert found.y is not None

@@ -17,7 +17,7 @@ from hexapods import hexapod_text
 import screwsynth.cases
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Task
+from screwsynth.nlp import Case, Free, Limits, Task
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
@@ -32,9 +32,8 @@ from screwsynth.nlp.proof.checker.workspace.statement import Machines
 from screwsynth.nlp.proof.statement.machine import Legs, joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.searched import Subject, asked_spectra_extremes
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
@@ -499,7 +498,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
     subject = Subject(case, case.model, pose_box(judged.workspace), joint_centres(case))
-    for extreme in asked_spectra_extremes(subject, ASKED[1:], gap=0.1):
+    for extreme in searched_extremes(replace(subject, case=replace(case, limits=Limits())), ASKED[1:], gap=0.1):
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 
 

@@ -29,8 +29,7 @@ from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, pose_ro
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem

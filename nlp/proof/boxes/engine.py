@@ -15,9 +15,9 @@ import numpy as np
 from ...errors import UncoveredError
 from ..enclosure.engine import kernel
 from ..enclosure.forms import QuadraticModel
-from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows, tangent_rows
+from ..enclosure.squared_quotients import Rows, search_rows, tangent_rows
 from ..enclosure.tape import Tape, compile_tape
-from ..statement.form import refuse_jumps
+from ..statement.form import refuse_jumps, without_ties
 from ..statement.standard_form import StandardForm
 
 if TYPE_CHECKING:
@@ -171,25 +171,30 @@ class Engine:
     ) -> None:
         self._module, self._shared, self._threads = kernel(), shared or 0, Threads(jobs)
         rows = search_rows(form, apart=shared is not None)
-        squares = tangent_rows(form) if tangents and shared is None else None
+        squares = tangent_rows(form) if tangents and shared is None and form.n <= MOST_VARIABLES else None
         tape, values = search_tape(form, rows), None if shared is not None else value_tape(form, squares)
         objective = objective_tape(form, len(tape))
-        self._form = (
-            form.n,
-            len(form.functions),
+        parts = (
             np.where(form.follows, 2, form.is_equation).astype(np.int32),
             np.array(form.dependence, dtype=np.int32),
             form.lower,
             form.upper,
-            np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32).ravel(),
+            np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32),
+            np.array(() if squares is None else squares.functions, dtype=np.int32),
+        )
+        self._form = (
+            form.n,
+            len(form.functions),
+            len(rows.quotients),
+            0 if squares is None else len(squares.quotients),
+            parts,
             tape.head,
             None if values is None else values.head,
             None if values is None or objective is None else objective.head,
-            np.array(() if squares is None else squares.functions, dtype=np.int32),
         )
 
     def examine(
-        self, lower: FloatArray, upper: FloatArray, threshold: float, models: Sequence[Any] = ()
+        self, lower: FloatArray, upper: FloatArray, threshold: float, models: Sequence[Any] = (None,) * 3
     ) -> Examination:
         """Examine boxes, and close those whose bounds do not exceed a threshold.
 
@@ -197,7 +202,7 @@ class Engine:
             lower: (n, B) lower ends.
             upper: (n, B) upper ends.
             threshold: boxes whose bound is at most this are closed.
-            models: arguments of the kernel that only limbs have.
+            models: arrays of the kernel that only limbs have.
         """
         n, count = lower.shape
         verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
@@ -208,7 +213,7 @@ class Engine:
         found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
 
         def examine_piece(piece: tuple[int, int]) -> None:
-            self._module.examine(self._form, (*ends, *found), count, *piece, threshold, *models)
+            self._module.examine(self._form, (*ends, *found, *models), count, *piece, threshold, self._shared)
 
         self._threads.map(examine_piece, pieces(count, self._threads.jobs))
         return Examination(*found)
@@ -239,7 +244,7 @@ class Engine:
         # 2 where every condition holds.
         rows = np.empty((3 + 4 * n + n * n + 4 * m, count))
         matters = (None if each is None else np.ascontiguousarray(each) for each in (least, tilts))
-        found = self.examine(lower, upper, threshold, (m, rows, *matters))
+        found = self.examine(lower, upper, threshold, (rows, *matters))
         vectors, H = rows[3 : 3 + 4 * n].reshape(4, n, -1), rows[3 + 4 * n :][: n * n].reshape(n, n, -1)
         sides = rows[3 + 4 * n + n * n :].reshape(m, 4, count)
         closing = (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED) if tilts is None else (Verdict.INFEASIBLE,)
@@ -259,7 +264,7 @@ class Engine:
         )
 
 
-def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short: bool = True) -> Tape:
+def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool = True) -> Tape:
     """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
 
     Equal parts are written once with ``is_short``; looking for them cannot be stopped, and takes as long as the rest.
@@ -270,13 +275,14 @@ def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short:
     try:
         rows = search_rows(form, apart=False) if rows is None else rows
         refuse_jumps(rows.expressions, form.x)
-        results = [rows.expressions, rows.jacobian.T]
+        jacobian = ca.densify(without_ties(ca.jacobian(rows.expressions, form.x), form.x))
+        results = [rows.expressions, jacobian.T]
         return compile_tape(ca.Function("search", [form.x], ca.cse(results) if is_short else results))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
 
 
-def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | None:
+def value_tape(form: StandardForm, rows: Rows | None = None) -> Tape | None:
     """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
 
     None is returned for a form with too many variables for a first pass.

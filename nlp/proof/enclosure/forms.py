@@ -6,13 +6,9 @@ On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, each value ``v`` has two enc
 
 where ``c`` is its value at the centre, ``a`` its scaled gradient there, ``[p, q]`` holds 0 and all terms of second
 order, and ``s`` bounds the rounding errors. The terms of second order shrink with ``t^2``, so that the integral of a
-gradient's form along a ray has a third of their width. These are Taylor models of first order (M. Berz and K. Makino,
-*Verified integration of ODEs and flows using differential algebraic methods on high-order Taylor models*, Reliable
-Computing 4 (1998)) with the products bounded as in affine arithmetic (J. Stolfi and L. H. de Figueiredo, 1997; F.
-Messine, *Extensions of affine arithmetic*, 2002). See ``docs/certificate.md``.
-
-A value that may be undefined somewhere in the box, or that overflows, is *poisoned*: its ``s`` and its ends are
-infinite, and so are those of every value computed from it.
+gradient's form along a ray has a third of their width. A value that may be undefined somewhere in the box, or that
+overflows, is *poisoned*: its ``s`` and its ends are infinite, and so are those of every value computed from it.
+``docs/certificate.md`` has the rules and their sources.
 
 With ``h = r e``, ``|e_i| <= 1``, the forms of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the
 ray from the centre, give
@@ -20,10 +16,7 @@ ray from the centre, give
     L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
     b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
 
-a quadratic model with a remainder of third order, without second derivatives. With ``mu`` on the simplex and
-``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
-conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
-``docs/certificate.md`` has the derivation.
+a quadratic model with a remainder of third order, without second derivatives.
 """
 
 from __future__ import annotations
@@ -122,6 +115,11 @@ class Forms(NamedTuple):
         """Return the forms of some of the expressions."""
         return Forms(self.c[:, which], self.a[:, which], self.r[:, which])
 
+    @property
+    def sizes(self) -> FloatArray:
+        """Bounds (B, R) of the sizes of the expressions."""
+        return np.asarray(np.abs(self.c) + np.abs(self.a).sum(axis=2) + self.r)
+
 
 class Encloser:
     """Forms of expressions.
@@ -195,14 +193,14 @@ class QuadraticModel:
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
         bound = np.empty(self.middle.size)
-        kernel().models(len(self.b), self._arrays(), bound.size, bound)
+        kernel().models(len(self.b), (*self._arrays(), bound, None, None, None), bound.size)
         return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
         low, high, levels = np.empty(self.b.shape), np.empty(self.b.shape), np.empty(self.middle.size)
         levels[:] = level
-        kernel().models(len(self.b), self._arrays(), levels.size, levels, low, high)
+        kernel().models(len(self.b), (*self._arrays(), None, levels, low, high), levels.size)
         return Ends(low, high)
 
     def _arrays(self) -> tuple[FloatArray, ...]:

@@ -82,10 +82,10 @@ class Tape:
         return len(self.op)
 
     @cached_property
-    def head(self) -> tuple[NDArray[np.int32], FloatArray, int, int, int]:
+    def head(self) -> tuple[tuple[NDArray[np.int32], FloatArray], int, int, int]:
         """The tape as the C kernel reads it: code, constants, and numbers of instructions, registers and results."""
         code = np.stack([self.op, self.to, self.a, self.b, self.first, self.last], axis=1).astype(np.int32)
-        return np.ascontiguousarray(code), self.k, len(self), self.registers, self.outputs
+        return (np.ascontiguousarray(code), self.k), len(self), self.registers, self.outputs
 
 
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}

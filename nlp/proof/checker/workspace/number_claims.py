@@ -48,8 +48,8 @@ _WRONG = 1e-6
 _ENLARGED = 1e-6
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
 _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32].T
-#: Rows and columns of the entries of a matrix (6, 6).
-_DENSE = np.indices((6, 6), dtype=np.intp).reshape(2, -1)
+#: Rows and columns of the entries of matrices (6, 6) and (3, 4).
+_DENSE, _ENDS = (np.indices(shape, dtype=np.intp).reshape(2, -1) for shape in ((6, 6), (3, 4)))
 #: Part of the trace that is taken off before Cholesky's factorisation: many times the bound of its rounding for
 #: matrices (6, 6), which is 8 roundings. A factorisation that ends proves the matrix positive definite (S. M. Rump,
 #: *Verification of positive definiteness*, BIT 46 (2006)).
@@ -275,33 +275,25 @@ class ClearanceClaim:
         (foot, arm), (other_foot, other_arm) = (robot.legs[k] for k in pair)
         self._feet = np.array(ca.DM(foot - other_foot)).ravel()
         # Differences of the ends of the two legs, times the scale: from foot to tip, tip to foot, and tip to tip.
-        ends = [
-            -robot.scale * (robot.position - foot) - other_arm,
-            robot.scale * (robot.position - other_foot) + arm,
-            arm - other_arm,
-        ]
-        self._forms = FormArithmetic(robot.z, ca.vertcat(*ends, robot.scale))
+        spans = robot.scale * (robot.position - foot), robot.scale * (robot.position - other_foot)
+        ends = -spans[0] - other_arm, spans[1] + arm, arm - other_arm
+        self._forms = FormArithmetic(robot.z, ca.vertcat(*[ca.vertcat(end, robot.scale) for end in ends]))
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
-        c, a, r = self._forms(lower[:, self.free], upper[:, self.free]).forms()
-        gaps = (c[:, :9] / c[:, 9:]).reshape(-1, 3, 3)
+        matrix = self._forms(lower[:, self.free], upper[:, self.free]).forms().matrix(_ENDS, (3, 4))
+        gaps = matrix.M[:, :, :3] / matrix.M[:, :, 3:]
         n = _between(self._feet, gaps[:, 0], gaps[:, 1])
         size = np.sqrt((n * n).sum(axis=1))
         needed = max(self._least, 0.0) * size * UP
         along = (n * self._feet).sum(axis=1)
         holds = along - needed >= PRODUCT * (np.abs(n) @ np.abs(self._feet) + needed)
-        shares = np.zeros(a.shape[::2])
-        for k in range(3):
-            part, factors = [*range(3 * k, 3 * k + 3), 9], np.column_stack([n, -needed])
-            slopes = (factors[:, :, None] * a[:, part]).sum(axis=1)
-            terms = r[:, part] + PRODUCT * (np.abs(c[:, part]) + np.abs(a[:, part]).sum(axis=2))
-            rest = np.abs(slopes).sum(axis=1) + (np.abs(factors) * terms).sum(axis=1)
-            fine = (factors * c[:, part]).sum(axis=1) >= rest * UP
-            holds &= fine
-            shares += np.where(fine[:, None], 0.0, np.abs(slopes))
+        factors = np.column_stack([n, -needed])[:, :, None]
+        slopes, rest = np.abs(matrix.A @ factors[:, None])[..., 0], (matrix.rest @ np.abs(factors))[..., 0]
+        fine = (matrix.M @ factors)[..., 0] >= (slopes.sum(axis=1) + rest) * UP
+        shares = np.where(fine[:, None], 0.0, slopes).sum(axis=2)
         # The distance is at most that of two points of the legs.
-        return Attempt(holds, shares, np.asarray(size < self._least * (1 - _WRONG)))
+        return Attempt(holds & fine.all(axis=1), shares, np.asarray(size < self._least * (1 - _WRONG)))
 
 
 def _between(feet: FloatArray, foot_to_tip: FloatArray, tip_to_foot: FloatArray) -> FloatArray:

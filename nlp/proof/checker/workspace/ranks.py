@@ -42,8 +42,8 @@ from .pose_boxes import COORDINATES, Attempt, PoseRoot
 _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
-#: Largest number of parts of the way between two poses.
-_PARTS = 4096
+#: Numbers of parts of the way between two poses that are tried.
+_PARTS = (1, 16, 256, 4096)
 #: Indices after a component, and before it, of a vector.
 _AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
@@ -173,17 +173,13 @@ class RankClaim:
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
             raise ProofError("the determinant has not opposite signs at the two poses")
-        waiting, parts = [(points[0], points[1])], 0
-        while waiting:
-            begin, end = waiting.pop()
-            parts += 1
-            closed = self._closed(np.minimum(begin, end)[None], np.maximum(begin, end)[None])
-            if all(np.isfinite(each).all() for each in self._matrices(closed)):
-                continue
-            middle = 0.5 * begin + 0.5 * end
-            if parts > _PARTS or not root.holds(middle[:COORDINATES]):
-                raise ProofError("the determinant is not shown to change continuously between the two poses")
-            waiting += [(begin, middle), (middle, end)]
+        for count in _PARTS:
+            way = points[0] + np.linspace(0, 1, count + 1)[:, None] * (points[1] - points[0])
+            way[[0, -1]] = points
+            matrices = self._matrices(self._closed(np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])))
+            if all(np.isfinite(each).all() for each in matrices) and all(root.holds(y[:COORDINATES]) for y in way):
+                return
+        raise ProofError("the determinant is not shown to change continuously between the two poses")
 
     @np.errstate(all="ignore")
     def _signs_at(self, y: FloatArray) -> list[int]:
@@ -227,7 +223,8 @@ class RankClaim:
             known = np.asarray(np.isfinite(M).all(axis=(1, 2)))
             null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._freedoms :]
             none = np.zeros((len(M), A.shape[1], *null.shape[1:]))
-            M, E, A = (np.concatenate(each, axis=-2) for each in ((M, null), (E, none[:, 0]), (A, none)))
+            rows = (M, null), (E, np.zeros_like(null)), (A, none)
+            M, E, A = (np.concatenate(each, axis=-2) for each in rows)
         C, p = inverses(M), len(self.free)
         moved = np.abs(C[:, None] @ A)
         # The error of a centre is no larger than the tolerance in any direction.

@@ -6,15 +6,18 @@
 #include "quotients.h"
 #include "runs.h"
 
+static void read_value(Box *x, size_t k, const Value *v, Py_ssize_t l)
+{
+    x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l], x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
+}
+
 /* The forms of second order of a box: centre, gradient and matrix of each row. */
 static void read_second(Box *x, int rows, Store out, Py_ssize_t l)
 {
     int n = x->n;
     for (int k = 0; k < rows; k++) {
-        const Value *v = value_of(out, k);
-        const Lane *a = terms_of(v);
-        x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
-        x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
+        const Lane *a = terms_of(value_of(out, k));
+        read_value(x, (size_t)k, value_of(out, k), l);
         double *H = x->gA + k * n * n;
         for (int i = 0; i < n; i++) {
             x->gb[k * n + i] = a[i][l];
@@ -32,9 +35,7 @@ static void read_gradients(Box *x, size_t E, Store out, Py_ssize_t l)
     size_t n = (size_t)x->n;
     const double *r = x->radius;
     for (size_t k = 0; k < E; k++) {
-        Value *v = value_of(out, (int)k);
-        x->c[k] = v->c[l], x->p[k] = v->p[l], x->q[k] = v->q[l], x->s[k] = v->s[l];
-        x->lo[k] = v->lo[l], x->hi[k] = v->hi[l];
+        read_value(x, k, value_of(out, (int)k), l);
         for (size_t i = 0, at = k * n; i < n; i++, at++) {
             Value *g = value_of(out, (int)(E + at));
             int wide = r[i] > 0;
@@ -65,12 +66,12 @@ static void examine_range(const Form *form, Report *report, Py_ssize_t begin, Py
         }
     room->used = behind;
     int rows = rows_of(form), others = form->expressions + rows_of_tangents(form);
-    Box x = lay_box(form->n, (size_t)(rows > others ? rows : others), form->quotients ? (size_t)form->functions : 0, room);
+    Box x = lay_box(form->n, (size_t)(rows > others ? rows : others), room);
     Py_ssize_t *open = (Py_ssize_t *)carve(room, boxes), count = finish - begin;
     double *scores = in_turn ? carve(room, boxes * n) : NULL; /* of the variables of open boxes */
     if (!room->at)
         return;
-    x.J = form->functions;
+    x.J = form->functions, x.squares = form->quotients > 0;
     for (Py_ssize_t k = 0; k < count; k++)
         open[k] = begin + k;
     for (size_t stage = 0; stage < COUNT(tapes); stage++) {

@@ -67,32 +67,23 @@ static void reach_quadratic(Box *x, double sign, double middle, const double *b,
 /* Moves the ends past points where sign times a row cannot reach a level. */
 static void reach_row(Box *x, int r, double sign, double level)
 {
-    int n = x->n, squares = x->squares && r < x->J;
+    int n = x->n;
     const double *A = x->gA + r * n * n;
-    double middle = sign * x->c[r] + x->s[r], lost = 0.0;
-    if (x->is_second) {
-        middle += sign > 0 ? x->q[r] : -x->p[r], lost = size_of_row(x, r);
-        for (int i = 0; i < n; i++)
-            x->fb[i] = sign * x->gb[r * n + i], x->fw[i] = 0.0;
-    } else
-        lost = fabs(x->c[r]);
-    for (int i = 0; i < n && !x->is_second; i++) {
+    double middle = sign * x->c[r] + x->s[r], lost = x->is_second ? size_of_row(x, r) : fabs(x->c[r]);
+    if (x->is_second)
+        middle += sign > 0 ? x->q[r] : -x->p[r];
+    for (int i = 0; i < n; i++) {
         int at = r * n + i;
         double p = sign > 0 ? x->gp[at] : -x->gq[at], q = sign > 0 ? x->gq[at] : -x->gp[at], across = 0.0;
         double low = 0.0, high = 0.0; /* the model's slopes are not used here */
+        x->fb[i] = sign * x->gb[at], x->fw[i] = 0.0;
+        if (x->is_second)
+            continue;
         for (int j = 0; j < n; j++)
             across += fabs(A[i * n + j]);
-        x->fb[i] = sign * x->gb[at];
         lost += finish_model(x->fb + i, x->fw + i, &low, &high, across, p, q, x->gs[at], 0.0);
-        if (squares) {
-            x->fw[i] += x->sw[at], lost += x->sw[at];
-            for (int j = 0; j < n; j++) {
-                double h = x->sH[at * n + j];
-                x->fH[i * n + j] = A[i * n + j] + h, lost += fabs(h);
-            }
-        }
     }
-    reach_quadratic(x, sign, middle, x->fb, squares ? x->fH : A, x->fw, 64 * ULP * lost + TINY, level, r);
+    reach_quadratic(x, sign, middle, x->fb, A, x->fw, 64 * ULP * lost + TINY, level, r);
 }
 
 /* Moves the ends past points where no function, unless it has tilts, or not the Lagrangian can reach the threshold, or a

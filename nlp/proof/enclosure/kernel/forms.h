@@ -161,26 +161,6 @@ INLINE void add_cubic_sizes(int n, Terms x, Terms y, const Lane *a, const Lane *
     }
 }
 
-/* Half of a function's second derivative at c, from its rule. */
-static double curve_of(int op, Rule rule, double c)
-{
-    switch (op) {
-    case SQRT:
-        return -0.25 * rule.slope / c;
-    case SIN:
-    case COS:
-        return -0.5 * rule.value;
-    case EXP:
-        return 0.5 * rule.value;
-    case LOG:
-        return -0.5 * rule.slope * rule.slope;
-    case ATAN:
-        return -c * rule.slope * rule.slope;
-    default:
-        return 0.0;
-    }
-}
-
 /* Makes the coefficients of a form those of t: from first to last, or those that are terms. */
 INLINE void write_terms(Value *v, int n, int order, int first, int last, Terms terms, const Lane *t)
 {
@@ -433,7 +413,7 @@ INLINE void interpret(int order, const Tape *tape, int n, Store work, Store out,
             EACH
             {
                 Rule rule = rule_of(op, x->c[l], x->lo[l], x->hi[l]);
-                double slope = rule.slope, curve = order > 1 ? curve_of(op, rule, x->c[l]) : 0.0;
+                double slope = rule.slope, curve = order > 1 ? rule.curve : 0.0;
                 double p = x->p[l], q = x->q[l], s = x->s[l], m = REST(x), S = CURVED(x) + m, rad = x->rad[l];
                 double moved = rad + SPREAD(x) + m, reach = moved + s, further = order > 1 ? moved + moved * moved : moved;
                 double mixed = most[l] + 2 * rad * m, square = mixed + S * S;

@@ -19,7 +19,7 @@ typedef struct {
 static void use_models(const Models *all, Room *room)
 {
     int n = all->n;
-    Box x = lay_box(n, 0, 0, room);
+    Box x = lay_box(n, 0, room);
     for (Py_ssize_t at = 0; room->at && at < all->B; at++) {
         for (int i = 0; i < n; i++) {
             Py_ssize_t place = i * all->B + at;

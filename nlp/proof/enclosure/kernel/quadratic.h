@@ -23,15 +23,14 @@ typedef struct {
     double *e_lo, *e_hi;
     int *why_lo, *why_hi;
     double q_middle, q_rounding;
-    int squares;          /* whether functions have quotients: quotients.h */
-    double *sH, *sw;      /* (J, n, n), (J, n): matrices and remainders of their models, whose linear part is in gb */
+    int squares;          /* whether functions have quotients, whose models are in gb, gA and gs: quotients.h */
     double *aE, *HN, *HD, *bN, *bD, *wN, *wD; /* (n), HN and HD: (n, n) */
 } Box;
 
-/* Lays a box with E rows, and J functions with quotients, over memory. */
-static Box lay_box(int variables, size_t E, size_t J, Room *room)
+/* Lays a box with E rows over memory. */
+static Box lay_box(int variables, size_t E, Room *room)
 {
-    Box x = {.n = variables, .squares = J > 0};
+    Box x = {.n = variables};
     size_t n = (size_t)variables;
     double **rows[] = {&x.c, &x.p, &x.q, &x.s, &x.lo, &x.hi, &x.weights, &x.size};
     double **vectors_of_rows[] = {&x.gb, &x.gp, &x.gq, &x.gs, &x.slope_lo, &x.slope_hi, &x.grad_lo, &x.grad_hi};
@@ -42,7 +41,7 @@ static Box lay_box(int variables, size_t E, size_t J, Room *room)
     CARVE(vectors_of_rows, E * n);
     CARVE(vectors, n);
     CARVE(matrices, n * n);
-    x.gA = carve(room, E * n * n), x.sH = carve(room, J * n * n), x.sw = carve(room, J * n);
+    x.gA = carve(room, E * n * n);
     x.why_lo = (int *)carve(room, n), x.why_hi = (int *)carve(room, n);
     return x;
 }
@@ -164,15 +163,6 @@ static void combine(Box *x)
             x->qlo[i] = low - margin, x->qhi[i] = high + margin;
         }
     }
-    for (int r = 0; x->squares && r < x->J; r++)
-        for (int i = 0; i < n && x->weights[r] != 0; i++) {
-            double weight = x->weights[r], w = x->sw[r * n + i] * weight;
-            x->qw[i] += w, lost += w;
-            for (int j = 0; j < n; j++) {
-                double h = x->sH[(r * n + i) * n + j] * weight;
-                x->H[i * n + j] += h, lost += fabs(h);
-            }
-        }
     x->q_rounding = 64 * ULP * (largest + lost) + TINY;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < i; j++)

@@ -34,6 +34,17 @@ typedef struct {
     double *A, *inverse, *work, *B, *v, *w, *t;
 } RankParts;
 
+/* Applies the reflection in column k of a matrix (rows, columns), from row k on, to a vector with a step between entries. */
+static void apply_reflection(const double *M, int rows, int columns, int k, double factor, double *vector, int step)
+{
+    double sum = 0;
+    for (int i = k; i < rows; i++)
+        sum += M[i * columns + k] * vector[i * step];
+    sum *= factor;
+    for (int i = k; i < rows; i++)
+        vector[i * step] -= sum * M[i * columns + k];
+}
+
 /* Turns column k of a matrix (rows, columns), from row k on, to its first entry by a reflection, and the later columns
  * with it. The reflection's vector stays in the column, its factor is returned; 0 for a column of zeros. */
 static double reflect(double *M, int rows, int columns, int k, double *diagonal)
@@ -45,25 +56,19 @@ static double reflect(double *M, int rows, int columns, int k, double *diagonal)
     *diagonal = 0;
     if (!(size > 0) || !isfinite(size))
         return 0;
-    double head = M[k * columns + k], turned = head > 0 ? -size : size, factor = 1 / (size * (size + fabs(head)));
-    *diagonal = turned;
-    M[k * columns + k] = head - turned;
-    for (int j = k + 1; j < columns; j++) {
-        double sum = 0;
-        for (int i = k; i < rows; i++)
-            sum += M[i * columns + k] * M[i * columns + j];
-        sum *= factor;
-        for (int i = k; i < rows; i++)
-            M[i * columns + j] -= sum * M[i * columns + k];
-    }
+    double head = M[k * columns + k], factor = 1 / (size * (size + fabs(head)));
+    *diagonal = head > 0 ? -size : size;
+    M[k * columns + k] = head - *diagonal;
+    for (int j = k + 1; j < columns; j++)
+        apply_reflection(M, rows, columns, k, factor, M + j, columns);
     return factor;
 }
 
 /* Writes an orthonormal basis (nullity, columns) of what the rows of a matrix miss, from reflections of its columns'
  * space with the longest row first. */
-static void null_space(const double *A, int rows, int columns, int nullity, double *basis, double *work)
+static void null_space(const double *A, int rows, int columns, int nullity, double *basis, double *M)
 {
-    double *M = work, diagonal, factors[64];
+    double diagonal, factors[64];
     int rank = columns - nullity;
     for (int i = 0; i < rows; i++)
         for (int j = 0; j < columns; j++)
@@ -88,14 +93,8 @@ static void null_space(const double *A, int rows, int columns, int nullity, doub
         double *row = basis + d * columns;
         for (int j = 0; j < columns; j++)
             row[j] = j == rank + d;
-        for (int k = rank - 1; k >= 0; k--) {
-            double sum = 0;
-            for (int j = k; j < columns; j++)
-                sum += M[j * rows + k] * row[j];
-            sum *= factors[k];
-            for (int j = k; j < columns; j++)
-                row[j] -= sum * M[j * rows + k];
-        }
+        for (int k = rank - 1; k >= 0; k--)
+            apply_reflection(M, columns, rows, k, factors[k], row, 1);
     }
 }
 
@@ -103,7 +102,7 @@ static void null_space(const double *A, int rows, int columns, int nullity, doub
  * sign of the determinant of a square A: each reflection changes it. */
 static int left_inverse(const double *A, int rows, int columns, double *C, double *work)
 {
-    double *M = work, *diagonal = work + rows * columns, *factors = diagonal + columns;
+    double *M = work, *diagonal = work + rows * columns, *factors = diagonal + columns, *column = factors + columns;
     int sign = 1;
     memcpy(M, A, (size_t)(rows * columns) * sizeof(double));
     for (int k = 0; k < columns; k++) {
@@ -114,17 +113,10 @@ static int left_inverse(const double *A, int rows, int columns, double *C, doubl
     }
     for (int r = 0; r < rows; r++) {
         /* Column r of the transposed reflections, then back substitution. */
-        double *column = factors + columns;
         for (int i = 0; i < rows; i++)
             column[i] = i == r;
-        for (int k = 0; k < columns; k++) {
-            double sum = 0;
-            for (int i = k; i < rows; i++)
-                sum += M[i * columns + k] * column[i];
-            sum *= factors[k];
-            for (int i = k; i < rows; i++)
-                column[i] -= sum * M[i * columns + k];
-        }
+        for (int k = 0; k < columns; k++)
+            apply_reflection(M, rows, columns, k, factors[k], column, 1);
         for (int k = columns - 1; k >= 0; k--) {
             double sum = column[k];
             for (int j = k + 1; j < columns; j++)

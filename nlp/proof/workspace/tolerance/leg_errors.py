@@ -17,7 +17,7 @@ import numpy as np
 from .....models import FloatArray
 from ...statement.machine import LEGS, CentreErrors, JointErrors, Legs
 from ..robot.pose_box import PoseBox, PoseNumbers
-from ..robot.tolerance_model import steepest
+from ..robot.posed_robot import steepest
 
 #: Part of itself by which the bound moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12

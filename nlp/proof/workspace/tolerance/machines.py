@@ -12,8 +12,10 @@ follow from others, or a number has kinks, boxes of poses are searched for all m
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -27,6 +29,7 @@ from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
+from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
 from ...statement.machine import CentreErrors, has_straight_legs
 from ...statement.tolerance import (
@@ -38,17 +41,16 @@ from ...statement.tolerance import (
     machine_layout,
     second_order_name,
 )
-from ..numbers.extremes import CLOSE, GAP, Extreme, nothing_known, prove_extreme, slack_of
+from ..numbers.bound_search import Minimum, smallest_values
+from ..numbers.expressions import Expressions
+from ..numbers.extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
 from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
-from ..robot.posed_robot import NotJudgedError, build_problem
-from ..robot.tolerance_model import ToleranceModel, family_of
-from ..verdict import Outcome
+from ..robot.posed_robot import NotJudgedError, Problem, build_problem, family_of
 from .leg_errors import of_legs
-from .machine_number import MachineNumber
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
@@ -80,7 +82,7 @@ class Machines:
             self.built = built_model(case.model) if tolerance else BuiltModel(closed.model, (), closed.reaches)
         except RobotError as error:
             raise NotJudgedError(str(error)) from None
-        self.family: ToleranceModel = family_of(case, self.built, build_problem(case, closed.model, box), tolerance)
+        self.family: Problem = family_of(case, self.built, build_problem(case, closed.model, box), tolerance)
         self.symbols: MachineLayout = machine_layout(case, self.built, tolerance, self._at)
         self._rests: dict[tuple[str, str], float] = {}
 
@@ -101,22 +103,44 @@ class Machines:
             paper: records the search for a proof.
         """
         if is_requested():
-            return not_bounded(claim, why_stopped())
-        whole = self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
-        number = MachineNumber(self.family, whole if claim.sense is Sense.MIN else -whole)
+            return extreme_of(claim, Minimum(reason=why_stopped()))
+        number, found = self.number(claim), None
         try:
-            found = None
-            if not self.family.problem.dependent and is_smooth(whole):
+            if not self.family.problem.dependent and is_smooth(number):
                 found = self._by_first_order(claim, number, gap, jobs, paper)
-            found = found or self._by_search(claim, number, gap)
+            found = found or next(self._by_search([claim], gap))
         except UncoveredError as error:
-            return not_bounded(claim, str(error))
+            return extreme_of(claim, Minimum(reason=str(error)))
         if found.centres is None or not has_straight_legs(self._case.model):
             return found
         return replace(found, errors=of_legs(found.centres), centres=None)
 
+    def followed(self, claims: Sequence[Claim], *, gap: float) -> Iterator[Extreme]:
+        """Yield the extremes of those limits that have rules, by one search in which bounds within limits are enough.
+
+        Args:
+            claims: the limits, in the symbols of machines.
+            gap: allowed distance of the bound from a value beyond its limit, as a part of it.
+        """
+        covered = [claim for claim in claims if self._is_covered(claim)]
+        if covered:
+            with suppress(UncoveredError):  # an equation of loops
+                yield from self._by_search(covered, gap, is_enough=True)
+
+    def _is_covered(self, claim: Claim) -> bool:
+        """Return whether a number has no operation without a rule."""
+        try:
+            compile_tape(ca.Function("number", [self.family.z], [self.number(claim)]))
+        except UncoveredError:
+            return False
+        return True
+
+    def number(self, claim: Claim) -> SX:
+        """Return a number in the coordinates of machines, times -1 where the largest value is meant."""
+        return -_sign(claim) * self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
+
     def _by_first_order(
-        self, claim: Claim, number: MachineNumber, gap: float, jobs: int | None, paper: PaperRecord | None
+        self, claim: Claim, number: SX, gap: float, jobs: int | None, paper: PaperRecord | None
     ) -> Extreme | None:
         """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
 
@@ -125,28 +149,30 @@ class Machines:
         """
         family, symbols, design, sign = self.family, self.symbols, self._design, _sign(claim)
         whole, machine = claim.expression, None
-        if any(ca.which_depends(number.entries, family.errors, 1, True)):
-            rest = self._rest(claim, number)
+        if any(ca.which_depends(number, family.errors, 1, True)):
+            values = Expressions(family, number)
+            rest = self._rest(claim, number, values)
             if not math.isfinite(rest):
                 return None
             gradient = ca.densify(ca.gradient(whole, symbols.errors))
             sizes = enumerate(symbols.near_zero(whole, design).tolist())
             change = sum((ca.norm_2(ca.vertcat(gradient[3 * j : 3 * j + 3], size)) for j, size in sizes), SX(0))
             whole += sign * (family.tolerance * change * _OUTWARDS + rest)
+            machine = partial(self._worst, values, sign)
             if paper is not None:
                 paper.rests[second_order_name(claim.name), claim.sense.value] = rest
-
-            def machine(pose: PoseNumbers) -> tuple[CentreErrors, float]:
-                """Return the errors that are worst at a pose, and the number, as people read it, with them."""
-                z = family.exact(family.problem.box.coordinates(pose)[list(family.problem.free)])[None]
-                z = number.worst(z, number.slopes(z))
-                return family.errors_of(z[0]), claim.reading.from_value(-sign * float(number.values(z)[0]))
-
         pose = design.table.variables_vector
         own = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
         return prove_extreme(design, own, gap=gap, jobs=jobs, machine=machine, paper=paper)
 
-    def _rest(self, claim: Claim, number: MachineNumber) -> float:
+    def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[CentreErrors, float]:
+        """Return the errors that are worst at a pose to first order, and the number with them."""
+        problem = self.family.problem
+        z = self.family.exact(problem.box.coordinates(pose)[list(problem.free)])[None]
+        z = values.worst(z, values.slopes(z, np.zeros(1, dtype=np.intp)))
+        return self.family.errors_of(z[0]), -sign * float(values.values(z)[0, 0])
+
+    def _rest(self, claim: Claim, number: SX, values: Expressions) -> float:
         """Return a bound of the terms of second order of a claim's number, the same for both senses; or infinite.
 
         Raises:
@@ -155,47 +181,31 @@ class Machines:
         family, key = self.family, (claim.name, claim.key.rpartition(".")[0])
         if key not in self._rests:
             poses = family.problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(family.problem.free)]
-            first = float(number.change(np.array([family.exact(z) for z in poses])).max())
-            self._rests[key] = second_order_change(family, number.entries, first)
+            z = np.array([family.exact(each) for each in poses])
+            slopes = values.slopes(z, np.zeros(_POSES, dtype=np.intp))[:, poses.shape[1] :].reshape(_POSES, -1, 3)
+            first = family.tolerance * float(np.nan_to_num(np.linalg.norm(slopes, axis=2)).sum(axis=1).max())
+            self._rests[key] = second_order_change(family, number, first)
         return self._rests[key]
 
-    def _by_search(self, claim: Claim, number: MachineNumber, gap: float) -> Extreme:
-        """Return the extreme of a number by a search of boxes of poses for all machines.
+    def _by_search(self, claims: Sequence[Claim], gap: float, *, is_enough: bool = False) -> Iterator[Extreme]:
+        """Yield the extremes of numbers by one search of boxes of poses for all machines.
+
+        Args:
+            claims: the numbers, in the symbols of machines.
+            gap: as a part of a number.
+            is_enough: whether bounds within limits are enough whatever the gap is.
 
         Raises:
-            UncoveredError: the expression holds an operation without a rule.
+            UncoveredError: an expression holds an operation without a rule.
         """
-        sign, read, family = _sign(claim), claim.reading.from_value, self.family
-        least = None if claim.limit is None else -sign * claim.limit
-        slack = 0.0 if claim.limit is None else slack_of(claim.limit)
-        found = number.minimum(gap=gap, limit=least, slack=slack)
-        is_bounded, is_known = math.isfinite(found.bound), math.isfinite(found.value)
-        is_proved = is_bounded and (not found.reason if least is None else found.bound >= least - slack)
-        outcome, reason = Outcome.PROVED if is_proved else Outcome.OPEN, found.reason or CLOSE
-        if least is not None and found.value < least - slack:
-            outcome = Outcome.REFUTED
-        problem = family.problem
-        return Extreme(
-            name=claim.name,
-            sense=claim.sense,
-            dimension=claim.reading.dimension,
-            key=claim.key,
-            limit=None if claim.limit is None else read(claim.limit),
-            bound=read(-sign * found.bound) if is_bounded else sign * math.inf,
-            reached=read(-sign * found.value) if is_known else math.nan,
-            pose=problem.box.pose(problem.pose_of(found.at)) if is_known else None,
-            outcome=outcome,
-            boxes=found.boxes,
-            seconds=found.seconds,
-            reason=reason if outcome is Outcome.OPEN else "",
-            centres=family.errors_of(found.at) if is_known and family.names else None,
-        )
-
-
-def not_bounded(claim: Claim, reason: str) -> Extreme:
-    """Return the extreme of a claim of which nothing is proved."""
-    limit = None if claim.limit is None else claim.reading.from_value(claim.limit)
-    return nothing_known(claim.name, claim.sense, claim.reading.dimension, reason, key=claim.key, limit=limit)
+        problem = self.family.problem
+        goals = [goal_of(claim, part=gap, is_enough=is_enough) for claim in claims]
+        every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals)
+        for claim, found in zip(claims, every, strict=True):
+            is_known = math.isfinite(found.value)
+            pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
+            centres = self.family.errors_of(found.at) if is_known and self.family.names else None
+            yield extreme_of(claim, found, pose, centres=centres)
 
 
 def _sign(claim: Claim) -> float:
