@@ -155,9 +155,9 @@ class BoundRule(FormRule):
         left = np.flatnonzero((shown.lower[:, which] <= shown.upper[:, which]).all(axis=0))
         which, forms = which[left], forms.select(left)
         low, high = shown.lower[:, which], shown.upper[:, which]
-        slopes, nothing = self._gradient(low, high), self._slopes.nothing
+        slopes = self._gradient(low, high)
         for i in self._slopes.stops:
-            up, down = (self._slopes.first_stop(i, side, slopes, forms.high) == nothing for side in (1, -1))
+            up, down = (self._slopes.rise(i, side, slopes, forms.high) for side in (1, -1))
             shown.lower[i, which] = np.where(up, high[i], low[i])
             shown.upper[i, which] = np.where(down & ~up, low[i], high[i])
 
@@ -182,19 +182,19 @@ class _Slopes:
 
     Attributes:
         stops: numbers of these conditions, for each variable.
-        nothing: the number that stands for no condition.
         expressions: the derivatives, (E, 1): for each variable, of the J functions and then of its conditions.
     """
 
     def __init__(self, form: StandardForm, variables: Sequence[int]) -> None:
-        self._J, self._equation, self.nothing = len(form.functions), form.is_equation, len(form.is_equation)
-        self.stops = {i: [r for r in range(self._J, self.nothing) if form.dependence[r][i]] for i in variables}
+        self._J, self._equation = len(form.functions), form.is_equation
+        conditions = range(self._J, len(self._equation))
+        self.stops = {i: [r for r in conditions if form.dependence[r][i]] for i in variables}
         entries = [(r, i) for i, stops in self.stops.items() for r in [*range(self._J), *stops]]
         self._at = {entry: k for k, entry in enumerate(entries)}
         self.expressions = ca.densify(ca.vertcat(*(form.jacobian[r, i] for r, i in entries)))
 
-    def first_stop(self, i: int, side: int, slopes: Sequence[Polynomial], high: FloatArray) -> NDArray[np.intp]:
-        """Return the first condition (N,) that may stop a point on its way to a side; 0 if a function may not rise.
+    def rise(self, i: int, side: int, slopes: Sequence[Polynomial], high: FloatArray) -> NDArray[np.bool_]:
+        """Return where (N,) all functions rise towards a side, and no condition may stop a point on its way.
 
         Args:
             i: the variable.
@@ -203,16 +203,15 @@ class _Slopes:
             high: (R, N) upper ends of functions and conditions.
         """
 
-        def least(r: int, way: int) -> FloatArray:
+        def grows(r: int, way: int) -> NDArray[np.bool_]:
             V = slopes[self._at[r, i]].V
-            return np.asarray(V[0] if way > 0 else -V[1])
+            return np.asarray(V[0] > 0 if way > 0 else V[1] < 0)
 
-        found = np.full(high.shape[1], self.nothing)
-        for r in reversed(self.stops[i]):
-            is_free = (high[r] < 0) | ((least(r, -side) > 0) & (not self._equation[r]))
-            found = np.where(is_free, found, r)
+        found = np.ones(high.shape[1], dtype=bool)
         for r in range(self._J):
-            found = np.where(least(r, side) > 0, found, 0)
+            found &= grows(r, side)
+        for r in self.stops[i]:
+            found &= (high[r] < 0) | (grows(r, -side) & (not self._equation[r]))
         return found
 
 
@@ -233,32 +232,17 @@ class MonotoneRule(FormRule):
 
     def examine(self, lower: FloatArray, upper: FloatArray, _: NDArray[np.intp]) -> Shown:
         """Examine pieces with ends (n, N)."""
-        form, i, R = self._form, self._i, self._slopes.nothing
+        form, i, R = self._form, self._i, len(self._equation)
         both = self._arithmetic(lower, upper)
-        values, slopes = (forms_of(some, lower, upper, form) for some in (both[:R], both[R:]))
-        holds, change = np.zeros(lower.shape[1], dtype=bool), _steepness(slopes, range(self._J))
+        values, holds = forms_of(both[:R], lower, upper, form), np.zeros(lower.shape[1], dtype=bool)
         for side in self._sides:
-            stop = self._slopes.first_stop(i, side, both[R:], values.high)
-            for r in self._slopes.stops[i]:
-                # The functions rise, and this condition may stop a point: it decides where to cut.
-                if (stop == r).any():
-                    change = np.where(stop == r, _steepness(values, [r]), change)
-            rises = stop == R
+            rises = self._slopes.rise(i, side, both[R:], values.high)
             if self._claims.kind not in FACES:
                 rises &= (upper[i] < form.upper[i]) if side > 0 else (lower[i] > form.lower[i])
             holds |= rises
-        shown, left = Shown(holds, change, lower.copy(), upper.copy()), np.flatnonzero(~holds)
+        shown, left = Shown(holds, np.zeros_like(lower), lower.copy(), upper.copy()), np.flatnonzero(~holds)
         self._use_conditions(shown, left, values.select(left), lower, upper)
         return shown
-
-
-def _steepness(forms: Forms, which: Sequence[int]) -> FloatArray:
-    """Return the largest sizes (n, N) of the slopes of some forms along each variable, times the radius."""
-    steep = np.zeros_like(forms.share)
-    for r in which:
-        model = polynomial_sum(forms.only(r), np.ones((1, steep.shape[1])))
-        steep = np.fmax(steep, np.abs(model.b) + model.reach)
-    return steep
 
 
 def rule_of(claims: Claims) -> BoundRule | MonotoneRule:

@@ -27,16 +27,15 @@ import base64
 import hashlib
 import json
 import zlib
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from ...case.pose import Free
 from ...case.workspace import Workspace
 from ...errors import InputError
 from ...system.strictjson import json_tree, object_of
 
-_FORMAT = "screwsynth-proof"
+_FORMAT: Final = "screwsynth-proof"
 _VERSION = 6
 #: Formats of earlier versions.
 _EARLIER = ("screwsynth-workspace-proof",)
@@ -92,11 +91,6 @@ class ProofClaim:
     tree: bytes = b""
     sides: tuple[tuple[float, ...], ...] = ()
 
-    def as_data(self) -> dict[str, object]:
-        """Return the JSON object."""
-        text = base64.b64encode(zlib.compress(self.tree, 9)).decode("ascii")
-        return {**vars(self), "tree": text, "digest": hashlib.sha256(self.tree).hexdigest()}
-
 
 @dataclass(frozen=True)
 class Unproved:
@@ -131,7 +125,9 @@ class Proof:
     def as_text(self) -> str:
         """Return the JSON text."""
         claim = ProofClaim(_OPTIMUM, "", "program", self.bound, self.graph, self.tree)
-        return _text(self.name, self.case, "program", asdict(self.statement), [claim])
+        return _text(
+            _File(_FORMAT, _VERSION, self.name, self.case, "program", self.statement, (_table_of(claim),), (), ())
+        )
 
 
 @dataclass(frozen=True)
@@ -165,7 +161,10 @@ class WorkspaceProof:
     def as_text(self) -> str:
         """Return the JSON text."""
         premises = _Premises(self.workspace, self.legs, self.quantities, self.leg_error, self.tolerance)
-        return _text(self.name, self.case, "workspace", vars(premises), self.claims, self.lemmas, self.unproved)
+        claims, lemmas = (tuple(map(_table_of, some)) for some in (self.claims, self.lemmas))
+        return _text(
+            _File(_FORMAT, _VERSION, self.name, self.case, "workspace", premises, claims, lemmas, self.unproved)
+        )
 
 
 def workspace_numbers(workspace: Workspace) -> object:
@@ -175,30 +174,6 @@ def workspace_numbers(workspace: Workspace) -> object:
         for values in (workspace.position, workspace.turns.angles)
     )
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
-
-
-def _text(
-    name: str,
-    case: str,
-    about: str,
-    premises: object,
-    claims: Sequence[ProofClaim],
-    lemmas: Sequence[ProofClaim] = (),
-    unproved: Sequence[Unproved] = (),
-) -> str:
-    """Return the JSON text of a proof."""
-    content = {
-        "format": _FORMAT,
-        "version": _VERSION,
-        "name": name,
-        "case": case,
-        "about": about,
-        "premises": premises,
-        "claims": [each.as_data() for each in claims],
-        "lemmas": [each.as_data() for each in lemmas],
-        "not_on_paper": [vars(each) for each in unproved],
-    }
-    return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
 @dataclass(frozen=True)
@@ -221,9 +196,9 @@ class _ClaimTable:
     reason: Literal["program", "regular", "singular", "boxes", "lengths", "one machine", "second order"]
     bound: float | None
     graph: str
+    tree: str
     sides: tuple[tuple[float, ...], ...]
     digest: str
-    tree: str
 
 
 @dataclass(frozen=True)
@@ -239,6 +214,17 @@ class _File:
     claims: tuple[_ClaimTable, ...]
     lemmas: tuple[_ClaimTable, ...]
     not_on_paper: tuple[Unproved, ...]
+
+
+def _text(file: _File) -> str:
+    """Return the JSON text of a proof."""
+    return json.dumps(asdict(file), indent=1, allow_nan=False) + "\n"
+
+
+def _table_of(claim: ProofClaim) -> _ClaimTable:
+    """Return a claim with its tree packed."""
+    text = base64.b64encode(zlib.compress(claim.tree, 9)).decode("ascii")
+    return _ClaimTable(**{**vars(claim), "tree": text}, digest=hashlib.sha256(claim.tree).hexdigest())
 
 
 def read_proof(text: str, source: str) -> Proof | WorkspaceProof:
