@@ -18,7 +18,7 @@ from certificate import case_with
 from limbs import machine
 
 from screwsynth.nlp import Case, Solution, load_case, solve
-from screwsynth.nlp.proof.boxes.threads import Threads
+from screwsynth.nlp.proof.boxes.engine import Threads
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import Certificate
 

@@ -95,7 +95,7 @@ from .proof.workspace.numbers.extremes import Extreme as Extreme
 from .proof.workspace.scale import Scale as Scale
 from .proof.workspace.scale import largest_scale as largest_scale
 from .proof.workspace.verdict import Outcome as Outcome
-from .proof.workspace.verdict import Regularity as Regularity
+from .proof.workspace.verdict import RankVerdict as RankVerdict
 from .results.jsondata import json_data as json_data
 from .results.reading import load_result as load_result
 from .results.regression import CaseCheck as CaseCheck

@@ -135,13 +135,17 @@ class Robot:
             self.chains.append(Chain(turns, limb, self._centre(turns)))
 
     def _centre(self, turns: list[Turn]) -> tuple[int, int]:
-        """Return the centre of a member: of its ball joint nearest the platform, or where two hinges in a row meet."""
+        """Return the centre of a member: of its ball joint nearest the platform, or where two hinges in a row meet.
+
+        Ends of a parallelogram are no hinges: one that meets a hinge at home is off from it in other machines.
+        """
         balls = [k for k, each in enumerate(turns) if not self.labels[each.coordinate][0]]
         if balls:
             return balls[-1], turns[balls[-1]].centre
+        rods = {each.coordinate for each in turns if each.factor < 0}
         for k in range(len(turns) - 1, 0, -1):
             one, other = turns[k - 1], turns[k]
-            if one.slides or other.slides or one.coordinate == other.coordinate:
+            if one.slides or other.slides or rods & {one.coordinate, other.coordinate}:
                 continue
             p, q = self.points[one.centre], self.points[other.centre]
             t, _, rank, _ = np.linalg.lstsq(np.stack([one.axis, -other.axis], 1), q - p, rcond=1e-9)

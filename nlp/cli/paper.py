@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..proof.checker.proof_file import Unproved, WorkspaceProof
     from ..proof.checker.workspace.check import CheckedClaim
     from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.proof_record import PaperRecord
+    from ..proof.workspace.proof_writer import PaperRecord
 
 
 def paper_record(target: str | None, json_file: str | None) -> PaperRecord | None:
@@ -27,7 +27,7 @@ def paper_record(target: str | None, json_file: str | None) -> PaperRecord | Non
         InputError: both are standard output.
     """
     from ..errors import InputError
-    from ..proof.workspace.proof_record import PaperRecord
+    from ..proof.workspace.proof_writer import PaperRecord
 
     if target is None:
         return None
@@ -81,7 +81,7 @@ def verify_paper(proof: WorkspaceProof, case: Case, leg_error: float) -> None:
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
-    count = len(checked.claims) + len(checked.unproved)
+    count = len(checked.claims) + len(proof.unproved)
     whose = f"the workspace of {one_line(case.name)}"
     if case.joint_centre_tolerance:
         off = f"{exact(case.joint_centre_tolerance)} {case.units.length}"
@@ -93,8 +93,8 @@ def verify_paper(proof: WorkspaceProof, case: Case, leg_error: float) -> None:
     for each in checked.claims:
         of = f", for lengths of legs that are {legs}" if each.name in ERRORS else ""
         typer.echo(f"  {one_line(each.name)}: {_words(each, case)}{of}")
-    _echo_unproved(checked.unproved, err=False)
-    if checked.unproved:
+    _echo_unproved(proof.unproved, err=False)
+    if proof.unproved:
         typer.echo("why claims are not on paper is what the file says, and not checked")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
 

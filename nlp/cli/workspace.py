@@ -13,7 +13,7 @@ from .workspacefiles import WorkspaceFiles
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.proof_record import PaperRecord
+    from ..proof.workspace.proof_writer import PaperRecord
     from ..results.workspace import WorkspacePose
 
 

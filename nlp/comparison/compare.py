@@ -17,9 +17,8 @@ from ..evidence.singularities import clause_of
 from ..interruption import Milestone, is_requested, one_call, reached, seconds_left, within
 from ..proof.enclosure.engine import kernel
 from ..proof.workspace.judge import judge_workspace
-from ..proof.workspace.verdict import Outcome
 from ..solver.certified import certify
-from ..solver.exchange import design_of
+from ..solver.semi_infinite import design_of
 from ..solver.solve import solve
 from .entry import Entry, generic_freedoms, outcome_of, proven_strokes, strokes_over_poses, task_fit
 from .placed import placed
@@ -251,17 +250,17 @@ def _with_judgement(entry: Entry, jobs: int | None) -> Entry:
     names = _measures(entry.contender)
     # Lengths of straight legs are among the claims already.
     asked = [name for name in names if name != "leg_length" or not entry.contender.model.legs]
-    if proof is not None:
-        verdict = Outcome.PROVED if proof.is_proved else outcome_of(proof.judgement)
-        strokes = proven_strokes(proof.judgement, names)
-        return replace(entry, judgement=proof.judgement, outcome=verdict, strokes=strokes)
-    try:
-        design = design_of(entry.placed.case, outcome.own.nlp, outcome.x)
-        judged = judge_workspace(design, quantities=asked, time_limit=_proof_seconds(), jobs=jobs, with_objective=False)
-    except ScrewsynthError as error:
-        return replace(entry, workspace_fault=str(error))
-    strokes = proven_strokes(judged, names)
+    judged = None if proof is None else proof.judgement
+    if judged is None or asked:
+        # An exchange proves the limits alone, and no range of another measure.
+        try:
+            design = design_of(entry.placed.case, outcome.own.nlp, outcome.x)
+            limit = _proof_seconds()
+            judged = judge_workspace(design, quantities=asked, time_limit=limit, jobs=jobs, with_objective=False)
+        except ScrewsynthError as error:
+            return replace(entry, workspace_fault=str(error))
     seconds = entry.seconds + time.perf_counter() - began
+    strokes = proven_strokes(judged, names)
     return replace(entry, judgement=judged, outcome=outcome_of(judged), strokes=strokes, seconds=seconds)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...models import Dimension, Displacement, FloatArray, Model, Parameter, frozen_array
+from ...models import Dimension, Displacement, FloatArray, Parameter, frozen_array
 from ..case.case import Case
 from ..case.limits.limit import Limit
 from ..case.limits.limits import Limits
@@ -20,7 +20,6 @@ from ..case.pose import Free, Pose, Value
 from ..case.settings import Expectation
 from ..case.task import Task
 from ..errors import CaseError
-from ..proof.statement.machine import LEGS
 from .robots import Contender
 
 
@@ -73,14 +72,9 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
     offset = np.array([_start(value) for value in case.position]) - factor * np.array(model.home)
     parameters = {item.name: _values(item, factor, part) for item in model.parameters}
     first, *further = (_moved_pose(pose, offset) for pose in case.poses)
-    workspace, left_out = case.workspace, []
+    workspace = case.workspace
     if workspace is not None:
         workspace = replace(workspace, position=_moved(workspace.position, offset))
-        if workspace.has_limits and not _is_hexapod(model):
-            workspace = replace(workspace, has_limits=False)
-            left_out.append(
-                LeftOut("limits.over", "is compared for robots with six straight legs alone", is_of_legs=True)
-            )
     bare = replace(
         case,
         model=model,
@@ -98,19 +92,13 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
         name=f"{case.name} with {contender.label}",
         title=contender.label,
     )
-    limits, others = _limits(case, bare)
-    left_out += others
+    limits, left_out = _limits(case, bare)
     try:
         found = replace(bare, limits=limits, joint_centre_tolerance=case.joint_centre_tolerance)
     except CaseError as error:
         left_out.append(LeftOut("tolerance.joint_centre", error.fault, is_of_legs=True))
         found = replace(bare, limits=limits)
     return Placed(found, frozen_array(offset, (3,)), tuple(left_out))
-
-
-def _is_hexapod(model: Model) -> bool:
-    """Return whether limits over a workspace can be held with a robot: six straight legs."""
-    return len(model.legs) == LEGS and len(model.wrenches) == LEGS and not model.unknowns
 
 
 def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:

@@ -78,8 +78,6 @@ def _proof_sentences(entry: Entry) -> list[str]:
         found.append(f"No certificate: {entry.certificate_fault}.")
     if entry.workspace_fault:
         found.append(f"The workspace is not judged: {entry.workspace_fault}.")
-    elif entry.judgement is not None and entry.judgement.regularity is None:
-        found.append("That the workspace has no singular pose is proved only for robots with six straight legs.")
     return found
 
 

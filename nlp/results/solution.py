@@ -18,7 +18,7 @@ from .point import head_data, objective, robot_data, versions, violations
 from .workspace import proof_data
 
 if TYPE_CHECKING:
-    from ..solver.exchange import WorkspaceProof
+    from ..solver.semi_infinite import WorkspaceProof
 
 
 def task_result(

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.numbers.extremes import Extreme
     from ..proof.workspace.robot.pose_box import PoseNumbers
-    from ..proof.workspace.verdict import Regularity
-    from ..solver.exchange import WorkspaceProof
+    from ..proof.workspace.verdict import RankVerdict
+    from ..solver.semi_infinite import WorkspaceProof
 
 
 class WorkspacePose(JsonObject):
@@ -267,14 +267,14 @@ def _fixed(value: object) -> float:
     return value
 
 
-def _regular_data(found: "Regularity", units: Units) -> RegularData:
+def _regular_data(found: "RankVerdict", units: Units) -> RegularData:
     """Return the verdict on regularity."""
     sides = None
     if found.sides is not None:
         sides = tuple(pose_data(found.box.pose(y), units) for y in found.sides)
     return RegularData(
         outcome=found.outcome,
-        pose=None if found.y is None else pose_data(found.box.pose(found.y), units),
+        pose=None if found.pose is None else pose_data(found.pose, units),
         between=sides,
         boxes=found.boxes,
         open=found.open,

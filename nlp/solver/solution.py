@@ -22,7 +22,7 @@ from .starts import Start
 from .status import Status
 
 if TYPE_CHECKING:
-    from .exchange import WorkspaceProof
+    from .semi_infinite import WorkspaceProof
 
 
 @dataclass(frozen=True, eq=False)

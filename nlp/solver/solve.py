@@ -58,7 +58,7 @@ def solve(
     search = case.search.but(starts, seed, compiled=compiled)
     phase(Phase.FORMULATING, 0, len(case.tasks))
     if case.workspace is not None and case.workspace.has_limits:
-        from .exchange import solve_over_workspace  # noqa: PLC0415 - other solves start without workspaces
+        from .semi_infinite import solve_over_workspace  # noqa: PLC0415 - other solves start without workspaces
 
         after_start = None if progress is None else partial(progress, case.tasks[0].name)
 

@@ -1,9 +1,12 @@
 """Cases about the machine of LinuxCNC's hexapod kinematics, in inches; see cases/hexapod-machining.toml."""
 
-from screwsynth.models import hexapod
+import numpy as np
+
+from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Task
 from screwsynth.nlp.proof.statement.machine import Legs
-from screwsynth.nlp.proof.workspace.numbers.bound_search import Number, OverPoses
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Minimum, Number, smallest_values
+from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox
 
@@ -51,11 +54,23 @@ def subject_of(robot: Legs, box: PoseBox, shortest: float = 0.0) -> Subject:
     return Subject(case_of_legs(robot), HEXAPOD, box, robot, shortest=shortest)
 
 
-def over(subject: Subject, number: Number) -> OverPoses:
-    """Bounds and values of a number over boxes of poses."""
-    return OverPoses(number, subject.problem)
-
-
-def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> OverPoses:
+def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> Clearance:
     """The distance of two legs."""
-    return over(subject := subject_of(robot, box), subject.clearance((one, other)))
+    return subject_of(robot, box).clearance((one, other))
+
+
+def values_of(number: Number, points: FloatArray) -> FloatArray:
+    """The values of a number at points (K, 6)."""
+    return np.asarray(number.values(points[:, list(number.problem.free)])[:, 0])
+
+
+def bounds_of(number: Number, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """The lower bounds of a number over boxes (B, 6)."""
+    free = list(number.problem.free)
+    return np.asarray(number.bounds(lower[:, free], upper[:, free])[:, 0])
+
+
+def smallest(number: Number, goal: Goal, time_limit: float | None = None) -> Minimum:
+    """The smallest value of one number."""
+    (found,) = smallest_values(number, [goal], time_limit=time_limit)
+    return found

@@ -321,7 +321,7 @@ def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() ->
     case = replace(base, tasks=[base.tasks[0], other])
     nlp = formulate_worst(case, [1.0, 1.0], [400.0, 400.0], 400.0)
     form = standard_form(nlp)
-    assert form.has_epigraph
+    assert form.nlp.program.places.epigraph is not None
     assert (len(form.functions), form.n, len(form.conditions)) == (2, nlp.n - 1, 0)
     found = certify_program(nlp, gap=1e-3)
     assert found.status is CertificateStatus.PROVED

@@ -15,7 +15,9 @@ from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim
+from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 
@@ -70,7 +72,7 @@ def test_bounds_of_a_limb_are_shown_for_the_boxes_claimed(count: int, side: int)
     x, rng = SX.sym("x", 2), np.random.default_rng(count)
     function = (5 + side * (x[0] + 2 * x[1])) ** 2 / (4 - side * x[0])
     nlp = formulate(load_case("paper-4.2-rotation"))
-    form = StandardForm(nlp, x, -np.ones(2), np.ones(2), (function,), (), (), 1.0, has_epigraph=False)
+    form = StandardForm(nlp, x, -np.ones(2), np.ones(2), (function,), ())
     for _ in range(5):
         lower = rng.uniform(-1, 0.8, (count, 2))
         upper = lower + rng.uniform(0.01, 0.2, (count, 2))
@@ -95,10 +97,9 @@ def sign_of(block: np.ndarray) -> int:
 @pytest.mark.parametrize("size", [2.0**-40, 1.0, 2.0**40])
 def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -> None:
     """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
-    rng, y, nothing = np.random.default_rng(1), SX.sym("y"), SX(0, 1)
-    lists: tuple[tuple[()], ...] = ((),) * 5
-    robot = PosedRobot(y, 0, (0,), np.zeros(6), np.ones(1), 1.0, SX(3, 1), SX(1), *lists, nothing, nothing, nothing)
-    assembly, at = Assembly(robot, nothing, np.zeros(1)), np.zeros((1, 6))
+    rng, case = np.random.default_rng(1), load_case("hexapod-linuxcnc")
+    robot = PosedRobot(case, case.model, pose_root(workspace_of_case(case)))
+    assembly, at = Assembly(robot, SX(0, 1), robot.centre), np.zeros((1, 6))
 
     def shown(block: np.ndarray) -> int:
         M = np.eye(6)

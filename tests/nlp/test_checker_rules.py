@@ -13,7 +13,8 @@ from screwsynth.nlp.proof.checker.bisection import Shown
 from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
 from screwsynth.nlp.proof.checker.polymodels import Tilts
 from screwsynth.nlp.proof.checker.tree import Node
-from screwsynth.nlp.proof.checker.workspace.tolerance import change_of_jacobian, change_of_rows
+from screwsynth.nlp.proof.checker.workspace.number_claims import change_of_jacobian
+from screwsynth.nlp.proof.checker.workspace.ranks import change_of_rows
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm
 
@@ -107,7 +108,7 @@ def random_form(seed: int, is_equation: bool) -> StandardForm:
         Condition("cap", polynomial(x[:2]) - 0.5, is_equation=False),
         Condition("relation", x[2] - 0.3 * polynomial(x[:2]), is_equation=is_equation),
     )
-    return StandardForm(nlp, x, -np.ones(N), np.ones(N), functions, conditions, (1.0,) * 4, 1.0, has_epigraph=False)
+    return StandardForm(nlp, x, -np.ones(N), np.ones(N), functions, conditions)
 
 
 def attempt(

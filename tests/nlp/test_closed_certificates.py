@@ -20,7 +20,7 @@ from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.statement import standard_form as statement
 from screwsynth.nlp.proof.statement.form import StandardForm
-from screwsynth.nlp.proof.statement.standard_form import is_in_home_mode, standard_form
+from screwsynth.nlp.proof.statement.standard_form import Kind, is_in_home_mode, standard_form
 from screwsynth.nlp.solver.certified import proof_of
 
 TWIST = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
@@ -34,7 +34,7 @@ def at_home(model: Model, part: float = 0.05) -> Case:
     return Case(model, parameters, model.home, [Task(TWIST, "max")])  # type: ignore[arg-type]
 
 
-def with_unknowns(form: StandardForm, assembly: object) -> StandardForm:  # noqa: ARG001 - the signature of what it replaces
+def with_unknowns(form: StandardForm) -> StandardForm:
     """The form as it is."""
     return form
 
@@ -132,7 +132,7 @@ def hexapod_with(limit: SmallestSingularValue) -> Case:
 def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
     limit = SmallestSingularValue(0.8, 10.0)
     form = standard_form(formulate(hexapod_with(limit)))
-    follows = np.array([each.follows for each in form.conditions])
+    follows = np.array([each.kind is Kind.FOLLOWS for each in form.conditions])
     assert follows.sum() == 22
     rng = np.random.default_rng(0)
     points = rng.uniform(form.lower, form.upper, (400, 6)) * [1, 1, 1, 0.5, 0.5, 0.5]
@@ -153,6 +153,6 @@ def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
     )
     assert (excluded == Verdict.INFEASIBLE).all()
     np.testing.assert_array_equal(by_reference, excluded)
-    estimate = tuple(each for each in form.conditions if not each.follows)
+    estimate = tuple(each for each in form.conditions if each.kind is not Kind.FOLLOWS)
     by_estimate = Engine(replace(form, conditions=estimate), 1).examine(bad - half, bad + half, -np.inf).verdict
     assert not (by_estimate == Verdict.INFEASIBLE).any()

@@ -164,9 +164,9 @@ def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
     assert own.workspace is not None
     ends = [value.lower if isinstance(value, Free) else value for value in own.workspace.position]
     assert np.array(ends) + offset == pytest.approx([20, -20, 140])
-    # A proof over the workspace is for straight legs: the limits hold at the stated pose alone, and this is said.
-    assert not own.workspace.has_limits
-    assert [each.key for each in found.left_out] == ["limits.over", "limits.leg_length"]
+    # Limits hold over the workspace of every robot.
+    assert own.workspace.has_limits
+    assert [each.key for each in found.left_out] == ["limits.leg_length"]
 
 
 def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:

@@ -15,7 +15,7 @@ from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.boxes.engine import search_tape
 from screwsynth.nlp.proof.enclosure.forms import Enclosures, enclose, midpoints
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape, compile_tape
-from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
+from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 
 balls = pytest.importorskip("balls")

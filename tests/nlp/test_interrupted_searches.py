@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 import pytest
+from hexapods import smallest
 from limb_cases import machine, poses
 
 import screwsynth.nlp
@@ -32,21 +33,20 @@ from screwsynth.nlp.proof.boxes.optimum import OptimumRule
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
+from screwsynth.nlp.proof.enclosure.forms import Forms
 from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
 from screwsynth.nlp.proof.workspace import scale
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.loop_limits import loop_extremes
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, Goal, Number, smallest_values
+from screwsynth.nlp.proof.workspace.numbers.expressions import Expressions
+from screwsynth.nlp.proof.workspace.numbers.extremes import goal_of
 from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel
 from screwsynth.nlp.proof.workspace.scale import largest_scale
-from screwsynth.nlp.proof.workspace.tolerance.machine_number import smallest_of_machines
-from screwsynth.nlp.proof.workspace.tolerance.machines import machines_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
+from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
 from screwsynth.nlp.solver.certified import certify
 
 ROOT = Path(screwsynth.nlp.__file__).parent
@@ -59,8 +59,7 @@ LOOPS = (
     *(str(ROOT / "proof" / "boxes" / "limbs" / name) for name in ("independent.py", "shared.py")),
     *(str(ROOT / "proof" / "workspace" / name) for name in ("judge.py", "scale.py")),
     str(ROOT / "proof" / "workspace" / "ranks" / "ranks.py"),
-    *(str(ROOT / "proof" / "workspace" / "numbers" / name) for name in ("loop_limits.py", "bound_search.py")),
-    str(ROOT / "proof" / "workspace" / "tolerance" / "machine_number.py"),
+    *(str(ROOT / "proof" / "workspace" / "numbers" / name) for name in ("expressions.py", "bound_search.py")),
 )
 assert all(Path(each).exists() for each in (*WATCHED, *LOOPS))
 
@@ -103,7 +102,7 @@ def at_instruction(n: int, error: type[BaseException], watched: tuple[str, ...])
         sys.settrace(before)
 
 
-def from_regularity(found: Regularity) -> Claim:
+def from_regularity(found: RankVerdict) -> Claim:
     assert found.outcome is not Outcome.PROVED or (found.open, found.share) == (0, 0.0)
     return Claim(found.outcome is Outcome.PROVED, -found.share, found.reason == STOPPED)
 
@@ -127,11 +126,10 @@ def six_legs_problem() -> Problem:
     return build_problem(Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])]), model, box)
 
 
-def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> Regularity:
+def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> RankVerdict:
     """The verdict on the rank of the rows of these legs."""
     problem = six_legs_problem()
-    refuter = SignRefuter(legs_and_box()[0], problem)
-    return prove_rank(problem, problem.locked, refuter=refuter, most_boxes=most_boxes, progress=progress)
+    return prove_rank(problem, problem.locked, most_boxes=most_boxes, progress=progress)
 
 
 def six_legs() -> Claim:
@@ -177,22 +175,25 @@ pitch = 0.1
     return replace(case, workspace=Workspace(place, turns), joint_centre_tolerance=tolerance)
 
 
-class Bowl:
+class Bowl(Number):
     """A function of the pose with a smallest value of -1, in the shape of a bowl, and bounds that are not sharp."""
 
     middle = np.array([0.3, 0.1, 3.6, 0.02, 0.01, -0.03])
 
-    def values(self, points: FloatArray) -> FloatArray:
-        return np.asarray(((points - self.middle) ** 2).sum(axis=1) - 1.0)
+    def values(self, z: FloatArray) -> FloatArray:
+        return np.asarray(((z - self.middle) ** 2).sum(axis=1, keepdims=True) - 1.0)
 
-    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
-        nearest = np.clip(self.middle, lower, upper)
-        return Bounds(self.values(nearest) - 0.1 * (upper - lower).sum(axis=1), upper - lower)
+    def over(self, forms: Forms, count: int) -> Bounds:
+        half = np.abs(forms.a[:, :, :count]).sum(axis=2)
+        nearest = np.clip(self.middle, forms.c - half, forms.c + half)
+        return Bounds(self.values(nearest) - 0.2 * half.sum(axis=1, keepdims=True), 2 * half[:, None])
 
 
 def bowl() -> Claim:
-    found = prove_minimum(Bowl(), legs_and_box()[1], gap=0.2)
-    assert found.bound <= -1.0 <= found.value == Bowl().values(found.at[None])[0]
+    problem = six_legs_problem()
+    number = Bowl(problem, problem.z)
+    found = smallest(number, Goal(0.2))
+    assert found.bound <= -1.0 <= found.value == number.values(found.at[None])[0, 0]
     return Claim(not found.reason, found.bound, found.reason == STOPPED)
 
 
@@ -203,28 +204,31 @@ def planar() -> Case:
 
 def loops() -> Claim:
     case = planar()
-    found = loop_extremes(case, closed_form(case.model), pose_box(workspace_of_case(case)), gap=0.2)
+    alone = Machines(case, closed_form(case.model), pose_box(workspace_of_case(case)))
+    claims = [each for each in alone.symbols.claims(())[1] if each.key.endswith("max")]
+    found = smallest_values(
+        Expressions(alone.family, ca.vertcat(*map(alone.number, claims))),
+        [goal_of(each, part=0.2) for each in claims],
+    )
     assert found
-    for each in found:
-        sign = 1.0 if each.key.endswith("max") else -1.0
-        if each.pose is not None:
-            assert sign * each.reached <= sign * each.bound
+    assert all(each.bound <= each.value for each in found)
     return Claim(
-        any(each.key.endswith("max") and each.outcome is Outcome.PROVED for each in found),
-        -max(each.bound for each in found if each.key.endswith("max")),
+        any(each.bound >= -(claim.limit or 0.0) for claim, each in zip(claims, found, strict=True)),
+        min(each.bound for each in found),
         any(each.reason == STOPPED for each in found),
     )
 
 
 @cache
-def family() -> ToleranceModel:
+def family() -> Problem:
     case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
-    return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case))).family
+    return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case))).family
 
 
 def machines() -> Claim:
     built = family()
-    found = smallest_of_machines(built, ca.sumsqr(built.coordinates) + built.coordinates[0], gap=0.2)
+    number = Expressions(built, ca.sumsqr(built.z) + built.z[0])
+    found = smallest(number, Goal(part=0.2))
     assert not found.value < found.bound
     return Claim(not found.reason, found.bound, found.reason == STOPPED)
 

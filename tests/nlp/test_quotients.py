@@ -29,7 +29,7 @@ ENGINES = {
 
 def free_of_limits(form: StandardForm, sign: int = 1) -> StandardForm:
     """The functions of a form alone, or minus them."""
-    return replace(form, functions=tuple(sign * each for each in form.functions), conditions=(), signs=())
+    return replace(form, functions=tuple(sign * each for each in form.functions), conditions=())
 
 
 def forms() -> list[StandardForm]:

@@ -30,8 +30,7 @@ from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
-from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel, family_of
+from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 FOLDER = Path(__file__).parents[2] / "nlp" / "proof" / "enclosure"
@@ -83,15 +82,13 @@ def test_other_robots_take_few_boxes_too(name: str, part: float, degrees: float,
 @pytest.mark.parametrize("tolerance", [0.0, 0.3])
 def test_the_kernel_agrees_with_the_reference_box_by_box(tolerance: float) -> None:
     problem, rng = hexapod(TURNS, 45), np.random.default_rng(1)
-    family = family_of(CASE, built_model(CASE.model), problem, tolerance) if tolerance else None
-    meant, z = family or problem, problem.z if family is None else family.coordinates
+    meant = family_of(CASE, built_model(CASE.model), problem, tolerance) if tolerance else problem
     box = problem.box
     lower = box.random(300, rng)
     upper = lower + (box.upper - box.lower) * rng.uniform(0, 0.2, (300, 1))
     cells = LoopBoxes(lower, upper, 0.5 * (lower + upper), np.ones(300, dtype=bool))
     ours, theirs = (
-        Examiner(problem, test(meant.locked, z, meant.start), family).examine(cells)
-        for test in (RankTest, NumpyRankTest)
+        Examiner(meant, test(meant.locked, meant.z, meant.start)).examine(cells) for test in (RankTest, NumpyRankTest)
     )
     # Near singular poses the kernel turns columns, and proves more.
     assert (ours.is_regular | ~theirs.is_regular).all()
@@ -156,14 +153,13 @@ class Copy:
         return first, second, np.eye(columns) - np.outer(t, t)
 
 
-def is_found(copy: Copy, problem: Problem, family: ToleranceModel | None = None) -> bool:
+def is_found(copy: Copy, meant: Problem) -> bool:
     """Whether ``I - C M(y)`` is beyond the kernel's bound at a point, or a box counts with too large a bound."""
-    rng, meant = np.random.default_rng(1), family or problem
-    z = problem.z if family is None else family.coordinates
-    examiner = Examiner(problem, RankTest(meant.locked, z, meant.start), family)
+    rng, problem = np.random.default_rng(1), meant.problem
+    examiner = Examiner(meant, RankTest(meant.locked, meant.z, meant.start))
     assert examiner.second is not None
     examiner.second.module = copy.module
-    M = ca.Function("M", [z], [ca.densify(meant.locked.matrix)])
+    M = ca.Function("M", [meant.z], [ca.densify(meant.locked.matrix)])
     n, columns = len(problem.start), meant.locked.matrix.shape[1]
     values = M(meant.start).full()
     scale = 2.0 ** -np.round(np.log2(np.linalg.norm(values, axis=1)))
@@ -181,7 +177,8 @@ def is_found(copy: Copy, problem: Problem, family: ToleranceModel | None = None)
             continue
         ends = np.where(rng.random((8, n)) < 0.5, lower, upper)
         for y in np.vstack([ends, centre[None], rng.uniform(lower, upper, (4, n))]):
-            machine = y if family is None else family.within(np.append(y, rng.normal(size=family.errors.numel())))
+            machine = meant.exact(y)
+            machine[n:] = meant.within(machine + rng.normal(size=len(machine)))[n:]
             values = scale[:, None] * M(machine).full()
             if (np.abs(np.eye(columns) - C @ values @ V) > B + 1e-11).any():
                 return True
@@ -189,7 +186,7 @@ def is_found(copy: Copy, problem: Problem, family: ToleranceModel | None = None)
 
 
 @cache
-def attacked() -> tuple[list[Problem], ToleranceModel]:
+def attacked() -> tuple[list[Problem], Problem]:
     """Robots over boxes of poses, and machines like the first one."""
     problems = [hexapod(ALL_AXES, 30), hexapod(TURNS, 25), gallery("6-rus", 0.1, 20)]
     return problems, family_of(CASE, built_model(CASE.model), problems[0], 0.5)
@@ -201,5 +198,5 @@ def attacked() -> tuple[list[Problem], ToleranceModel]:
 def test_a_planted_fault_is_found(fault: str, tmp_path: Path) -> None:
     copy = Copy(tmp_path, *FAULTS[fault])
     problems, machines = attacked()
-    found = any(is_found(copy, problem) for problem in problems) or is_found(copy, problems[0], machines)
+    found = any(is_found(copy, problem) for problem in problems) or is_found(copy, machines)
     assert found == (fault != "no fault")

@@ -9,6 +9,7 @@ import casadi as ca
 import flint
 import numpy as np
 import pytest
+from hexapods import bounds_of, smallest, values_of
 from numpy_engine import first_order
 from typer.testing import CliRunner
 
@@ -22,15 +23,15 @@ from screwsynth.nlp.proof.enclosure.forms import Encloser, Forms, enclose
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import OverPoses, prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.singular_values import SingularValues
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal
+from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import SingularValues
 from screwsynth.nlp.proof.workspace.ranks import loop_boxes
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import BY_NEWTON
-from screwsynth.nlp.proof.workspace.robot.motion_matrix import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_model import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
@@ -125,15 +126,16 @@ def test_boxes_are_not_divided_before_the_widths_of_joints_settle(
 
 
 def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    judged = rank.RankTest._judged
+    matrices = rank.RankTest.matrices
 
-    def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray, *more: int) -> rank.Tested:
-        return judged(self, M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R), *more)
+    def without(self: rank.RankTest, forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray]:
+        M0, M, R = matrices(self, forms)
+        return M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R)
 
     monkeypatch.setattr(loop_boxes, "MOST_VARIABLES", 0)  # forms of first order, as robots with loops have them
     problem = problem_of("6-ups", 0.5, 80)
     assert not wrong_boxes(problem, problem.locked, 1.0, 1)[1]
-    monkeypatch.setattr(rank.RankTest, "_judged", without)
+    monkeypatch.setattr(rank.RankTest, "matrices", without)
     assert wrong_boxes(problem, problem.locked, 1.0, 1)[1]
 
 
@@ -284,17 +286,16 @@ def test_singular_values_of_a_delta_are_bounded() -> None:
     problem = build_problem(case, closed_form(model).model, box)
     points = box.random(500, np.random.default_rng(0))
     for is_condition in (False, True):
-        spectrum = OverPoses(SingularValues(problem, 1.0, is_condition=is_condition), problem)
-        values_there = spectrum.values(points)
-        found = prove_minimum(spectrum, box, gap=0.05 * abs(float(values_there[0])))
+        spectrum = SingularValues(problem, 1.0, is_condition=is_condition)
+        values_there = values_of(spectrum, points)
+        found = smallest(spectrum, Goal(0.05 * abs(float(values_there[0]))))
         assert not found.reason
         assert found.bound <= values_there.min() + 1e-12
         assert found.value <= values_there.min() + 0.05 * abs(float(values_there[0]))
         # Small boxes about points, whose bounds hold at their corners.
         lower, upper = points - 1e-3, points + 1e-3
-        lower[:, 3:], upper[:, 3:] = points[:, 3:], points[:, 3:]
-        bounds = spectrum.bounds(lower, upper).lower
-        assert (bounds <= np.minimum(spectrum.values(lower), spectrum.values(upper))).all()
+        bounds = bounds_of(spectrum, lower, upper)
+        assert (bounds <= np.minimum(values_of(spectrum, lower), values_of(spectrum, upper))).all()
 
 
 DELTA = """

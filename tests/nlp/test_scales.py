@@ -95,7 +95,7 @@ def ball(value: object, low: float, high: float, s: float) -> tuple[object, obje
 def form_of(function: ca.Function, sign: float) -> StandardForm:
     x, ends = SX.sym("x", N), np.full(N, 1e308)
     nlp = formulate(load_case("paper-4.2-rotation"))
-    return StandardForm(nlp, x, -ends, ends, (sign * function(x),), (), (), 1.0, has_epigraph=False)
+    return StandardForm(nlp, x, -ends, ends, (sign * function(x),), ())
 
 
 def engine_of(form: StandardForm, engine: str) -> Engine | NumpyEngine:

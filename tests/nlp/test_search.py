@@ -5,8 +5,20 @@ import math
 import numpy as np
 import pytest
 
-from screwsynth.nlp.proof.boxes.rows import SMALL, WHOLE, Boxes, bisected, joined, some
-from screwsynth.nlp.proof.boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
+from screwsynth.nlp.proof.boxes.search import (
+    SMALL,
+    TOO_SMALL,
+    WHOLE,
+    Boxes,
+    Effort,
+    Order,
+    Rule,
+    Search,
+    Verdicts,
+    bisected,
+    joined,
+    some,
+)
 
 
 class Peak(Rule[np.ndarray]):

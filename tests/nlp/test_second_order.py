@@ -117,7 +117,7 @@ def random_form(seed: int) -> StandardForm:
     conditions = tuple(Condition(f"h{k}", values[-1 - k] - 1.0, is_equation=k == 1) for k in range(2))
     ends = np.full(random_graphs.N, 4.0)
     nlp = formulate(load_case("paper-4.2-rotation"))
-    return StandardForm(nlp, x, -ends, ends, (values[-3],), conditions, (), 1.0, has_epigraph=False)
+    return StandardForm(nlp, x, -ends, ends, (values[-3],), conditions)
 
 
 def test_the_first_pass_is_that_of_the_reference_on_random_graphs() -> None:
@@ -193,7 +193,6 @@ def test_no_point_above_the_threshold_is_cut_off(name: str) -> None:
         again = Engine(form, jobs)
         for one, other in zip(vars(found).values(), vars(again.examine(lower, upper, threshold)).values(), strict=True):
             assert one.tobytes() == other.tobytes()
-        again.close()
     rng, points = np.random.default_rng(3), 60
     x = np.repeat(lower, points, axis=1) + rng.random((form.n, 240 * points)) * np.repeat(upper - lower, points, axis=1)
     values = np.array(function(x))

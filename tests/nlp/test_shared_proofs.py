@@ -13,7 +13,7 @@ from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
-from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, OwnBoxes, bound_limb, first_largest_of_lists
+from screwsynth.nlp.proof.boxes.limbs.decomposition import LimbBound, bound_limb, first_largest_of_lists
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
@@ -21,10 +21,9 @@ from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.polymodels import Tilts, forms_of, polynomial_sum
-from screwsynth.nlp.proof.checker.polynomials import sub
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Statement
-from screwsynth.nlp.proof.checker.tree import Node, SharedLeaf, leaf_bytes, read_shared
+from screwsynth.nlp.proof.checker.tree import Node, SharedLeaves, leaf_bytes, read_shared
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
 
@@ -63,13 +62,14 @@ def proof(best: ProgramSolution) -> Proof:
     return proof_of(best.nlp, GAP, best.x)
 
 
-def middle_leaf(proof: Proof, nlp: Nlp) -> SharedLeaf:
+def middle_leaf(proof: Proof, nlp: Nlp) -> SharedLeaves:
     """The leaf whose box is nearest to home's rotation, in which poses are feasible."""
     _, found = separated(nlp.case)
     assert found.common is not None
     leaves = read_shared(proof.tree, found.common.lower, found.common.upper, len(found.limbs))
-    leaves = [each for each in leaves if np.isfinite(each.bounds).all()]
-    return min(leaves, key=lambda each: float(np.linalg.norm(np.clip(0.0, each.lower[3:], each.upper[3:]))))
+    leaves = leaves.select(np.isfinite(leaves.bounds).all(axis=0))
+    away = np.linalg.norm(np.clip(0.0, leaves.lower[3:], leaves.upper[3:]), axis=0)
+    return SharedLeaves(*(each[..., away.argmin()] for each in leaves))
 
 
 def rejected(proof: Proof, nlp: Nlp) -> str:
@@ -166,8 +166,7 @@ def test_a_fault_in_dropping_own_boxes_is_found(
 
     def careless(*given: object) -> LimbBound:
         found = bound_limb(*given)  # type: ignore[arg-type]
-        own = given[3]
-        assert isinstance(own, OwnBoxes)
+        own = found.own
         reached = found.reached + part * np.abs(found.reached)
         bounds = np.where(found.bounds < reached[own.of], -np.inf, found.bounds)
         best = np.maximum.reduceat(bounds, own.starts)
@@ -203,7 +202,7 @@ def test_models_of_limbs_minus_tilts_bound_every_point(kind: str) -> None:
     with np.errstate(all="ignore"):
         (value,) = PolynomialArithmetic(ca.Function("f", [limb.x], [limb.functions[0]]))(low, high)
         assert np.isfinite(value.s).all()
-        forms = forms_of([sub(value, tilts.polynomial(low, high))], low, high, limb)
+        forms = forms_of([value - tilts.polynomial(low, high)], low, high, limb)
         bound = polynomial_sum(forms, np.ones((1, L))).bound()
     share = np.concatenate([rng.random((limb.n, L, points)), rng.integers(0, 2, (limb.n, L, points))], axis=2)
     x = low[:, :, None] + share * size[:, :, None]

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -23,8 +22,8 @@ from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
 from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.machine import Legs
-from screwsynth.nlp.proof.statement.piecewise_derivatives import without_ties
 from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
@@ -115,6 +114,6 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     monkeypatch.setattr(target, name, interrupt)
     # The poses of opposite signs that are known before a box is bisected would refute the claim, as they should.
     problem = build_problem(case, model, box)
-    found = ranks.prove_rank(problem, problem.locked, refuter=SimpleNamespace(look=lambda *_: None))
+    found = ranks.prove_rank(problem, problem.locked, look=lambda *_: None)
     assert found.outcome is Outcome.OPEN
     assert found.reason == "interrupted"

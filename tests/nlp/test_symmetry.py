@@ -32,7 +32,7 @@ def form_of(
     pairs = (("limit", limit, False), ("equation", equation, True))
     conditions = tuple(Condition(name, each(x), exact) for name, each, exact in pairs if each is not None)
     ends = np.full(3, -1.0), np.full(3, 1.0)
-    stated = {"functions": (function(x),), "conditions": conditions, "signs": ()}
+    stated = {"functions": (function(x),), "conditions": conditions}
     return replace(base_form(), x=x, lower=ends[0], upper=ends[1], **stated)
 
 

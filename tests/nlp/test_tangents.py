@@ -131,7 +131,7 @@ def test_a_maximum_has_no_tangents_and_a_quotient_that_may_be_undefined_none_eit
     assert rows is not None
     assert rows.functions == (0,) * 6
     x = form.x
-    narrow = replace(form, functions=(-((x[0] + 1) ** 2) / (x[1] ** 2 + x[2] ** 2),), conditions=(), signs=())
+    narrow = replace(form, functions=(-((x[0] + 1) ** 2) / (x[1] ** 2 + x[2] ** 2),), conditions=())
     rows = tangent_rows(narrow)
     assert rows is not None
     tape = value_tape(narrow, rows)

@@ -5,7 +5,7 @@ import pytest
 from limb_cases import poses
 
 from screwsynth.nlp import Case, formulate, load_case
-from screwsynth.nlp.proof.boxes.threads import Threads, pieces
+from screwsynth.nlp.proof.boxes.engine import Threads, pieces
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 
@@ -30,7 +30,6 @@ def test_results_keep_the_order_of_the_items_and_faults_are_passed_on() -> None:
         assert threads.map(lambda item: item * item, range(20)) == [item * item for item in range(20)]
         with pytest.raises(ZeroDivisionError):
             threads.map(lambda item: 1 // item, [1, 0])
-        threads.close()
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
-from hexapods import HEXAPOD, case_of_legs, clearance, hexapod_text, over, subject_of
+from hexapods import HEXAPOD, bounds_of, case_of_legs, clearance, hexapod_text, smallest, subject_of, values_of
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
@@ -24,15 +24,14 @@ from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.proof.enclosure.forms import Encloser
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
-from screwsynth.nlp.proof.workspace.numbers.pose_error import WorstError
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
+from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.ranks.signs import SignRefuter
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, scaled
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.slices.slices import Region, slices_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome, Regularity
+from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
@@ -77,22 +76,15 @@ def legs(case: Case) -> Legs:
     return found
 
 
-def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> Regularity:
+def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> RankVerdict:
     """The verdict on the rank of the rows of six legs."""
     problem = build_problem(case_of_legs(robot), HEXAPOD, box)
-    return prove_rank(problem, problem.locked, refuter=SignRefuter(robot, problem), most_boxes=most_boxes)
+    return prove_rank(problem, problem.locked, most_boxes=most_boxes)
 
 
 def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
     """Determinants of the legs' vectors and moments at points (K, 6), from rotation matrices."""
-    w, x, y, z = (quaternions := box.quaternions(points)).T / np.linalg.norm(quaternions, axis=1)
-    turn = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    ).transpose(2, 0, 1)
+    turn = np.array([box.pose(each).rotation for each in points])
     arm = np.einsum("kij,lj->kli", turn, robot.platform)
     span = points[:, None, :3] + arm - robot.base
     return np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2))
@@ -168,7 +160,7 @@ def test_expansions_enclose_exact_rows_and_a_wrong_one_does_not(case: Case, kind
     half = (box.upper - box.lower) * rng.uniform(0, 0.2, (40, 1))
     lower, upper = centre - half, centre + half
     problem = subject_of(robot, box).problem
-    c, a, r = Encloser(problem.z, ca.vec(ca.densify(problem.scaled.rows).T)).second(lower.T, upper.T).as_terms()
+    c, a, r = Encloser(problem.z, ca.vec(ca.densify(problem.scaled.rows).T)).second(lower.T, upper.T)
     units = np.array([1.0, 1.0, 1.0, *[problem.length] * 3])
     middle, slopes, rest = (
         c.reshape(-1, 6, 6) * units,
@@ -232,17 +224,17 @@ def test_random_robots_are_never_called_regular_where_the_determinant_changes_it
 def test_bounds_over_boxes_hold_at_samples(case: Case, kind: TurnKind, name: str) -> None:
     rng = np.random.default_rng(5)
     box, robot = pose_box(turned(kind, 25)), legs(case)
-    oracle, subject = clearance(robot, box, 1, 2), subject_of(robot, box)
+    number: Number = clearance(robot, box, 1, 2)
     if name != "clearance":
-        oracle = over(subject, subject.spectrum(11.5, is_condition=name == "condition number"))
+        number = subject_of(robot, box).spectrum(11.5, is_condition=name == "condition number")
     lower = box.random(150, rng)
     upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (150, 6)), box.upper)
-    bound = oracle.bounds(lower, upper).lower
+    bound = bounds_of(number, lower, upper)
     least = np.full(150, np.inf)
     for _ in range(40):
         share = rng.uniform(size=(150, 6))
         share = np.where(rng.uniform(size=share.shape) < 0.4, np.round(share), share)
-        least = np.minimum(least, oracle.values(lower + share * (upper - lower)))
+        least = np.minimum(least, values_of(number, lower + share * (upper - lower)))
     assert (bound <= least + 1e-12).all()
     # The bounds say something: half of these boxes have one that is less than a fifth off.
     assert np.median((least - bound) / np.abs(least)) < 0.2
@@ -250,9 +242,10 @@ def test_bounds_over_boxes_hold_at_samples(case: Case, kind: TurnKind, name: str
 
 def test_the_smallest_clearance_is_met_within_the_gap(case: Case) -> None:
     box, robot = pose_box(turned(TurnKind.ANY_AXIS, 20)), legs(case)
-    found = prove_minimum(clearance(robot, box, 1, 2), box, gap=0.05)
+    number = clearance(robot, box, 1, 2)
+    found = smallest(number, Goal(0.05))
     assert found.value - 0.05 <= found.bound <= found.value
-    samples = clearance(robot, box, 1, 2).values(box.random(100_000, np.random.default_rng(0)))
+    samples = values_of(number, box.random(100_000, np.random.default_rng(0)))
     assert samples.min() >= found.bound
 
 
@@ -460,7 +453,7 @@ def test_the_shipped_design_violates_nothing_at_a_million_poses() -> None:
         cosine = (span * home).sum(axis=2) / lengths / np.linalg.norm(home, axis=1)
         assert cosine.min() >= math.cos(math.radians(25))
         for one, other in ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 0)):
-            assert clearance(robot, box, one, other).values(points[:2000]).min() >= 3
+            assert values_of(clearance(robot, box, one, other), points[:2000]).min() >= 3
     assert least.min() >= 20
     assert most.max() <= 38
     assert (most - least).max() <= 17
@@ -577,15 +570,14 @@ def test_errors_of_the_pose_are_bounded_for_every_machine_within_its_tolerances(
 def test_first_order_errors_are_bounded_over_boxes(case: Case, kind: TurnKind, is_rotation: bool) -> None:
     rng = np.random.default_rng(6)
     box = pose_box(turned(kind, 25))
-    subject = subject_of(legs(case), box)
-    oracle = over(subject, WorstError(subject.problem, is_rotation=is_rotation))
+    number = WorstError(subject_of(legs(case), box).problem, is_rotation=is_rotation)
     lower = box.random(100, rng)
     upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.15, (100, 6)), box.upper)
-    bound = oracle.bounds(lower, upper).lower
+    bound = bounds_of(number, lower, upper)
     least = np.zeros(100)
     for _ in range(30):
         share = np.round(rng.uniform(size=(100, 6)), int(rng.integers(2)) * 3)
-        least = np.minimum(least, oracle.values(lower + share * (upper - lower)))
+        least = np.minimum(least, values_of(number, lower + share * (upper - lower)))
     assert (bound <= least).all()
     assert np.median(bound / least) < 1.1
 

@@ -27,19 +27,20 @@ from screwsynth.nlp.proof.checker.proof_file import read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
+from screwsynth.nlp.proof.enclosure.forms import Forms
 from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers import expressions
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
-from screwsynth.nlp.proof.workspace.tolerance import machine_number
 from screwsynth.nlp.proof.workspace.tolerance import machines as tolerance
-from screwsynth.nlp.proof.workspace.tolerance.machines import Machines, Proving, machine_extremes, machines_of
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
 from screwsynth.nlp.results.schema import result_schema
@@ -81,7 +82,7 @@ def case_of(name: str) -> Case:
 
 
 def machines(case: Case) -> Machines:
-    return machines_of(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
+    return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case)))
 
 
 @dataclass(frozen=True)
@@ -233,10 +234,8 @@ SAMPLED: dict[str, Callable[[], Sampled]] = {"3-rps": ThreeRps, "6-rus": SixRus,
 
 def wanted(found: Machines, names: tuple[str, ...], gap: float) -> list[Extreme]:
     """Return the smallest and largest value of each of these numbers."""
-    proving = Proving(gap, 1)
-    quantities = [each.name for each in found.built.model.quantities]
-    every = machine_extremes(found, quantities, proving, with_objective=True, only=names)
-    return [each for each in every if each.name in names]
+    every = found.symbols.claims([each.name for each in found.built.model.quantities])[1]
+    return [found.extreme(each, gap=gap, jobs=1) for each in every if each.name in names]
 
 
 def samples(robot: Sampled, box: PoseBox, tolerance: float, more: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -302,11 +301,21 @@ def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
 
 
 def test_terms_of_errors_that_are_too_small_are_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    spread = machine_number.by_centres
+    spread = expressions.by_centres
     monkeypatch.setattr(tolerance, "_OUTWARDS", 0.8)
-    monkeypatch.setattr(machine_number, "by_centres", lambda slopes: 0.8 * spread(slopes))
+    monkeypatch.setattr(expressions, "by_centres", lambda slopes: 0.8 * spread(slopes))
     for name, number in (("three-upu", "leg_length limb 2"), ("3-rps", "actuator_length limb 1")):
         assert max(ratios(name, 1e-5, (number,)).values()) < 1.0
+
+
+def test_errors_that_do_not_matter_are_zero_without_a_sign() -> None:
+    family = machines(case_of("3-rps")).family
+    free = family.z[family.problem.independent[0]]
+    (found,) = smallest_values(expressions.Expressions(family, free - family.errors[2]), [Goal(part=0.1)])
+    errors = family.errors_of(found.at).vectors
+    assert errors[0, 2] == pytest.approx(1e-3, rel=1e-9)
+    assert np.count_nonzero(errors) == 1
+    assert not np.signbit(errors).any()
 
 
 def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:
@@ -317,20 +326,21 @@ def wrong_boxes(name: str, tolerance: float) -> tuple[int, int]:
     """
     family = machines(replace(case_of(name), joint_centre_tolerance=tolerance)).family
     problem, rng = family.problem, np.random.default_rng(0)
-    test = rank.RankTest(family.locked, family.coordinates, family.start)
-    examiner = Examiner(problem, test, family)
+    examiner = Examiner(family, rank.RankTest(family.locked, family.z, family.start))
     own, n, count = list(problem.independent), len(problem.start), 64
     middle = problem.box.random(count, rng)[:, list(problem.free)][:, own]
-    lower, upper = np.full((count, n), np.nan), np.full((count, n), np.nan)
+    lower, upper = np.full((2, count, len(family.start)), tolerance)
+    lower[:, n:] = -tolerance
+    lower[:, :n] = upper[:, :n] = np.nan
     half = rng.uniform(0, 0.3, (count, 1)) * problem.size[own]
     lower[:, own], upper[:, own] = middle - half, middle + half
-    cells = LoopBoxes(lower, upper, np.tile(problem.start, (count, 1)), np.full(count, not problem.dependent))
+    cells = LoopBoxes(lower, upper, np.tile(family.start, (count, 1)), np.full(count, not problem.dependent))
     found = examiner.examine(cells)
-    loops, newton = family.loops, SingularPose(problem, family.locked, family)
-    M = ca.Function("M", [family.coordinates], [ca.densify(family.locked.matrix)])
+    loops, newton = family.loops, SingularPose(family, family.locked)
+    M = ca.Function("M", [family.z], [ca.densify(family.locked.matrix)])
     wrong = 0
     for k in np.flatnonzero(found.is_regular):
-        z = family.exact(found.boxes.centre[k])
+        z = found.boxes.centre[k].copy()
         design = loops.closed(z, list(problem.dependent))
         assert design is not None
         C = np.linalg.pinv(M(design).full())
@@ -350,12 +360,12 @@ def test_no_box_is_regular_for_all_machines_in_which_one_is_not(monkeypatch: pyt
         assert boxes >= 32
         assert not wrong
     # Without the part of the errors boxes are said to be regular in which a machine is not.
-    judged = rank.RankTest._judged
+    examine = rank.RankTest.examine
 
-    def without(self: rank.RankTest, M0: FloatArray, M: FloatArray, R: FloatArray, f: int) -> rank.Tested:
-        return judged(self, M0, M[:, :f], np.zeros_like(R), f)
+    def without(self: rank.RankTest, forms: Forms, f: int) -> rank.Tested:
+        return examine(self, Forms(forms.c, forms.a[:, :, :f], np.zeros_like(forms.r)), f)
 
-    monkeypatch.setattr(rank.RankTest, "_judged", without)
+    monkeypatch.setattr(rank.RankTest, "examine", without)
     assert wrong_boxes("6-ups", 0.4)[1]
 
 
@@ -390,7 +400,7 @@ def wrongly_shown(name: str, tolerance: float, covered: float) -> tuple[int, int
         for _ in range(8):
             errors = rng.normal(size=(len(rows), len(built.names), 3))
             errors *= tolerance / np.linalg.norm(errors, axis=2, keepdims=True)
-            y = rng.uniform(lower[rows], upper[rows])[:, claim._free]
+            y = rng.uniform(lower[rows], upper[rows])[:, claim.free]
             machine = assembly.moved(design, np.hstack([y, errors.reshape(len(rows), -1)]))
             assert np.isfinite(machine).all()
             wrong += int((np.linalg.det(C @ matrices(machine)) <= 0).sum())

@@ -11,10 +11,11 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from hexapods import clearance, hexapod_text, over, subject_of
+from hexapods import bounds_of, clearance, hexapod_text, smallest, subject_of, values_of
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
+from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Limits, load_case, load_result, solve
 from screwsynth.nlp.case.limits.joints import JointAngle
 from screwsynth.nlp.case.limits.legs import Actuator, LegLength
@@ -22,21 +23,20 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.bound_search import prove_minimum
+from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
-from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
-from screwsynth.nlp.proof.workspace.robot.tolerance_model import ToleranceModel, family_of
-from screwsynth.nlp.proof.workspace.tolerance.leg_errors import of_legs
-from screwsynth.nlp.proof.workspace.tolerance.machines import Proving, machine_extremes, machines_of
+from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
+from screwsynth.nlp.proof.workspace.tolerance.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
@@ -192,17 +192,18 @@ def machines(case: Case) -> Machines:
 
 def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case, machines: Machines) -> None:
     sampled, seen = dict(numbers(case, legs(case), machines)), set()
-    every = machines_of(case, case.model, pose_box(workspace_of_case(case)))
+    every = EveryMachine(case, closed_form(case.model), pose_box(workspace_of_case(case)))
     picked = [name for name in sampled if " 1-" in name or " 2+" in name or " " not in name]
-    for each in machine_extremes(every, ["base_joint_angle"], Proving(1e-3, 1), with_objective=True, only=picked):
+    claims = [each for each in every.symbols.claims(["base_joint_angle"])[1] if each.name in picked]
+    for each in (every.extreme(claim, gap=1e-3, jobs=1) for claim in claims):
         seen.add((each.name.partition(" ")[0], each.key == ""))
         assert beyond(each, sampled[each.name]) <= 0, each.name
         # Proven bounds are near: a hundredth of the largest number of the exact machine, with the gap.
         assert beyond(each, sampled[each.name]) > -0.03 * np.abs(sampled[each.name]).max(), each.name
         # The errors that come with a value are those of a machine within the tolerance which has that value.
-        assert each.centres is not None
+        assert each.errors is not None
         assert each.pose is not None
-        assert max(np.linalg.norm(part, axis=1).max() for part in of_legs(each.centres)) <= TOLERANCE
+        assert max(np.linalg.norm(part, axis=1).max() for part in each.errors) <= TOLERANCE
         assert beyond(each, np.array([each.reached])) <= 1e-9 * abs(each.reached), each.name
     assert len(seen) == 10
     determinants = np.linalg.det(machines.J)
@@ -217,23 +218,23 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
     values = np.linalg.svd(machines.J[:20_000] / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
     subject = subject_of(robot, box, 15.0)
     spectra = [subject.spectrum(LENGTH, is_condition=is_condition) for is_condition in (False, True)]
-    checks = [
+    checks: list[tuple[Number, FloatArray]] = [
         (clearance(robot, box, 0, 1), machines.clearance(0, 1)),
         (clearance(robot, box, 0, 2), machines.clearance(0, 2)),
-        (over(subject, spectra[0]), values[:, -1]),
-        (over(subject, spectra[1]), -values[:, 0] / values[:, -1]),
+        (spectra[0], values[:, -1]),
+        (spectra[1], -values[:, 0] / values[:, -1]),
     ]
     rng = np.random.default_rng(1)
-    for oracle, sampled in checks:
-        assert oracle.bounds(box.lower[None], box.upper[None]).lower[0] <= sampled.min()
+    for number, sampled in checks:
+        assert bounds_of(number, box.lower[None], box.upper[None])[0] <= sampled.min()
         # At a point the bound and the value of the worst machine differ by the rest, and by the 2 % of the norm.
         points = box.random(50, rng)
-        at = oracle.bounds(points, points).lower
-        exact = oracle.values(points)
+        at = bounds_of(number, points, points)
+        exact = values_of(number, points)
         assert (at <= exact + 1e-12).all()
         assert (at >= exact - 0.05 * np.abs(exact)).all()
     for number in spectra:
-        errors = number.errors(points[0])
+        errors = number.worst(points[0])
         assert errors is not None
         assert max(np.linalg.norm(part, axis=1).max() for part in errors) <= TOLERANCE
 
@@ -241,19 +242,21 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
 def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> None:
     robot, box = legs(case), pose_box(workspace_of_case(case))
     for y in box.random(5, np.random.default_rng(3)):
-        wide = robot._replace(tolerance=float(clearance(robot, box, 0, 1).values(y[None])[0]))
-        assert clearance(wide, box, 0, 1).values(y[None])[0] == 0
-        errors = subject_of(wide, box).nearest((0, 1), y)
+        wide = robot._replace(tolerance=float(values_of(clearance(robot, box, 0, 1), y[None])[0]))
+        assert values_of(clearance(wide, box, 0, 1), y[None])[0] == 0
+        errors = clearance(wide, box, 0, 1).worst(y)
         assert errors is not None
         made = errors.applied(wide)
-        assert clearance(made._replace(tolerance=0.0), box, 0, 1).values(y[None])[0] < 1e-9 * wide.tolerance
+        assert values_of(clearance(made._replace(tolerance=0.0), box, 0, 1), y[None])[0] < 1e-9 * wide.tolerance
 
 
 def test_errors_of_a_machine_that_is_singular_at_every_pose_have_no_value(case: Case) -> None:
     """Joints of base and platform at the same azimuths: Newton's method finds no pose of a machine with errors."""
     robot = legs(case)
-    similar, box = Legs(robot.base, 0.5 * robot.base), pose_box(Workspace((0.0, 0.0, 20.0), Turns()))
-    for each in pose_errors(similar, subject_of(similar, box).problem, 1e-3, 10.0):
+    similar, box = Legs(robot.base, 0.5 * robot.base), pose_box(Workspace((0.0, 0.0, Free(19.0, 21.0)), Turns()))
+    with within(2.0):
+        found = list(pose_errors(subject_of(similar, box, 10.0), 1e-3))
+    for each in found:
         assert each.outcome is Outcome.OPEN
         assert (each.bound, each.pose) == (math.inf, None)
         assert math.isnan(each.reached)
@@ -271,18 +274,13 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
     exact = build_problem(case, case.model, box)
     family = family_of(case, built_model(case.model), exact, robot.tolerance)
 
-    def examined(family: ToleranceModel | None) -> Examined:
-        """The boxes, for all machines of a family, or for the design."""
-        matrix, z, start = (
-            (exact.locked, exact.z, exact.start)
-            if family is None
-            else (family.locked, family.coordinates, family.start)
-        )
+    def examined(meant: Problem) -> Examined:
+        """The boxes, for all machines or for the design."""
         cells = LoopBoxes(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
-        return Examiner(exact, RankTest(matrix, z, start), family).examine(cells)
+        return Examiner(meant, RankTest(meant.locked, meant.z, meant.start)).examine(cells)
 
     found, changed = examined(family), 0
-    for k in np.flatnonzero(examined(None).is_regular):
+    for k in np.flatnonzero(examined(exact).is_regular):
         signs = np.sign(np.linalg.det(Machines(robot, replace(box, lower=lower[k], upper=upper[k]), 60, seed=int(k)).J))
         if found.is_regular[k]:
             assert (signs == signs[0]).all()
@@ -403,10 +401,10 @@ def test_a_limit_is_refined_until_it_is_decided_whatever_the_gap_is(case: Case) 
         assert {outcome} <= {each.outcome for each in limited} <= {outcome, Outcome.PROVED}
     # The searches that are not those of certificates go on too, and end at a value that meets its limit.
     box = pose_box(workspace_of_case(case))
-    oracle = clearance(robot, box, 0, 1)
-    least = prove_minimum(oracle, box, gap=1e-4).value
+    number = clearance(robot, box, 0, 1)
+    least = smallest(number, Goal(1e-4)).value
     for limit, slack in ((least - 1e-6, 0.0), (least + 1e-10, 1e-9)):
-        found = prove_minimum(oracle, box, gap=1.0, limit=limit, slack=slack, time_limit=20)
+        found = smallest(number, Goal(1.0, limit=limit, slack=slack), time_limit=20)
         assert found.bound >= limit - slack, found
 
 

@@ -22,15 +22,14 @@ from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.checker.proof_file import ProofError, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import posed_robot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank, prove_ranks
-from screwsynth.nlp.proof.workspace.ranks.singular_pose import NewtonRefuter
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularSearch
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -203,11 +202,9 @@ def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
         problem,
         problem.locked,
         most_boxes=4000,
-        refuter=NewtonRefuter(
-            problem,
-            problem.locked,
-            is_shown=lambda z: homes.is_singular(problem.pose_of(z), None, constraints=False),
-        ),
+        look=SingularSearch(
+            problem, problem.locked, lambda at: homes.is_singular(at.y, at.centres, constraints=False)
+        ).look,
     )
     assert found.outcome is Outcome.REFUTED
     assert found.y is not None
@@ -267,8 +264,8 @@ def test_the_check_begins_in_the_working_mode_of_home() -> None:
             build_problem(case, model, pose_box(case.workspace))
         except NotJudgedError:
             with pytest.raises(ProofError, match="in the assembly of home"):
-                start_of(posed_robot(case, model, pose_root(case.workspace)))
+                start_of(PosedRobot(case, model, pose_root(case.workspace)))
             tried += 1
         else:
-            start_of(posed_robot(case, model, pose_root(case.workspace)))
+            start_of(PosedRobot(case, model, pose_root(case.workspace)))
     assert 0 < tried < 6

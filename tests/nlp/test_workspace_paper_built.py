@@ -17,24 +17,23 @@ from hexapods import hexapod_text
 import screwsynth.cases
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Task
+from screwsynth.nlp import Case, Free, Limits, Task
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
 from screwsynth.nlp.proof.checker.workspace import check
-from screwsynth.nlp.proof.checker.workspace.leg_claims import SingularClaim
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import posed_robot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
+from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClaim, SingularClaim, change_of_jacobian
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
-from screwsynth.nlp.proof.checker.workspace.tolerance import Machines, change_of_jacobian
+from screwsynth.nlp.proof.checker.workspace.statement import Machines
 from screwsynth.nlp.proof.statement.machine import Legs, joint_centres, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.numbers.searched import Subject, asked_spectra_extremes
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
@@ -245,8 +244,8 @@ def test_other_lemmas_and_directions_are_rejected(proof: WorkspaceProof) -> None
     kept = tuple(each for each in proof.lemmas if each is not rest and not each.name.startswith(name))
     assert "other expressions" in rejections(replace(proof, lemmas=(*kept, smaller)))("F", "max")
     reject = rejections(replace(proof, lemmas=kept))
-    assert "no bound" in reject("F", "max")
-    assert "have no proof" in reject(name, "max")
+    assert f"{second_order_name('F')}: has no proof" in reject("F", "max")
+    assert "has no proof" in reject(name, "max")
     reject, stroke = rejections(proof), claim(proof, name, "max")
     turned = (stroke.sides[0], (0.0, 0.6, 0.8))
     assert "other expressions" in reject(name, "max", sides=turned)
@@ -259,14 +258,14 @@ def test_other_lemmas_and_directions_are_rejected(proof: WorkspaceProof) -> None
 def machines_of(text: str) -> tuple[Machines, PoseRoot]:
     """The machines of a case as the check has them."""
     case, root = case_of(text), pose_root(workspace_of_case(case_of(text)))
-    return Machines(case, closed_form(case.model).model, workspace_of_case(case), root), root
+    return Machines(case, closed_form(case.model).model, root), root
 
 
 @pytest.mark.parametrize("robot", ["hexapod", "6-rus"])
 def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> None:
     """What is shown of terms of second order is at least that of random machines, and little more."""
     found, root = machines_of(TEXT if robot == "hexapod" else CRANKS)
-    rng, t, symbols = np.random.default_rng(1), found.tolerance, found.symbols
+    rng, t, symbols = np.random.default_rng(1), found.symbols.tolerance, found.symbols
     m, count = len(symbols.built.names), 400
     reaches, claims = symbols.claims(())
     kinds = {each.name.partition(" ")[0] + each.sense.value: each for each in (*reaches, *claims) if found.varies(each)}
@@ -297,10 +296,10 @@ def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> 
         # To first order the steep machine is the worst one.
         change = np.maximum(sign * (most - exact.ravel()), 1e-300)
         assert (sign * (values - exact.ravel()) / change).max() > 0.95, each.name
-        claimed = found.second_order(each, 0.9 * largest)
+        claimed = SecondOrderClaim(found, each.expression, 0.9 * largest)
         assert not claimed.attempt(root.lower[None], root.upper[None]).holds[0]
         points = np.repeat((0.5 * root.lower + 0.5 * root.upper)[None], 2, axis=0)
-        assert found.second_order(each, 30 * largest).attempt(*points[:, None]).holds[0], each.name
+        assert SecondOrderClaim(found, each.expression, 30 * largest).attempt(*points[:, None]).holds[0], each.name
         assert none.numel() == 3 * m
 
 
@@ -309,12 +308,12 @@ def test_a_number_with_a_kink_has_no_terms_of_second_order() -> None:
     (some,) = (each for each in found.symbols.claims(())[1] if (each.name, each.sense) == ("F", Sense.MAX))
     for kink in (ca.fabs(some.expression - 1), ca.fmax(some.expression, 1)):
         with pytest.raises(UncoveredError, match="jump"):
-            found.second_order(replace(some, expression=kink), 1e9)
+            SecondOrderClaim(found, kink, 1e9)
 
 
 def test_lengths_of_one_machine_hold_at_two_poses() -> None:
     found, root = machines_of(TEXT)
-    rng, symbols, t = np.random.default_rng(2), found.symbols, found.tolerance
+    rng, symbols, t = np.random.default_rng(2), found.symbols, found.symbols.tolerance
     free = np.flatnonzero(root.upper > root.lower)
     poses = rng.uniform(root.lower, root.upper, (2, 6))[:, free]
     errors = rng.normal(size=(2000, 12, 3))
@@ -330,7 +329,7 @@ def test_lengths_of_one_machine_hold_at_two_poses() -> None:
         for sense, pose in zip((Sense.MAX, Sense.MIN), poses, strict=True):
             one = length_of_one_machine(symbols, i, sense, about)
             rest = 4 * t**2 / min(length)
-            assert found.second_order(one, rest).attempt(root.lower[None], root.upper[None]).holds[0]
+            assert SecondOrderClaim(found, one.expression, rest).attempt(root.lower[None], root.upper[None]).holds[0]
             value = ca.Function("value", [found.design.table.variables_vector], [found.number(one, rest)])
             bounds.append(float(value(pose)))
         lengths = [
@@ -390,7 +389,7 @@ def test_changes_of_rows_hold_those_of_machines() -> None:
         lower = rng.uniform(root.lower, root.upper, (40, 6))
         upper = np.minimum(lower + 1e-3 * (root.upper - root.lower), root.upper)
         claims = [regular(some.exact, root, each) for each in (0.0, t)]
-        without, bound = (each._matrices(each._closed(lower, upper))[1] for each in claims)
+        without, bound = (each._matrices(each._closed(lower, upper)).E for each in claims)
         y = lower + rng.uniform(size=lower.shape) * (upper - lower)
         poses = [box.pose(each) for each in y]
         R, p = np.array([each.rotation for each in poses]), np.array([each.position for each in poses])
@@ -419,7 +418,7 @@ def test_no_claim_is_shown_where_a_machine_violates_it() -> None:
     root, t, shown, kept, singular = pose_root(Machine.WORKSPACE), 0.1, 0, 0, 0
     for seed in range(30):
         some = Machine(seed, t, 800)
-        at, robot = (some.y[None], some.y[None]), posed_robot(case_with(some.exact), HEXAPOD, root)
+        at, robot = (some.y[None], some.y[None]), PosedRobot(case_with(some.exact), HEXAPOD, root)
         values = np.linalg.svd(some.J / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
         least, condition = values[:, -1], values[:, 0] / values[:, -1]
         change = change_of_jacobian(some.exact, t, LENGTH, 0.999 * float(some.length[0].min()) - 2 * t)
@@ -455,13 +454,14 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     ).claims
     assert found.is_refuted
     assert found.by_machine
-    pose, *machine = claim(given, "regular").sides
-    exact = [tuple(each) for each in given.legs]
+    design, machine = claim(given, "regular").sides
+    assert design == (*machine[:6], *[0.0] * 36)
     for sides, fault in (
-        ((pose, *exact), "same sign"),
-        ((pose, *(tuple(2.0 * part for part in each) for each in machine)), "more than the tolerance"),
-        ((tuple(9.0 for _ in pose), *machine), "not one of the workspace"),
-        ((pose, *machine[1:]), "no pose and machine"),
+        ((design, design), "not opposite signs"),
+        ((design, (*machine[:6], *(2.0 * part for part in machine[6:]))), "more than the tolerance"),
+        ((design, (*[9.0] * 6, *machine[6:])), "not one of the workspace"),
+        ((design, machine[:-3]), "no two poses"),
+        ((design[:6], machine), "no two poses"),
     ):
         assert fault in rejected(changed(given, "regular", "", sides=sides), text)
     smaller = text.replace("joint_centre = 0.8", "joint_centre = 0.1")
@@ -498,7 +498,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
     subject = Subject(case, case.model, pose_box(judged.workspace), joint_centres(case))
-    for extreme in asked_spectra_extremes(subject, ASKED[1:], gap=0.1):
+    for extreme in searched_extremes(replace(subject, case=replace(case, limits=Limits())), ASKED[1:], gap=0.1):
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 
 

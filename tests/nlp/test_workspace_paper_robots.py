@@ -29,8 +29,7 @@ from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, pose_ro
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.proof_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
@@ -197,11 +196,11 @@ def test_closed_loops_are_where_they_are_shown_to_be(name: str) -> None:
     half = 0.5 * (root.upper - root.lower)
     boxes = boxes_about(0.5 * (root.lower + root.upper), half, rng)
     lower, upper = (each[:, own] for each in boxes)
-    found = assembly.enclosed(lower, upper, assembly.near(lower, upper))
+    found = assembly.enclosed(lower, upper)
     known = found.is_known
     assert known.mean() > 0.3
     at = lower + rng.choice([0.01, 0.99], lower.shape) * (upper - lower)
-    z = assembly.points.moved(found.near, at, own, D)[known][:, D]
+    z = assembly.moved(found.near, at)[known][:, D]
     low, high = found.lower[known][:, D], found.upper[known][:, D]
     assert ((low < z) & (z < high)).all()
     moved = (z - 0.5 * (low + high)) / (0.5 * (high - low)) - found.off[known]

@@ -23,7 +23,7 @@ from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from screwsynth.nlp.proof.workspace.slices.slices import Region, Slice, slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
-from screwsynth.nlp.solver.exchange import WorkspaceProof
+from screwsynth.nlp.solver.semi_infinite import WorkspaceProof
 
 NOTICE = "the limits are taken at the stated pose alone, not over the workspace"
 
@@ -295,10 +295,45 @@ def test_slices_need_two_numbers_that_the_robot_can_choose() -> None:
         slices_of(case_of(text, over="", rb="1.0", rp="0.6", height="1.1"))
 
 
-def test_limits_that_are_not_judged_over_a_workspace_are_refused() -> None:
-    text = f"{THREE_UPU}[limits]\n{OVER}\nactuator = {{ stroke_max = 20 }}\n"
-    with pytest.raises(CaseError, match=r"needs a robot with six straight legs, or no limits\.actuator"):
-        solve(case_from_tables(tomllib.loads(text), name="mine", source="mine"))
+def three_upu(tables: str, **values: str) -> Case:
+    text = THREE_UPU.replace("min = 45, max = 55", "min = 47, max = 53")
+    for name, value in values.items():
+        text = text.replace(f"{name} = {{ min = 30, max = 60 }}", f"{name} = {value}")
+    return case_from_tables(tomllib.loads(text + tables), name="mine", source="mine")
+
+
+def test_a_design_of_three_legs_keeps_its_strokes_over_the_workspace() -> None:
+    solution = solve(three_upu(f"[limits]\n{OVER}\nactuator = {{ stroke_max = 5.5 }}\n"))
+    proof = proof_of(solution)
+    assert proof.is_proved
+    # Without rotation the platform's joints stay above those of the base by the difference of the radii.
+    stroke = np.diff(np.hypot(number(proof.judgement.case, "base_radius") - 25, [47, 53]))[0]
+    assert 5.5 * (1 - 3e-3) < stroke < 5.5
+
+
+def test_machines_whose_rows_their_errors_change_in_proportion_are_judged() -> None:
+    """Terms of second order that are all 0 are no expression at all."""
+    judged = judge_workspace(three_upu("[tolerance]\njoint_centre = 0.01\n", base_radius="50"), with_limits=False)
+    assert judged.regularity.outcome in Outcome
+
+
+@pytest.mark.slow
+def test_a_design_of_a_robot_with_loops_is_proved_for_every_machine_within_a_tolerance() -> None:
+    text = TRIPOD.replace("[solve]", "[tolerance]\njoint_centre = 0.0005\n[solve]")
+    free = {"rb": "{ min = 0.7, max = 1.5 }", "rp": "{ min = 0.4, max = 1.0 }", "height": "{ min = 1.0, max = 1.2 }"}
+    proof, exact = (proof_of(solve(case_of(each, over=OVER, **free))) for each in (text, TRIPOD))
+    assert proof.is_proved
+    errors = [each.errors for each in proof.poses if each.errors is not None]
+    assert errors
+    assert max(float(np.linalg.norm(each, axis=1).max()) for each in errors) == pytest.approx(0.0005)
+    # The worst machine is near the limit, and the exact design keeps room for it.
+    reached = [abs(each.reached) for each in proof.judgement.extremes if each.limit is not None]
+    assert 0.2 * (1 - 3e-3) < max(reached) <= 0.2
+    rng = np.random.default_rng(0)
+    roll, pitch = rng.uniform(-math.radians(10), math.radians(10), (2, 100_000))
+    z = rng.uniform(1.0, 1.2, 100_000)
+    longest, exactly = (np.abs(tripod(each.judgement.case, roll, pitch, z)[0]).max() for each in (proof, exact))
+    assert longest < exactly
 
 
 def test_a_front_and_a_compiled_sweep_say_that_limits_hold_at_the_stated_pose(tmp_path: Path) -> None:

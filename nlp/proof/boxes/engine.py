@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import enum
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -12,11 +15,10 @@ import numpy as np
 from ...errors import UncoveredError
 from ..enclosure.engine import kernel
 from ..enclosure.forms import QuadraticModel
-from ..enclosure.squared_quotients import SearchRows, TangentRows, search_rows, tangent_rows
+from ..enclosure.squared_quotients import Rows, search_rows, tangent_rows
 from ..enclosure.tape import Tape, compile_tape
-from ..statement.piecewise_derivatives import refuse_jumps
+from ..statement.form import refuse_jumps, without_ties
 from ..statement.standard_form import StandardForm
-from .threads import Threads, pieces
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,10 +29,57 @@ if TYPE_CHECKING:
 _MANY_CONDITIONS = 4
 #: Largest number of variables for which the first pass is made: a value has half its square as coefficients.
 MOST_VARIABLES = 12
-#: Half of the kernel's block: large enough that Python's work between blocks takes no noticeable part of the time.
-_BOXES_PER_JOB = 2048
+#: Boxes examined at once: Python's work between blocks takes no noticeable part of the time. The order of the search
+#: depends on this number, which must not depend on that of the threads.
+BLOCK = 4096
 #: An end of a box that contraction did not move, and one that was moved to the opposite face by monotonicity.
 UNMOVED, COLLAPSED = -2, -1
+#: Fewest boxes of a piece: two of the kernel's blocks of 32. Starting a piece costs about as much as a few boxes.
+_LEAST_PIECE = 64
+
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class Threads:
+    """Threads that share the parts of one step of a search; they end with this object.
+
+    Args:
+        jobs: number of threads; one for each processor when left out.
+
+    Attributes:
+        jobs: number of threads.
+    """
+
+    def __init__(self, jobs: int | None = None) -> None:
+        self.jobs = max(1, jobs if jobs is not None else os.cpu_count() or 1)
+        self._pool = ThreadPoolExecutor(self.jobs) if self.jobs > 1 else None
+
+    def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+        """Return the results of a function for some items, in their order; a thread that is done takes the next one."""
+        every = list(items)
+        if self._pool is None or len(every) < 2:
+            return [function(each) for each in every]
+        return [each.result() for each in [self._pool.submit(function, each) for each in every]]
+
+
+def pieces(count: int, jobs: int) -> Sequence[tuple[int, int]]:
+    """Return begins and ends of the pieces of so many boxes for some threads.
+
+    Boxes cost differently, by what closes them. So each piece is a part of what is left: large ones first, in which
+    few lanes of the kernel stay empty, and small ones last, so that no thread waits long for another.
+    """
+    if jobs == 1:
+        return [(0, count)]
+    found, begin = [], 0
+    while begin < count:
+        size = max(_LEAST_PIECE, (count - begin) // (2 * jobs) // _LEAST_PIECE * _LEAST_PIECE)
+        # A last piece that would be smaller is added to this one.
+        end = begin + size if count - begin - size >= _LEAST_PIECE else count
+        found.append((begin, end))
+        begin = end
+    return found
 
 
 class Verdict(enum.IntEnum):
@@ -81,7 +130,7 @@ class LimbModels:
         is_possible: (B,) whether an optimum may lie in the box.
         defined: (B,) whether the limb's function has a value in the whole box.
         holds: (B,) whether every condition of the limb holds on the whole box.
-        lower, upper: (n, B) the part of the box that is left; shared variables as they were.
+        lower, upper: (n, B) the part of the box that is left; of shared variables where there are no own ones.
         L: upper models of the Lagrangian, whose multipliers make its gradient small in the own variables.
         slope_lo, slope_hi: (m, B) gradient of the function along shared variables.
         stops_up, stops_down: (m, B) whether a condition may stop a point from moving along a shared variable.
@@ -112,108 +161,95 @@ class Engine:
         shared: number of the first variables that the form, a limb's, shares with others; None for a whole form.
         tangents: whether the first pass has tangents to the squares of a minimum.
 
-    Attributes:
-        block: number of boxes to examine at once.
-
     Raises:
         UncoveredError: an expression holds an operation without a rule.
         InputError: the kernel was not built.
     """
 
     def __init__(
-        self,
-        form: StandardForm,
-        jobs: int | None = None,
-        shared: int | None = None,
-        *,
-        tangents: bool = True,
+        self, form: StandardForm, jobs: int | None = None, shared: int | None = None, *, tangents: bool = True
     ) -> None:
-        self._module, self._shared = kernel(), shared or 0
-        self._threads = Threads(jobs)
-        # The size of a block decides the order of the search, so it must not depend on the number of threads.
-        self.block = 2 * _BOXES_PER_JOB
-        functions = len(form.functions)
+        self._module, self._shared, self._threads = kernel(), shared or 0, Threads(jobs)
         rows = search_rows(form, apart=shared is not None)
-        squares = tangent_rows(form) if tangents and shared is None else None
+        squares = tangent_rows(form) if tangents and shared is None and form.n <= MOST_VARIABLES else None
         tape, values = search_tape(form, rows), None if shared is not None else value_tape(form, squares)
         objective = objective_tape(form, len(tape))
-        equation = np.where(form.follows, 2, form.is_equation).astype(np.int32)
-        depends = np.array(form.dependence, dtype=np.int32)
-        self._form = (
-            form.n,
-            functions,
-            equation,
-            depends,
+        parts = (
+            np.where(form.follows, 2, form.is_equation).astype(np.int32),
+            np.array(form.dependence, dtype=np.int32),
             form.lower,
             form.upper,
-            np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32).ravel(),
+            np.array([(each.function, each.sign) for each in rows.quotients], dtype=np.int32),
+            np.array(() if squares is None else squares.functions, dtype=np.int32),
+        )
+        self._form = (
+            form.n,
+            len(form.functions),
+            len(rows.quotients),
+            0 if squares is None else len(squares.quotients),
+            parts,
             tape.head,
             None if values is None else values.head,
             None if values is None or objective is None else objective.head,
-            np.array(() if squares is None else squares.functions, dtype=np.int32),
         )
 
-    def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
+    def examine(
+        self, lower: FloatArray, upper: FloatArray, threshold: float, models: Sequence[Any] = (None,) * 3
+    ) -> Examination:
         """Examine boxes, and close those whose bounds do not exceed a threshold.
 
         Args:
             lower: (n, B) lower ends.
             upper: (n, B) upper ends.
             threshold: boxes whose bound is at most this are closed.
+            models: arrays of the kernel that only limbs have.
         """
-        return self._examine(lower, upper, threshold, ())
+        n, count = lower.shape
+        verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
+        cut_lower, cut_upper = (np.empty((n, count), dtype=np.int32) for _ in range(2))
+        left_lower, left_upper, centre = (np.empty((n, count)) for _ in range(3))
+        bound, value = np.empty(count), np.empty(count)
+        ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
 
-    def limb_models(self, lower: FloatArray, upper: FloatArray, least: FloatArray | None = None) -> LimbModels:
-        """Return upper models of a limb over boxes with ends (n, B).
+        def examine_piece(piece: tuple[int, int]) -> None:
+            self._module.examine(self._form, (*ends, *found, *models), count, *piece, threshold, self._shared)
 
-        Args:
-            lower: lower ends; those of shared variables come first.
-            upper: upper ends.
-            least: (B,) points whose values are less do not matter; None where all do.
-        """
-        m = self._shared
-        found = self._models(lower, upper, -np.inf, least, None)
-        found.lower[:m], found.upper[:m] = lower[:m], upper[:m]
-        return found
+        self._threads.map(examine_piece, pieces(count, self._threads.jobs))
+        return Examination(*found)
 
-    def common_models(self, lower: FloatArray, upper: FloatArray, tilts: FloatArray, threshold: float) -> LimbModels:
-        """Return upper models of the part with shared variables alone, with the limbs' tilts, over boxes (m, B).
-
-        What is left of the boxes is where the conditions can hold and the sum can exceed a threshold; nothing is left
-        where a lower end is above the upper one.
-
-        Args:
-            lower: lower ends.
-            upper: upper ends.
-            tilts: (3 + m + m^2, B) sum of the limbs' bests, sum of their sizes, bound of the rounding of each sum of
-                tilts, and these sums: gradients, and matrices row by row.
-            threshold: the threshold.
-        """
-        return self._models(lower, upper, threshold, None, tilts)
-
-    def _models(
+    def limb_models(
         self,
         lower: FloatArray,
         upper: FloatArray,
-        threshold: float,
-        least: FloatArray | None,
-        tilts: FloatArray | None,
+        least: FloatArray | None = None,
+        tilts: FloatArray | None = None,
+        threshold: float = -np.inf,
     ) -> LimbModels:
-        """Return upper models; the kernel writes flags, then the models, then slopes and stops of shared variables.
+        """Return upper models of a limb over boxes, or of the part with shared variables alone with the limbs' tilts.
 
-        A flag is 1 where the function is defined, plus 2 where every condition holds.
+        What is left of boxes of shared variables is where the conditions can hold and the sum can exceed the threshold;
+        nothing is left where a lower end is above the upper one.
+
+        Args:
+            lower: (n, B) lower ends; those of shared variables come first.
+            upper: (n, B) upper ends.
+            least: (B,) points whose values are less do not matter; None where all do.
+            tilts: (3 + m + m^2, B) sum of the limbs' bests, sum of their sizes, bound of the rounding of each sum of
+                tilts, and these sums: gradients, and matrices row by row; None for a limb.
+            threshold: the threshold.
         """
         (n, count), m = lower.shape, self._shared
+        # Flags, the models, then slopes and stops of shared variables. A flag is 1 where the function is defined, plus
+        # 2 where every condition holds.
         rows = np.empty((3 + 4 * n + n * n + 4 * m, count))
         matters = (None if each is None else np.ascontiguousarray(each) for each in (least, tilts))
-        found = self._examine(lower, upper, threshold, (m, rows, *matters))
+        found = self.examine(lower, upper, threshold, (rows, *matters))
         vectors, H = rows[3 : 3 + 4 * n].reshape(4, n, -1), rows[3 + 4 * n :][: n * n].reshape(n, n, -1)
         sides = rows[3 + 4 * n + n * n :].reshape(m, 4, count)
-        is_closed = found.verdict == Verdict.INFEASIBLE
-        if tilts is None:
-            is_closed |= (found.verdict == Verdict.MONOTONE) | (found.verdict == Verdict.EMPTIED)
+        closing = (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED) if tilts is None else (Verdict.INFEASIBLE,)
         return LimbModels(
-            is_possible=~is_closed,
+            is_possible=~np.isin(found.verdict, closing),
             defined=(rows[0] == 1) | (rows[0] == 3),
             holds=rows[0] >= 2,
             lower=found.lower,
@@ -227,28 +263,8 @@ class Engine:
             value=found.value,
         )
 
-    def _examine(self, lower: FloatArray, upper: FloatArray, threshold: float, models: tuple[Any, ...]) -> Examination:
-        """Examine boxes on all threads; with ``models`` those arguments of the kernel that only limbs have."""
-        n, count = lower.shape
-        verdict, reason, split = (np.empty(count, dtype=np.int32) for _ in range(3))
-        cut_lower, cut_upper = (np.empty((n, count), dtype=np.int32) for _ in range(2))
-        left_lower, left_upper, centre = (np.empty((n, count)) for _ in range(3))
-        bound, value = np.empty(count), np.empty(count)
-        ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        found = (verdict, reason, bound, left_lower, left_upper, cut_lower, cut_upper, split, value, centre)
 
-        def examine_piece(piece: tuple[int, int]) -> None:
-            self._module.examine(self._form, (*ends, *found), count, *piece, threshold, *models)
-
-        self._threads.map(examine_piece, pieces(count, self._threads.jobs))
-        return Examination(*found)
-
-    def close(self) -> None:
-        """Stop the threads."""
-        self._threads.close()
-
-
-def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short: bool = True) -> Tape:
+def search_tape(form: StandardForm, rows: Rows | None = None, *, is_short: bool = True) -> Tape:
     """Compile the E rows of a form, its R expressions if left out, then their derivatives, row by row.
 
     Equal parts are written once with ``is_short``; looking for them cannot be stopped, and takes as long as the rest.
@@ -259,13 +275,14 @@ def search_tape(form: StandardForm, rows: SearchRows | None = None, *, is_short:
     try:
         rows = search_rows(form, apart=False) if rows is None else rows
         refuse_jumps(rows.expressions, form.x)
-        results = [rows.expressions, rows.jacobian.T]
+        jacobian = ca.densify(without_ties(ca.jacobian(rows.expressions, form.x), form.x))
+        results = [rows.expressions, jacobian.T]
         return compile_tape(ca.Function("search", [form.x], ca.cse(results) if is_short else results))
     except UncoveredError as error:
         raise UncoveredError(error.operation, _uncovered_limit(form)) from None
 
 
-def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | None:
+def value_tape(form: StandardForm, rows: Rows | None = None) -> Tape | None:
     """Compile a form's R expressions alone, for the first pass, and the rows for tangents behind them.
 
     None is returned for a form with too many variables for a first pass.
@@ -278,7 +295,7 @@ def value_tape(form: StandardForm, rows: TangentRows | None = None) -> Tape | No
 
 def without_conditions(form: StandardForm) -> StandardForm:
     """Return the form of the functions alone."""
-    return replace(form, conditions=(), signs=())
+    return replace(form, conditions=())
 
 
 def objective_tape(form: StandardForm, length: int) -> Tape | None:

@@ -1,9 +1,10 @@
-"""The incumbent of a search of the whole box: the best feasible point known."""
+"""The incumbent of a search: the best feasible point known, of the whole box or of limbs."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ...evidence.kkt import FEASIBLE, Linearisation, close_equations, correct_po
 from ...evidence.state import loops_are_closed
 from ...interruption import is_requested
 from ...program.sampling import starting_points
+from ..statement.limb_separation import Limb
 from ..statement.standard_form import StandardForm
 
 #: Difference allowed between a claimed value and the one computed there, in parts of the objective's scale.
@@ -29,20 +31,6 @@ class IncumbentError(InputError):
     """The point that was given is not feasible, or does not have the value claimed."""
 
 
-class PointKeeper(Protocol):
-    """The best point known to a search of boxes."""
-
-    @property
-    def value(self) -> float:
-        """Value of the form there; -inf without a point."""
-
-    def consider(self, point: FloatArray) -> None:
-        """Keep a point (n,) if it is feasible and better."""
-
-    def improve_near(self, point: FloatArray) -> None:
-        """Correct a point (n,) towards an optimum, and keep the result if it is better."""
-
-
 class _Point(NamedTuple):
     """A point (n,) and its value; None and -inf without one."""
 
@@ -55,16 +43,12 @@ class Incumbent:
 
     Args:
         form: the form whose box is searched.
-
-    Attributes:
-        size: number n of the form's variables.
     """
 
     def __init__(self, form: StandardForm) -> None:
-        self._form = form
-        self._best = _Point(None, -math.inf)
-        self.size = form.n
-        self._given = math.nan
+        self._form, self._best, self._given = form, _Point(None, -math.inf), math.nan
+        # The last known part (d,) of each limb while there is no point, by the places of its variables.
+        self._parts: dict[tuple[int, ...], FloatArray] = {}
 
     @property
     def x(self) -> FloatArray | None:
@@ -81,9 +65,9 @@ class Incumbent:
         """Whether the search has found a better point than the one given."""
         return self.value > self._given + _BETTER * self._form.nlp.objective_size
 
-    def program_point(self) -> FloatArray:
-        """Return the point (n,) in the program's variables; zeros without one."""
-        return self._with_level(np.zeros(self._form.n) if self.x is None else self.x, self.value)
+    def program_point(self) -> FloatArray | None:
+        """Return the point (n,) in the program's variables; None without one."""
+        return None if self.x is None else self._with_level(self.x, self.value)
 
     def start(self, x: FloatArray | None, claimed: float | None) -> None:
         """Begin with a given point, or with the best of a few.
@@ -134,7 +118,7 @@ class Incumbent:
     def _with_level(self, point: FloatArray, value: float) -> FloatArray:
         """Return the point with the program's epigraph variable, where it has one."""
         variables = self._form.program_variables(point)
-        if not self._form.has_epigraph:
+        if self._form.nlp.program.places.epigraph is None:
             return variables
         nlp = self._form.nlp
         return np.append(variables, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
@@ -158,3 +142,51 @@ class Incumbent:
         better = value > self.value + _TIE * self._form.nlp.objective_size
         if better and self._violation(point, value, known) <= FEASIBLE:
             self._best = _Point(np.array(point), value)
+
+    def with_part(self, limbs: Sequence[Limb], part: FloatArray) -> FloatArray | None:
+        """Return the point with another part (d,) of limbs; without one the limbs' parts, once there is one of each."""
+        given, whole = {each.own: part for each in limbs}, self.x
+        if whole is None:
+            self._parts |= given
+            given, whole = self._parts, np.full(self._form.n, np.nan)
+        whole = whole.copy()
+        for places, own in given.items():
+            whole[list(places)] = own
+        return whole if np.isfinite(whole).all() else None
+
+
+class LimbPoint:
+    """The part of the incumbent that belongs to one limb, or to its copies too.
+
+    Args:
+        limbs: the limb and its copies.
+        whole: the incumbent, which a better part improves.
+    """
+
+    def __init__(self, limbs: Sequence[Limb], whole: Incumbent) -> None:
+        self._limbs, self._whole = limbs, whole
+        self._at: FloatArray | None = None
+        self._value = -math.inf
+
+    @property
+    def value(self) -> float:
+        """Value of the limb at the incumbent, the mean where it has copies; -inf without one."""
+        at = self._whole.x
+        if at is not self._at and at is not None:
+            values = [each.form.value_at(at[list(each.own)]) for each in self._limbs]
+            # The point last: an interrupt before it leaves the value to be computed again.
+            self._value = math.fsum(values) / len(values)
+            self._at = at
+        return self._value
+
+    def consider(self, point: FloatArray) -> None:
+        """Improve the incumbent by a part (d,) of it, if that is feasible and better."""
+        whole = self._whole.with_part(self._limbs, point)
+        if whole is not None:
+            self._whole.consider(whole)
+
+    def improve_near(self, point: FloatArray) -> None:
+        """Improve the incumbent from a part (d,) of it that is not feasible yet."""
+        whole = self._whole.with_part(self._limbs, point)
+        if whole is not None:
+            self._whole.improve_near(whole)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from ....models import FloatArray
 from ..checker.tree import Node, node_bytes
 from ..statement.standard_form import StandardForm
-from .engine import COLLAPSED, Engine, Examination, Verdict
-from .incumbent import PointKeeper
-from .rows import SMALL, WHOLE, Boxes
-from .search import Order, Rule, Search, Verdicts
+from .engine import BLOCK, COLLAPSED, Engine, Examination, Verdict
+from .incumbent import Incumbent, LimbPoint
+from .search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts
 from .tree import TreeRecord, halves_of, keys_of
 
 #: Widths, in parts of the whole box, below which a box is not bisected: one without a finite bound, which is taken to
@@ -24,17 +23,15 @@ LEAST_WIDTHS = 2.0**-16, 2.0**-40
 
 
 def optimum_search(
-    form: StandardForm, engine: Callable[[], Engine], incumbent: PointKeeper, recorder: TreeRecord | None = None
+    form: StandardForm,
+    engine: Callable[[], Engine],
+    incumbent: Incumbent | LimbPoint,
+    recorder: TreeRecord | None = None,
 ) -> Search[OptimumRule]:
     """Return the search of the box of a form: see :class:`OptimumRule`."""
     root = Boxes(form.lower[None], form.upper[None], np.array([np.inf]), np.array([WHOLE]), ())
-    return Search(
-        OptimumRule(form, engine, incumbent, recorder),
-        root,
-        whole=form.upper - form.lower,
-        least=LEAST_WIDTHS,
-        order=Order.LARGEST_CHUNK,
-    )
+    rule = OptimumRule(form, engine, incumbent, recorder)
+    return Search(rule, root, whole=form.upper - form.lower, least=LEAST_WIDTHS, order=Order.LARGEST_CHUNK)
 
 
 class OptimumRule(Rule[tuple[()]]):
@@ -51,51 +48,39 @@ class OptimumRule(Rule[tuple[()]]):
         incumbent: the best point known.
     """
 
+    block = BLOCK
+
     def __init__(
         self,
         form: StandardForm,
         engine: Callable[[], Engine],
-        incumbent: PointKeeper,
-        recorder: TreeRecord | None = None,
+        incumbent: Incumbent | LimbPoint,
+        recorder: TreeRecord | None,
     ) -> None:
-        self.form, self.incumbent = form, incumbent
-        self._build, self._recorder = engine, recorder
-        self._engine: Engine | None = None
-        self.block = 1
-        self._turn, self._closed = 0, -math.inf
+        self.names, self.incumbent = form.names, incumbent
+        self._functions, self._build, self._recorder, self._turn = len(form.functions), engine, recorder, 0
 
-    def close(self) -> None:
-        """Stop the engine."""
-        if self._engine is not None:
-            self._engine.close()
-
-    def fault(self, small: Sequence[Boxes[tuple[()]]]) -> str:
-        """Return the reason for stopping at boxes without a finite bound, with the place of the first; else empty."""
-        return reason_without_bound(self.form, small)
+    @cached_property
+    def _engine(self) -> Engine:
+        return self._build()
 
     def examine(self, boxes: Boxes[tuple[()]]) -> Verdicts[tuple[()]]:
         """Return bounds of boxes, and improve the incumbent."""
-        ends = np.ascontiguousarray(boxes.lower.T), np.ascontiguousarray(boxes.upper.T)
-        engine = self._engine = self._engine or self._build()
-        self.block = engine.block
-        found = engine.examine(*ends, self.target)
+        found = self._engine.examine(boxes.lower.T, boxes.upper.T, self.target)
         self._turn += 1
         self._improve(found)
-        closed = found.verdict == Verdict.BOUNDED
-        if closed.any():
-            self._closed = max(self._closed, float(found.bound[closed].max()))
-            if self._recorder is not None:
-                # A checker with other arithmetic needs the room up to the threshold to show these boxes again.
-                self._closed = max(self._closed, self.target)
-        if self._closed < self.target and self._is_contracted_by_value(found):
-            self._closed = self.target
+        bounded = found.verdict == Verdict.BOUNDED
+        closed = float(found.bound[bounded].max(initial=-math.inf))
+        # A checker with other arithmetic needs the room up to the threshold to show these boxes again.
+        if (bounded.any() and self._recorder is not None) or self._is_contracted_by_value(found):
+            closed = max(closed, self.target)
         # Most boxes of a block may be closed: only the open ones are looked at here, since this is no work for threads.
         rest = np.flatnonzero(found.verdict == Verdict.OPEN)
         lower, upper = found.lower[:, rest].T, found.upper[:, rest].T
         # A box that collapsed to one that cannot be bisected, such as a corner, has not been examined as that box yet.
         moved = ((lower != boxes.lower[rest]) | (upper != boxes.upper[rest])).any(axis=1)
         left = Boxes(lower, upper, np.fmin(found.bound[rest], boxes.bound[rest]), found.split[rest].astype(np.intp), ())
-        return Verdicts(left, self._closed, len(boxes.split), moved, reasons=(found, rest))
+        return Verdicts(left, closed, len(boxes.split), moved, reasons=(found, rest))
 
     def record(self, boxes: Boxes[tuple[()]], found: Verdicts[tuple[()]], split: NDArray[np.intp]) -> None:
         """Record a block of boxes; a contraction closes the part cut off."""
@@ -107,7 +92,7 @@ class OptimumRule(Rule[tuple[()]]):
         parts = {k: halves[j] if split[j] >= 0 else (moved[j],) for j, k in enumerate(rest) if split[j] != SMALL}
         for k, key in enumerate(keys):
             if k in parts or examined.verdict[k] != Verdict.OPEN:
-                text = _node_of(examined, k, boxes.upper[k], len(self.form.functions))
+                text = _node_of(examined, k, boxes.upper[k], self._functions)
                 cut = node_bytes(Node.HALF, int(examined.split[k])) if len(parts.get(k, ())) == 2 else b""
                 self._recorder.add(key, text + cut, *parts.get(k, ()))
 
@@ -126,23 +111,12 @@ class OptimumRule(Rule[tuple[()]]):
         """Return whether a contraction excluded points because of their value, which is at most the threshold."""
         # A box that is closed by its bound needs no contraction. The bound of a proof keeps the distance from what its
         # checker must show.
-        count, rest = len(self.form.functions), (found.verdict != Verdict.BOUNDED) | (self._recorder is not None)
+        count, rest = self._functions, (found.verdict != Verdict.BOUNDED) | (self._recorder is not None)
         return any(
             # Numbers from 0 to count - 1, in one comparison: negative ones are large without a sign.
             bool(((why.view(np.uint32) < count) & rest).any())
             for why in (found.cut_lower, found.cut_upper)
         )
-
-
-def reason_without_bound(form: StandardForm, small: Sequence[Boxes[Any]]) -> str:
-    """Return the reason for stopping at boxes of which one has no finite bound; empty where all have one."""
-    for boxes in small:
-        which = int(np.argmin(np.isfinite(boxes.bound)))
-        if not np.isfinite(boxes.bound[which]):
-            point = 0.5 * (boxes.lower[which] + boxes.upper[which])
-            at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(form.names, point, strict=True))
-            return f"the expressions have no finite bound near {at}, as where a limb has zero length"
-    return ""
 
 
 def _node_of(found: Examination, k: int, upper: FloatArray, functions: int) -> bytes:

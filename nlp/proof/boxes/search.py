@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from ...interruption import Milestone, reached, reason_of, reason_to_stop
-from .rows import SMALL, WHOLE, Boxes, Columns, bisected, joined, some
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,6 +36,65 @@ _MANY = 2_000_000
 _FEW = 50_000
 #: Seconds between two reports of progress.
 _REPORT_EVERY = 0.1
+#: Coordinates to bisect of boxes that are examined again as they are, and of those that are too small to be bisected.
+WHOLE, SMALL = -1, -2
+
+Columns = TypeVar("Columns")
+Rows = TypeVar("Rows")
+
+
+class Boxes(NamedTuple, Generic[Columns]):
+    """B boxes.
+
+    Attributes:
+        lower, upper: (B, n) ends.
+        bound: (B,) upper bounds.
+        split: (B,) coordinate to bisect; ``WHOLE`` for none.
+        more: columns that a rule carries: arrays (B, ...), or tuples of them.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    bound: FloatArray
+    split: NDArray[np.intp]
+    more: Columns
+
+
+def some(rows: Rows, which: NDArray[np.bool_] | NDArray[np.intp]) -> Rows:
+    """Return some rows of an array, or of all arrays of a tuple; other columns have a method ``some`` of their own."""
+    each: Any = rows
+    if isinstance(each, tuple):
+        chosen: Rows = _alike(each, [some(part, which) for part in each])
+    else:
+        chosen = each.some(which) if hasattr(each, "some") else each[which]
+    return chosen
+
+
+def joined(parts: Sequence[Rows]) -> Rows:
+    """Return the rows of arrays, or of tuples of them, one after the other."""
+    every: Any = parts
+    if len(parts) == 1:
+        return parts[0]
+    if isinstance(every[0], tuple):
+        whole: Rows = _alike(every[0], [joined(each) for each in zip(*every, strict=True)])
+    else:
+        join: Any = getattr(every[0], "joined", np.concatenate)
+        whole = join(every)
+    return whole
+
+
+def _alike(pattern: Any, columns: Sequence[Any]) -> Any:  # noqa: ANN401 - any kind of tuple
+    """Return columns as a tuple of the same type."""
+    return getattr(type(pattern), "_make", tuple)(columns)
+
+
+def bisected(boxes: Boxes[Columns]) -> Boxes[Columns]:
+    """Return the lower halves of all boxes, then the upper ones."""
+    every, count = np.arange(len(boxes.split)), len(boxes.split)
+    parts = some(boxes, np.concatenate([every, every]))
+    middle = 0.5 * boxes.lower[every, boxes.split] + 0.5 * boxes.upper[every, boxes.split]
+    parts.upper[every, boxes.split] = parts.lower[count + every, boxes.split] = middle
+    return parts
 
 
 class Order(enum.Enum):
@@ -51,8 +109,7 @@ class Verdicts(NamedTuple, Generic[Columns]):
     """Results for boxes.
 
     Attributes:
-        left: (O,) the parts of the open boxes that are left; ``WHOLE`` or ``SMALL`` in the place of a
-            coordinate to bisect as for :meth:`Rule.record`.
+        left: (O,) the parts of the open boxes that are left, with ``WHOLE`` or ``SMALL`` as for :meth:`Rule.record`.
         closed: largest bound of what was closed or cut off.
         examined: number of boxes examined.
         again: (O,) whether a part that is too small to be bisected is to be examined again, as one that was moved; None
@@ -75,10 +132,12 @@ class Rule(ABC, Generic[Columns]):
     Attributes:
         target: bound up to which boxes may be closed.
         block: number of boxes examined at once.
+        names: of the coordinates, for :attr:`Search.fault`.
     """
 
     target: float = -math.inf
     block: int
+    names: Sequence[str] = ()
 
     def divided(self, boxes: Boxes[Columns]) -> Boxes[Columns]:
         """Return the halves of boxes, with what they carry: all lower ones, then all upper ones."""
@@ -87,14 +146,6 @@ class Rule(ABC, Generic[Columns]):
     @abstractmethod
     def examine(self, boxes: Boxes[Columns]) -> Verdicts[Columns]:
         """Return the results for boxes."""
-
-    def fault(self, small: Sequence[Boxes[Columns]]) -> str:
-        """Return the reason for stopping at boxes that are too small; empty for none."""
-        del small
-        return ""
-
-    def close(self) -> None:
-        """Stop what works beside the rule."""
 
     def record(self, boxes: Boxes[Columns], found: Verdicts[Columns], split: NDArray[np.intp]) -> None:
         """Record a step for a proof.
@@ -151,13 +202,7 @@ class Search(Generic[AnyRule]):
     """
 
     def __init__(
-        self,
-        rule: AnyRule,
-        root: Boxes[Any],
-        *,
-        whole: FloatArray,
-        least: tuple[float, float],
-        order: Order,
+        self, rule: AnyRule, root: Boxes[Any], *, whole: FloatArray, least: tuple[float, float], order: Order
     ) -> None:
         self.rule, self._order = rule, order
         self._columns = np.flatnonzero(whole > 0)
@@ -187,12 +232,14 @@ class Search(Generic[AnyRule]):
 
     @property
     def fault(self) -> str:
-        """Reason for stopping at boxes that are too small; empty for none."""
-        return self.rule.fault(self.state.small)
-
-    def close(self) -> None:
-        """Stop what works beside the search."""
-        self.rule.close()
+        """Reason for stopping at small boxes of which one has no finite bound, with its place; else empty."""
+        for boxes in self.state.small:
+            which = int(np.argmin(np.isfinite(boxes.bound)))
+            if not np.isfinite(boxes.bound[which]):
+                point = 0.5 * (boxes.lower[which] + boxes.upper[which])
+                at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(self.rule.names, point, strict=True))
+                return f"the expressions have no finite bound near {at}, as where a limb has zero length"
+        return ""
 
     def step(self, target: float) -> None:
         """Examine the parts of some boxes, and close those whose bounds do not exceed a target."""
@@ -270,7 +317,7 @@ class Search(Generic[AnyRule]):
         return joined(taken)
 
 
-class SearchMethod(Protocol):
+class Steps(Protocol):
     """A search that is run step by step, of one box or of several; see :class:`Search`."""
 
     @property
@@ -281,23 +328,8 @@ class SearchMethod(Protocol):
     def boxes(self) -> int:
         """Number of boxes examined."""
 
-    @property
-    def left(self) -> int:
-        """Number of boxes that are left."""
-
-    @property
-    def bound(self) -> float:
-        """Upper bound over all boxes."""
-
-    @property
-    def fault(self) -> str:
-        """Reason for stopping at boxes that are too small; empty for none."""
-
     def step(self, target: float) -> None:
         """Examine some boxes, and close those whose bounds do not exceed a target."""
-
-    def close(self) -> None:
-        """Stop what works beside it."""
 
 
 @dataclass(frozen=True)
@@ -320,7 +352,7 @@ class Effort:
         return time.perf_counter() - self.began
 
     def run(
-        self, search: SearchMethod, ending: Callable[[], str | None], target: Callable[[], float] = lambda: -math.inf
+        self, search: Steps, ending: Callable[[], str | None], target: Callable[[], float] = lambda: -math.inf
     ) -> str:
         """Run a search until no box is open; return the reason for stopping before, or an empty text.
 
@@ -331,7 +363,7 @@ class Effort:
         """
         return reason_of(lambda: self._run(search, ending, target))
 
-    def _run(self, search: SearchMethod, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
+    def _run(self, search: Steps, ending: Callable[[], str | None], target: Callable[[], float]) -> str:
         """Run a search that may be interrupted."""
         reported = -math.inf
         reached(Milestone.BOUND)

@@ -10,58 +10,16 @@ Copies are forms with the same operations, constants and bounds, in other variab
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
 
 from ....models import frozen_array
 from ...errors import UncoveredError
-from ..enclosure.tape import Op, compile_tape
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from ..enclosure.tape import Tape
-    from ..statement.standard_form import StandardForm
-
-#: Odd functions of one value, which change their sign with it.
-_ODD = frozenset({Op.SCALE, Op.SIN, Op.ATAN})
-#: Even functions of one value.
-_EVEN = frozenset({Op.SQUARE, Op.COS})
-#: Operations whose result changes its sign with the first value, where it keeps or changes it.
-_LIKE_THE_FIRST = _ODD | {Op.ADD, Op.SUB, Op.SHIFT}
-
-
-class _Equations:
-    """Linear equations modulo 2; a sum of unknowns is a number with their bits."""
-
-    def __init__(self) -> None:
-        #: Sums that are 0, by their highest unknown.
-        self._sums: dict[int, int] = {}
-
-    def add(self, total: int) -> None:
-        """Add the equation that a sum of unknowns is 0."""
-        while total:
-            highest = total.bit_length() - 1
-            if highest not in self._sums:
-                self._sums[highest] = total
-                return
-            total ^= self._sums[highest]
-
-    def solutions(self, unknowns: int) -> list[int]:
-        """Return a basis of the solutions: each has a bit that no other one has, its lowest."""
-        basis = []
-        for free in range(unknowns):
-            if free in self._sums:
-                continue
-            # The unknowns below a highest one determine it: from the lowest up, with one free unknown 1.
-            solution = 1 << free
-            for highest in sorted(self._sums):
-                if (self._sums[highest] & solution).bit_count() % 2:
-                    solution |= 1 << highest
-            basis.append(solution)
-        return basis
+from ..enclosure.tape import Op, Tape, compile_tape
+from ..statement.standard_form import StandardForm
+from .engine import without_conditions
 
 
 def mirrors(form: StandardForm) -> list[tuple[int, ...]]:
@@ -69,20 +27,14 @@ def mirrors(form: StandardForm) -> list[tuple[int, ...]]:
 
     Bounds stay as they are, as do the functions, the inequalities, and whether an equation holds.
     """
-    held = [i for i in range(form.n) if form.lower[i] != -form.upper[i]]
+    held = [1 << i for i in range(form.n) if form.lower[i] != -form.upper[i]]
     if len(held) == form.n:
         return []
-    equations = _Equations()
-    for i in held:
-        equations.add(1 << i)
+    found: list[int] = []
     # Mostly the functions alone have no mirror: then the many expressions of the conditions are not looked at.
-    for part in (replace(form, conditions=(), signs=()), form):
+    for part in (without_conditions(form), form):
         tape = _tape_of(part)
-        if tape is None:
-            return []
-        for each in _conditions_of(tape, part.is_equation):
-            equations.add(each)
-        found = equations.solutions(form.n)
+        found = [] if tape is None else _solutions([*held, *_sums_of(tape, part.is_equation)], form.n)
         if not found:
             return []
     return [tuple(i for i in range(form.n) if each >> i & 1) for each in found]
@@ -117,30 +69,48 @@ def _tape_of(form: StandardForm) -> Tape | None:
         return None
 
 
-def _conditions_of(tape: Tape, is_equation: tuple[bool, ...]) -> Iterable[int]:
-    """Yield sums of unknowns that must be 0 for every value of a tape to keep or change its sign.
+def _sums_of(tape: Tape, is_equation: Sequence[bool]) -> Iterator[int]:
+    """Yield sums of unknowns that are 0 modulo 2 where every value of a tape keeps or changes its sign.
 
-    An unknown is 1 where a variable changes its sign; a register has the sum that is 1 where it does.
+    An unknown is 1 where a variable changes its sign; a sum is a number with the bits of its unknowns. A register has
+    the sum that is 1 where it changes its sign.
     """
     signs: dict[int, int] = {}
-    rows = zip(tape.op.tolist(), tape.to.tolist(), tape.a.tolist(), tape.b.tolist(), tape.k.tolist(), strict=True)
-    for op, to, a, b, k in rows:
+    for op, to, a, b, k in zip(*(each.tolist() for each in (tape.op, tape.to, tape.a, tape.b, tape.k)), strict=True):
+        one, other = signs.get(a, 0), signs.get(b, 0)
         if op == Op.INPUT:
             signs[to] = 1 << a
-            continue
-        one, other = signs.get(a, 0), signs.get(b, 0)
-        if op == Op.OUTPUT:
+        elif op == Op.OUTPUT:
             yield 0 if is_equation[to] else one
+        elif op in (Op.ADD, Op.SUB):
+            yield one ^ other
+            signs[to] = one
+        elif op in (Op.MUL, Op.DIV):
+            signs[to] = one ^ other
+        elif op in (Op.SCALE, Op.SIN, Op.ATAN) or (op == Op.SHIFT and k == 0):
+            signs[to] = one  # an odd function
         else:
-            yield _condition(op, one, other, k)
-            signs[to] = one ^ other if op in (Op.MUL, Op.DIV) else one if op in _LIKE_THE_FIRST else 0
+            # Even functions keep the sign in any case; others are neither odd nor even, and a constant has no operand.
+            yield 0 if op in (Op.SQUARE, Op.COS, Op.CONSTANT) else one
+            signs[to] = 0
 
 
-def _condition(op: int, one: int, other: int, k: float) -> int:
-    """Return the sum that must be 0 for the result of an operation to keep or change its sign."""
-    if op in (Op.ADD, Op.SUB):
-        return one ^ other
-    if op in (Op.CONSTANT, Op.MUL, Op.DIV) or op in _ODD or op in _EVEN or (op == Op.SHIFT and k == 0):
-        return 0
-    # A function that is neither odd nor even, or a sum with a constant.
-    return one
+def _solutions(sums: Iterable[int], unknowns: int) -> list[int]:
+    """Return a basis of the sets of unknowns with which sums are 0 modulo 2: each has a bit of its own, its lowest."""
+    rows: dict[int, int] = {}
+    for total in sums:
+        left = total
+        while left and left.bit_length() - 1 in rows:
+            left ^= rows[left.bit_length() - 1]
+        if left:
+            rows[left.bit_length() - 1] = left
+    basis = []
+    for free in range(unknowns):
+        if free not in rows:
+            # The unknowns below the highest one of a row determine it: from the lowest up, with one free unknown 1.
+            solution = 1 << free
+            for highest in sorted(rows):
+                if (rows[highest] & solution).bit_count() % 2:
+                    solution |= 1 << highest
+            basis.append(solution)
+    return basis

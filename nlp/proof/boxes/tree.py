@@ -37,8 +37,7 @@ class TreeRecord:
 
     def clear(self) -> None:
         """Forget everything recorded: the search begins again."""
-        self.begin, self.lacks_boxes = b"", False
-        self._root: bytes = b""
+        self.begin, self.lacks_boxes, self._root = b"", False, b""
         self._nodes: dict[bytes, tuple[bytes, tuple[bytes, ...]]] = {}
         self._limbs: list[tuple[TreeRecord, Callable[[], float]]] = []
 
@@ -61,8 +60,7 @@ class TreeRecord:
     def cuts(self, lower: FloatArray, upper: FloatArray, split: NDArray[np.signedinteger]) -> None:
         """Record boxes (B, n) that are cut in the middle of a coordinate each, (B,)."""
         middle, halves = halves_of(lower, upper, split)
-        every = zip(keys_of(lower, upper), split.tolist(), middle.tolist(), halves, strict=True)
-        for key, i, value, parts in every:
+        for key, i, value, parts in zip(keys_of(lower, upper), split.tolist(), middle.tolist(), halves, strict=True):
             self.add(key, node_bytes(Node.CUT, i, value=value), *parts)
 
     def contractions(
@@ -99,15 +97,14 @@ class TreeRecord:
         return b"".join(parts)
 
     def _tree_of_limbs(self, *, with_open: bool) -> bytes:
-        """Return the limbs' bounds and trees."""
+        """Return the limbs' bounds and trees; of limbs of which one has no feasible point, the tree of that one."""
         bounds = [bound() for _, bound in self._limbs]
         parts = [bytes([Node.LIMBS])]
         for (record, _), bound in zip(self._limbs, bounds, strict=True):
-            if bound > -np.inf and -np.inf in bounds:
-                parts += [struct.pack("<d", np.inf), bytes([Node.BOUNDED])]
-            else:
-                outer = bound + _OUTWARDS * abs(bound) if bound > -np.inf else bound
-                parts += [struct.pack("<d", outer), record.tree(with_open=with_open)]
+            is_needed = bound == -np.inf or -np.inf not in bounds
+            outer = bound + _OUTWARDS * abs(bound) if bound > -np.inf else bound
+            parts.append(struct.pack("<d", outer if is_needed else np.inf))
+            parts.append(record.tree(with_open=with_open) if is_needed else bytes([Node.BOUNDED]))
         return b"".join(parts)
 
 

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from ....models import FloatArray, frozen_array
 from ...case.task import Sense
@@ -25,7 +26,7 @@ from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
 from ..boxes.limbs.shared import shared_search
 from ..boxes.optimum import optimum_search
-from ..boxes.search import TOO_SMALL, Effort, SearchMethod
+from ..boxes.search import TOO_SMALL, Effort, Search
 from ..boxes.symmetry import halved
 from ..boxes.tree import TreeRecord
 from ..enclosure.engine import ENGINE, kernel
@@ -88,33 +89,12 @@ def certify_program(
         if nlp.n == 0:
             return _certify_point(nlp, above, effort.seconds)
         kernel()  # before any work where it is missing
-        form = standard_form(nlp)
-        incumbent = Incumbent(form)
-        # The method in use takes the place of this one: what it sets up can be stopped.
-        whole = optimum_search(form, partial(Engine, form, jobs), incumbent)
-        search = _Search(form, incumbent, whole, gap, above, effort)
+        search = _Search(standard_form(nlp), gap, above, effort, jobs, progress)
         try:
             search.incumbent.start(x, claimed)
         except IncumbentError as error:
             return replace(search.certificate(str(error)), status=CertificateStatus.REFUSED)
-
-        def run() -> str:
-            reason = reason_to_stop(effort.seconds)
-            while not reason:
-                search.restart(_method(form, incumbent, jobs, recorder))
-                reason = search.run(progress)
-                if reason or not search.is_short():
-                    break
-                search.method.close()
-                if recorder is not None:
-                    recorder.clear()
-            return reason
-
-        try:
-            reason = reason_of(run)
-        finally:
-            search.method.close()
-        return search.certificate(reason)
+        return search.certificate(reason_of(lambda: search.run(recorder)))
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
@@ -134,54 +114,73 @@ def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate
     )
 
 
-def _method(form: StandardForm, incumbent: Incumbent, jobs: int | None, recorder: TreeRecord | None) -> SearchMethod:
-    """Return the search for a form: by limbs where it separates, else of the whole box.
-
-    A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to
-    squares, which its checker does not have.
-    """
-    form = halved(form) if recorder is None else form
-    separation = separate(form)
-    if separation is not None and not separation.shared:
-        return IndependentSearch(form, separation, incumbent, jobs, recorder)
-    if separation is None or form.n <= _WHOLE_BOX:
-        build = partial(Engine, form, jobs, tangents=recorder is None)
-        return optimum_search(form, build, incumbent, recorder)
-    return shared_search(form, separation, incumbent, jobs, recorder)
-
-
-@dataclass
 class _Search:
     """The state of a search; all values are those of the standard form, which is maximised.
 
-    Attributes:
+    Args:
         form: the form.
+        gap, above, jobs, progress: as for :func:`certify_program`.
+        effort: the clock.
+
+    Attributes:
         incumbent: the best feasible point known.
-        method: examines boxes.
-        gap: as for :func:`certify_program`.
-        above: as for :func:`certify_program`.
-        effort: the clock, and the time there is.
-        history: (seconds, bound, incumbent) in the program's own sense.
-        first_value: value of the incumbent when the method began.
-        boxes_before: number of boxes that methods before this one examined.
     """
 
-    form: StandardForm
-    incumbent: Incumbent
-    method: SearchMethod
-    gap: float
-    above: float | None
-    effort: Effort
-    history: list[tuple[float, float, float]] = field(default_factory=list)
-    first_value: float = -math.inf
-    boxes_before: int = 0
+    def __init__(
+        self,
+        form: StandardForm,
+        gap: float,
+        above: float | None,
+        effort: Effort,
+        jobs: int | None,
+        progress: CertifyProgress | None,
+    ) -> None:
+        self._form, self._gap, self._above, self._jobs, self._progress = form, gap, above, jobs, progress
+        self._effort, self.incumbent = replace(effort, progress=self._report), Incumbent(form)
+        # The method in use takes the place of this one: what it sets up can be stopped.
+        self._method: Search[Any] | IndependentSearch = optimum_search(form, partial(Engine, form), self.incumbent)
+        # (seconds, bound, incumbent) in the program's own sense, and the boxes that methods before this one examined.
+        self._history: list[tuple[float, float, float]] = []
+        self._boxes_before = 0
+
+    def run(self, recorder: TreeRecord | None) -> str:
+        """Search until no box is open; return the reason for stopping earlier, or an empty text.
+
+        Limbs that were closed before a better point was known may leave too little of the gap for the others. Then the
+        search begins again with that point.
+        """
+        while not (reason := reason_to_stop(self._effort.seconds)):
+            self._boxes_before += self._method.boxes
+            self._method, first = self._new_method(recorder), self.incumbent.value
+            reason = self._effort.run(self._method, self._ending, lambda: self._threshold)
+            is_decided = self._has_counterexample() or self._method.bound == -math.inf or self._is_met()
+            if reason or self._method.left or is_decided or self.incumbent.value <= first:
+                return reason
+            if recorder is not None:
+                recorder.clear()
+        return reason
+
+    def _new_method(self, recorder: TreeRecord | None) -> Search[Any] | IndependentSearch:
+        """Return the search for the form: by limbs where it separates, else of the whole box.
+
+        A proof covers the whole box where mirrors would leave a part of it, and boxes are closed without tangents to
+        squares, which its checker does not have.
+        """
+        form, jobs = halved(self._form) if recorder is None else self._form, self._jobs
+        separation = separate(form)
+        if separation is not None and not separation.shared:
+            return IndependentSearch(separation, self.incumbent, jobs, recorder)
+        if separation is None or form.n <= _WHOLE_BOX:
+            build = partial(Engine, form, jobs, tangents=recorder is None)
+            return optimum_search(form, build, self.incumbent, recorder)
+        return shared_search(form, separation, self.incumbent, jobs, recorder)
 
     @property
-    def threshold(self) -> float:
+    def _threshold(self) -> float:
         """Largest bound of a box that may be closed."""
-        if self.above is not None:
+        if self._above is not None:
             # Strictly below, and by more than the bound moves outwards in the end.
-            return math.nextafter(-self.above - 2 * _FOLDED * abs(self.above), -math.inf)
+            return math.nextafter(-self._above - 2 * _FOLDED * abs(self._above), -math.inf)
         if self.incumbent.x is None:
             return -math.inf
         # The bound moves outwards in the end, and the gap must hold with that.
@@ -189,107 +188,85 @@ class _Search:
 
     def _has_counterexample(self) -> bool:
         """Return whether F is not above the value at a known point; an F that is rounding error counts as 0."""
-        if self.above is None or self.incumbent.x is None:
+        if self._above is None or self.incumbent.x is None:
             return False
-        return self.incumbent.value >= -self.above - ZERO_F * self.form.nlp.objective_size
+        return self.incumbent.value >= -self._above - ZERO_F * self._form.nlp.objective_size
 
     def _allowed_gap(self) -> tuple[float, bool]:
         """Return the largest difference of bound and incumbent, and whether it is a part of the incumbent."""
-        floor, value = _NEAR_ZERO * self.form.nlp.objective_size, abs(self.incumbent.value)
-        if floor < value < math.inf:
-            return self.gap * value, True
-        return self.gap * floor, False
+        floor, value = _NEAR_ZERO * self._form.nlp.objective_size, abs(self.incumbent.value)
+        is_relative = floor < value < math.inf
+        return self._gap * (value if is_relative else floor), is_relative
 
     @property
-    def bound(self) -> float:
+    def _bound(self) -> float:
         """Upper bound of the maximum, at this state of the search."""
-        known = max(self.method.bound, self.incumbent.value)
+        known = max(self._method.bound, self.incumbent.value)
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
-
-    def is_short(self) -> bool:
-        """Return whether every box is closed with a bound that is too wide, and a better point is known by now.
-
-        Limbs that were closed before it was known may leave too little of the gap for the others.
-        """
-        if self.method.left or self._has_counterexample() or self.method.bound == -math.inf:
-            return False
-        return not self._is_met() and self.incumbent.value > self.first_value
-
-    def restart(self, method: SearchMethod) -> None:
-        """Begin again with a new search of the whole box, and the best point known by now."""
-        self.boxes_before += self.method.boxes
-        self.method, self.first_value = method, self.incumbent.value
 
     def _is_met(self) -> bool:
         """Return whether the bound is as good as asked for, once no box is open."""
-        if self.above is not None:
-            return self.bound < -self.above
-        return self.method.bound <= self.threshold + _GAP_ROUNDING * self._allowed_gap()[0]
-
-    def run(self, progress: CertifyProgress | None) -> str:
-        """Search until no box is open; return the reason for stopping earlier, or an empty text."""
-        effort = replace(self.effort, progress=lambda seconds: self._report(seconds, progress))
-        return effort.run(self.method, self._ending, lambda: self.threshold)
+        if self._above is not None:
+            return self._bound < -self._above
+        return self._method.bound <= self._threshold + _GAP_ROUNDING * self._allowed_gap()[0]
 
     def _ending(self) -> str | None:
         """Return the reason for ending; None for going on."""
-        if self.method.fault:
-            return self.method.fault
-        if not self.method.is_open:
-            return TOO_SMALL if self.method.left else ""
+        if self._method.fault:
+            return self._method.fault
+        if not self._method.is_open:
+            return TOO_SMALL if self._method.left else ""
         if self._has_counterexample():
-            return f"F is {self.form.sign * self.incumbent.value:.10g} at a point of the box"
+            return f"F is {self._form.sign * self.incumbent.value:.10g} at a point of the box"
         return None
 
-    def _report(self, seconds: float, progress: CertifyProgress | None) -> None:
-        """Report progress, and add to the history; a full history loses every second entry."""
-        bound, incumbent = self.form.sign * self.bound, self.form.sign * self.incumbent.value
+    def _report(self, seconds: float) -> None:
+        """Report progress, and add to the history."""
+        bound, incumbent = self._noted(seconds)
+        if self._progress is not None:
+            self._progress(seconds, bound, incumbent, self._boxes_before + self._method.boxes, self._method.left)
+
+    def _noted(self, seconds: float) -> tuple[float, float]:
+        """Return bound and incumbent, added to the history; a full one loses every second entry."""
+        bound, incumbent = self._form.sign * self._bound, self._form.sign * self.incumbent.value
         if math.isfinite(bound) and math.isfinite(incumbent):
-            if len(self.history) >= _HISTORY:
-                del self.history[1::2]
-            self.history.append((seconds, bound, incumbent))
-        if progress is not None:
-            progress(seconds, bound, incumbent, self.boxes_before + self.method.boxes, self.method.left)
+            if len(self._history) >= _HISTORY:
+                del self._history[1::2]
+            self._history.append((seconds, bound, incumbent))
+        return bound, incumbent
 
     def certificate(self, reason: str) -> Certificate:
         """Return the certificate at this state of the search."""
-        nlp, sign = self.form.nlp, self.form.sign
-        seconds = self.effort.seconds
-        self._report(seconds, None)
-        left = self.method.left
-        known = self.incumbent.x is not None
-        if self._has_counterexample():
-            status = CertificateStatus.REFUSED
-            at = ", ".join(
-                f"{variable.name} = {value:.6g}"
-                for variable, value in zip(nlp.program.variables, self.incumbent.program_point(), strict=True)
-            )
-            reason = f"F is {sign * self.incumbent.value:.10g} at {at}, not above {self.above:.10g}"
+        nlp, x, seconds, left = self._form.nlp, self.incumbent.program_point(), self._effort.seconds, self._method.left
+        bound, incumbent = self._noted(seconds)
+        if x is not None and self._has_counterexample():
+            status, named = CertificateStatus.REFUSED, zip(nlp.program.variables, x, strict=True)
+            at = ", ".join(f"{variable.name} = {value:.6g}" for variable, value in named)
+            reason = f"F is {incumbent:.10g} at {at}, not above {self._above:.10g}"
         elif left or reason:
             status = CertificateStatus.INCOMPLETE
-        elif not known and self.method.bound == -math.inf:
+        elif x is None and self._method.bound == -math.inf:
             status = CertificateStatus.INFEASIBLE
+        elif self._is_met():
+            status = CertificateStatus.PROVED
         else:
-            status = CertificateStatus.PROVED if self._is_met() else CertificateStatus.INCOMPLETE
-            reason = "" if self._is_met() else "the bounds of the limbs do not add up to the one asked for"
+            status, reason = CertificateStatus.INCOMPLETE, "the bounds of the limbs do not add up to the one asked for"
         allowed, is_relative = self._allowed_gap()
-        own = self.incumbent.x
-        in_other_mode = not nlp.in_home_mode and own is not None and is_in_home_mode(nlp, own) is False
         return Certificate(
             status=status,
             nlp=nlp,
-            x=None if self.incumbent.x is None else frozen_array(self.incumbent.program_point(), (nlp.n,)),
-            incumbent=sign * self.incumbent.value if known else math.nan,
-            bound=sign * self.bound if status is not CertificateStatus.INFEASIBLE else math.nan,
+            x=None if x is None else frozen_array(x, (nlp.n,)),
+            incumbent=math.nan if x is None else incumbent,
+            bound=math.nan if status is CertificateStatus.INFEASIBLE else bound,
             allowed=allowed,
             is_relative=is_relative,
-            above=self.above,
+            above=self._above,
             was_beaten=self.incumbent.was_beaten,
             engine=ENGINE,
-            boxes=self.boxes_before + self.method.boxes,
+            boxes=self._boxes_before + self._method.boxes,
             open=left,
             seconds=seconds,
             reason=reason,
-            history=tuple(self.history),
-            in_other_mode=in_other_mode,
+            history=tuple(self._history),
+            in_other_mode=not nlp.in_home_mode and x is not None and is_in_home_mode(nlp, x) is False,
         )

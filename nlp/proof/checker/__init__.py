@@ -2,7 +2,7 @@
 
 The modules import each other in this order: ``proof_file`` (JSON), ``tree`` (boxes as bytes, and what their leaves
 claim), ``bisection`` (the loop that shows claims), ``premises`` (the program of a case, and the claim in words),
-``intervals`` and ``polynomials`` (values over boxes, and the rules of operations on them), ``arithmetic`` (operations
+``polynomials`` (values over boxes, and the rules of operations on them), ``arithmetic`` (operations
 of CasADi's graphs), ``polymodels`` (weighted sums of polynomials), ``optimum`` (rules of claims about a program) and
 ``check``. ``fractions`` and the room ``workspace`` serve proofs about poses.
 """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
 
 #: Largest number of bisections on the way to a piece.
 _MOST_BISECTIONS = 60
-#: Number of claims whose boxes wait at a time.
-_CLAIMS = 4096
 #: Every so many bisections the widest variable is halved, so that all become narrow whatever the models tell of them.
 _WIDEST = 5
 
@@ -75,55 +72,46 @@ class Rule(Protocol):
         """Return the sentence that a claim could not be shown."""
 
 
-def show(rule: Rule, lower: FloatArray, upper: FloatArray, done: Callable[[int], None] | None = None) -> int:
+def show(rule: Rule, lower: FloatArray, upper: FloatArray) -> int:
     """Show claims, and return the number of pieces examined.
 
     Args:
         rule: shows them.
         lower: (n, L) lower ends of the claims' boxes.
         upper: (n, L) upper ends.
-        done: called with the number of claims that have been shown since the last call.
 
     Raises:
         ProofError: a claim could not be shown.
     """
-    every = range(0, lower.shape[1], _CLAIMS)
-    return sum(_show(rule, lower[:, k : k + _CLAIMS], upper[:, k : k + _CLAIMS], k, done) for k in every)
-
-
-def _show(
-    rule: Rule, lower: FloatArray, upper: FloatArray, number: int, done: Callable[[int], None] | None = None
-) -> int:
-    """Show some claims, the first of which has this number."""
-    count = lower.shape[1]
-    owner, depth = np.arange(count), np.zeros(count, dtype=np.intp)
-    used, total, waiting = np.zeros(count, dtype=np.intp), 0, count
-    while owner.size:
-        # The last pieces are taken first: one claim is finished before the next begins, as far as blocks allow.
+    (n, count), begun, total = lower.shape, 0, 0
+    used, waiting = np.zeros(count, dtype=np.intp), (np.zeros((n, 0)), np.zeros((n, 0)))
+    owner, depth = np.zeros((2, 0), dtype=np.intp)
+    while begun < count or owner.size:
+        # The last pieces are taken first: claims are finished before others begin, as far as blocks allow.
+        more = np.arange(begun, min(begun + max(rule.block - owner.size, 0), count))
+        begun += more.size
+        a, b = (np.concatenate([old, new[:, more]], axis=1) for old, new in zip(waiting, (lower, upper), strict=True))
+        owner, depth = np.concatenate([owner, more]), np.concatenate([depth, np.zeros_like(more)])
         first = max(owner.size - rule.block, 0)
-        a, b, of, deep = lower[:, first:], upper[:, first:], owner[first:], depth[first:]
+        low, high, of, deep = a[:, first:], b[:, first:], owner[first:], depth[first:]
         np.add.at(used, of, 1)
         total += of.size
         with np.errstate(all="ignore"):
-            found = rule.examine(a, b, number + of)
+            found = rule.examine(low, high, of)
             left = np.flatnonzero(~(found.holds | (found.lower > found.upper).any(axis=0)))
-            along = _variables_to_bisect(found, a, b, rule.width, deep)[left]
+            along = _variables_to_bisect(found, low, high, rule.width, deep)[left]
         low, high, of, deep = found.lower[:, left], found.upper[:, left], of[left], deep[left] + 1
         failed = (used[of] > rule.most_pieces) | (deep > _MOST_BISECTIONS)
         if found.is_wrong is not None:
             failed |= found.is_wrong[left]
         if failed.any():
-            raise ProofError(rule.sentence(number + int(of[failed.argmax()])))
+            raise ProofError(rule.sentence(int(of[failed.argmax()])))
         columns = np.arange(of.size)
         middle = 0.5 * low[along, columns] + 0.5 * high[along, columns]
         below, above = high.copy(), low.copy()
         below[along, columns] = above[along, columns] = middle
-        lower = np.concatenate([lower[:, :first], low, above], axis=1)
-        upper = np.concatenate([upper[:, :first], below, high], axis=1)
+        waiting = np.hstack([a[:, :first], low, above]), np.hstack([b[:, :first], below, high])
         owner, depth = np.concatenate([owner[:first], of, of]), np.concatenate([depth[:first], deep, deep])
-        if done is not None:
-            before, waiting = waiting, np.unique(owner).size
-            done(before - waiting)
     return total
 
 

@@ -10,27 +10,23 @@ derivatives of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ....models import FloatArray
 from ...program.nlp import Nlp
+from ..statement.form import refuse_jumps
 from ..statement.limb_separation import separate
-from ..statement.piecewise_derivatives import refuse_jumps
 from ..statement.standard_form import StandardForm, standard_form
 from .bisection import show
 from .optimum import Claims, rule_of
 from .polymodels import Tilts
 from .premises import fingerprint, is_same_program
 from .proof_file import Proof, ProofError
-from .tree import FACES, Box, Node, SharedLeaf, TreeReader, read_claims, read_shared
+from .tree import FACES, Box, Node, SharedLeaves, TreeReader, read_claims, read_shared
 
 #: Rounding of sums of a few numbers, in parts of their sizes: many times the largest possible.
 _SUMS = 1e-13
-#: Callback with the number of claims checked, and of those to be checked.
-CheckProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -48,13 +44,12 @@ class VerifiedProof:
     bound: float
 
 
-def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -> VerifiedProof:
+def check_proof(proof: Proof, nlp: Nlp) -> VerifiedProof:
     """Check a proof, by showing each of its claims again.
 
     Args:
         proof: the proof.
         nlp: the program that it is about, built from the case.
-        progress: called after each group of boxes.
 
     Raises:
         ProofError: the proof is for another program, its bytes are no tree, or a claim could not be shown.
@@ -65,18 +60,8 @@ def check_proof(proof: Proof, nlp: Nlp, progress: CheckProgress | None = None) -
     refuse_jumps(form.expressions, form.x)
     bound = -np.inf if proof.bound is None else proof.bound
     kinds = {bytes([Node.LIMBS]): _of_limbs, bytes([Node.SHARED]): _of_shared_limbs}
-    read = kinds.get(proof.tree[:1], _of_tree)
-    leaves, every = read(proof.tree, form, bound)
-    shown, count, pieces = 0, sum(each.bounds.size for each in every), 0
-
-    def done(more: int) -> None:
-        nonlocal shown
-        shown += more
-        if progress is not None:
-            progress(shown, count - shown)
-
-    for each in every:
-        pieces += show(rule_of(each), each.lower, each.upper, done)
+    leaves, every = kinds.get(proof.tree[:1], _of_tree)(proof.tree, form, bound)
+    pieces = sum(show(rule_of(each), each.lower, each.upper) for each in every)
     return VerifiedProof(leaves, pieces, bound)
 
 
@@ -106,25 +91,23 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[
         size = sum(map(abs, bounds))
         if not (math.isfinite(size) and math.fsum(bounds) + _SUMS * size <= bound):
             raise ProofError("the bounds of the limbs are more than the proven one together")
-    parts = empty or parts
-    read = [_claims_of(boxes, limb, least) for limb, least, boxes in parts]
+    read = [_claims_of(claims, limb, least) for limb, least, claims in empty or parts]
     return sum(leaves for leaves, _ in read), [each for _, some in read for each in some]
 
 
-def _claims_of(boxes: dict[tuple[Node, int], list[Box]], form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
+def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
     """Return the number of the boxes of a tree, and the claims about them.
 
     Raises:
         ProofError: a box collapses on a face that is not the form's.
     """
     every = []
-    for (kind, i), some in boxes.items():
-        lower, upper = _stacked(some, form.n)
+    for (kind, i), (lower, upper) in claims.items():
         ends, whole = (upper, form.upper) if kind == Node.FACE_UPPER else (lower, form.lower)
         if kind in FACES and (ends[i] != whole[i]).any():
             raise ProofError(f"a box is collapsed on a face of {form.names[i]} that is not the case's")
-        every.append(Claims(form, kind, i, lower, upper, np.full(len(some), bound)))
-    return sum(map(len, boxes.values())), every
+        every.append(Claims(form, kind, i, lower, upper, np.full(lower.shape[1], bound)))
+    return sum(each.bounds.size for each in every), every
 
 
 def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
@@ -139,37 +122,22 @@ def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int
     common, limbs = separation.common, [limb.form for limb in separation.limbs]
     leaves = read_shared(tree, common.lower, common.upper, len(limbs))
     # The sums first: they are quick, and without them the limbs' bounds show nothing.
-    every = [_of_sum([each for each in leaves if each.bounds.min() > -np.inf], common, len(limbs), bound)]
+    every = [_of_sum(leaves.select(leaves.bounds.min(axis=0) > -np.inf), common, bound)]
     for k, limb in enumerate(limbs):
-        claimed = [each for each in leaves if each.bounds[k] < np.inf]
-        lower, upper = _stacked([(each.lower, each.upper) for each in claimed], common.n)
-        own = [np.repeat(ends[common.n :, None], len(claimed), axis=1) for ends in (limb.lower, limb.upper)]
-        lower, upper = np.concatenate([lower, own[0]]), np.concatenate([upper, own[1]])
-        bounds = np.array([each.bounds[k] for each in claimed])
-        every.append(Claims(limb, Node.BOUNDED, 0, lower, upper, bounds, _tilts(k, claimed, common.n)))
-    return len(leaves), [each for each in every if each.bounds.size]
+        claimed = leaves.select(leaves.bounds[k] < np.inf)
+        own = [np.repeat(ends[common.n :, None], claimed.bounds.shape[1], axis=1) for ends in (limb.lower, limb.upper)]
+        lower, upper = np.concatenate([claimed.lower, own[0]]), np.concatenate([claimed.upper, own[1]])
+        tilts = Tilts.over(claimed.lower, claimed.upper, claimed.g[k], claimed.Q[k])
+        every.append(Claims(limb, Node.BOUNDED, 0, lower, upper, claimed.bounds[k], tilts))
+    return leaves.bounds.shape[1], [each for each in every if each.bounds.size]
 
 
-def _of_sum(leaves: Sequence[SharedLeaf], common: StandardForm, K: int, bound: float) -> Claims:
-    """Return the claims about the part with shared variables alone: minus the K limbs' tilts are its own tilts."""
-    lower, upper = _stacked([(each.lower, each.upper) for each in leaves], common.n)
-    parts = [_tilts(k, leaves, common.n) for k in range(K)]
-    tilts = Tilts.over(lower, upper, *(-np.sum([getattr(each, name) for each in parts], axis=0) for name in "gQ"))
-    bounds = np.array([each.bounds for each in leaves]).reshape(-1, K)
+def _of_sum(leaves: SharedLeaves, common: StandardForm, bound: float) -> Claims:
+    """Return the claims about the part with shared variables alone: minus the limbs' tilts are its own tilts."""
+    lower, upper, bounds, g, Q = leaves
+    tilts = Tilts.over(lower, upper, -g.sum(axis=0), -Q.sum(axis=0))
     # The tilts' sums are rounded, and so is this one.
-    sizes = abs(bound) + np.abs(bounds).sum(axis=1) + np.sum([each.sizes() for each in parts], axis=0)
-    left = bound - bounds.sum(axis=1) - _SUMS * sizes
+    parts = [Tilts.over(lower, upper, *each).sizes() for each in zip(g, Q, strict=True)]
+    sizes = abs(bound) + np.abs(bounds).sum(axis=0) + np.sum(parts, axis=0)
+    left = bound - bounds.sum(axis=0) - _SUMS * sizes
     return Claims(common, Node.BOUNDED, 0, lower, upper, left, tilts)
-
-
-def _stacked(boxes: Sequence[Box], n: int) -> tuple[FloatArray, FloatArray]:
-    """Return the ends (n, L) of boxes."""
-    lower = np.array([low for low, _ in boxes]).reshape(-1, n).T
-    return lower, np.array([high for _, high in boxes]).reshape(-1, n).T
-
-
-def _tilts(k: int, leaves: Sequence[SharedLeaf], m: int) -> Tilts:
-    """Return the tilts of limb number k over the leaves' boxes."""
-    g = np.array([each.g[k] for each in leaves]).reshape(-1, m).T
-    Q = np.moveaxis(np.array([each.Q[k] for each in leaves]).reshape(-1, m, m), 0, 2)
-    return Tilts.over(*_stacked([(each.lower, each.upper) for each in leaves], m), g, Q)

@@ -1,26 +1,24 @@
 """Rules of claims about boxes of a form, shown by polynomials of second order: what holds, and what is left of boxes.
 
-A claim that is clearly wrong at the centre of what is left of a box is refused at once, without many bisections. The
-centres are evaluated in doubles, and count only where they miss the claim by far more than rounding; nothing that is
+A bound that is clearly wrong at the centre of what is left of a box is refused at once, without many bisections. The
+centres are evaluated in doubles, and count only where they miss the bound by far more than rounding; nothing that is
 accepted rests on this.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-from casadi import SX
 
 from ..statement.standard_form import StandardForm
 from .arithmetic import PolynomialArithmetic
 from .bisection import Shown
 from .polymodels import Forms, Tilts, forms_of, polynomial_sum, reaching_part, weights_of
-from .polynomials import Polynomial, places, sub
+from .polynomials import Polynomial, places
 from .tree import FACES, Node
 
 if TYPE_CHECKING:
@@ -57,40 +55,20 @@ class Claims:
     tilts: Tilts | None = None
 
 
-class FormRule(ABC):
+class FormRule:
     """The rule of some claims, for the loop of the checker.
 
     Args:
         claims: the claims.
-        at_centres: the expressions (K, 1) that tell at the centre of a box whether a claim is wrong.
+        form: of the functions and conditions that count.
     """
 
     most_pieces = 5_000
 
-    def __init__(self, claims: Claims, at_centres: SX) -> None:
-        self._claims, form = claims, claims.form
-        self._form, self._J, self._equation = form, len(form.functions), form.is_equation
+    def __init__(self, claims: Claims, form: StandardForm) -> None:
+        self._claims, self._form, self._J, self._equation = claims, form, len(form.functions), form.is_equation
         self.width = form.upper - form.lower
         self.block = min(max(_COEFFICIENTS // places(form.n).total, _FEWEST), _MOST)
-        self._at_centres = ca.Function("centres", [form.x], [at_centres])
-
-    def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
-        """Examine pieces with ends (n, N) of the claims with these numbers (N,)."""
-        shown = self._attempt(lower, upper, of)
-        shown.is_wrong = np.zeros(of.size, dtype=bool)
-        left = np.flatnonzero(~shown.holds)
-        if left.size:
-            points = 0.5 * shown.lower[:, left] + 0.5 * shown.upper[:, left]
-            shown.is_wrong[left] = self._are_wrong(self._at_centres(points).full(), points, of[left])
-        return shown
-
-    @abstractmethod
-    def _attempt(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
-        """Try to show the claims on pieces."""
-
-    @abstractmethod
-    def _are_wrong(self, values: FloatArray, points: FloatArray, of: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Return which points (n, K), with these values of the expressions at centres, are counterexamples."""
 
     def sentence(self, claim: int) -> str:
         """Return the sentence that a claim could not be shown."""
@@ -103,71 +81,73 @@ class FormRule(ABC):
         box = ", ".join(f"{name} in [{low:.6g}, {high:.6g}]" for name, low, high in ends)
         return f"{what} could not be shown for the box {box}"
 
-    def _cut_by_conditions(
+    def _use_conditions(
         self, shown: Shown, which: NDArray[np.intp], forms: Forms, lower: FloatArray, upper: FloatArray
     ) -> None:
-        """Leave only parts of some pieces, with their forms, where no single condition excludes a point."""
+        """Leave only parts of some pieces, with ends and forms, where no single condition excludes a point.
+
+        Without functions, a piece is shown where a condition excludes all of it.
+        """
         for r in range(self._J, len(self._equation)):
             for sign in (-1.0, 1.0) if self._equation[r] else (-1.0,):
                 if sign < 0 and not (forms.high[r] >= 0).any():
                     continue
                 model = polynomial_sum(forms.only(r), np.full((1, which.size), sign))
+                if not self._J:
+                    shown.keep(which, model.bound() < 0, model.change())
                 shown.cut(which, reaching_part(model, 0.0, lower[:, which], upper[:, which]))
-
-
-def rule_of(claims: Claims) -> FormRule:
-    """Return the rule of some claims."""
-    if claims.kind == Node.BOUNDED:
-        return BoundRule(claims)
-    return InfeasibleRule(claims) if claims.kind == Node.INFEASIBLE else MonotoneRule(claims)
 
 
 class BoundRule(FormRule):
     """The rule of claims that no feasible point of a box has a value above a bound.
 
-    A function is at most the bound, or a condition cannot hold, or a weighted sum of all is at most the bound. What is
-    left of a limb's box collapses on its face where the limb rises along a variable of its own, which no condition
-    stops: a feasible point above the bound could be moved to that face, where it would be feasible and above the bound
-    too. Its gradient has no tilt, which depends on the shared variables alone. A tree over all variables has faces
-    itself.
+    A function is at most the bound, or a condition cannot hold, or a weighted sum of all is at most the bound. The
+    claim that a condition holds nowhere in a box is the same without functions, and with that condition alone.
+
+    What is left of a limb's box collapses on its face where the limb rises along a variable of its own, which no
+    condition stops: a feasible point above the bound could be moved to that face, where it would be feasible and above
+    the bound too. Its gradient has no tilt, which depends on the shared variables alone. A tree over all variables has
+    faces itself.
     """
 
     def __init__(self, claims: Claims) -> None:
         form = claims.form
-        super().__init__(claims, form.expressions)
-        self._arithmetic = PolynomialArithmetic(ca.Function("values", [form.x], [ca.cse(form.expressions)]))
+        if claims.kind == Node.INFEASIBLE:
+            form = replace(form, functions=(), conditions=(form.conditions[claims.index - len(form.functions)],))
+        super().__init__(claims, form)
+        function = ca.Function("values", [form.x], [ca.cse(form.expressions)])
+        self._arithmetic, self._at_centres = PolynomialArithmetic(function), function
         own = range(0) if claims.tilts is None else range(len(claims.tilts.g), form.n)
         self._slopes = _Slopes(form, own)
         self._gradient = PolynomialArithmetic(ca.Function("slopes", [form.x], [ca.cse(self._slopes.expressions)]))
 
-    def _attempt(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
+    def examine(self, lower: FloatArray, upper: FloatArray, of: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (n, N) of the claims with these numbers (N,)."""
         J, bound, values = self._J, self._claims.bounds[of], self._arithmetic(lower, upper)
         if self._claims.tilts is not None:
-            values[0] = sub(values[0], self._claims.tilts.select(of).polynomial(lower, upper))
+            values[0] = values[0] - self._claims.tilts.select(of).polynomial(lower, upper)
         forms = forms_of(values, lower, upper, self._form)
         defined = np.isfinite(forms.high[:J]).all(axis=0)
-        holds = defined & (forms.high[:J].min(axis=0) <= bound)
+        holds = defined & (forms.high[:J].min(axis=0, initial=np.inf) <= bound)
         for low, high, is_equation in zip(forms.low[J:], forms.high[J:], self._equation[J:], strict=True):
             holds |= (low > 0) | (is_equation & (high < 0))
         shown = Shown(holds, np.zeros_like(lower), lower.copy(), upper.copy())
         left = np.flatnonzero(~holds & defined)
-        if not left.size:
-            return shown
         forms = forms.select(left)
-        models = []
-        for weights in weights_of(J, self._equation, forms.centres(), forms.high, forms.gradients()):
-            model = polynomial_sum(forms, weights)
-            shown.keep(left, model.bound() <= bound[left], model.change())
-            models.append(model)
-        rest = np.flatnonzero(~shown.holds[left])
-        if rest.size:
-            which, forms = left[rest], forms.select(rest)
+        if J:
+            models = [polynomial_sum(forms, weights) for weights in weights_of(J, self._equation, forms)]
             for model in models:
-                few = model.select(rest)
-                shown.cut(which, reaching_part(few, bound[which], lower[:, which], upper[:, which]))
-            self._cut_by_conditions(shown, which, forms, lower, upper)
-            if self._slopes.stops:
-                self._collapse(shown, which, forms)
+                shown.keep(left, model.bound() <= bound[left], model.change())
+            rest = np.flatnonzero(~shown.holds[left])
+            left, forms = left[rest], forms.select(rest)
+            for model in models:
+                shown.cut(left, reaching_part(model.select(rest), bound[left], lower[:, left], upper[:, left]))
+        self._use_conditions(shown, left, forms, lower, upper)
+        if self._slopes.stops:
+            self._collapse(shown, left, forms)
+        rest = np.flatnonzero(~shown.holds)
+        shown.is_wrong = np.zeros(of.size, dtype=bool)
+        shown.is_wrong[rest] = self._are_wrong(0.5 * shown.lower[:, rest] + 0.5 * shown.upper[:, rest], of[rest])
         return shown
 
     def _collapse(self, shown: Shown, which: NDArray[np.intp], forms: Forms) -> None:
@@ -181,42 +161,16 @@ class BoundRule(FormRule):
             shown.lower[i, which] = np.where(up, high[i], low[i])
             shown.upper[i, which] = np.where(down & ~up, low[i], high[i])
 
-    def _are_wrong(self, values: FloatArray, points: FloatArray, of: NDArray[np.intp]) -> NDArray[np.bool_]:
-        bound, best = self._claims.bounds[of], values[: self._J].min(axis=0)
-        sizes = np.abs(best) + np.where(np.isfinite(bound), np.abs(bound), 0.0)
+    def _are_wrong(self, points: FloatArray, of: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Return which points (n, K) are counterexamples of claims (K,) by more than rounding."""
+        values, bound = self._at_centres(points).full(), self._claims.bounds[of]
+        best = values[: self._J].min(axis=0, initial=np.inf)
+        sizes = sum(np.where(np.isfinite(each), np.abs(each), 0.0) for each in (best, bound))
         if self._claims.tilts is not None:
             tilts = self._claims.tilts.select(of)
             best, sizes = best - tilts.at(points[: len(tilts.g)]), sizes + tilts.sizes()
         feasible = (values[self._J :] < -_CLEARLY).all(axis=0)
         return np.asarray(feasible & (best - bound > _CLEARLY * sizes) & (not any(self._equation)))
-
-
-class InfeasibleRule(FormRule):
-    """The rule of claims that a condition is positive on a box; for an equation, positive or negative."""
-
-    def __init__(self, claims: Claims) -> None:
-        form, r = claims.form, claims.index
-        super().__init__(claims, form.expressions[r])
-        self._is_equation = form.is_equation[r]
-        self._arithmetic = PolynomialArithmetic(ca.Function("values", [form.x], [ca.cse(form.expressions[r])]))
-
-    def _attempt(self, lower: FloatArray, upper: FloatArray, *_: object) -> Shown:
-        forms = forms_of(self._arithmetic(lower, upper), lower, upper, self._form)
-        holds = forms.low[0] > 0
-        if self._is_equation:
-            holds |= forms.high[0] < 0
-        shown = Shown(holds, np.zeros_like(lower), lower.copy(), upper.copy())
-        left = np.flatnonzero(~holds)
-        if left.size:
-            forms = forms.select(left)
-            for sign in (-1.0, 1.0) if self._is_equation else (-1.0,):
-                model = polynomial_sum(forms, np.full((1, left.size), sign))
-                shown.keep(left, model.bound() < 0, model.change())
-                shown.cut(left, reaching_part(model, 0.0, lower[:, left], upper[:, left]))
-        return shown
-
-    def _are_wrong(self, values: FloatArray, *_: object) -> NDArray[np.bool_]:
-        return np.asarray((values[0] < -_CLEARLY) & (not self._is_equation))
 
 
 class _Slopes:
@@ -234,8 +188,7 @@ class _Slopes:
 
     def __init__(self, form: StandardForm, variables: Sequence[int]) -> None:
         self._J, self._equation, self.nothing = len(form.functions), form.is_equation, len(form.is_equation)
-        depends = form.dependence
-        self.stops = {i: [r for r in range(self._J, self.nothing) if depends[r][i]] for i in variables}
+        self.stops = {i: [r for r in range(self._J, self.nothing) if form.dependence[r][i]] for i in variables}
         entries = [(r, i) for i, stops in self.stops.items() for r in [*range(self._J), *stops]]
         self._at = {entry: k for k, entry in enumerate(entries)}
         self.expressions = ca.densify(ca.vertcat(*(form.jacobian[r, i] for r, i in entries)))
@@ -251,8 +204,8 @@ class _Slopes:
         """
 
         def least(r: int, way: int) -> FloatArray:
-            low, up = slopes[self._at[r, i]].V
-            return low if way > 0 else -up
+            V = slopes[self._at[r, i]].V
+            return np.asarray(V[0] if way > 0 else -V[1])
 
         found = np.full(high.shape[1], self.nothing)
         for r in reversed(self.stops[i]):
@@ -272,13 +225,14 @@ class MonotoneRule(FormRule):
 
     def __init__(self, claims: Claims) -> None:
         form = claims.form
-        super().__init__(claims, ca.vertcat(form.expressions, form.jacobian[:, claims.index]))
+        super().__init__(claims, form)
         self._i, self._slopes = claims.index, _Slopes(form, [claims.index])
         self._sides = {Node.FACE_UPPER: (1,), Node.FACE_LOWER: (-1,)}.get(claims.kind, (1, -1))
         both = ca.cse([form.expressions, self._slopes.expressions])
         self._arithmetic = PolynomialArithmetic(ca.Function("both", [form.x], both))
 
-    def _attempt(self, lower: FloatArray, upper: FloatArray, *_: object) -> Shown:
+    def examine(self, lower: FloatArray, upper: FloatArray, _: NDArray[np.intp]) -> Shown:
+        """Examine pieces with ends (n, N)."""
         form, i, R = self._form, self._i, self._slopes.nothing
         both = self._arithmetic(lower, upper)
         values, slopes = (forms_of(some, lower, upper, form) for some in (both[:R], both[R:]))
@@ -293,22 +247,9 @@ class MonotoneRule(FormRule):
             if self._claims.kind not in FACES:
                 rises &= (upper[i] < form.upper[i]) if side > 0 else (lower[i] > form.lower[i])
             holds |= rises
-        shown = Shown(holds, change, lower.copy(), upper.copy())
-        left = np.flatnonzero(~holds)
-        if left.size:
-            self._cut_by_conditions(shown, left, values.select(left), lower, upper)
+        shown, left = Shown(holds, change, lower.copy(), upper.copy()), np.flatnonzero(~holds)
+        self._use_conditions(shown, left, values.select(left), lower, upper)
         return shown
-
-    def _are_wrong(self, values: FloatArray, *_: object) -> NDArray[np.bool_]:
-        J, R = self._J, self._slopes.nothing
-        values, slopes = values[:R], values[R:]
-        # A function that falls there, or a condition that does not hold strictly and grows, excludes a direction.
-        excluded, clear = [], _CLEARLY * (1 + np.abs(slopes))
-        for side in self._sides:
-            falls = (side * slopes[:J] < -clear[:J]).any(axis=0)
-            grows = (values[J:] > _CLEARLY) & (side * slopes[J:] > clear[J:])
-            excluded.append(falls | grows.any(axis=0))
-        return np.asarray(np.all(excluded, axis=0))
 
 
 def _steepness(forms: Forms, which: Sequence[int]) -> FloatArray:
@@ -318,3 +259,8 @@ def _steepness(forms: Forms, which: Sequence[int]) -> FloatArray:
         model = polynomial_sum(forms.only(r), np.ones((1, steep.shape[1])))
         steep = np.fmax(steep, np.abs(model.b) + model.reach)
     return steep
+
+
+def rule_of(claims: Claims) -> BoundRule | MonotoneRule:
+    """Return the rule of some claims."""
+    return BoundRule(claims) if claims.kind in (Node.BOUNDED, Node.INFEASIBLE) else MonotoneRule(claims)

@@ -147,20 +147,14 @@ def polynomial_sum(forms: Forms, weights: FloatArray) -> SumModel:
 def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
     """Return an upper bound (N,) of ``b e + 1/2 e'He`` for e in [-1, 1]^n, with ``e_i = s_i`` where ``s_i`` is not 0.
 
-    It is the lesser of two: the sum over free variables one by one, with absolute values of the terms that couple them;
-    and that from a tangent plane to a concave part, which Gershgorin's circles give.
+    It is that from a tangent plane to a concave part, which Gershgorin's circles give.
     """
     Hs = np.einsum("ijb,jb->ib", H, s)
     base = (b * s).sum(axis=0) + 0.5 * (s * Hs).sum(axis=0)
     free = s == 0
-    b, H = np.where(free, b + Hs, 0.0), np.where(free[:, None] & free[None], H, 0.0)
-    diagonal = np.einsum("iib->ib", H)
-    others = np.abs(H).sum(axis=1) - np.abs(diagonal)
-    peak = (diagonal < 0) & (np.abs(b) < -diagonal)
-    alone = np.where(peak, b * (b / np.where(peak, -2 * diagonal, 1.0)), np.abs(b) + 0.5 * diagonal)
-    separate = (alone + 0.5 * others).sum(axis=0)
-    shift = np.maximum(diagonal + others, 0.0)
-    C = H.copy()
+    b, C = np.where(free, b + Hs, 0.0), np.where(free[:, None] & free[None], H, 0.0)
+    diagonal = np.einsum("iib->ib", C)
+    shift = np.maximum(diagonal + np.abs(C).sum(axis=1) - np.abs(diagonal), 0.0)
     for i in range(len(b)):
         C[i, i] -= shift[i]
     e = np.zeros_like(b)
@@ -171,7 +165,7 @@ def _largest(b: FloatArray, H: FloatArray, s: FloatArray) -> FloatArray:
             e[i] = np.clip(np.where(np.isfinite(step), step, 0.0), -1.0, 1.0)
     Ce = np.einsum("ijb,jb->ib", C, e)
     plane = np.abs(b + Ce).sum(axis=0) - 0.5 * (e * Ce).sum(axis=0) + 0.5 * shift.sum(axis=0)
-    return np.asarray(base + np.fmin(separate, plane))
+    return np.asarray(base + plane)
 
 
 def reaching_part(
@@ -199,29 +193,26 @@ def reaching_part(
         return np.where(none, np.inf, np.fmax(lower, low)), np.where(none, -np.inf, np.fmin(upper, high))
 
 
-def weights_of(
-    functions: int, is_equation: Sequence[bool], values: FloatArray, high: FloatArray, G: FloatArray
-) -> list[FloatArray]:
-    """Return two choices of weights (R, N): of functions, not negative with sum 1; of inequalities, not positive.
+def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> list[FloatArray]:
+    """Return choices of weights (R, N): of functions, not negative with sum 1; of inequalities, not positive.
 
     Any weights give a bound, and these make it small. The bound of ``L = sum_r w_r v_r`` over a box is about
     ``L(c) + sum_i r_i |dL/dx_i (c)|``. The weights are found in two steps: coordinate descent on the sum of squares of
-    the scaled gradient, and then on this bound itself, which also counts how far a condition is violated at the
-    centre. The first weights are better where the optimum lies in the box, the second ones for a box on the edge of the
+    the scaled gradient, and then on this bound itself, which also counts how far a condition is violated at the centre.
+    The first weights are better where the optimum lies in the box, the second ones for a box on the edge of the
     feasible set.
 
     Args:
         functions: number of functions, which come before the conditions.
         is_equation: whether each of the R expressions must be 0.
-        values: (R, N) values at the centres of the boxes.
-        high: (R, N) largest values on the boxes.
-        G: (R, n, N) gradients at the centres times the radii of the boxes.
+        forms: of the expressions over the boxes.
     """
-    usable = np.isfinite(G).all(axis=1) & np.isfinite(values) & np.isfinite(high)
+    values, G = forms.centres(), forms.gradients()
+    usable = np.isfinite(G).all(axis=1) & np.isfinite(values) & np.isfinite(forms.high)
     for r in range(functions, len(G)):
         if not is_equation[r]:
             # A condition that cannot bind gets no weight.
-            usable[r] &= ~(high[r] < 0)
+            usable[r] &= ~(forms.high[r] < 0)
     G, values = np.where(usable[:, None], G, 0.0), np.where(usable, values, 0.0)
     weights = np.zeros_like(values)
     weights[0] = 1.0
@@ -332,4 +323,4 @@ class Tilts:
         P[at.products] = self.Q[at.first, at.second] * r[at.first] * r[at.second]
         s = _SUMS * self.sizes(np.abs(e) + r) + _TINY
         anything = np.full_like(s, np.inf)
-        return settled(tuple(range(m)), P, s, (-anything, anything))
+        return settled(tuple(range(m)), P, s, np.array([-anything, anything]))

@@ -7,8 +7,9 @@ On boxes ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, every value v is enclosed by
 ``s`` holds all terms of third and higher order, bounded by sums of sizes, and all rounding. A function of one variable
 is its Taylor polynomial with Lagrange's remainder of third order, or an identity that replaces it. A value keeps only
 the coefficients of the variables that it depends on. Coefficients are computed in round to nearest, and ``s`` grows by
-the number of roundings that an operation makes of each of its terms, counted with a margin, in parts of the sizes of
-its operands.
+the number of roundings that an operation makes of each of its terms, counted with a margin: the last one in parts of
+the coefficient, and those before in parts of the sizes of the operands. Ends of ranges move outwards by one number at
+every operation, or by a library's error.
 
 A work rate squared is a quotient ``N^2 / D`` of polynomials. Its square and its division one after the other would have
 terms of third order many times as large as the quotient's, so the two are one operation. For any number rho,
@@ -28,22 +29,27 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import intervals as ends
-
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from ....models import FloatArray
-    from .intervals import Ends
 
 #: Rounding unit of doubles.
 UNIT = 2.0**-53
 #: More than underflow can cost an operation.
 _TINY = 1e-290
-#: Roundings of each term of an operation, in parts of its size, with a margin. A sum, a multiple and a shift make one,
-#: a product and a square at most three, a quotient at most six, and a Taylor polynomial at most twelve with those of
-#: its slope and its curve.
-_ONCE, _PRODUCT, _QUOTIENT, _TAYLOR = 2 * UNIT, 6 * UNIT, 12 * UNIT, 16 * UNIT
+#: Rounding of a number, with a margin, in parts of its size: the last one of each coefficient, and that of a sum.
+_ONCE = 2 * UNIT
+#: Roundings of each term of an operation before the last one, with a margin. A product and a square make at most two, a
+#: quotient five, and a Taylor polynomial eleven with those of its slope and its curve.
+_PRODUCT, _QUOTIENT, _TAYLOR = 4 * UNIT, 10 * UNIT, 14 * UNIT
+#: Error of a library's sine, cosine, exponential, logarithm and arc tangent, in parts of their size or of 1.
+_LIBRARY = 4e-15
+#: Directions outwards of the two ends of a range, and numbers beyond all.
+_SIDES = np.array([[-1.0], [1.0]])
+_ENDS = _SIDES * np.inf
 
 
 class Places(NamedTuple):
@@ -103,7 +109,7 @@ class Polynomial:
         on: the d variables that it depends on, in order.
         P: (m, N) coefficients at :func:`places`.
         s: (N,) radius of the ball; NaN where the value may be undefined.
-        V: ends (N,) of the range.
+        V: (2, N) ends of the range.
         rad: (N,) sum of the sizes of linear coefficients.
         curved: (N,) largest size of the part of second order.
         size: (N,) sum of the sizes of all coefficients.
@@ -113,7 +119,7 @@ class Polynomial:
     on: tuple[int, ...]
     P: FloatArray
     s: FloatArray
-    V: Ends
+    V: FloatArray
     rad: FloatArray
     curved: FloatArray
     size: FloatArray
@@ -123,9 +129,10 @@ class Polynomial:
         """Return the value over some boxes; a constant is one number for all."""
         if self.P.shape[1] == 1:
             return self
-        V = self.V[0][which], self.V[1][which]
-        rad, curved, size = self.rad[which], self.curved[which], self.size[which]
-        return Polynomial(self.on, self.P[:, which], self.s[which], V, rad, curved, size)
+        P, s, V, rad, curved, size = (
+            each[..., which] for each in (self.P, self.s, self.V, self.rad, self.curved, self.size)
+        )
+        return Polynomial(self.on, P, s, V, rad, curved, size)
 
     def spread(self, on: tuple[int, ...]) -> FloatArray:
         """Return the coefficients (M, N) in more variables."""
@@ -135,6 +142,34 @@ class Polynomial:
         P[_rows_in(self.on, on)] = self.P
         return P
 
+    @property
+    def number(self) -> float | None:
+        """The number that a constant is; None for another value."""
+        return float(self.P[0, 0]) if not self.on and self.s.size == 1 and self.s[0] == 0 else None
+
+    def __add__(self, other: Polynomial) -> Polynomial:
+        """Return the sum."""
+        on, X, Y = _together(self, other)
+        return settled(on, X + Y, self.s + other.s, _out(self.V + other.V))
+
+    def __sub__(self, other: Polynomial) -> Polynomial:
+        """Return the difference."""
+        on, X, Y = _together(self, other)
+        return settled(on, X - Y, self.s + other.s, _out(self.V - other.V[::-1]))
+
+    def __mul__(self, other: Polynomial | float) -> Polynomial:
+        """Return the product."""
+        if isinstance(other, float):
+            return _multiple(self, other)
+        for u, v in ((self, other), (other, self)):
+            if v.number is not None:
+                return _multiple(u, v.number)
+        return _product(self, other)
+
+    def __truediv__(self, other: Polynomial) -> Polynomial:
+        """Return the quotient."""
+        return _quotient(self, other) if self.root is None else _squared_quotient(self.root, other, self.V)
+
 
 def middles(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the centres and radii (n, N) of boxes with ends (n, N); a radius is rounded up."""
@@ -143,8 +178,18 @@ def middles(lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArra
     return centre, np.where(radius > 0, np.nextafter(radius, np.inf), 0.0)
 
 
-def settled(on: tuple[int, ...], P: FloatArray, s: FloatArray, V: Ends) -> Polynomial:
-    """Return a value, its range intersected with that of its polynomial; undefined unless that is finite."""
+def settled(
+    on: tuple[int, ...], P: FloatArray, s: FloatArray | float, V: FloatArray, rounding: float = _ONCE
+) -> Polynomial:
+    """Return a value, its range intersected with that of its polynomial; undefined unless that is finite.
+
+    Args:
+        on: its variables.
+        P: (m, N) coefficients.
+        s: (N,) radius of the ball without the last rounding of each coefficient.
+        V: (2, N) a range.
+        rounding: the last rounding of each coefficient, in parts of its size; 0 for exact ones.
+    """
     at = places(len(on))
     sizes = np.abs(P)
     size = sizes.sum(axis=0)
@@ -153,91 +198,46 @@ def settled(on: tuple[int, ...], P: FloatArray, s: FloatArray, V: Ends) -> Polyn
     squares, products = P[at.squares], sizes[at.products].sum(axis=0)
     up = (np.maximum(squares, 0.0).sum(axis=0) + products) * grown
     down = (products - np.minimum(squares, 0.0).sum(axis=0)) * grown
-    s = s * grown
-    low, high = ends.out(P[0] - (rad + down + s) * grown, P[0] + (rad + up + s) * grown)
+    s = (s + rounding * size) * grown
+    reach = rad + s
+    low, high = P[0] - (reach + down) * grown, P[0] + (reach + up) * grown
     undefined = 0.0 * (s + size)
-    V = np.fmax(V[0], low) + undefined, np.fmin(V[1], high) + undefined
+    V = np.array([np.fmax(V[0], np.nextafter(low, -np.inf)), np.fmin(V[1], np.nextafter(high, np.inf))]) + undefined
     return Polynomial(on, P, s + undefined, V, rad, np.maximum(up, down), size)
 
 
 def variable(i: int, lower: FloatArray, upper: FloatArray) -> Polynomial:
     """Return variable number i, over boxes with these ends (N,) of it."""
     centre, radius = middles(lower, upper)
-    P = np.zeros((places(1).total, lower.size))
-    P[0], P[1] = centre, radius
     none = np.zeros(lower.size)
-    return Polynomial((i,), P, none, (lower, upper), radius, none, np.abs(centre) + radius)
+    P = np.array([centre, radius, none])
+    return Polynomial((i,), P, none, np.array([lower, upper]), radius, none, np.abs(centre) + radius)
 
 
 def constant(value: float) -> Polynomial:
     """Return a constant."""
-    flat, none = np.array([value]), np.zeros(1)
-    return Polynomial(
-        (), flat[:, None], none if np.isfinite(value) else flat * np.nan, (flat, flat), none, none, np.abs(flat)
-    )
+    return settled((), np.array([[value]]), 0.0, np.array([[value], [value]]), 0.0)
 
 
-def number_of(u: Polynomial) -> float | None:
-    """Return the number that a constant is; None for what is not known to be one."""
-    return float(u.V[0][0]) if not u.on and u.V[0].size == 1 and u.V[0][0] == u.V[1][0] else None
-
-
-def add(u: Polynomial, v: Polynomial) -> Polynomial:
-    """Return u + v."""
-    for one, other in ((u, v), (v, u)):
-        number = number_of(one)
-        if number is not None:
-            return shift(other, number)
-    on, P, R = _together(u, v)
-    return settled(on, P + R, u.s + v.s + _ONCE * (u.size + v.size), ends.add(u.V, v.V))
-
-
-def sub(u: Polynomial, v: Polynomial) -> Polynomial:
-    """Return u - v."""
-    by = number_of(v)
-    if by is not None:
-        return shift(u, -by)
-    on, P, R = _together(u, v)
-    return settled(on, P - R, u.s + v.s + _ONCE * (u.size + v.size), ends.sub(u.V, v.V))
-
-
-def scale(u: Polynomial, by: float) -> Polynomial:
+def _multiple(u: Polynomial, by: float) -> Polynomial:
     """Return a multiple of u."""
+    V = by * (u.V if by > 0 else u.V[::-1])
     if abs(by) == 1:
-        V = u.V if by > 0 else (-u.V[1], -u.V[0])
         return Polynomial(u.on, by * u.P, u.s, V, u.rad, u.curved, u.size)
-    slack, factor = places(len(u.on)).slack, np.array([by])
-    size = abs(by) * (1 + slack)
-    s = size * u.s + (_ONCE * (size * u.size) + _TINY)
-    V = ends.mul(u.V, (factor, factor))
-    return Polynomial(
-        u.on, u.P * by, s + 0.0 * size, V, size * u.rad + _TINY, size * u.curved + _TINY, size * u.size + _TINY
-    )
+    factor = abs(by) * (1 + places(len(u.on)).slack)
+    rad, curved, size = (factor * each + _TINY for each in (u.rad, u.curved, u.size))
+    return Polynomial(u.on, by * u.P, factor * u.s + _ONCE * size + _TINY, _out(V), rad, curved, size)
 
 
-def shift(u: Polynomial, by: float) -> Polynomial:
-    """Return u plus a number."""
-    P, number = u.P.copy(), np.array([by])
-    P[0] += by
-    s = u.s * (1 + _ONCE) + _ONCE * np.abs(P[0])
-    # Taken from u.size, a large constant would leave its rounding, in which small coefficients are lost.
-    size = np.abs(P).sum(axis=0)
-    return Polynomial(u.on, P, s, ends.add(u.V, (number, number)), u.rad, u.curved, size)
-
-
-def mul(u: Polynomial, v: Polynomial) -> Polynomial:
+def _product(u: Polynomial, v: Polynomial) -> Polynomial:
     """Return u v."""
-    for one, other in ((u, v), (v, u)):
-        number = number_of(one)
-        if number is not None:
-            return scale(other, number)
     on, X, Y = _together(u, v)
     at = places(len(on))
     P = X[0] * Y
     P[1:] += Y[0] * X[1:]
     _add_product(P, X[at.linear], Y[at.linear], at)
-    rest = _size_of_rest(u, v) + _PRODUCT * (u.size * v.size) + _TINY
-    return settled(on, P, u.size * v.s + v.size * u.s + u.s * v.s + rest, ends.mul(u.V, v.V))
+    rest = u.rad * v.curved + v.rad * u.curved + u.curved * v.curved + _PRODUCT * (u.size * v.size) + _TINY
+    return settled(on, P, u.size * v.s + v.size * u.s + u.s * v.s + rest, _ends_of_product(u.V, v.V))
 
 
 def square(u: Polynomial) -> Polynomial:
@@ -247,21 +247,17 @@ def square(u: Polynomial) -> Polynomial:
     P[0] *= 0.5
     _add_square(P, u.P[at.linear], at, 1.0)
     rest = (2 * u.rad + u.curved) * u.curved + _PRODUCT * (u.size * u.size) + _TINY
-    found = settled(u.on, P, (2 * u.size + u.s) * u.s + rest, ends.square(u.V))
-    return replace(found, root=u)
+    one, other = u.V * u.V
+    V = _out(np.array([np.minimum(one, other), np.maximum(one, other)]))
+    V[0] = np.where((u.V[0] <= 0) & (u.V[1] >= 0), 0.0, np.maximum(V[0], 0.0))
+    return replace(settled(u.on, P, (2 * u.size + u.s) * u.s + rest, V), root=u)
 
 
-def div(u: Polynomial, v: Polynomial) -> Polynomial:
+def _quotient(u: Polynomial, v: Polynomial) -> Polynomial:
     """Return ``u / v = P + (u - P v) / v``, P the quotient's polynomial: ``u - P v`` has no terms below the third.
 
     The ball of P v, and what rounding leaves of those below, are divided by the smallest size of v.
     """
-    number = number_of(v)
-    if number is not None and abs(np.frexp(number)[0]) == 0.5:
-        # A power of 2 has an exact inverse.
-        return scale(u, 1 / number)
-    if u.root is not None and number is None:
-        return _squared_quotient(u.root, v, u.V)
     on, X, Y = _together(u, v)
     at = places(len(on))
     inverse = 1 / Y[0]
@@ -273,14 +269,13 @@ def div(u: Polynomial, v: Polynomial) -> Polynomial:
     rad, curved = parts[at.linear].sum(axis=0), parts[at.squares.start :].sum(axis=0)
     size = np.abs(ratio) + rad + curved
     near = np.maximum(v.V[0], -v.V[1])
-    near = np.where(near > 0, near, np.nan)
     rest = rad * v.curved + curved * (v.rad + v.curved) + u.s + size * v.s
     rest = rest + (_QUOTIENT * (u.size + size * v.size) + _TINY * (1 + v.size))
-    return settled(on, P, rest / near, ends.mul(u.V, ends.inverse(v.V)))
+    return settled(on, P, rest / np.where(near > 0, near, np.nan), _ends_of_product(u.V, _ends_of_inverse(v.V)))
 
 
-def _squared_quotient(N: Polynomial, D: Polynomial, square: Ends) -> Polynomial:
-    """Return ``N^2 / D``, by the identity of this module's docstring, with the range of ``N^2``.
+def _squared_quotient(N: Polynomial, D: Polynomial, square: FloatArray) -> Polynomial:
+    """Return ``N^2 / D``, by the identity of this module's docstring, with the range (2, N) of ``N^2``.
 
     With a the linear part of E and ``|E - a.e| <= rest``, ``E^2`` is ``(a.e)^2`` to ``rest (2 sum |a_i| + rest)``.
     """
@@ -292,20 +287,20 @@ def _squared_quotient(N: Polynomial, D: Polynomial, square: Ends) -> Polynomial:
     error = N.s + size * D.s + _PRODUCT * (N.size + size * D.size) + _TINY
     a, parts = E[at.linear], np.abs(E)
     reach, rest = parts[at.linear].sum(axis=0), parts[at.squares.start :].sum(axis=0) + parts[0] + error
-    inverse = ends.inverse(D.V)
+    inverse = _ends_of_inverse(D.V)
     middle, half = 0.5 * (inverse[0] + inverse[1]), 0.5 * (inverse[1] - inverse[0])
-    far = np.maximum(-inverse[0], inverse[1])
+    far = np.abs(inverse).max(axis=0)
     P = rho * (X + E)
     _add_square(P, a, at, middle)
     # Multiplied in this order, no small factor is lost beside a large one.
     s = reach * (reach * (half + _QUOTIENT * far)) + rest * ((2 * reach + rest) * far)
     s = s + size * (N.s + error + _QUOTIENT * (2 * N.size + size * D.size)) + _TINY * (1 + far + reach + rest)
-    return settled(on, P, s, ends.mul(square, inverse))
+    return settled(on, P, s, _ends_of_product(square, inverse))
 
 
 def _taylor(
     u: Polynomial,
-    V: Ends,
+    V: FloatArray,
     terms: tuple[FloatArray, FloatArray, FloatArray],
     third: FloatArray | float,
     error: FloatArray | float,
@@ -314,7 +309,7 @@ def _taylor(
 
     Args:
         u: the value.
-        V: range of ``f(u)``.
+        V: (2, N) range of ``f(u)``.
         terms: ``f(c)``, ``f'(c)`` and ``curve``, half of ``f''(c)``, (N,) each.
         third: bound of the rest in parts of ``|Y|^3``.
         error: error of the three terms beyond that of arithmetic.
@@ -340,7 +335,7 @@ def sqrt(u: Polynomial) -> Polynomial:
 
     ``S = sqrt(c + Y) = r + Y / 2r - Y^2 / 8r^3 + Y^3 (S + 3r) / (8 r^3 (S + r)^3)`` with ``r = sqrt(c)``.
     """
-    V, root = ends.sqrt(u.V), np.sqrt(u.P[0])
+    V, root = np.maximum(_out(np.sqrt(u.V)), 0.0), np.sqrt(u.P[0])
     slope = 0.5 / root
     curve = -0.25 * slope / u.P[0]
     third = (V[0] + 3 * root) / (V[0] + root) ** 3 * -curve * (1 + 1e-13)
@@ -350,20 +345,20 @@ def sqrt(u: Polynomial) -> Polynomial:
 def sin(u: Polynomial) -> Polynomial:
     """Return the sine of u."""
     sine, cosine = np.sin(u.P[0]), np.cos(u.P[0])
-    return _taylor(u, ends.wave(u.V, np.sin), (sine, cosine, -0.5 * sine), 1 / 6 + 1e-15, ends.LIBRARY)
+    return _taylor(u, _ends_of_wave(u.V, np.sin), (sine, cosine, -0.5 * sine), 1 / 6 + 1e-15, _LIBRARY)
 
 
 def cos(u: Polynomial) -> Polynomial:
     """Return the cosine of u."""
     sine, cosine = np.sin(u.P[0]), np.cos(u.P[0])
-    return _taylor(u, ends.wave(u.V, np.cos), (cosine, -sine, -0.5 * cosine), 1 / 6 + 1e-15, ends.LIBRARY)
+    return _taylor(u, _ends_of_wave(u.V, np.cos), (cosine, -sine, -0.5 * cosine), 1 / 6 + 1e-15, _LIBRARY)
 
 
 def exp(u: Polynomial) -> Polynomial:
     """Return the exponential of u."""
-    V, value = ends.exp(u.V), np.exp(u.P[0])
+    V, value = _near(np.exp(u.V)), np.exp(u.P[0])
     third = np.maximum(V[1], value) * (1 / 6 + 1e-13)
-    return _taylor(u, V, (value, value, 0.5 * value), third, 2 * ends.LIBRARY * value)
+    return _taylor(u, V, (value, value, 0.5 * value), third, 2 * _LIBRARY * value)
 
 
 def log(u: Polynomial) -> Polynomial:
@@ -371,15 +366,15 @@ def log(u: Polynomial) -> Polynomial:
     c = u.P[0]
     low = np.minimum(np.where(u.V[0] > 0, u.V[0], np.nan), c)
     value, slope = np.log(c), 1 / c
-    third, error = (1 / 3 + 1e-13) / low**3, ends.LIBRARY * (1 + np.abs(value))
-    return _taylor(u, ends.log(u.V), (value, slope, -0.5 * slope * slope), third, error)
+    third, error = (1 / 3 + 1e-13) / low**3, _LIBRARY * (1 + np.abs(value))
+    return _taylor(u, _near(np.log(u.V), 1.0), (value, slope, -0.5 * slope * slope), third, error)
 
 
 def atan(u: Polynomial) -> Polynomial:
     """Return the arc tangent; its third derivative is at most 2 in size."""
     value, slope = np.arctan(u.P[0]), 1 / (1 + u.P[0] * u.P[0])
     terms = value, slope, -u.P[0] * slope * slope
-    return _taylor(u, ends.atan(u.V), terms, 1 / 3 + 1e-15, ends.LIBRARY)
+    return _taylor(u, _near(np.arctan(u.V)), terms, 1 / 3 + 1e-15, _LIBRARY)
 
 
 def ramp(u: Polynomial) -> Polynomial:
@@ -390,21 +385,15 @@ def ramp(u: Polynomial) -> Polynomial:
     half = np.where((low < 0) & (high > 0), 0.5 * np.maximum(-part * low, (1 - part) * high), 0.0)
     P = part * u.P
     P[0] += half
-    s = part * u.s + half + (2 * _ONCE * (u.size + half) + _TINY)
-    return settled(u.on, P, s, (np.maximum(low, 0.0), np.maximum(high, 0.0)))
+    return settled(u.on, P, part * u.s + half + (_ONCE * (u.size + half) + _TINY), np.maximum(u.V, 0.0))
 
 
 def step(u: Polynomial) -> Polynomial:
     """Return 1 where u is not negative, else 0."""
-    least, most = np.where(u.V[0] > 0, 1.0, 0.0), np.where(u.V[1] < 0, 0.0, 1.0)
+    V = np.array([u.V[0] > 0, ~(u.V[1] < 0)], dtype=float)
     P = np.zeros_like(u.P)
-    P[0] = 0.5 * (least + most)
-    return settled(u.on, P, 0.5 * (most - least) + 0.0 * u.s, (least, most))
-
-
-def _size_of_rest(x: Polynomial, y: Polynomial) -> FloatArray:
-    """Return a bound (N,) of the terms of third and fourth order of a product of two polynomials."""
-    return x.rad * y.curved + y.rad * x.curved + x.curved * y.curved
+    P[0] = 0.5 * (V[0] + V[1])
+    return settled(u.on, P, 0.5 * (V[1] - V[0]) + 0.0 * u.s, V)
 
 
 def _together(u: Polynomial, v: Polynomial) -> tuple[tuple[int, ...], FloatArray, FloatArray]:
@@ -426,3 +415,35 @@ def _add_square(P: FloatArray, a: FloatArray, at: Places, by: FloatArray | float
     scaled = a * by
     P[at.squares] += scaled * a
     P[at.products] += (2 * scaled)[at.first] * a[at.second]
+
+
+def _out(V: FloatArray) -> FloatArray:
+    """Return ends (2, N) moved outwards by one number."""
+    return np.nextafter(V, _ENDS)
+
+
+def _near(V: FloatArray, least: float = 1e-280) -> FloatArray:
+    """Return ends (2, N) from a library, moved outwards by its error, in parts of their sizes and of a least one."""
+    return V + _SIDES * (_LIBRARY * (np.abs(V) + least))
+
+
+def _ends_of_product(U: FloatArray, V: FloatArray) -> FloatArray:
+    """Return the ends of the product of two ranges."""
+    one, other = U[0] * V, U[1] * V
+    least, most = np.minimum(one, other), np.maximum(one, other)
+    return _out(np.array([np.minimum(*least), np.maximum(*most)]))
+
+
+def _ends_of_inverse(V: FloatArray) -> FloatArray:
+    """Return the ends of the inverse of a range; NaN for one with 0 in it."""
+    return _out(np.where((V[0] > 0) | (V[1] < 0), 1 / V[::-1], np.nan))
+
+
+def _ends_of_wave(V: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return the range of sine or cosine, by the Lipschitz constant of 1 about the middle and the second derivative."""
+    middle = 0.5 * (V[0] + V[1])
+    radius = np.nextafter(np.maximum(V[1] - middle, middle - V[0]), np.inf)
+    value = function(middle)
+    steep = np.sqrt(np.maximum(1 - value * value, 0.0)) + 1e-7
+    spread = np.minimum(radius, steep * radius + 0.5 * radius * radius) * (1 + 1e-12) + 4 * _LIBRARY
+    return np.asarray(np.clip(value + _SIDES * spread, -1.0, 1.0))

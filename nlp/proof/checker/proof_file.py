@@ -8,14 +8,13 @@ A proof of a program's optimum has one claim. A claim is proved by one of
 
     program     a tree of :mod:`.tree` for a program, whose value is at most the bound wherever it is feasible
     regular     a tree of boxes of poses, each regular or outside of the workspace
-    singular    the opposite: two poses at which the determinant of the rows has opposite signs
+    singular    the opposite: two poses, or a pose of each of two machines, with determinants of opposite signs
     boxes       a tree of boxes on each of which a number is not below (above) its bound
     lengths     the bounds of the lengths of a leg, from which a limit on its stroke follows
 
 and, where it is about every machine within a tolerance on joint centres, also by
 
     one machine         two directions, and two lemmas: lengths of a leg of one machine at two poses
-    singular machine    the opposite: a pose, and a machine at which the determinant has another sign there
 
 Lemmas are claims of their own that others rest on: lengths of ``one machine``, each proved by a tree for a program, and
 
@@ -38,7 +37,7 @@ from ...errors import InputError
 from ...system.strictjson import json_tree, object_of
 
 _FORMAT = "screwsynth-proof"
-_VERSION = 5
+_VERSION = 6
 #: Formats of earlier versions.
 _EARLIER = ("screwsynth-workspace-proof",)
 #: Largest tree in bytes: the proofs of docs/certificate.md have a few million.
@@ -80,8 +79,9 @@ class ProofClaim:
             feasible point.
         graph: fingerprint of the program; empty for other reasons.
         tree: nodes in bytes; empty for a claim without a tree.
-        sides: two poses (6,) with determinants of opposite signs; two directions (3,) of a leg, in the world frame and
-            in the platform frame; a pose (6,) and joint centres (12, 3); empty for other reasons.
+        sides: two poses (6,) with determinants of opposite signs, after each those of a machine's m joint centres'
+            errors (3 m,) where these are not 0; two directions (3,) of a leg, in the world frame and in the platform
+            frame; empty for other reasons.
     """
 
     name: str
@@ -218,9 +218,7 @@ class _ClaimTable:
 
     name: str
     sense: str
-    reason: Literal[
-        "program", "regular", "singular", "boxes", "lengths", "one machine", "singular machine", "second order"
-    ]
+    reason: Literal["program", "regular", "singular", "boxes", "lengths", "one machine", "second order"]
     bound: float | None
     graph: str
     sides: tuple[tuple[float, ...], ...]

@@ -35,7 +35,7 @@ from __future__ import annotations
 
 import enum
 import struct
-from collections.abc import Callable, Set
+from collections.abc import Iterator, Set
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -44,6 +44,8 @@ from ..statement.standard_form import StandardForm
 from .proof_file import ProofError
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ....models import FloatArray
 
 _VALUE = struct.Struct("<d")
@@ -69,10 +71,10 @@ class Node(enum.IntEnum):
 #: Kinds whose node has the faces of a box.
 FACES = (Node.FACE_UPPER, Node.FACE_LOWER)
 
-#: Ends (n,) of a box.
+#: Ends (n,) of a box, or (n, L) of several.
 Box = tuple["FloatArray", "FloatArray"]
-#: Callback with a leaf's (or face's) kind, variable (-1 for a leaf), and the ends (n,) of its box.
-Leaf = Callable[[int, int, "FloatArray", "FloatArray"], None]
+#: Kind of a leaf or face, its variable (-1 for a leaf), and the ends (n,) of its box.
+Leaf = tuple[int, int, "FloatArray", "FloatArray"]
 
 
 def node_bytes(kind: Node, *indices: int, value: float | None = None) -> bytes:
@@ -134,14 +136,14 @@ class TreeReader:
         if self.at != len(self._tree):
             raise ProofError("the tree goes on after every box is closed")
 
-    def walk(self, lower: FloatArray, upper: FloatArray, leaf: Leaf, inner: Set[Node]) -> None:
-        """Read the nodes of the tree of a box with ends (n,).
+    def walk(self, lower: FloatArray, upper: FloatArray, inner: Set[Node]) -> Iterator[Leaf]:
+        """Read the nodes of the tree of a box with ends (n,), and yield its leaves and faces.
 
         Args:
             lower: lower ends.
             upper: upper ends.
-            leaf: reads the rest of a leaf, and keeps it; refuses kinds that it does not know.
-            inner: kinds of nodes with children that the tree may have.
+            inner: kinds of nodes with children that the tree may have; others are leaves, of which the bytes after the
+                first are to be read before the next one is asked for.
 
         Raises:
             ProofError: the bytes are no such tree.
@@ -151,7 +153,7 @@ class TreeReader:
             low, high = waiting.pop()
             (kind,) = self.read(1)
             if kind not in inner:
-                leaf(kind, -1, low, high)
+                yield kind, -1, low, high
                 continue
             i = self.index(range(len(low)), "variable")
             if kind == Node.HALF:
@@ -162,36 +164,33 @@ class TreeReader:
                     raise ProofError(f"the tree cuts a box at {value:.6g}, which is outside of it")
                 waiting += halves(low, high, i, value)[::-1]
             elif kind in FACES:
-                leaf(kind, i, low, high)
+                yield kind, i, low, high
                 end = high[i] if kind == Node.FACE_UPPER else low[i]
                 waiting.append((with_end(low, i, end), with_end(high, i, end)))
             else:
-                waiting += self._cut(kind, i, (low, high), leaf)
-
-    def _cut(self, kind: int, i: int, box: Box, leaf: Leaf) -> list[Box]:
-        """Read a cut: one part is a leaf, and the other, if it is not empty, is returned."""
-        value = self.number()
-        if not np.isfinite(value):
-            raise ProofError("the tree cuts at a number that is not finite")
-        (reason,) = self.read(1)
-        below, above = halves(*box, i, min(max(value, box[0][i]), box[1][i]))
-        if kind == Node.BELOW:
-            leaf(reason, -1, *below)
-            return [above] if value <= box[1][i] else []
-        leaf(reason, -1, *above)
-        return [below] if value >= box[0][i] else []
+                value = self.number()
+                if not np.isfinite(value):
+                    raise ProofError("the tree cuts at a number that is not finite")
+                (reason,) = self.read(1)
+                parts = halves(low, high, i, min(max(value, low[i]), high[i]))
+                closed, rest = parts if kind == Node.BELOW else parts[::-1]
+                yield reason, -1, *closed
+                # Nothing is left where the whole box is on the closed side.
+                waiting += [rest] if (value <= high[i] if kind == Node.BELOW else value >= low[i]) else []
 
 
-def read_claims(reader: TreeReader, form: StandardForm) -> dict[tuple[Node, int], list[Box]]:
-    """Read the claims of a tree: their boxes, which cover the form's, by kind of node and condition or variable (or 0).
+def read_claims(reader: TreeReader, form: StandardForm) -> dict[tuple[Node, int], Box]:
+    """Read the claims of a tree, by kind of node and condition or variable (or 0): ends (n, L) of their boxes.
+
+    The boxes cover the form's.
 
     Raises:
         ProofError: the bytes are no tree.
     """
     claims: dict[tuple[Node, int], list[Box]] = {}
     conditions = range(len(form.functions), len(form.functions) + len(form.conditions))
-
-    def leaf(kind: int, i: int, lower: FloatArray, upper: FloatArray) -> None:
+    inner = frozenset({Node.HALF, Node.ABOVE, Node.BELOW, *FACES})
+    for kind, i, lower, upper in reader.walk(form.lower, form.upper, inner):
         index = max(i, 0)
         if kind == Node.INFEASIBLE:
             index = reader.index(conditions, "row")
@@ -200,19 +199,19 @@ def read_claims(reader: TreeReader, form: StandardForm) -> dict[tuple[Node, int]
         elif kind not in (Node.BOUNDED, *FACES) or (kind in FACES) != (i >= 0):
             raise ProofError(f"the tree holds {kind} where a reason must stand")
         claims.setdefault((Node(kind), index), []).append((lower, upper))
+    return {
+        key: (np.array([low for low, _ in some]).T, np.array([up for _, up in some]).T) for key, some in claims.items()
+    }
 
-    reader.walk(form.lower, form.upper, leaf, frozenset({Node.HALF, Node.ABOVE, Node.BELOW, *FACES}))
-    return claims
 
-
-class SharedLeaf(NamedTuple):
-    """A leaf of a tree of shared variables.
+class SharedLeaves(NamedTuple):
+    """L leaves of a tree of m shared variables, with K limbs.
 
     Attributes:
-        lower, upper: (m,) ends of its box.
-        bounds: (K,) of the limbs; all infinite for an infeasible leaf, which claims nothing of any limb.
-        g: (K, m) and
-        Q: (K, m, m) symmetric, of their tilts; 0 for infinite bounds.
+        lower, upper: (m, L) ends of their boxes.
+        bounds: (K, L) of the limbs; all infinite for an infeasible leaf, which claims nothing of any limb.
+        g: (K, m, L) and
+        Q: (K, m, m, L) symmetric, of their tilts; 0 for infinite bounds.
     """
 
     lower: FloatArray
@@ -221,9 +220,13 @@ class SharedLeaf(NamedTuple):
     g: FloatArray
     Q: FloatArray
 
+    def select(self, which: NDArray[np.bool_]) -> SharedLeaves:
+        """Return some of the leaves."""
+        return SharedLeaves(*(each[..., which] for each in self))
+
 
 def leaf_bytes(bounds: FloatArray, g: FloatArray, Q: FloatArray) -> bytes:
-    """Return the node of a bounded leaf, from the arrays of :class:`SharedLeaf`."""
+    """Return the node of a bounded leaf with bounds (K,) and tilts (K, m), (K, m, m)."""
     rows, columns = np.triu_indices(g.shape[1])
     parts = [bytes([Node.BOUNDED])]
     for k, bound in enumerate(bounds.tolist()):
@@ -233,38 +236,31 @@ def leaf_bytes(bounds: FloatArray, g: FloatArray, Q: FloatArray) -> bytes:
     return b"".join(parts)
 
 
-def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -> list[SharedLeaf]:
+def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -> SharedLeaves:
     """Return the leaves of a tree of shared variables, whose boxes cover that with ends (m,).
 
     Raises:
-        ProofError: the bytes are no such tree.
+        ProofError: the bytes are no such tree, or a number is NaN or infinite where it must not be.
     """
-    reader = TreeReader(tree, 1)
-    leaves: list[SharedLeaf] = []
-
-    def leaf(kind: int, _: int, low: FloatArray, high: FloatArray) -> None:
-        if kind == Node.INFEASIBLE:
-            m = len(low)
-            leaves.append(SharedLeaf(low, high, np.full(limbs, np.inf), np.zeros((limbs, m)), np.zeros((limbs, m, m))))
-        elif kind == Node.BOUNDED:
-            leaves.append(_read_leaf(reader, limbs, low, high))
-        else:
+    reader, leaves = TreeReader(tree, 1), []
+    for kind, _, low, high in reader.walk(lower, upper, frozenset({Node.HALF})):
+        if kind not in (Node.INFEASIBLE, Node.BOUNDED):
             raise ProofError(f"the tree holds {kind} where a node of shared variables must stand")
-
-    reader.walk(lower, upper, leaf, frozenset({Node.HALF}))
+        leaves.append((low, high, *_numbers_of_leaf(reader if kind == Node.BOUNDED else None, limbs, len(low))))
     reader.finish()
-    return leaves
+    return SharedLeaves(*(np.stack(each, axis=-1) for each in zip(*leaves, strict=True)))
 
 
-def _read_leaf(reader: TreeReader, K: int, lower: FloatArray, upper: FloatArray) -> SharedLeaf:
-    """Return the bounded leaf whose numbers come next.
+def _numbers_of_leaf(reader: TreeReader | None, K: int, m: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return bounds and tilts of a bounded leaf, which come next, or those of an infeasible one.
 
     Raises:
         ProofError: a number is NaN or infinite where it must not be.
     """
-    m = len(lower)
     rows, columns = np.triu_indices(m)
-    bounds, g, Q = np.zeros(K), np.zeros((K, m)), np.zeros((K, m, m))
+    bounds, g, Q = np.full(K, np.inf), np.zeros((K, m)), np.zeros((K, m, m))
+    if reader is None:
+        return bounds, g, Q
     for k in range(K):
         bounds[k] = reader.number()
         if np.isfinite(bounds[k]):
@@ -274,4 +270,4 @@ def _read_leaf(reader: TreeReader, K: int, lower: FloatArray, upper: FloatArray)
     known = np.isinf(bounds) if is_empty else np.isfinite(bounds)
     if not (known.all() and np.isfinite(g).all() and np.isfinite(Q).all()):
         raise ProofError("a leaf of the tree has a bound or a tilt that is no number")
-    return SharedLeaf(lower, upper, bounds, g, Q)
+    return bounds, g, Q

@@ -6,13 +6,9 @@ On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, each value ``v`` has two enc
 
 where ``c`` is its value at the centre, ``a`` its scaled gradient there, ``[p, q]`` holds 0 and all terms of second
 order, and ``s`` bounds the rounding errors. The terms of second order shrink with ``t^2``, so that the integral of a
-gradient's form along a ray has a third of their width. These are Taylor models of first order (M. Berz and K. Makino,
-*Verified integration of ODEs and flows using differential algebraic methods on high-order Taylor models*, Reliable
-Computing 4 (1998)) with the products bounded as in affine arithmetic (J. Stolfi and L. H. de Figueiredo, 1997; F.
-Messine, *Extensions of affine arithmetic*, 2002). See ``docs/certificate.md``.
-
-A value that may be undefined somewhere in the box, or that overflows, is *poisoned*: its ``s`` and its ends are
-infinite, and so are those of every value computed from it.
+gradient's form along a ray has a third of their width. A value that may be undefined somewhere in the box, or that
+overflows, is *poisoned*: its ``s`` and its ends are infinite, and so are those of every value computed from it.
+``docs/certificate.md`` has the rules and their sources.
 
 With ``h = r e``, ``|e_i| <= 1``, the forms of a gradient, ``grad L in G + A t e + t^2 [p, q]``, integrated along the
 ray from the centre, give
@@ -20,10 +16,7 @@ ray from the centre, give
     L(c + h) in L(c) + sum_i b_i e_i + 1/2 sum_ij H_ij e_i e_j +- sum_i w_i |e_i|,
     b_i = r_i (G_i + (p_i + q_i) / 6),   H = sym(r_i A_ij),   w_i = r_i (q_i - p_i) / 6,
 
-a quadratic model with a remainder of third order, without second derivatives. With ``mu`` on the simplex and
-``lambda_k >= 0`` on inequalities, ``L = sum_j mu_j phi_j - sum_k lambda_k h_k`` is at least ``min phi`` wherever the
-conditions hold: its bound holds there for any multipliers. The multipliers used make its gradient at the centre small.
-``docs/certificate.md`` has the derivation.
+a quadratic model with a remainder of third order, without second derivatives.
 """
 
 from __future__ import annotations
@@ -122,29 +115,10 @@ class Forms(NamedTuple):
         """Return the forms of some of the expressions."""
         return Forms(self.c[:, which], self.a[:, which], self.r[:, which])
 
-
-class SecondForms(NamedTuple):
-    """R expressions over B boxes, with ``Q_ij e_i e_j`` for each pair i <= j, row by row.
-
-    Attributes:
-        c: (B, R) values at the centres, and middles of the terms of higher order.
-        a: (B, R, n) linear parts.
-        Q: (B, R, n (n + 1) / 2) terms of second order.
-        r: (B, R) bounds of the rest; infinite where a value may be undefined.
-    """
-
-    c: FloatArray
-    a: FloatArray
-    Q: FloatArray
-    r: FloatArray
-
-    def as_terms(self) -> Forms:
-        """Return forms whose linear parts go on with the products of two coordinates, a square being 1/2 +- 1/2."""
-        n = self.a.shape[2]
-        squares = np.cumsum([0, *range(n, 1, -1)])
-        Q = self.Q.copy()
-        Q[:, :, squares] *= 0.5
-        return Forms(self.c + Q[:, :, squares].sum(axis=2), np.concatenate([self.a, Q], axis=2), self.r)
+    @property
+    def sizes(self) -> FloatArray:
+        """Bounds (B, R) of the sizes of the expressions."""
+        return np.asarray(np.abs(self.c) + np.abs(self.a).sum(axis=2) + self.r)
 
 
 class Encloser:
@@ -167,11 +141,10 @@ class Encloser:
         """Return the forms over boxes with ends (n, B)."""
         return forms_of(enclose(self.tape, lower, upper, self.module))
 
-    def second(self, lower: FloatArray, upper: FloatArray) -> SecondForms:
-        """Return the forms of second order over boxes with ends (n, B)."""
-        n = len(lower)
-        c, terms, r = forms_of(enclose(self.tape, lower, upper, self.module, 2))
-        return SecondForms(c, terms[:, :, :n], terms[:, :, n:], r)
+    def second(self, lower: FloatArray, upper: FloatArray) -> Forms:
+        """Return the forms of second order over boxes with ends (n, B): ``e_i e_j``, i <= j, follow row by row."""
+        found = forms_of(enclose(self.tape, lower, upper, self.module, 2))
+        return halve_squares(found, len(lower))
 
 
 def forms_of(found: Enclosures) -> Forms:
@@ -179,6 +152,14 @@ def forms_of(found: Enclosures) -> Forms:
     middle, half = 0.5 * (found.p + found.q), 0.5 * (found.q - found.p)
     rest = half + found.s + 4 * ULP * (half + np.abs(found.c) + np.abs(middle))
     return Forms((found.c + middle).T, found.a.transpose(2, 0, 1), rest.T)
+
+
+def halve_squares(forms: Forms, n: int) -> Forms:
+    """Return forms of second order in n coordinates with 1/2 + 1/2 e for each ``e_i^2``: e in [-1, 1]."""
+    squares = n + np.cumsum([0, *range(n, 1, -1)])
+    a = forms.a.copy()
+    a[:, :, squares] *= 0.5
+    return Forms(forms.c + a[:, :, squares].sum(axis=2), a, forms.r)
 
 
 class Ends(NamedTuple):
@@ -212,14 +193,14 @@ class QuadraticModel:
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
         bound = np.empty(self.middle.size)
-        kernel().models(len(self.b), self._arrays(), bound.size, bound)
+        kernel().models(len(self.b), (*self._arrays(), bound, None, None, None), bound.size)
         return bound
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
         low, high, levels = np.empty(self.b.shape), np.empty(self.b.shape), np.empty(self.middle.size)
         levels[:] = level
-        kernel().models(len(self.b), self._arrays(), levels.size, levels, low, high)
+        kernel().models(len(self.b), (*self._arrays(), None, levels, low, high), levels.size)
         return Ends(low, high)
 
     def _arrays(self) -> tuple[FloatArray, ...]:

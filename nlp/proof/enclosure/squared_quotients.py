@@ -16,14 +16,12 @@ the sum of squares is small; any other one gives a bound that holds too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 from casadi import SX
 
 from ..statement.limb_separation import terms_of
-from ..statement.piecewise_derivatives import without_ties
 
 if TYPE_CHECKING:
     from ..statement.standard_form import StandardForm
@@ -44,47 +42,46 @@ class Quotient(NamedTuple):
     function: int
 
 
-@dataclass(frozen=True, eq=False)
-class SearchRows:
-    """A form's expressions as a search encloses them.
+class Rows(NamedTuple):
+    """Expressions of which squared quotients are taken apart.
 
     Attributes:
-        expressions: (E, 1) functions without their quotients, conditions, then N and D of each quotient.
-        jacobian: (E, n) derivatives, dense.
+        expressions: (E, 1) functions without their quotients, then what goes with them, then N and D of each quotient.
         quotients: the terms that are missing in the functions.
     """
 
     expressions: SX
-    jacobian: SX
     quotients: tuple[Quotient, ...]
 
+    @property
+    def functions(self) -> tuple[int, ...]:
+        """Number of the function of each quotient."""
+        return tuple(each.function for each in self.quotients)
 
-def _taken_apart(form: StandardForm, signs: tuple[int, ...]) -> tuple[list[SX], list[Quotient]]:
-    """Return the functions of a form without their squared quotients of some signs, and these."""
-    rests: list[SX] = []
-    found: list[Quotient] = []
+
+def _taken_apart(form: StandardForm, signs: tuple[int, ...], more: tuple[SX, ...] = ()) -> Rows | None:
+    """Return the functions of a form without their squared quotients of some signs; None without any."""
+    rests, found = [SX(0) for _ in form.functions], list[Quotient]()
     for j, function in enumerate(form.functions):
-        rest = SX(0)
         for term in terms_of(function):
             quotient = as_quotient(term, j)
             if quotient is None or quotient.sign not in signs:
-                rest = rest + term
+                rests[j] = rests[j] + term
             else:
                 found.append(quotient)
-        rests.append(rest)
-    return rests, found
-
-
-def search_rows(form: StandardForm, *, apart: bool) -> SearchRows:
-    """Return the expressions of a form, with the squared quotients of its functions taken apart if so wanted."""
-    rests, found = _taken_apart(form, (1, -1)) if apart else ([], [])
-    if not found:
-        return SearchRows(form.expressions, form.jacobian, ())
-    conditions = [each.expression for each in form.conditions]
     parts = [part for each in found for part in (each.N, each.D)]
-    expressions = ca.densify(ca.vertcat(*rests, *conditions, *parts))
-    jacobian = ca.densify(without_ties(ca.jacobian(expressions, form.x), form.x))
-    return SearchRows(expressions, jacobian, tuple(found))
+    return Rows(ca.densify(ca.vertcat(*rests, *more, *parts)), tuple(found)) if found else None
+
+
+def search_rows(form: StandardForm, *, apart: bool) -> Rows:
+    """Return the expressions of a form, with the squared quotients of its functions taken apart if so wanted."""
+    rows = _taken_apart(form, (1, -1), tuple(each.expression for each in form.conditions)) if apart else None
+    return rows or Rows(form.expressions, ())
+
+
+def tangent_rows(form: StandardForm) -> Rows | None:
+    """Return the functions of a form for tangents, without terms ``-N^2 / D``; None where no function has any."""
+    return _taken_apart(form, (-1,))
 
 
 def as_quotient(term: SX, function: int) -> Quotient | None:
@@ -105,22 +102,3 @@ def as_quotient(term: SX, function: int) -> Quotient | None:
         return None
     N, D = term.dep(0).dep(0), term.dep(1)
     return Quotient(N, D if abs(factor) == 1 else D / abs(factor), 1 if factor > 0 else -1, function)
-
-
-class TangentRows(NamedTuple):
-    """Rows behind the expressions of a form.
-
-    Attributes:
-        expressions: (J + 2 K, 1) functions without their K terms ``-N^2 / D``, then N and D of each.
-        functions: (K,) number of the function of each.
-    """
-
-    expressions: SX
-    functions: tuple[int, ...]
-
-
-def tangent_rows(form: StandardForm) -> TangentRows | None:
-    """Return the rows of a form for tangents; None where no function has squares with a minus sign."""
-    rests, found = _taken_apart(form, (-1,))
-    parts = [part for each in found for part in (each.N, each.D)]
-    return TangentRows(ca.vertcat(*rests, *parts), tuple(each.function for each in found)) if found else None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -81,22 +82,12 @@ class Tape:
         return len(self.op)
 
     @cached_property
-    def head(self) -> tuple[NDArray[np.int32], FloatArray, int, int, int]:
+    def head(self) -> tuple[tuple[NDArray[np.int32], FloatArray], int, int, int]:
         """The tape as the C kernel reads it: code, constants, and numbers of instructions, registers and results."""
         code = np.stack([self.op, self.to, self.a, self.b, self.first, self.last], axis=1).astype(np.int32)
-        return np.ascontiguousarray(code), self.k, len(self), self.registers, self.outputs
+        return (np.ascontiguousarray(code), self.k), len(self), self.registers, self.outputs
 
 
-_SAME = {ca.OP_ADD: Op.ADD, ca.OP_SUB: Op.SUB, ca.OP_MUL: Op.MUL, ca.OP_DIV: Op.DIV}
-_UNARY = {
-    ca.OP_SQ: Op.SQUARE,
-    ca.OP_SQRT: Op.SQRT,
-    ca.OP_SIN: Op.SIN,
-    ca.OP_COS: Op.COS,
-    ca.OP_EXP: Op.EXP,
-    ca.OP_LOG: Op.LOG,
-    ca.OP_ATAN: Op.ATAN,
-}
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
 #: Operations between two looks at whether to stop: about a tenth of a second.
 _LOOK = 2048
@@ -104,73 +95,178 @@ _LOOK = 2048
 _LARGEST_POWER = 64
 
 
+class _Value:
+    """A number in formulas: what an operation gives, or the constant ``k``. An instruction that reads it writes it.
+
+    Attributes:
+        op, a, b, k: the operation.
+        register: where it goes; -1 for any that is free.
+        reach: the variables that it depends on, as bits; -1 until it is written.
+    """
+
+    __slots__ = ("a", "b", "is_constant", "k", "op", "reach", "register")
+
+    def __init__(self, op: Op, a: _Value | None = None, b: _Value | None = None, k: float = 0.0) -> None:
+        self.op, self.a, self.b, self.k = op, a, b, k
+        self.is_constant = op is Op.CONSTANT
+        self.register, self.reach = -1, -1
+
+    def __add__(self, other: _Value) -> _Value:
+        one, two = (other, self) if self.is_constant else (self, other)
+        return _Value(Op.SHIFT, one, k=two.k) if two.is_constant else _Value(Op.ADD, one, two)
+
+    def __sub__(self, other: _Value) -> _Value:
+        return _Value(Op.SHIFT, self, k=-other.k) if other.is_constant else _Value(Op.SUB, self, other)
+
+    def __neg__(self) -> _Value:
+        return _constant(-self.k) if self.is_constant else _Value(Op.SCALE, self, k=-1.0)
+
+    def __mul__(self, other: _Value) -> _Value:
+        one, two = (other, self) if self.is_constant else (self, other)
+        return _Value(Op.SCALE, one, k=two.k) if two.is_constant else _Value(Op.MUL, one, two)
+
+    def __truediv__(self, other: _Value) -> _Value:
+        return _Value(Op.DIV, self, other)
+
+
+def _constant(k: float) -> _Value:
+    return _Value(Op.CONSTANT, k=k)
+
+
+def _twice(a: _Value) -> _Value:
+    return _Value(Op.SCALE, a, k=2.0)
+
+
+def _hypot(a: _Value, b: _Value) -> _Value:
+    return _Value(Op.SQRT, _Value(Op.SQUARE, a) + _Value(Op.SQUARE, b))
+
+
+def _asin(a: _Value) -> _Value:
+    """Return ``atan(a / sqrt(1 - a^2))``, for |a| < 1."""
+    return _Value(Op.ATAN, a / _Value(Op.SQRT, -_Value(Op.SQUARE, a) + _constant(1.0)))
+
+
+def _fmax(a: _Value, b: _Value) -> _Value:
+    """Return ``b + ramp(a - b)``. A constant is b, so that ``fmax(0, x)`` is a ramp of x and nothing else."""
+    a, b = (b, a) if a.is_constant else (a, b)
+    return b + _Value(Op.RAMP, a - b)
+
+
+def _power(a: _Value, b: _Value) -> _Value:
+    """Return a whole power, or half of one, as products, a root and a quotient."""
+    if not b.is_constant:
+        raise UncoveredError("the operation 'pow'")
+    if not ((2 * b.k).is_integer() and 0 < abs(b.k) <= _LARGEST_POWER):
+        raise UncoveredError(f"the power {b.k:g}")
+    base, left = (a, int(abs(b.k))) if b.k.is_integer() else (_Value(Op.SQRT, a), int(abs(2 * b.k)))
+    product = _constant(1.0)
+    while left:
+        if left & 1:
+            product = base if product.is_constant else product * base
+        base, left = _Value(Op.SQUARE, base), left >> 1
+    return _constant(1.0) / product if b.k < 0 else product
+
+
+#: CasADi's operations by those of a tape: identities that are exact for real numbers. No double is pi; pi / 2 is
+#: twice the arc tangent of 1.
+_FORMULAS: dict[int, Callable[[_Value, _Value], _Value]] = {
+    ca.OP_ADD: lambda a, b: a + b,
+    ca.OP_SUB: lambda a, b: a - b,
+    ca.OP_MUL: lambda a, b: a * b,
+    ca.OP_DIV: lambda a, b: a / b,
+    ca.OP_SQ: lambda a, _: _Value(Op.SQUARE, a),
+    ca.OP_SQRT: lambda a, _: _Value(Op.SQRT, a),
+    ca.OP_SIN: lambda a, _: _Value(Op.SIN, a),
+    ca.OP_COS: lambda a, _: _Value(Op.COS, a),
+    ca.OP_EXP: lambda a, _: _Value(Op.EXP, a),
+    ca.OP_LOG: lambda a, _: _Value(Op.LOG, a),
+    ca.OP_ATAN: lambda a, _: _Value(Op.ATAN, a),
+    ca.OP_TWICE: lambda a, _: _twice(a),
+    ca.OP_NEG: lambda a, _: _Value(Op.SCALE, a, k=-1.0),
+    ca.OP_ASSIGN: lambda a, _: _Value(Op.SCALE, a, k=1.0),
+    ca.OP_INV: lambda a, _: _constant(1.0) / a,
+    ca.OP_TAN: lambda a, _: _Value(Op.SIN, a) / _Value(Op.COS, a),
+    ca.OP_HYPOT: _hypot,
+    ca.OP_ASIN: lambda a, _: _asin(a),
+    ca.OP_ACOS: lambda a, _: -_asin(a) + _twice(_Value(Op.ATAN, _constant(1.0))),
+    # Off the negative x-axis.
+    ca.OP_ATAN2: lambda a, b: _twice(_Value(Op.ATAN, a / (_hypot(a, b) + b))),
+    ca.OP_FMAX: _fmax,
+    ca.OP_FMIN: lambda a, b: -_fmax(-a, -b),
+    ca.OP_LE: lambda a, b: _Value(Op.STEP, b - a),
+    ca.OP_FABS: lambda a, _: _twice(_Value(Op.RAMP, a)) - a,
+    # Where it is not 0.
+    ca.OP_SIGN: lambda a, _: _twice(_Value(Op.STEP, a)) + _constant(-1.0),
+    ca.OP_POW: _power,
+    ca.OP_CONSTPOW: _power,
+}
+
+
 class _TapeWriter:
     """A tape under construction.
 
-    It knows which registers hold constants, so that operations with a constant need no register for it. The variables
-    that a register depends on are the bits of a number.
-
     Args:
-        inputs: number of variables.
-        registers: number of registers of the CasADi function.
+        registers: number of registers of the CasADi function; those beyond them are free.
     """
 
-    def __init__(self, inputs: int, registers: int) -> None:
+    def __init__(self, registers: int) -> None:
         self._rows: list[tuple[int, int, int, int, float, int]] = []
-        self._inputs, self._spare = inputs, registers
-        self.constant: dict[int, float] = {}
-        self._written: set[int] = set()
-        self._reach: dict[int, int] = {}
+        self._values: dict[int, _Value] = {}
+        self._free, self._next, self._registers = registers, registers, registers
 
-    def temporary(self) -> int:
-        """Return a new register beyond those of the CasADi function."""
-        self._spare += 1
-        return self._spare - 1
+    def put(self, register: int, value: _Value) -> None:
+        """Set a register of the CasADi function."""
+        if value.reach >= 0:
+            value = _Value(Op.SCALE, value, k=1.0)
+        value.register, self._next = register, self._free
+        if not value.is_constant:
+            self._write(value)
+        self._values[register] = value
 
-    def _read(self, register: int) -> int:
-        """Return the variables that a register depends on, after writing its constant where it holds one."""
-        if register in self.constant and register not in self._written:
-            self._append(Op.CONSTANT, register, 0, 0, self.constant[register], 0)
-            self._written.add(register)
-        return self._reach[register]
+    def put_input(self, register: int, index: int) -> None:
+        """Set a register of the CasADi function to a variable."""
+        value = self._values[register] = _Value(Op.INPUT)
+        value.register, value.reach = register, 1 << index
+        self._rows.append((Op.INPUT, register, index, 0, 0.0, value.reach))
 
-    def set_constant(self, register: int, value: float) -> None:
-        """Set a register to a constant, which is written only when an instruction reads it."""
-        self.constant[register] = value
-        self._written.discard(register)
+    def put_formula(self, register: int, op: int, operands: list[int]) -> None:
+        """Set a register of the CasADi function to the result of an operation on some."""
+        if op not in _FORMULAS:
+            raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
+        self.put(register, _FORMULAS[op](self._values[operands[0]], self._values[operands[-1]]))
 
-    def write(self, op: Op, to: int, a: int, b: int | None = None, k: float = 0.0) -> None:
-        """Append an instruction on registers."""
-        reach = self._read(a)
-        if b is None:
-            b = a
-        else:
-            reach |= self._read(b)
-        self._append(op, to, a, b, k, reach)
+    def output(self, register: int, place: int) -> None:
+        """Make a register of the CasADi function a result."""
+        read, reach = self._read(self._values[register])
+        self._rows.append((Op.OUTPUT, place, read, read, 0.0, reach))
 
-    def write_input(self, to: int, index: int) -> None:
-        """Append the instruction that reads a variable."""
-        self._append(Op.INPUT, to, index, 0, 0.0, 1 << index)
+    def _read(self, value: _Value) -> tuple[int, int]:
+        """Return a value's register and reach, after writing it where it is not there yet."""
+        if value.reach < 0:
+            self._write(value)
+        return value.register, value.reach
 
-    def _append(self, op: Op, to: int, a: int, b: int, k: float, reach: int) -> None:
-        self._rows.append((op, to, a, b, k, reach))
-        if op is not Op.OUTPUT:
-            self._reach[to] = reach
-            if op is not Op.CONSTANT:
-                self.constant.pop(to, None)
+    def _write(self, value: _Value) -> None:
+        """Append the instruction that computes a value, after those of its operands."""
+        a, reach = self._read(value.a) if value.a else (0, 0)
+        b, other = self._read(value.b) if value.b else (a, 0)
+        if value.register < 0:
+            value.register, self._next = self._next, self._next + 1
+            self._registers = max(self._registers, self._next)
+        value.reach = reach | other
+        self._rows.append((value.op, value.register, a, b, value.k, value.reach))
 
-    def finish(self, outputs: int) -> Tape:
+    def finish(self, inputs: int, outputs: int) -> Tape:
         """Return the tape."""
-        *codes, k, reach = zip(*self._rows, strict=True)
-        spans = (
-            [(each & -each).bit_length() - 1 if each else 0 for each in reach],
-            [each.bit_length() for each in reach],
-        )
-        op, to, a, b, first, last = (np.array(each, dtype=np.int32) for each in (*codes, *spans))
+        # Expressions without an entry have no instructions.
+        *codes, k, reach = zip(*self._rows, strict=True) if self._rows else [()] * 6
+        least = [(each & -each).bit_length() - 1 if each else 0 for each in reach]
+        columns = (*codes, least, [each.bit_length() for each in reach])
+        op, to, a, b, first, last = (np.array(each, dtype=np.int32) for each in columns)
         constants = np.array(k, dtype=np.float64)
         for column in (op, to, a, b, constants, first, last):
             column.setflags(write=False)
-        return Tape(op, to, a, b, constants, first, last, self._inputs, outputs, self._spare)
+        return Tape(op, to, a, b, constants, first, last, inputs, outputs, self._registers)
 
 
 def compile_tape(function: ca.Function) -> Tape:
@@ -183,9 +279,8 @@ def compile_tape(function: ca.Function) -> Tape:
     Raises:
         UncoveredError: the function holds an operation without a rule, or a constant that is not finite.
     """
-    writer = _TapeWriter(function.numel_in(0), function.sz_w())
-    sizes = [function.numel_out(i) for i in range(function.n_out())]
-    offset = np.concatenate([[0], np.cumsum(sizes)])
+    writer = _TapeWriter(function.sz_w())
+    offset = np.cumsum([0, *(function.numel_out(i) for i in range(function.n_out()))])
     for index in range(function.n_instructions()):
         if index % _LOOK == 0:
             stop_if_requested()
@@ -195,167 +290,11 @@ def compile_tape(function: ca.Function) -> Tape:
             value = function.instruction_constant(index)
             if not math.isfinite(value):
                 raise UncoveredError(f"the constant {value}")
-            writer.set_constant(target[0], value)
+            writer.put(target[0], _constant(value))
         elif op == ca.OP_INPUT:
-            writer.write_input(target[0], source[1])
+            writer.put_input(target[0], source[1])
         elif op == ca.OP_OUTPUT:
-            writer.write(Op.OUTPUT, int(offset[target[0]]) + target[1], source[0])
+            writer.output(source[0], int(offset[target[0]]) + target[1])
         else:
-            _write_operation(writer, op, target[0], source)
-    return writer.finish(int(offset[-1]))
-
-
-def _write_operation(writer: _TapeWriter, op: int, to: int, source: list[int]) -> None:
-    """Write an operation of CasADi's in the operations of a tape."""
-    a = source[0]
-    b = source[1] if len(source) > 1 else a
-    known = writer.constant
-    if op in _SAME:
-        if op == ca.OP_MUL and (a in known or b in known):
-            a, b = (b, a) if a in known else (a, b)
-            writer.write(Op.SCALE, to, a, k=known[b])
-        elif op == ca.OP_ADD and (a in known or b in known):
-            a, b = (b, a) if a in known else (a, b)
-            writer.write(Op.SHIFT, to, a, k=known[b])
-        elif op == ca.OP_SUB and b in known:
-            writer.write(Op.SHIFT, to, a, k=-known[b])
-        else:
-            writer.write(_SAME[op], to, a, b)
-    elif op in _UNARY:
-        writer.write(_UNARY[op], to, a)
-    elif op in (ca.OP_TWICE, ca.OP_NEG):
-        writer.write(Op.SCALE, to, a, k=2.0 if op == ca.OP_TWICE else -1.0)
-    elif op == ca.OP_ASSIGN:
-        writer.write(Op.SCALE, to, a, k=1.0)
-    else:
-        _write_composition(writer, op, to, a, b)
-
-
-def _write_composition(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
-    """Write an operation as several others, by an identity that is exact for real numbers."""
-    one = writer.temporary()
-    if op in (ca.OP_FMAX, ca.OP_FMIN, ca.OP_LE, ca.OP_FABS, ca.OP_SIGN):
-        _write_kink(writer, op, to, a, b)
-    elif op == ca.OP_INV:
-        writer.set_constant(one, 1.0)
-        writer.write(Op.DIV, to, one, a)
-    elif op == ca.OP_TAN:
-        other = writer.temporary()
-        writer.write(Op.SIN, one, a)
-        writer.write(Op.COS, other, a)
-        writer.write(Op.DIV, to, one, other)
-    elif op == ca.OP_HYPOT:
-        other = writer.temporary()
-        writer.write(Op.SQUARE, one, a)
-        writer.write(Op.SQUARE, other, b)
-        writer.write(Op.ADD, one, one, other)
-        writer.write(Op.SQRT, to, one)
-    elif op in (ca.OP_ASIN, ca.OP_ACOS):
-        # asin y = atan(y / sqrt(1 - y^2)), acos y = pi/2 - asin y, for |y| < 1.
-        writer.write(Op.SQUARE, one, a)
-        writer.write(Op.SCALE, one, one, k=-1.0)
-        writer.write(Op.SHIFT, one, one, k=1.0)
-        writer.write(Op.SQRT, one, one)
-        writer.write(Op.DIV, one, a, one)
-        writer.write(Op.ATAN, to, one)
-        if op == ca.OP_ACOS:
-            writer.write(Op.SCALE, to, to, k=-1.0)
-            _add_half_pi(writer, to)
-    elif op == ca.OP_ATAN2:
-        # atan2(y, x) = 2 atan(y / (sqrt(x^2 + y^2) + x)), off the negative x-axis.
-        other = writer.temporary()
-        writer.write(Op.SQUARE, one, a)
-        writer.write(Op.SQUARE, other, b)
-        writer.write(Op.ADD, one, one, other)
-        writer.write(Op.SQRT, one, one)
-        writer.write(Op.ADD, one, one, b)
-        writer.write(Op.DIV, one, a, one)
-        writer.write(Op.ATAN, one, one)
-        writer.write(Op.SCALE, to, one, k=2.0)
-    elif op in (ca.OP_POW, ca.OP_CONSTPOW) and b in writer.constant:
-        _write_power(writer, to, a, writer.constant[b])
-    else:
-        raise UncoveredError(f"the operation {_NAMES.get(op, str(op))!r}")
-
-
-def _write_kink(writer: _TapeWriter, op: int, to: int, a: int, b: int) -> None:
-    """Write an operation with a kink or a step by a ramp or a step of one number.
-
-    fmax(a, b) = b + ramp(a - b), fmin(a, b) = b - ramp(b - a), (a <= b) = step(b - a), |a| = 2 ramp(a) - a, and the
-    sign of a is 2 step(a) - 1 where it is not 0.
-    """
-    other = writer.temporary()
-    if op == ca.OP_LE:
-        _write_difference(writer, other, b, a)
-        writer.write(Op.STEP, to, other)
-    elif op == ca.OP_SIGN:
-        writer.write(Op.STEP, other, a)
-        writer.write(Op.SCALE, other, other, k=2.0)
-        writer.write(Op.SHIFT, to, other, k=-1.0)
-    elif op == ca.OP_FABS:
-        writer.write(Op.RAMP, other, a)
-        writer.write(Op.SCALE, other, other, k=2.0)
-        writer.write(Op.SUB, to, other, a)
-    else:
-        # The constant is the one that is added, so that fmax(0, x) is a ramp of x and nothing else.
-        if a in writer.constant:
-            a, b = b, a
-        _write_difference(writer, other, *((a, b) if op == ca.OP_FMAX else (b, a)))
-        writer.write(Op.RAMP, other, other)
-        if op == ca.OP_FMIN:
-            writer.write(Op.SCALE, other, other, k=-1.0)
-        if b in writer.constant:
-            writer.write(Op.SHIFT, to, other, k=writer.constant[b])
-        else:
-            writer.write(Op.ADD, to, b, other)
-
-
-def _write_difference(writer: _TapeWriter, to: int, a: int, b: int) -> None:
-    """Write ``a - b`` for numbers of which at most one is constant."""
-    if b in writer.constant:
-        writer.write(Op.SHIFT, to, a, k=-writer.constant[b])
-    elif a in writer.constant:
-        writer.write(Op.SCALE, to, b, k=-1.0)
-        writer.write(Op.SHIFT, to, to, k=writer.constant[a])
-    else:
-        writer.write(Op.SUB, to, a, b)
-
-
-def _add_half_pi(writer: _TapeWriter, to: int) -> None:
-    """Write an addition of pi / 2, as twice the arc tangent of 1: no double is pi."""
-    quarter = writer.temporary()
-    writer.set_constant(quarter, 1.0)
-    writer.write(Op.ATAN, quarter, quarter)
-    writer.write(Op.SCALE, quarter, quarter, k=2.0)
-    writer.write(Op.ADD, to, to, quarter)
-
-
-def _write_power(writer: _TapeWriter, to: int, a: int, power: float) -> None:
-    """Write a whole power, or half of one, as products, a root and a quotient."""
-    twice = 2 * power
-    if not (twice.is_integer() and 0 < abs(power) <= _LARGEST_POWER):
-        raise UncoveredError(f"the power {power:g}")
-    base, result = writer.temporary(), writer.temporary()
-    if power.is_integer():
-        writer.write(Op.SCALE, base, a, k=1.0)
-        left = int(abs(power))
-    else:
-        writer.write(Op.SQRT, base, a)
-        left = int(abs(twice))
-    empty = True
-    while left:
-        if left & 1:
-            if empty:
-                writer.write(Op.SCALE, result, base, k=1.0)
-            else:
-                writer.write(Op.MUL, result, result, base)
-            empty = False
-        left >>= 1
-        if left:
-            writer.write(Op.SQUARE, base, base)
-    if power < 0:
-        unit = writer.temporary()
-        writer.set_constant(unit, 1.0)
-        writer.write(Op.DIV, to, unit, result)
-    else:
-        writer.write(Op.SCALE, to, result, k=1.0)
+            writer.put_formula(target[0], op, source)
+    return writer.finish(function.numel_in(0), int(offset[-1]))

@@ -1,7 +1,6 @@
 """Statement of what is proved: programs in standard form, and claims about a workspace.
 
-The modules import each other in this order: ``piecewise_derivatives``, ``form``, ``reduced_form`` (a program without
-unknowns in closed form), ``standard_form`` and ``limb_separation`` for certificates; ``machine`` (a robot with its
-dimensions), ``claims``, ``posed_layout`` (a case as expressions of the pose) and ``tolerance`` (every machine) for
-workspaces.
+The modules import each other in this order: ``form``, ``standard_form`` and ``limb_separation`` for certificates;
+``machine`` (a robot with its dimensions), ``claims``, ``posed_layout`` (a case as expressions of the pose) and
+``tolerance`` (every machine) for workspaces.
 """

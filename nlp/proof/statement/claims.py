@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
-from ...case.limits.constraint import SQUARED_LENGTH, BoundedConstraint, Reading
+from ...case.limits.constraint import SQUARED_LENGTH, Reading
 from ...case.limits.legs import Actuator, LegLength
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...case.task import Sense
@@ -26,7 +26,7 @@ REGULAR, CONSTRAINTS = "regular", "constraints regular"
 #: Key of the claims that limbs reach every pose.
 REACH = "reach"
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
-OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
+_OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
 #: Names of the measures that are no quantities of a robot.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
 
@@ -42,8 +42,7 @@ class Claim:
         reading: how the expression reads as the number.
         key: dotted key, below ``limits``, of the number in the case; empty where the number has no limit.
         limit: largest or smallest value allowed of the expression; None where the number has no limit.
-        leg, task: index of the leg whose length, or of the task whose F, the number is; None for another.
-        quantity: name of the measure of the robot that the number is; empty for another.
+        leg: index of the leg whose length the number is; None for another.
         uncovered: reason for a claim about the exact machine where others are meant; else empty.
     """
 
@@ -54,8 +53,6 @@ class Claim:
     key: str = ""
     limit: float | None = None
     leg: int | None = None
-    task: int | None = None
-    quantity: str = ""
     uncovered: str = ""
 
 
@@ -92,39 +89,22 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
     Raises:
         InputError: the robot has no measure of a name.
     """
-    found = with_limits(_of_quantities(layout, quantities), [*_of_limits(layout), *_of_legs(layout)])
-    if with_objective:
-        found += _of_tasks(layout)
-    return found
-
-
-def with_limits(claims: Iterable[Claim], more: Sequence[Claim]) -> list[Claim]:
-    """Return claims after those on limits of theirs and after more; a measure with its limit is claimed once.
-
-    Args:
-        claims: among them measures that are asked for, which give way to claims of the same number.
-        more: further claims.
-    """
-    named = {(each.name, each.sense) for each in more}
-    kept = [each for each in claims if each.limit is not None or (each.name, each.sense) not in named]
-    place = next((k for k, each in enumerate(kept) if not each.key or each.leg is not None), len(kept))
-    return [*kept[:place], *more, *kept[place:]]
+    found = [*_of_limits(layout), *_of_legs(layout)]
+    # A measure with its limit is claimed once.
+    named = {(each.name, each.sense) for each in found}
+    found += [each for each in _of_quantities(layout, quantities) if (each.name, each.sense) not in named]
+    return [*found, *_of_tasks(layout)] if with_objective else found
 
 
 def _of_limits(layout: Layout) -> Iterator[Claim]:
     """Yield a claim for each side of each limit at a pose."""
     # At one pose the limit on a leg's dead length says less than over all poses.
-    own = (*OWN_SEARCHES, "leg_length", f"{Actuator.key}.") if layout.robots[0].legs else OWN_SEARCHES
-    items = (*layout.constraints, *layout.constant_limits)
-    yield from claims_of_items([item for item in items if not any(key.startswith(own) for key in item.constraint.keys)])
-
-
-def claims_of_items(items: Sequence[BoundedConstraint]) -> Iterator[Claim]:
-    """Yield a claim for each side of constraints that is a limit of the case."""
-    for item in items:
+    own = (*_OWN_SEARCHES, "leg_length", f"{Actuator.key}.") if layout.robots[0].legs else _OWN_SEARCHES
+    for item in (*layout.constraints, *layout.constant_limits):
         constraint = item.constraint
-        low, high = constraint.keys
-        for key, sense, limit in ((low, Sense.MIN, item.lower), (high, Sense.MAX, item.upper)):
+        if any(key.startswith(own) for key in constraint.keys):
+            continue
+        for key, sense, limit in zip(constraint.keys, (Sense.MIN, Sense.MAX), (item.lower, item.upper), strict=True):
             if key and math.isfinite(limit):
                 yield Claim(constraint.name, sense, constraint.expression, constraint.reading, key, limit)
 
@@ -132,19 +112,12 @@ def claims_of_items(items: Sequence[BoundedConstraint]) -> Iterator[Claim]:
 def _of_legs(layout: Layout) -> Iterator[Claim]:
     """Yield the smallest and the largest length of each leg, with their limits: the lengths that its actuator needs."""
     limit = next((each for each in layout.case.limits if isinstance(each, LegLength)), None)
-    ends = ((Sense.MIN, "min"), (Sense.MAX, "max"))
     for i, leg in enumerate(layout.robots[0].legs):
-        for sense, end in ends:
-            allowed = None if limit is None else getattr(limit, end)
-            yield Claim(
-                f"leg_length limb {leg.name}",
-                sense,
-                ca.sumsqr(leg.span),
-                SQUARED_LENGTH,
-                "" if allowed is None else f"leg_length.{end}",
-                None if allowed is None else allowed**2,
-                leg=i,
-            )
+        for sense in (Sense.MIN, Sense.MAX):
+            allowed = None if limit is None else getattr(limit, sense.value)
+            key, square = ("", None) if allowed is None else (f"leg_length.{sense.value}", allowed**2)
+            name = f"leg_length limb {leg.name}"
+            yield Claim(name, sense, ca.sumsqr(leg.span), SQUARED_LENGTH, key, square, leg=i)
 
 
 def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
@@ -156,7 +129,7 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
         for i, owner in enumerate(quantity.owners):
             for sense in (Sense.MIN, Sense.MAX):
-                yield Claim(f"{name} limb {owner}", sense, values[i], Reading(quantity.dimension), quantity=name)
+                yield Claim(f"{name} limb {owner}", sense, values[i], Reading(quantity.dimension))
 
 
 def _of_tasks(layout: Layout) -> Iterator[Claim]:
@@ -164,4 +137,4 @@ def _of_tasks(layout: Layout) -> Iterator[Claim]:
     for j, task in enumerate(layout.case.tasks):
         name = "F" if len(layout.case.tasks) == 1 else f"F of {task.name}"
         for sense in (Sense.MIN, Sense.MAX):
-            yield Claim(name, sense, layout.robots[0].F[j], Reading(Dimension.NUMBER), task=j)
+            yield Claim(name, sense, layout.robots[0].F[j], Reading(Dimension.NUMBER))

@@ -1,26 +1,47 @@
 """A program in standard form: functions, the least of which is maximised over a box, and conditions.
 
 A form may lack variables of the program that follow from the others; its lift returns them.
+
+CasADi writes the derivative of ``fmax(a, b)`` by a as ``(b <= a) / ((a <= b) + (b <= a))``, which is 1, 0, or a half
+where both are equal. Enclosed term by term, the divisor may be 0. Here the sum of the two comparisons is written as 1.
+The derivative is then 1 where both are equal, and as it was elsewhere. Bounds use integrals of derivatives along lines,
+and any number from 0 to 1 is a generalised derivative there. Values that jump have no such derivative.
 """
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ....models import FloatArray
+from ...errors import UncoveredError
 from ...program.kernel import Kernel, single_output
 from ...program.nlp import Nlp
-from .piecewise_derivatives import without_ties
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Difference of a variable from what replaces it, in radians and in parts of a slide's range, above which the point is
 #: another solution of the loops. Where the two solutions meet, a point that keeps the loops to 1e-9 is so far off one.
 _SAME = 1e-4
+#: Operations whose value jumps. Their derivative is written as 0, so that its integral along a line is not the change.
+_JUMPS = {ca.OP_LE: "the comparison 'le'", ca.OP_SIGN: "the operation 'sign'"}
+
+
+class Kind(enum.Enum):
+    """Origin of a condition."""
+
+    LIMIT = "a constraint of the program"
+    LOOP = "an equation of a robot's loops, or a number that it bounds"
+    ASSEMBLY = "a sign or reach of a robot's assembly, which is no constraint of the program"
+    FOLLOWS = "follows from another one: it excludes boxes, and has no multiplier of its own"
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,22 +52,25 @@ class Condition:
         name: in the words of a case.
         expression: (1, 1).
         is_equation: whether it must be 0.
-        follows: whether it follows from another one. It excludes boxes, and has no multiplier of its own.
+        kind: its origin.
     """
 
     name: str
     expression: SX
     is_equation: bool
-    follows: bool = False
+    kind: Kind = Kind.LIMIT
+
+    @property
+    def is_of_joints(self) -> bool:
+        """Whether it states how joints hold together."""
+        return self.kind in (Kind.LOOP, Kind.ASSEMBLY)
 
 
-@dataclass(frozen=True, eq=False)
-class Lift:
+class Lift(NamedTuple):
     """What replaces variables of a program in a form without them.
 
     Attributes:
         x: (n,) symbols of all variables.
-        kept: places of the form's variables, in order.
         places: places of the variables that are replaced.
         values: (k, 1) expressions of the form's variables that replace them.
         is_angle: for each of them, whether whole turns make no difference.
@@ -55,38 +79,11 @@ class Lift:
     """
 
     x: SX
-    kept: tuple[int, ...]
     places: tuple[int, ...]
     values: SX
     is_angle: tuple[bool, ...]
     ranges: FloatArray
     signs: SX
-
-    def variables(self, point: FloatArray) -> FloatArray:
-        """Return all variables (n,) at a point (m,) of the form."""
-        x = np.zeros(self.x.numel())
-        x[list(self.kept)] = point
-        x[list(self.places)] = self._values_at(point).ravel()
-        return x
-
-    def point(self, x: FloatArray) -> FloatArray:
-        """Return the form's variables (m,) of all variables (n,)."""
-        return np.asarray(x, dtype=np.float64)[list(self.kept)]
-
-    def holds(self, x: FloatArray) -> bool:
-        """Return whether variables (n,) have the values that replace them, and joints that hold together."""
-        index = list(self.places)
-        apart = np.asarray(x, dtype=np.float64)[index] - self.variables(self.point(x))[index]
-        turned = np.where(self.is_angle, np.abs(np.sin(apart / 2)), np.abs(apart / self.ranges))
-        return bool(np.all(turned <= _SAME)) and bool(np.all(self._signs_at(x) <= 0))
-
-    @cached_property
-    def _values_at(self) -> Kernel[FloatArray]:
-        return _kernel(self.x[list(self.kept)], [self.values])
-
-    @cached_property
-    def _signs_at(self) -> Kernel[FloatArray]:
-        return _kernel(self.x, [self.signs])
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +91,11 @@ class StandardForm:
     """A maximisation over a box.
 
     Attributes:
-        nlp: the program that it states.
+        nlp: the program that it states, whose epigraph variable it does not have.
         x: (n,) symbols.
         lower, upper: (n,) ends of the box.
         functions: ``phi_j``, the least of which is maximised.
-        conditions: ``h_k``, with ``signs`` at the end; numbered after the functions where both are counted.
-        sign: factor from the program's objective to the value that is maximised: -1 for a minimum.
-        signs: conditions of a robot's assembly, which are no constraints of the program.
-        has_epigraph: whether the program's last variable is an epigraph variable, which this form does not have.
+        conditions: ``h_k``, numbered after the functions where both are counted.
         places: places of its variables in the program, where they are not the first ones.
         lift: what replaces variables of the program that this form does not have; None where it has them all.
     """
@@ -112,9 +106,6 @@ class StandardForm:
     upper: FloatArray
     functions: tuple[SX, ...]
     conditions: tuple[Condition, ...]
-    signs: tuple[Condition, ...]
-    sign: float
-    has_epigraph: bool
     places: tuple[int, ...] | None = None
     lift: Lift | None = None
 
@@ -124,10 +115,14 @@ class StandardForm:
         return int(self.x.numel())
 
     @property
+    def sign(self) -> float:
+        """Factor from the program's objective to the value that is maximised: -1 for a minimum."""
+        return -self.nlp.sign
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the variables."""
-        variables = self.nlp.program.variables
-        return tuple(variables[i].name for i in (range(self.n) if self.places is None else self.places))
+        return tuple(self.nlp.program.variables[i].name for i in self._index)
 
     @property
     def is_equation(self) -> tuple[bool, ...]:
@@ -137,7 +132,7 @@ class StandardForm:
     @property
     def follows(self) -> tuple[bool, ...]:
         """Whether each of the R expressions is a condition that follows from others."""
-        return (*(False for _ in self.functions), *(condition.follows for condition in self.conditions))
+        return (*(False for _ in self.functions), *(each.kind is Kind.FOLLOWS for each in self.conditions))
 
     @cached_property
     def expressions(self) -> SX:
@@ -150,10 +145,9 @@ class StandardForm:
         return ca.densify(without_ties(ca.jacobian(self.expressions, self.x), self.x))
 
     @cached_property
-    def dependence(self) -> list[list[bool]]:
+    def dependence(self) -> NDArray[np.bool_]:
         """(R, n) whether an expression depends on a variable."""
-        pattern = ca.jacobian(self.expressions, self.x).sparsity()
-        return [[bool(pattern.has_nz(r, i)) for i in range(self.n)] for r in range(self.expressions.numel())]
+        return dependence_of(self.expressions, self.x)
 
     def value_at(self, x: FloatArray) -> float:
         """Return the value that is maximised at a point (n,), as computed in doubles."""
@@ -161,28 +155,98 @@ class StandardForm:
 
     def point_of(self, x: FloatArray) -> FloatArray:
         """Return the form's variables (n,) of those of the program (m,)."""
-        point = np.asarray(x, dtype=np.float64)
-        return point[: self.n] if self.lift is None else self.lift.point(point)
+        return np.asarray(x, dtype=np.float64)[self._index]
 
     def program_variables(self, point: FloatArray) -> FloatArray:
         """Return the program's variables (m,), an epigraph variable left out, at a point (n,) of the form."""
-        return np.array(point, dtype=np.float64) if self.lift is None else self.lift.variables(point)
+        if self.lift is None:
+            return np.array(point, dtype=np.float64)
+        x = np.zeros(self.lift.x.numel())
+        x[self._index], x[list(self.lift.places)] = point, self._replaced_at(point).ravel()
+        return x
 
     def keeps_signs(self, x: FloatArray) -> bool:
-        """Return whether the conditions of the assembly hold at a point (m,) of the program, as computed in doubles."""
-        if self.lift is not None:
-            return self.lift.holds(np.asarray(x)[: self.lift.x.numel()])
-        return not self.signs or bool(np.all(self._signs_at(x[: self.n]) <= 0))
+        """Return whether a point (m,) of the program is one of the form's assembly, as computed in doubles."""
+        lift = self.lift
+        if lift is not None:
+            index = list(lift.places)
+            apart = x[index] - self.program_variables(self.point_of(x))[index]
+            turned = np.where(lift.is_angle, np.abs(np.sin(apart / 2)), np.abs(apart / lift.ranges))
+            if not np.all(turned <= _SAME):
+                return False
+        return bool(np.all(self._signs_at(x[: (self.x if lift is None else lift.x).numel()]) <= 0))
 
-    @cached_property
-    def _signs_at(self) -> Kernel[FloatArray]:
-        return _kernel(self.x, [each.expression for each in self.signs])
+    @property
+    def _index(self) -> list[int]:
+        """Places of the variables in the program."""
+        return list(range(self.n) if self.places is None else self.places)
 
     @cached_property
     def _functions_at(self) -> Kernel[FloatArray]:
         return _kernel(self.x, self.functions)
 
+    @cached_property
+    def _replaced_at(self) -> Kernel[FloatArray]:
+        return _kernel(self.x, [] if self.lift is None else [self.lift.values])
+
+    @cached_property
+    def _signs_at(self) -> Kernel[FloatArray]:
+        if self.lift is not None:
+            return _kernel(self.lift.x, [self.lift.signs])
+        return _kernel(self.x, [each.expression for each in self.conditions if each.kind is Kind.ASSEMBLY])
+
+
+def dependence_of(expressions: SX, x: SX) -> NDArray[np.bool_]:
+    """Return whether each of some expressions (R, 1) depends on each variable, (R, n)."""
+    return np.asarray(ca.DM(ca.jacobian_sparsity(expressions, x), 1).full() > 0)
+
 
 def _kernel(x: SX, expressions: Sequence[SX]) -> Kernel[FloatArray]:
     """Return expressions of x as a function of NumPy arrays."""
-    return Kernel(ca.Function("values", [x], [ca.densify(ca.vertcat(*expressions))]), single_output)
+    values = ca.densify(ca.vertcat(SX(0, 1), *expressions))
+    return Kernel(ca.Function("values", [x], [values]), single_output)
+
+
+def refuse_jumps(expressions: SX, x: SX) -> None:
+    """Refuse expressions of x (n, 1) whose values jump. Derivatives of theirs may: those of continuous values do.
+
+    Raises:
+        UncoveredError: there is such an expression.
+    """
+    function = ca.Function("values", [x], [expressions])
+    for k in range(function.n_instructions()):
+        if function.instruction_id(k) in _JUMPS:
+            raise UncoveredError(_JUMPS[function.instruction_id(k)])
+
+
+def without_ties(expressions: SX, x: SX) -> SX:
+    """Return expressions (r, c) of x (n, 1) with the sum of a comparison and its converse written as 1."""
+    function = ca.Function("ties", [x], [expressions])
+    count = function.n_instructions()
+    if not any(function.instruction_id(k) == ca.OP_LE for k in range(count)):
+        return expressions
+    work: list[SX] = [SX(0)] * function.sz_w()
+    # Operands of the comparison that a value is, by their hashes.
+    compared: dict[int, tuple[int, int]] = {}
+    # A hash is the address of a node, which another node may get once nothing holds the first one.
+    held: list[SX] = []
+    results = [SX(0)] * expressions.nnz()
+    for k in range(count):
+        op, source, target = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
+        if op == ca.OP_OUTPUT:
+            results[target[1]] = work[source[0]]
+        elif op == ca.OP_INPUT:
+            work[target[0]] = x[source[1]]
+        elif op == ca.OP_CONST:
+            work[target[0]] = SX(function.instruction_constant(k))
+        elif len(source) == 1:
+            work[target[0]] = SX.unary(op, work[source[0]])
+        else:
+            a, b = work[source[0]], work[source[1]]
+            one, other = (compared.get(each.element_hash()) for each in (a, b))
+            is_tie = op == ca.OP_ADD and one is not None and other == one[::-1]
+            work[target[0]] = SX(1) if is_tie else SX.binary(op, a, b)
+            if op == ca.OP_LE:
+                compared[work[target[0]].element_hash()] = (a.element_hash(), b.element_hash())
+                held.append(work[target[0]])
+    return SX(expressions.sparsity(), ca.vertcat(*results))

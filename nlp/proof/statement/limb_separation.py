@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from ....models import frozen_array
-from .standard_form import Condition, StandardForm
+from .form import StandardForm, dependence_of
 
 #: Largest number of terms of a sum that are told apart; a longer one counts as one term.
 _MOST_TERMS = 4096
@@ -52,78 +54,63 @@ class Separation:
     limbs: tuple[Limb, ...]
 
 
-@dataclass(frozen=True)
-class _Choice:
-    """Shared variables, and groups of own variables with the terms and conditions that depend on them."""
-
-    shared: tuple[int, ...]
-    groups: tuple[frozenset[int], ...]
-
-    @property
-    def size(self) -> int:
-        """Number of variables of the largest part."""
-        return len(self.shared) + max(map(len, self.groups))
-
-
 def separate(form: StandardForm) -> Separation | None:
     """Return the separation of a form; None where it has several functions, or no parts smaller than itself."""
     if len(form.functions) != 1:
         return None
     terms = terms_of(form.functions[0])
-    of_terms = _dependence(terms, form.x)
-    of_conditions = _dependence([each.expression for each in form.conditions], form.x)
-    choice = _choose(form.n, of_terms, of_conditions)
-    if choice is None:
+    expressions = ca.vertcat(*terms, *[each.expression for each in form.conditions])
+    # The variables of each term, then of each condition.
+    links = [frozenset(np.flatnonzero(row).tolist()) for row in dependence_of(expressions, form.x)]
+    groups = _smallest_groups(form.n, links, len(terms))
+    if not groups:
         return None
+    shared = tuple(i for i in range(form.n) if not any(i in group for group in groups))
     limbs = []
-    for group in choice.groups:
+    for group in groups:
         own = tuple(sorted(group))
-        parts = [term for term, depends in zip(terms, of_terms, strict=True) if depends & group]
-        kept = [each for each, depends in zip(form.conditions, of_conditions, strict=True) if depends & group]
-        limbs.append(Limb(own, _part(form, (*choice.shared, *own), parts, kept)))
-    shared = frozenset(choice.shared)
-    rest = [term for term, depends in zip(terms, of_terms, strict=True) if depends <= shared]
-    kept = [each for each, depends in zip(form.conditions, of_conditions, strict=True) if depends <= shared]
-    if choice.shared:
-        return Separation(choice.shared, _part(form, choice.shared, rest, kept), 0.0, tuple(limbs))
-    if kept:
+        limbs.append(Limb(own, _part(form, terms, (*shared, *own), [bool(link & group) for link in links])))
+    rest = [link <= frozenset(shared) for link in links]
+    if shared:
+        return Separation(shared, _part(form, terms, shared, rest), 0.0, tuple(limbs))
+    if any(rest[len(terms) :]):
         return None
-    return Separation((), None, float(ca.DM(sum(rest, SX(0)))), tuple(limbs))
+    return Separation((), None, float(ca.DM(sum(compress(terms, rest), SX(0)))), tuple(limbs))
 
 
-def _part(
-    form: StandardForm, places: Sequence[int], terms: Sequence[SX], conditions: Sequence[Condition]
-) -> StandardForm:
-    """Return a part of a form over some of its variables."""
+def _part(form: StandardForm, terms: Sequence[SX], places: Sequence[int], chosen: Sequence[bool]) -> StandardForm:
+    """Return the part of a form over some of its variables with chosen terms, then conditions."""
     index = list(places)
     return StandardForm(
         nlp=form.nlp,
         x=form.x[index],
         lower=frozen_array(form.lower[index], (len(index),)),
         upper=frozen_array(form.upper[index], (len(index),)),
-        functions=(sum(terms, SX(0)),),
-        conditions=tuple(conditions),
-        signs=tuple(each for each in conditions if any(each is sign for sign in form.signs)),
-        sign=form.sign,
-        has_epigraph=False,
+        functions=(sum(compress(terms, chosen), SX(0)),),
+        conditions=tuple(compress(form.conditions, chosen[len(terms) :])),
         places=tuple(places) if form.places is None else tuple(form.places[i] for i in places),
     )
 
 
-def _choose(n: int, terms: Sequence[frozenset[int]], conditions: Sequence[frozenset[int]]) -> _Choice | None:
-    """Return the separation whose largest part is smallest; None without one that is smaller than the whole.
+def _smallest_groups(n: int, links: Sequence[frozenset[int]], terms: int) -> list[frozenset[int]]:
+    """Return the own variables of each limb of the separation whose largest part is smallest.
 
     A variable of at most so many terms is own, for every such number; own variables of one term or one condition belong
-    to one limb.
+    to one limb. None are returned where no separation has parts that are smaller than the whole.
+
+    Args:
+        n: number of variables.
+        links: variables of each term, then of each condition.
+        terms: number of terms.
     """
-    counts = [sum(i in term for term in terms) for i in range(n)]
-    best: _Choice | None = None
-    for most in sorted(set(counts))[:-1] if len(set(counts)) > 1 else sorted(set(counts)):
+    counts = [sum(i in term for term in links[:terms]) for i in range(n)]
+    numbers, best, least = sorted(set(counts)), list[frozenset[int]](), n
+    for most in numbers[:-1] or numbers:
         own = frozenset(i for i in range(n) if counts[i] <= most)
-        groups = _connected(own, [*terms, *conditions])
-        choice = _Choice(tuple(i for i in range(n) if i not in own), tuple(sorted(groups, key=min)))
-        if len(groups) > 1 and choice.size < n and (best is None or choice.size < best.size):
-            best = choice
+        groups = _connected(own, links)
+        size = n - len(own) + max(map(len, groups))
+        if len(groups) > 1 and size < least:
+            best, least = sorted(groups, key=min), size
     return best
 
 
@@ -135,18 +122,6 @@ def _connected(own: frozenset[int], links: Sequence[frozenset[int]]) -> list[fro
         if len(touched) > 1:
             groups = [group for group in groups if not group & link] + [frozenset().union(*touched)]
     return groups
-
-
-def _dependence(expressions: Sequence[SX], x: SX) -> list[frozenset[int]]:
-    """Return the places of the variables on which each expression (1, 1) depends."""
-    if not expressions:
-        return []
-    pattern = ca.jacobian(ca.vertcat(*expressions), x).sparsity()
-    rows, columns = pattern.get_triplet()
-    found: list[set[int]] = [set() for _ in expressions]
-    for row, column in zip(rows, columns, strict=True):
-        found[row].add(column)
-    return [frozenset(each) for each in found]
 
 
 def terms_of(expression: SX) -> list[SX]:

@@ -95,25 +95,19 @@ def has_straight_legs(model: Model) -> bool:
 
 
 def legs_of(case: Case) -> Legs | None:
-    """Return the legs of a robot with fixed dimensions; None for one that is not six straight legs.
-
-    Their tolerance is the case's.
-    """
+    """Return the legs of a robot that is six straight legs, as :func:`joint_centres` does; None for another one."""
     return joint_centres(case) if has_straight_legs(case.model) else None
 
 
 def joint_centres(case: Case) -> Legs | None:
     """Return the straight legs of a robot with fixed dimensions, with the case's tolerance; None without legs."""
-    return Legs(*leg_joints(case), case.joint_centre_tolerance or 0.0) if case.model.legs else None
-
-
-def leg_joints(case: Case) -> tuple[FloatArray, FloatArray]:
-    """Return the joint centres (L, 3) of the L legs of a robot with fixed dimensions, on base and platform, length."""
     model = case.model
+    if not model.legs:
+        return None
     symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
     parts = [value for name in case.parameters for value in case.components(name)]
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
-    outputs = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
-    base, platform = ca.Function("legs", [symbols], outputs).call([values])
-    shape = len(model.legs), 3
-    return frozen_array(np.array(base).T, shape), frozen_array(np.array(platform).T, shape)
+    ends = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
+    found = ca.Function("legs", [symbols], ends).call([values])
+    base, platform = (frozen_array(np.array(each).T, (len(model.legs), 3)) for each in found)
+    return Legs(base, platform, case.joint_centre_tolerance or 0.0)

@@ -48,21 +48,15 @@ def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Ca
 
 
 def posed_layout(case: Case, workspace: Workspace) -> Layout:
-    """Return a case with fixed dimensions as symbols of one pose, which is any of a workspace.
-
-    Args:
-        case: the case; its own poses are not used.
-        workspace: the poses.
-    """
+    """Return a case with fixed dimensions, whose own poses are not used, as symbols of one pose of a workspace."""
     turns = workspace.turns
-    # The rotation of a workspace by roll, pitch and yaw is added below.
-    rotation = Rotation(None, turns.angles[0] if turns.kind is TurnKind.ANY_AXIS else 0.0)
-    if turns.kind is TurnKind.AXIS:
-        rotation = Rotation(turns.axis, turns.angles[0])
-    one = at_one_pose(case, workspace.position, rotation)
+    if turns.kind is not TurnKind.ROLL_PITCH_YAW:
+        axis = turns.axis if turns.kind is TurnKind.AXIS else None
+        one = at_one_pose(case, workspace.position, Rotation(axis, turns.angles[0]))
+        return lay_out(one, one.tasks)
+    one = at_one_pose(case, workspace.position, Rotation(None, 0.0))
 
     def add_turns(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
-        """Add a pose whose rotation is by roll, pitch and yaw."""
         position = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position))
         angles = [
             table.add(f"{prefix}{name}", Dimension.ANGLE, value).symbols
@@ -71,7 +65,7 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
         turned = _turn(2, angles[2]) @ _turn(1, angles[1]) @ _turn(0, angles[0])
         return StatedPoseSymbols(turned, position.symbols, position.places, position.symbols, None, [], (HERE,))
 
-    return lay_out(one, one.tasks, add_turns if turns.kind is TurnKind.ROLL_PITCH_YAW else None)
+    return lay_out(one, one.tasks, add_turns)
 
 
 def _turn(about: int, angle: SX) -> SX:
@@ -109,11 +103,6 @@ def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[
 
     The case is one of symbols of the pose, without loops, signs and limits: where a limb does not reach, its loop has
     no value.
-
-    Args:
-        case: with fixed dimensions.
-        closed: its robot without unknowns in closed form.
-        workspace: the poses.
     """
     layout = _bare_layout(case, closed.model, workspace)
     return layout, reach_claims_on(layout, closed.reaches)
@@ -131,35 +120,22 @@ def reach_claims_on(layout: Layout, reaches: Sequence[Reach]) -> tuple[Claim, ..
 def closed_layout(case: Case, closed: ClosedForm, workspace: Workspace) -> Layout:
     """Return a case as symbols of the pose, with unknowns in closed form: all of its limbs reach every pose.
 
-    Args:
-        case: with fixed dimensions.
-        closed: its robot without unknowns in closed form.
-        workspace: the poses.
+    Loop equations that hold at every pose by themselves are left out; with unknowns all are kept. A Delta that is held
+    without rotation is such a robot: the second rod of a limb closes with the first. A bound for a robot without an
+    equation holds for the robot with it, too: it is one over more poses.
     """
-    model = _without_identities(case, closed.model, workspace)
+    model = closed.model
+    if not model.unknowns and model.closure:
+        layout = _bare_layout(case, model, workspace)
+        nlp = extreme_program(layout, SX(0), Sense.MIN)
+        scaled = _on(layout, [ca.vertcat(*[each.scaled for each in model.closure])])
+        function = ca.Function("closure", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in scaled])
+        found = [function(x, nlp.arguments).full().ravel() for x in starting_points(nlp, _TESTS, _SEED)]
+        # A limb that does not reach a pose has no value there.
+        holds = np.nanmax(np.abs(found), axis=0, initial=0.0) <= _IDENTITY
+        holds &= np.isfinite(found).sum(axis=0) >= _TESTS // 2
+        model = replace(model, closure=tuple(each for each, kept in zip(model.closure, ~holds, strict=True) if kept))
     return posed_layout(replace(case, model=model), workspace)
-
-
-def _without_identities(case: Case, model: Model, workspace: Workspace) -> Model:
-    """Return a robot without the loop equations that hold at every pose by themselves; with unknowns all are kept.
-
-    A Delta that is held without rotation is such a robot: the second rod of a limb closes with the first. A bound for a
-    robot without an equation holds for the robot with it, too: it is one over more poses.
-    """
-    if model.unknowns or not model.closure:
-        return model
-    layout = _bare_layout(case, model, workspace)
-    nlp = extreme_program(layout, SX(0), Sense.MIN)
-    scaled = _on(layout, [ca.vertcat(*[each.scaled for each in model.closure])])
-    function = ca.Function("closure", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in scaled])
-    found = [function(x, nlp.arguments).full().ravel() for x in starting_points(nlp, _TESTS, _SEED)]
-    # A limb that does not reach a pose has no value there.
-    largest = np.nanmax(np.abs(found), axis=0, initial=0.0)
-    known = np.isfinite(found).sum(axis=0) >= _TESTS // 2
-    holds = known & (largest <= _IDENTITY)
-    return replace(
-        model, closure=tuple(each for each, is_identity in zip(model.closure, holds, strict=True) if not is_identity)
-    )
 
 
 def _bare_layout(case: Case, model: Model, workspace: Workspace) -> Layout:

@@ -29,7 +29,7 @@ from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.places import SymbolTable
 from .claims import Claim, claims_of, one_machine_name
-from .machine import leg_joints
+from .machine import joint_centres
 from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
 #: Part of a derivative below which its size is smoothed, and place of the pose in its ranges at which it is taken.
@@ -56,34 +56,32 @@ class BuiltModel(NamedTuple):
     reaches: tuple[Reach, ...]
 
 
-def built_model(model: Model) -> BuiltModel:
+def built_model(model: Model, *, extended: bool = False) -> BuiltModel:
     """Return a robot with errors of its joint centres.
 
     Args:
         model: the robot.
+        extended: whether closed forms have values out of reach too.
 
     Raises:
         RobotError: its joint centres are not known, or it cannot be put together with errors.
     """
-    exact = closed_form(model).model
     displaced = _displaced(model)
-    closed = closed_form(displaced.model)
-    built = closed.model
-    unknowns = [[item.name for item in each.unknowns] for each in (exact, built)]
-    members = [[(item.rank, item.screws.shape, item.is_pinned) for item in each.members] for each in (exact, built)]
-    rows = [[item.label for item in each.wrenches] for each in (exact, built)]
-    equations = [[item.name for item in each.closure] for each in (exact, built)]
-    if any(one != other for one, other in (unknowns, members, rows, equations)) or exact.generic != built.generic:
+    closed = closed_form(displaced.model, extended=extended)
+    if _kinds_of(closed_form(model).model) != _kinds_of(closed.model):
         raise RobotError("", "errors of joint centres take freedoms from the robot: its limbs or loops change")
-    return BuiltModel(built, tuple(each.name for each in displaced.centres), closed.reaches)
+    return BuiltModel(closed.model, tuple(each.name for each in displaced.centres), closed.reaches)
+
+
+def _kinds_of(model: Model) -> tuple[object, ...]:
+    """Return what is the same for all machines of a robot: unknowns, members, rows, equations and ranks."""
+    members = [(item.rank, item.screws.shape, item.is_pinned) for item in model.members]
+    rows, equations = [item.label for item in model.wrenches], [item.name for item in model.closure]
+    return [item.name for item in model.unknowns], members, rows, equations, model.generic
 
 
 def _displaced(model: Model) -> DisplacedRobot:
-    """Return a robot with errors of its joint centres as parameters.
-
-    Raises:
-        RobotError: its joint centres are not known, or it cannot be put together with errors.
-    """
+    """Return a robot with errors of its joint centres as parameters; raises as :func:`built_model` does."""
     if not model.structure:
         if not model.built or model.members or model.unknowns:
             raise RobotError("", "the joint centres of this robot are not known")
@@ -113,25 +111,19 @@ class PoseCoordinates(NamedTuple):
 
 
 def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
-    """Return a case as symbols of one pose, in the coordinates of a search.
-
-    Args:
-        case: its own poses are not used.
-        at: the poses.
-    """
+    """Return a case, whose own poses are not used, as symbols of one pose in the coordinates of a search."""
     one = at_one_pose(case, tuple(at.values[:3]), Rotation(None, 0.0))
 
     def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
-        """Add a pose with the coordinates of its rotation."""
-        placed, turn = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position)), []
+        placed, turns = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position)), []
         for k, value in enumerate(at.values[3:]):
             kind = Dimension.NUMBER if isinstance(value, Free) else Dimension.ANGLE
             symbol = table.add(f"{prefix}turn{k + 1}", kind, value).symbols
-            turn.append(symbol if isinstance(value, Free) else ca.tan(symbol / 2))
-        ball = Constraint(f"{prefix}turn", ca.sumsqr(ca.vertcat(*turn)), Reading(Dimension.NUMBER))
+            turns.append(symbol if isinstance(value, Free) else ca.tan(symbol / 2))
+        turn = ca.vertcat(*turns)
+        ball = Constraint(f"{prefix}turn", ca.sumsqr(turn), Reading(Dimension.NUMBER))
         held = [BoundedConstraint(ball, -math.inf, at.ball)] if at.ball < math.inf else []
-        rotation = at.rotation(ca.vertcat(*turn))
-        return StatedPoseSymbols(rotation, placed.symbols, placed.places, placed.symbols, None, held, (HERE,))
+        return StatedPoseSymbols(at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (HERE,))
 
     return lay_out(one, one.tasks, add_pose)
 
@@ -188,45 +180,34 @@ class MachineLayout(NamedTuple):
 
 
 def machine_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoordinates) -> MachineLayout:
-    """Return every machine within a tolerance as symbols of one pose.
-
-    Args:
-        case: with fixed dimensions.
-        built: its robot with errors.
-        tolerance: largest size of each error, length.
-        at: the poses.
-    """
+    """Return every machine within a tolerance of a case with fixed dimensions as symbols of one pose."""
     parameters = {name: case.parameters[name] for name in case.parameters}
     size = Free(-tolerance, tolerance)
     own = {item.name: (size, size, size) for item in built.model.parameters if item.name not in parameters}
-    limits = Limits(*(_mounted(case, each) for each in case.limits))
     # The mounting axes of joints are those of the design.
+    limits = Limits(*(_mounted(case, each) for each in case.limits))
     machines = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
     return MachineLayout(coordinate_layout(machines, at), built, tolerance)
 
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
     """Return a limit on angles of joints with the mounting axes of the design as numbers; another one as it is."""
-    if not (isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
+    legs = joint_centres(case)
+    if legs is None or not (isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
         return limit
-    home, (base, platform) = limit.about, leg_joints(case)
+    home = limit.about
     axis = SX(unit_axes((home.axis,), 1)[0].tolist())
     R = np.array(ca.evalf(matrix_from_axis_angle(axis, SX(home.angle))))
-    n = np.array(home.position) + platform @ R.T - base
+    n = np.array(home.position) + legs.platform @ R.T - legs.base
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     own = n if isinstance(limit, BaseJointAngle) else n @ R
     return replace(limit, about=tuple((float(x), float(y), float(z)) for x, y, z in own))
 
 
 def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
-    """Return the design as symbols of one pose: those of the pose of its machines.
+    """Return the design, a case with a model without unknowns, as symbols of one pose: those of its machines.
 
     Equations of loops are left out, which hold at every pose by themselves: a bound without one is over more poses.
-
-    Args:
-        case: with fixed dimensions.
-        model: its robot, all of whose unknowns are in closed form.
-        at: the poses.
     """
     return coordinate_layout(replace(case, model=without_loops(model)), at)
 
@@ -272,7 +253,7 @@ def length_of_one_machine(machines: MachineLayout, leg: int, sense: Sense, about
     part with the fixed vectors c_p and c_b cancels; little is left of it where the leg's direction changes little.
 
     Args:
-        machines: the machines, with two errors for each leg.
+        machines: with two errors for each leg.
         leg: index of the leg.
         sense: whether the smallest or the largest value is meant.
         about: c_b and c_p.

@@ -2,38 +2,35 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ....models.joints.closedform import ClosedForm, closed_form
+from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.task import Sense
 from ...case.workspace import Workspace
 from ...interruption import is_requested, one_call, within
-from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.machine import Legs, check_leg_error, has_straight_legs, joint_centres, legs_of, workspace_of_case
+from ..statement.machine import check_leg_error, has_straight_legs, joint_centres, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
-from .numbers.extremes import GAP, Extreme, prove_extreme
-from .numbers.loop_limits import loop_extremes
+from .numbers.bound_search import Minimum
+from .numbers.extremes import GAP, Extreme, extreme_of, prove_extreme
 from .numbers.pose_error import pose_errors
-from .numbers.searched import Subject, asked_spectra_extremes, searched_limits
-from .numbers.strokes import Refine, with_strokes
+from .numbers.searched import Subject, searched_extremes
+from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
-from .robot.pose_box import PoseBox, pose_box
+from .robot.pose_box import pose_box
 from .robot.posed_robot import NotJudgedError
-from .tolerance.leg_errors import of_legs
-from .tolerance.machines import Machines, Proving, machine_extreme, machine_extremes, machines_of, shown_extremes
-from .verdict import Outcome, Regularity
+from .tolerance.machines import Machines
+from .verdict import Outcome, RankVerdict
 
 if TYPE_CHECKING:
-    from .proof_record import PaperRecord
+    from .proof_writer import PaperRecord
 
 #: Seconds for all searches together where none are asked for: those of singular values have no other end in six
 #: dimensions. Of what is left, each takes half at most.
@@ -41,6 +38,8 @@ TIME_LIMIT = 60.0
 _PART = 0.5
 #: Gap of the proof on paper of a limit that is known to hold: it is made finer where the limit needs it.
 _AS_NEEDED = 1.0
+#: Reason for numbers of a robot that does not have all poses.
+_OUT_OF_REACH = "not every machine within the tolerance is proved to reach every pose"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,29 +56,34 @@ class Judgement:
 
     case: Case
     workspace: Workspace
-    regularity: Regularity
+    regularity: RankVerdict
     extremes: tuple[Extreme, ...]
-    constraints: Regularity | None = None
+    constraints: RankVerdict | None = None
 
     @property
-    def ranks(self) -> tuple[Regularity, ...]:
+    def ranks(self) -> tuple[RankVerdict, ...]:
         """Verdicts on ranks."""
         return (self.regularity,) if self.constraints is None else (self.regularity, self.constraints)
 
     @property
+    def verdicts(self) -> tuple[RankVerdict | Extreme, ...]:
+        """Verdicts on ranks, then on numbers."""
+        return (*self.ranks, *self.extremes)
+
+    @property
     def is_regular(self) -> bool:
         """Whether all ranks are proved to be full."""
-        return all(each.outcome is Outcome.PROVED for each in self.ranks)
+        return not any(each.fails for each in self.ranks)
 
     @property
     def is_proved(self) -> bool:
         """Whether all ranks are proved to be full, and every limit holds; a number without a limit is information."""
-        return self.is_regular and not any(each.fails for each in self.extremes)
+        return not any(each.fails for each in self.verdicts)
 
     @property
     def is_refuted(self) -> bool:
         """Whether a pose is known that is singular or outside of a limit."""
-        return Outcome.REFUTED in [*(each.outcome for each in self.ranks), *(each.outcome for each in self.extremes)]
+        return any(each.outcome is Outcome.REFUTED for each in self.verdicts)
 
 
 @one_call
@@ -115,7 +119,7 @@ def judge_workspace(
             the errors of the platform's pose are bounded, where F is.
         until_fault: whether the work ends at the first rank or limit that is not proved.
         rank_progress: called during the search for singular poses.
-        progress: called before each number with its name, the number of those done, and of all.
+        progress: called before each number with its name, the number of those done, and of all of its kind.
         paper: records the searches for a proof.
 
     Raises:
@@ -128,193 +132,159 @@ def judge_workspace(
     check_leg_error(case, leg_error)
     workspace = own if workspace is None else workspace
     with within(time_limit, _PART):
-        box, legs = pose_box(workspace), legs_of(case)
-        closed = closed_form(case.model)
-        machines, unknown = _machines(case, closed, box)
-        homes = Homes(case, box, [name for name in quantities if name not in SPECTRAL], machines)
+        numbers = _Numbers(case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
+        homes = Homes(case, numbers.box, numbers.names, numbers.machines)
         ranks = (
-            Ranks(not_judged(box, unknown), None)
-            if unknown
-            else prove_ranks(closed.model, homes, legs=legs, progress=rank_progress, paper=paper)
+            Ranks(not_judged(numbers.box, numbers.unknown), None)
+            if numbers.unknown
+            else prove_ranks(numbers.closed.model, homes, progress=rank_progress, paper=paper)
         )
         judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
         if not with_limits or (until_fault and not judged.is_regular):
             return judged
-        numbers = _Numbers(case, workspace, closed, legs, gap, jobs, progress, paper, machines, unknown)
-        found: list[Extreme] = []
-        for each in numbers.add(found, quantities, leg_error, with_objective=with_objective):
+        for each in numbers.extremes():
+            numbers.found.append(each)
             if until_fault and each.fails:
                 break
-        return replace(judged, extremes=tuple(homes.shown(each) for each in found))
+        return replace(judged, extremes=tuple(homes.shown(each) for each in numbers.found))
 
 
-def _machines(case: Case, closed: ClosedForm, box: PoseBox) -> tuple[Machines | None, str]:
-    """Return the machines that are meant, or why they are not judged: None and no reason for the design alone."""
-    if not case.joint_centre_tolerance:
-        return None, ""
-    try:
-        return machines_of(case, closed.model, box), ""
-    except NotJudgedError as error:
-        return None, str(error)
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Numbers:
     """The numbers of a machine over its workspace.
 
     Attributes:
-        case: with fixed dimensions.
-        workspace: the poses.
-        closed: its robot without unknowns in closed form.
-        legs: joint centres; None for a robot that is not six straight legs.
-        gap, jobs, progress, paper: as in :func:`judge_workspace`.
+        case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper: as in
+            :func:`judge_workspace`.
+        box: the poses.
+        closed: the robot without unknowns in closed form.
+        names: measures that are numbers of the robot.
         machines: every machine within the tolerance; None where the design is judged, or none.
         unknown: reason why the machines that are meant are not judged; else empty.
+        found: the extremes so far. Lengths that a stroke needs more finely take the place of those before.
     """
 
     case: Case
     workspace: Workspace
-    closed: ClosedForm
-    legs: Legs | None
+    quantities: Sequence[str]
+    leg_error: float
+    with_objective: bool
     gap: float
     jobs: int | None
     progress: Callable[[str, int, int], None] | None
     paper: PaperRecord | None
-    machines: Machines | None
-    unknown: str
 
-    def add(
-        self, found: list[Extreme], quantities: Sequence[str], leg_error: float, *, with_objective: bool
-    ) -> Iterator[Extreme]:
-        """Add the extremes of the reach of limbs, limits, lengths of legs, measures and tasks, and yield each.
+    def __post_init__(self) -> None:
+        self.box, self.closed = pose_box(self.workspace), closed_form(self.case.model)
+        self.names = [name for name in self.quantities if name not in SPECTRAL]
+        self.machines: Machines | None = None
+        self.unknown = ""
+        if self.case.joint_centre_tolerance:
+            try:
+                self.machines = Machines(self.case, self.closed, self.box)
+            except NotJudgedError as error:
+                self.unknown = str(error)
+        self.found: list[Extreme] = []
+        self._claims: Sequence[Claim] = ()
+        self._prove: Callable[..., Extreme] = prove_extreme
 
-        Args:
-            found: gets the extremes; lengths that a stroke needs more finely take the place of those found before.
-            quantities: names of measures.
-            leg_error: largest error of a leg's length, length.
-            with_objective: whether F of each task, and errors of the pose, are bounded.
+    def extremes(self) -> Iterator[Extreme]:
+        """Yield the extremes of the reach of limbs, limits, lengths of legs, measures, tasks, and errors of the pose.
+
+        Each has to be among those found before the next one is proved.
 
         Raises:
             InputError: the robot has no measure of a name.
         """
-        case, legs, machines = self.case, self.legs, self.machines
-        names = [name for name in quantities if name not in SPECTRAL]
-        refine: Refine
-        if machines is not None:
-            proving = Proving(self.gap, self.jobs, self.progress, self.paper)
-            extremes = machine_extremes(machines, names, proving, with_objective=with_objective)
-            yield from _add(found, map(partial(_of_legs, machines), extremes))
-            refine = partial(_refined_machines, machines, proving)
-        else:
-            refine = yield from self._add_design(found, names, with_objective=with_objective)
-        lengths = [each for each in found if each.name.startswith("leg_length limb ") and each.sense is Sense.MIN]
+        yield from self._of_design() if self.machines is None else self._of_machines(self.machines)
+        lengths = [each for each in self.found if each.name.startswith("leg_length limb ") and each.sense is Sense.MIN]
         shortest = min((each.bound for each in lengths), default=0.0)
         subject = Subject(
-            case=case,
+            case=self.case,
             model=self.closed.model,
-            box=pose_box(self.workspace),
-            legs=joint_centres(case),
-            built=None if machines is None else (machines.built, machines.family),
+            box=self.box,
+            legs=joint_centres(self.case),
+            family=None if self.machines is None else self.machines.family,
             unknown=self.unknown,
             shortest=shortest,
         )
-        before = len(found)
-        found[:] = with_strokes(subject, found, refine)
-        yield from found[before:]
-        yield from _add(found, searched_limits(subject, gap=self.gap, paper=self.paper))
-        yield from _add(found, asked_spectra_extremes(subject, quantities, gap=self.gap, paper=self.paper))
-        eps = leg_error + 2 * (case.joint_centre_tolerance or 0.0)
-        if legs is not None and with_objective and eps > 0:
-            exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
-            yield from _add(found, pose_errors(legs, subject.problem, eps, exact, paper=self.paper))
+        count = len(self.found)
+        whole = with_strokes(subject, self.found, self._finer)
+        self.found, strokes = whole[:count], whole[count:]
+        yield from strokes
+        yield from searched_extremes(subject, self.quantities, gap=self.gap, paper=self.paper)
+        if has_straight_legs(self.case.model) and self.with_objective:
+            yield from pose_errors(subject, self.leg_error, paper=self.paper)
 
-    def _add_design(
-        self, found: list[Extreme], names: Sequence[str], *, with_objective: bool
-    ) -> Generator[Extreme, None, Refine]:
-        """Add the extremes of the design, yield each, and return the function that proves its lengths more finely."""
-        case, box = self.case, pose_box(self.workspace)
-        is_reached = True
-        if self.closed.reaches:
-            place, reaches = reach_claims(case, self.closed, self.workspace)
-            yield from self._add_proved(found, place, [replace(each, uncovered=self.unknown) for each in reaches])
-            is_reached = not any(each.fails for each in found)
+    def _of_machines(self, machines: Machines) -> Iterator[Extreme]:
+        """Yield the extremes of expressions over all machines."""
+        reaches, claims = machines.symbols.claims(self.names, with_objective=self.with_objective)
+        prove = partial(machines.extreme, jobs=self.jobs, paper=self.paper)
+        yield from self._proved(reaches, prove)
+        if any(each.fails for each in self.found):
+            yield from (extreme_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
+        else:
+            yield from self._proved(claims, prove)
+
+    def _of_design(self) -> Iterator[Extreme]:
+        """Yield the extremes of expressions of the design."""
+        case, closed, workspace = self.case, self.closed, self.workspace
+        if closed.reaches:
+            layout, reaches = reach_claims(case, closed, workspace)
+            yield from self._proved(reaches, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper))
+        is_reached = not any(each.fails for each in self.found)
         # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
-        is_closed = self.closed.reaches and is_reached
-        layout = closed_layout(case, self.closed, self.workspace) if is_closed else posed_layout(case, self.workspace)
-        claims = claims_of(layout, names, with_objective=with_objective)
-        prove = self._prove(layout)
-        claims = [replace(each, uncovered=self.unknown) for each in claims]
-        decided: list[Extreme] = []
-        if not case.joint_centre_tolerance:
-            decided = [
-                each for each in loop_extremes(case, self.closed, box, gap=self.gap) if each.outcome is not Outcome.OPEN
-            ]
-            if is_reached:
-                proving = Proving(self.gap, self.jobs)
-                decided += shown_extremes(case, self.closed, box, names, proving, with_objective=with_objective)
-        yield from self._add_proved(found, layout, claims, decided)
-        return partial(_refined, partial(prove, paper=self.paper, again=True), claims)
+        is_closed = closed.reaches and is_reached
+        layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
+        claims = claims_of(layout, self.names, with_objective=self.with_objective)
+        decided = [] if self.unknown or not closed.model.unknowns else self._in_home(is_reached=is_reached)
+        yield from self._proved(claims, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper), decided)
 
-    def _prove(self, layout: Layout) -> Callable[..., Extreme]:
-        """Return the function that proves a claim to a gap."""
-        return partial(prove_extreme, layout, jobs=self.jobs)
+    def _in_home(self, *, is_reached: bool) -> Iterator[Extreme]:
+        """Yield the extremes of a design with loops that are decided in the assembly of home.
 
-    def _add_proved(
-        self, found: list[Extreme], layout: Layout, claims: Sequence[Claim], decided: Sequence[Extreme] = ()
+        Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is
+        singular. The loops are followed here, and the design is the only machine within no tolerance.
+        """
+        try:
+            alone = Machines(self.case, self.closed, self.box)
+        except NotJudgedError:
+            return
+        claims = alone.symbols.claims(self.names, with_objective=self.with_objective)[1]
+        limited = alone.followed([claim for claim in claims if claim.limit is not None], gap=self.gap)
+        yield from (each for each in limited if each.outcome is not Outcome.OPEN)
+        for claim in claims if is_reached else ():
+            if claim.limit is None:
+                yield alone.extreme(claim, gap=self.gap, jobs=self.jobs)
+
+    def _proved(
+        self, claims: Sequence[Claim], prove: Callable[..., Extreme], decided: Iterable[Extreme] = ()
     ) -> Iterator[Extreme]:
-        """Add the extremes of claims, and yield them; those that are decided are searched again for the paper alone."""
-        prove, known = self._prove(layout), {(each.name, each.sense, each.key): each for each in decided}
+        """Yield the extremes of claims; those that are decided are searched again for the paper alone."""
+        self._claims, self._prove = claims, prove
+        known = {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(claims):
             if self.progress is not None:
                 self.progress(claim.name, done, len(claims))
             own = known.get((claim.name, claim.sense, claim.key))
             is_limit = own is not None and own.limit is not None
             if own is None or (self.paper is not None and not (is_limit and own.outcome is not Outcome.PROVED)):
-                again = prove(claim, gap=_AS_NEEDED if is_limit else self.gap, paper=self.paper)
-                if is_limit and self.paper is not None and again.outcome is not Outcome.PROVED:
-                    self.paper.elsewhere.add((claim.name, claim.sense.value))
+                gap = _AS_NEEDED if is_limit else self.gap
+                again = prove(replace(claim, uncovered=self.unknown), gap=gap)
                 own = own or again
-            yield from _add(found, [own])
+            yield own
 
+    def _finer(self, leg: int, sense: Sense, gap: float, about: Directions | None) -> Extreme | None:
+        """Return a length of a leg, proved more finely; None where the work is requested to stop.
 
-def _of_legs(machines: Machines, each: Extreme) -> Extreme:
-    """Return an extreme with the errors of its machine as those of six straight legs, if it has these."""
-    if not has_straight_legs(machines.case.model):
-        return each
-    return replace(each, errors=None if each.centres is None else of_legs(each.centres), centres=None)
-
-
-def _refined(
-    prove: Callable[..., Extreme],
-    claims: Sequence[Claim],
-    leg: int,
-    sense: Sense,
-    gap: float,
-    about: Directions | None,  # noqa: ARG001 - the design is one machine at all poses
-) -> Extreme | None:
-    """Return a length of a leg, proved more finely; None where the work is requested to stop."""
-    claim = next(each for each in claims if each.leg == leg and each.sense is sense)
-    return None if is_requested() else prove(claim, gap=gap)
-
-
-def _refined_machines(
-    machines: Machines, proving: Proving, leg: int, sense: Sense, gap: float, about: Directions | None
-) -> Extreme | None:
-    """Return the same of all machines, less the part of their errors in these directions, which no pose changes."""
-    claims = (
-        machines.symbols.claims(())[1]
-        if about is None
-        else [length_of_one_machine(machines.symbols, leg, sense, about)]
-    )
-    if about is not None and proving.paper is not None:
-        proving.paper.directions[claims[0].name] = about
-    prove = partial(machine_extreme, machines, again=True)
-    found = _refined(lambda claim, *, gap: prove(claim, proving._replace(gap=gap)), claims, leg, sense, gap, about)
-    return None if found is None else _of_legs(machines, found)
-
-
-def _add(found: list[Extreme], more: Iterable[Extreme]) -> Iterator[Extreme]:
-    """Add extremes one by one, and yield each."""
-    for each in more:
-        found.append(each)
-        yield each
+        With directions it is less the part of its errors along them, which no pose changes.
+        """
+        if is_requested() or (about is not None and self.machines is None):
+            return None
+        if about is None or self.machines is None:
+            claim = next(each for each in self._claims if each.leg == leg and each.sense is sense)
+        else:
+            claim = length_of_one_machine(self.machines.symbols, leg, sense, about)
+            if self.paper is not None:
+                self.paper.directions[claim.name] = about
+        return self._prove(claim, gap=gap)

@@ -1,45 +1,97 @@
-"""The proof on paper of a judgement, from the records of its searches."""
+"""The proof on paper of a judgement: what its searches record, and what of that is a proof of a claim."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
+import numpy as np
+
+from ....models import FloatArray
+from ...case.task import Sense
+from ..boxes.tree import TreeRecord
+from ..certificate.certificate import CertificateStatus
 from ..checker.premises import fingerprint
-from ..checker.proof_file import ProofClaim, Unproved, WorkspaceProof, workspace_numbers
-from ..checker.workspace.statement import ERRORS, ExpectedClaim, RobotClaims, expected_claims, robot_claims
-from ..statement.claims import REACH, asked_name, one_machine_name
-from ..statement.machine import Legs, legs_of
+from ..checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, workspace_numbers
+from ..checker.tree import Node
+from ..checker.workspace.statement import ERRORS, ExpectedClaim, expected_claims, legs_numbers, robot_claims
+from ..statement.claims import REACH, REGULAR, one_machine_name
+from ..statement.machine import INSIDE, legs_of
 from ..statement.tolerance import second_order_name
-from .proof_record import PaperRecord
-from .singular_sides import singular_sides
-from .verdict import Outcome, Regularity
+from .numbers.extremes import slack_of
+from .verdict import Outcome, RankVerdict
 
 if TYPE_CHECKING:
-    from ....models import Model
+    from ...program.nlp import Nlp
+    from ..certificate.certificate import Certificate
+    from ..statement.claims import Claim
+    from ..statement.tolerance import Directions
     from .judge import Judgement
     from .numbers.extremes import Extreme
 
+#: Name and sense of a claim.
+Key = tuple[str, str]
+#: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
+_FOLDED = 1e-12
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
-#: Kinds of claims about ranks.
-_RANKS = ("regular", "constraints")
-#: Kinds of claims that rest on the shortest lengths of legs where machines are meant.
-_OF_ROWS = ("singular value", "condition")
 #: Reason of claims about machines within a tolerance that are not known.
 _AS_BUILT = "the robot cannot be put together with errors of its joint centres"
 #: Reason of numbers of machines whose coordinates follow from others, or that have kinks.
 _BY_MACHINES = "it is proved by a search of boxes for all machines together, which has no proof on paper"
 #: Reason of claims of kinds that the checker does not know.
 _NO_RULES = "claims of this kind have no proof on paper"
+_NOT_JUDGED = "it was not judged"
 _NO_BOUND = "its search has no bound"
 _ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"
-#: Reasons of claims about other robots than six straight legs.
 _BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
+
+
+@dataclass(eq=False)
+class PaperRecord:
+    """Records of all searches about one machine.
+
+    Attributes:
+        programs: bounds of numbers by the rules of ``certify``, with their trees.
+        boxes: trees of other searches, by name.
+        firsts: bounds of the errors of the pose to first order, for legs that are one unit off, by name.
+        rests: bounds of terms of second order by which numbers of machines are bounded.
+        directions: fixed directions of a leg, by the name of lengths of one machine.
+    """
+
+    programs: dict[Key, ProofClaim] = field(default_factory=dict)
+    boxes: dict[str, TreeRecord] = field(default_factory=dict)
+    firsts: dict[str, float] = field(default_factory=dict)
+    rests: dict[Key, float] = field(default_factory=dict)
+    directions: dict[str, Directions] = field(default_factory=dict)
+
+    def own(self, name: str) -> TreeRecord:
+        """Return the record of a search of its own."""
+        return self.boxes.setdefault(name, TreeRecord())
+
+    def constant(self, claim: Claim, nlp: Nlp, value: float) -> None:
+        """Record a number that does not depend on the pose."""
+        bound = -nlp.sign * value
+        self._keep(claim, nlp, bound + _FOLDED * abs(bound), bytes([Node.BOUNDED]))
+
+    def program(self, claim: Claim, found: Certificate, tree: TreeRecord) -> None:
+        """Record a search of a number, if it has a bound, open boxes being leaves, that keeps the number's limit."""
+        is_bounded = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE)
+        sign = 1.0 if claim.sense is Sense.MAX else -1.0
+        most = math.inf if claim.limit is None else sign * claim.limit + slack_of(claim.limit)
+        if is_bounded and math.isfinite(found.bound) and sign * found.bound <= most:
+            self._keep(claim, found.nlp, -found.nlp.sign * found.bound, tree.tree(with_open=True))
+
+    def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
+        """Keep the best bound of a program; of two programs of one name the first, as the check has it."""
+        found = ProofClaim(claim.name, claim.sense.value, "program", bound, fingerprint(nlp), tree)
+        before = self.programs.setdefault((found.name, found.sense), found)
+        if before.graph == found.graph and bound <= (before.bound or 0.0):
+            self.programs[found.name, found.sense] = found
 
 
 def paper_of(
@@ -54,179 +106,163 @@ def paper_of(
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
     """
-    legs = legs_of(judged.case)
-    robot, is_reached = _robot_claims(judged, record)
-    # Of numbers of one name the first counts, and of strokes, which come later, that over all poses.
-    keys = [_key(judged, each) for each in judged.extremes]
-    last = dict(zip(keys, judged.extremes, strict=True))
-    first = dict(zip(reversed(keys), reversed(judged.extremes), strict=True))
-    proved: dict[tuple[str, str], ProofClaim] = {}
+    writer = _Writer(judged, record)
+    claims = expected_claims(judged.case, writer.robot, quantities, leg_error)
     unproved = []
-    expected = expected_claims(judged.case, robot, quantities, leg_error)
-    for each in expected:
-        if judged.case.joint_centre_tolerance and robot.machines is None:
-            unproved.append(Unproved(each.name, each.sense, _AS_BUILT))
-            continue
-        is_reach = each.claim is not None and each.claim.key == REACH
-        if each.kind == "number" and not (is_reach or is_reached):
-            unproved.append(Unproved(each.name, each.sense, _NO_REACH))
-            continue
-        extremes = first if each.kind == "number" else last
-        is_rank = each.kind in _RANKS
-        found = _rank(each, judged, record, robot.model) if is_rank else _number(each, extremes, record, proved)
-        is_of_lengths = each.kind == "error" or (judged.case.joint_centre_tolerance and each.kind in _OF_ROWS)
-        if is_of_lengths and not _has_lengths(judged, proved):
-            found = _NO_LENGTHS
-        if found == _NO_BOUND and judged.case.joint_centre_tolerance and each.key not in record.programs:
-            found = _BY_MACHINES
-        if isinstance(found, ProofClaim):
-            proved[each.key] = found
-        else:
-            unproved.append(Unproved(each.name, each.sense, found))
-    known = {each.key for each in expected}
-    unproved += [Unproved(*key, _NO_RULES) for key in keys if key not in known]
+    for each in claims:
+        try:
+            writer.proved[each.key] = writer.proof(each)
+        except ProofError as error:
+            unproved.append(Unproved(*each.key, str(error)))
+    known = {each.key for each in claims}
+    unproved += [Unproved(*key, _NO_RULES) for key in writer.extremes if key not in known]
     # The whole errors follow from those of first order together, and from the lengths of legs.
-    missing = [each for each in ERRORS if (each, "max") not in proved]
-    if len(missing) == 1:
-        (other,) = [each for each in ERRORS if each not in missing]
-        del proved[other, "max"]
-        unproved.append(Unproved(other, "max", f"the {missing[0]} has no proof"))
+    missing = [each for each in ERRORS if (each, "max") not in writer.proved]
+    for other in ERRORS if len(missing) == 1 else ():
+        if writer.proved.pop((other, "max"), None):
+            unproved.append(Unproved(other, "max", f"the {missing[0]} has no proof"))
     return WorkspaceProof(
         case=text,
         name=judged.case.name,
         workspace=workspace_numbers(judged.workspace),
-        legs=legs_numbers(legs),
+        legs=legs_numbers(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
-        claims=tuple(proved.values()),
+        claims=tuple(writer.proved.values()),
         unproved=tuple(unproved),
         tolerance=judged.case.joint_centre_tolerance or 0.0,
-        lemmas=tuple(_lemmas(record, proved)),
+        lemmas=tuple(writer.lemmas()),
     )
 
 
-def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
-    """Return joint centres (12, 3), base before platform; none for a robot that is not six straight legs."""
-    return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
+class _Writer:
+    """Writer of the proofs of claims.
+
+    Args:
+        judged: the verdicts.
+        record: of the searches that led to them.
+
+    Attributes:
+        robot: the robot as the check has it, with the symbols in which its numbers were bounded.
+        extremes: the verdicts on numbers; of two of one name the first.
+        proved: the claims so far.
+    """
+
+    def __init__(self, judged: Judgement, record: PaperRecord) -> None:
+        self._case, self._judged, self._record = judged.case, judged, record
+        self._reaches = [each for each in judged.extremes if each.key == REACH]
+        reached = {each.name for each in self._reaches if each.outcome is Outcome.PROVED}
+        self.robot = robot_claims(judged.case, judged.workspace, reached)
+        self.extremes = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
+        self.proved: dict[Key, ProofClaim] = {}
+
+    def proof(self, each: ExpectedClaim) -> ProofClaim:
+        """Return a claim with its proof; one that rests on others comes after them.
+
+        Raises:
+            ProofError: it has none, with the reason.
+        """
+        if self._case.joint_centre_tolerance and self.robot.machines is None:
+            raise ProofError(_AS_BUILT)
+        if each.kind == "rank":
+            return self._rank(each.name)
+        if each.key not in self.extremes:
+            raise ProofError(_NOT_JUDGED)
+        found = self.extremes[each.key]
+        if found.outcome is not Outcome.PROVED:
+            raise ProofError(_words(found))
+        if each.kind == "number":
+            return self._program(found)
+        if each.kind == "lengths":
+            return self._of_lengths(found)
+        return self._boxes(each, found)
+
+    def _rank(self, name: str) -> ProofClaim:
+        """Return the claim that J, or the constraint wrenches, keep their rank, or the opposite."""
+        found = self._judged.regularity if name == REGULAR else self._judged.constraints
+        if found is None:
+            raise ProofError(_NOT_JUDGED)
+        if found.outcome is Outcome.REFUTED and found.y is not None:
+            return self._singular(name, found, found.y)
+        if found.outcome is not Outcome.PROVED:
+            raise ProofError(_words(found))
+        tree = self._record.own(name)
+        if tree.lacks_boxes:
+            raise ProofError(_BEYOND)
+        return ProofClaim(name, "", "regular", tree=tree.tree(with_open=True))
+
+    def _singular(self, name: str, found: RankVerdict, y: FloatArray) -> ProofClaim:
+        """Return the opposite of a claim about a rank, which is refuted at a pose (6,)."""
+        if found.sides is not None:
+            return ProofClaim(name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
+        machines = self.robot.machines
+        if machines is None or found.reason:
+            raise ProofError(f"{_words(found)}; a computed pose has no proof")
+        # The determinant has the other sign for the largest errors in these directions too, and is farther from 0.
+        centres = found.centres if found.errors is None else found.errors.of_centres(machines.symbols.built.names)
+        if centres is None:
+            raise ProofError(_words(found))
+        errors = centres.vectors.copy()
+        errors *= INSIDE * machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
+        sides = [np.concatenate([y, each.ravel()]) for each in (np.zeros_like(errors), errors)]
+        return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
+
+    def _program(self, found: Extreme) -> ProofClaim:
+        """Return a claim with a tree of the search of ``certify``."""
+        # The search needs the reach of all limbs for the closed forms, and so do the claims on paper.
+        is_reached = all(each.outcome is Outcome.PROVED for each in self._reaches)
+        if found.key != REACH and is_reached and any((each.name, "min") not in self.proved for each in self._reaches):
+            raise ProofError(_NO_REACH)
+        program = self._record.programs.get((found.name, found.sense.value))
+        if program is None:
+            raise ProofError(_BY_MACHINES if self._case.joint_centre_tolerance else _ONE_ASSEMBLY)
+        return program
+
+    def _of_lengths(self, found: Extreme) -> ProofClaim:
+        """Return a claim about a telescoping leg, from its lengths or from those of one machine."""
+        directions = self._record.directions.get(one_machine_name(found.name))
+        if directions is None:
+            self._need_lengths([found.name.partition(" limb ")[2]], ("min", "max"))
+            return ProofClaim(found.name, found.sense.value, "lengths", found.bound)
+        sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
+        return ProofClaim(found.name, found.sense.value, "one machine", found.bound, sides=sides)
+
+    def _boxes(self, each: ExpectedClaim, found: Extreme) -> ProofClaim:
+        """Return a claim with a tree of a search of its own."""
+        if each.kind == "error" or (self._case.joint_centre_tolerance and each.kind != "clearance"):
+            self._need_lengths([leg.name for leg in self._case.model.legs], ("min",))
+        if each.kind == "error":
+            bound = self._record.firsts[each.name] * (1 + _OUTWARDS)
+        else:
+            sign = 1.0 if found.sense is Sense.MAX else -1.0
+            # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
+            limit = found.bound + sign * _OUTWARDS * abs(found.bound) if each.limit is None else each.limit
+            bound = sign * max(sign * limit, sign * found.bound)
+            if not math.isfinite(bound) or (each.limit is None and not bound > 0):
+                raise ProofError(_NO_BOUND)
+        tree = self._record.own(each.name).tree(with_open=True)
+        return ProofClaim(each.name, each.sense, "boxes", bound, tree=tree)
+
+    def _need_lengths(self, legs: Sequence[str], senses: Sequence[str]) -> None:
+        """Refuse a claim where the shortest, or longest, lengths of legs that it rests on have no proof.
+
+        Raises:
+            ProofError: they have none.
+        """
+        if any((f"leg_length limb {leg}", sense) not in self.proved for leg in legs for sense in senses):
+            raise ProofError(_NO_LENGTHS)
+
+    def lemmas(self) -> Iterator[ProofClaim]:
+        """Yield the claims that those about every machine rest on."""
+        machines = [name for (name, _), each in self.proved.items() if each.reason == "one machine"]
+        lengths = [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
+        yield from (self._record.programs[key] for key in lengths if key in self._record.programs)
+        for name, sense in [key for key, each in self.proved.items() if each.reason == "program"] + lengths:
+            rest = self._record.rests.get((second_order_name(name), sense))
+            if rest is not None:
+                yield ProofClaim(second_order_name(name), sense, "second order", rest)
 
 
-def _key(judged: Judgement, each: Extreme) -> tuple[str, str]:
-    """Return the name in proofs, and the sense, of an extreme."""
-    spectral = each.name in (SmallestSingularValue.key, ConditionNumber.key) and not each.key
-    return asked_name(judged.case, each.name) if spectral else each.name, each.sense.value
-
-
-def _lemmas(record: PaperRecord, proved: dict[tuple[str, str], ProofClaim]) -> Iterator[ProofClaim]:
-    """Yield the claims that those about every machine rest on."""
-    machines = [name for (name, _), each in proved.items() if each.reason == "one machine"]
-    keys = [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
-    for key in keys:
-        program = record.programs.get(key)
-        if program is not None and program.tree is not None:
-            yield ProofClaim(*key, "program", program.bound, fingerprint(program.nlp), program.tree)
-    for name, sense in [key for key, each in proved.items() if each.reason == "program"] + keys:
-        rest = record.rests.get((second_order_name(name), sense))
-        if rest is not None:
-            yield ProofClaim(second_order_name(name), sense, "second order", rest)
-
-
-def _has_lengths(judged: Judgement, proved: dict[tuple[str, str], ProofClaim]) -> bool:
-    """Return whether the shortest lengths of the legs have proofs."""
-    return all((f"leg_length limb {leg.name}", "min") in proved for leg in judged.case.model.legs)
-
-
-class _Robot(NamedTuple):
-    """Claims about a robot, and whether its numbers rest on no claim about reach that is not on paper."""
-
-    claims: RobotClaims
-    is_reached: bool
-
-
-def _robot_claims(judged: Judgement, record: PaperRecord) -> _Robot:
-    """Return the claims about the robot of a judgement, with the symbols in which its numbers were bounded."""
-    reaches = [each for each in judged.extremes if each.key == REACH]
-    proved = {each.name for each in reaches if each.outcome is Outcome.PROVED}
-    on_paper = {each for each in proved if (found := record.programs.get((each, "min"))) and found.tree is not None}
-    # The search needs the reach of all limbs for the closed forms, and so do the claims on paper.
-    return _Robot(robot_claims(judged.case, judged.workspace, proved), len(proved) < len(reaches) or proved == on_paper)
-
-
-def _rank(each: ExpectedClaim, judged: Judgement, record: PaperRecord, model: Model) -> ProofClaim | str:
-    """Return the claim that J, or the constraint wrenches, keep their rank, or why it has no proof."""
-    found = judged.regularity if each.kind == "regular" else judged.constraints
-    if found is None:
-        return "it was not judged"
-    if found.outcome is Outcome.PROVED:
-        own = record.own(each.name)
-        return _BEYOND if own.lacks_boxes else ProofClaim(each.name, "", "regular", tree=own.tree(with_open=True))
-    if found.outcome is Outcome.REFUTED:
-        return _refuted(each, found, judged, model)
+def _words(found: Extreme | RankVerdict) -> str:
+    """Return an outcome and its reason."""
     return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
-
-
-def _refuted(each: ExpectedClaim, found: Regularity, judged: Judgement, model: Model) -> ProofClaim | str:
-    """Return the opposite of a claim about a rank with its proof, or why it has no proof."""
-    if found.sides is not None:
-        return ProofClaim(each.name, "", "singular", sides=tuple(map(tuple, found.sides.tolist())))
-    legs = legs_of(judged.case)
-    if found.errors is not None and found.y is not None and legs is not None:
-        machine = found.errors.applied(legs)
-        return ProofClaim(each.name, "", "singular machine", sides=(tuple(found.y.tolist()), *legs_numbers(machine)))
-    why = "a computed pose has no proof"
-    if each.kind == "regular" and found.y is not None and legs is None:
-        sides = singular_sides(judged.case, model, judged.workspace, found.y)
-        if not isinstance(sides, str):
-            return ProofClaim(each.name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))
-        why = sides
-    return f"{found.outcome.value}: {found.reason}; {why}"
-
-
-def _number(
-    each: ExpectedClaim,
-    extremes: dict[tuple[str, str], Extreme],
-    record: PaperRecord,
-    proved: dict[tuple[str, str], ProofClaim],
-) -> ProofClaim | str:
-    """Return the claim about a number with its proof, or why there is none."""
-    found = extremes.get(each.key)
-    if found is None:
-        return "it was not judged"
-    if found.outcome is not Outcome.PROVED:
-        return f"{found.outcome.value}: {found.reason}" if found.reason else found.outcome.value
-    if each.kind == "number":
-        return _program(each, record)
-    if each.kind in ("stroke", "dead length"):
-        directions = record.directions.get(one_machine_name(each.name))
-        if directions is not None:
-            sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
-            return ProofClaim(each.name, each.sense, "one machine", found.bound, sides=sides)
-        leg = each.name.partition(" ")[2].removeprefix("limb ")
-        missing = any((f"leg_length limb {leg}", sense) not in proved for sense in ("min", "max"))
-        return _NO_LENGTHS if missing else ProofClaim(each.name, each.sense, "lengths", found.bound)
-    return _boxes(each, found.bound, record)
-
-
-def _program(each: ExpectedClaim, record: PaperRecord) -> ProofClaim | str:
-    """Return a claim with a tree of the search of ``certify``, or why there is none."""
-    program = record.programs.get(each.key)
-    if each.key in record.elsewhere:
-        return _ONE_ASSEMBLY
-    if program is None or program.tree is None:
-        return _NO_BOUND
-    return ProofClaim(each.name, each.sense, "program", program.bound, fingerprint(program.nlp), program.tree)
-
-
-def _boxes(each: ExpectedClaim, reached: float, record: PaperRecord) -> ProofClaim | str:
-    """Return a claim with a tree of a search of its own, or why there is none."""
-    if each.name not in record.boxes:
-        return "its search was not recorded"
-    if each.kind == "error":
-        bound = record.firsts[each.name] * (1 + _OUTWARDS)
-    else:
-        sign = 1.0 if each.sense == "max" else -1.0
-        # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
-        limit = reached + sign * _OUTWARDS * abs(reached) if each.limit is None else each.limit
-        bound = sign * max(sign * limit, sign * reached)
-        if not math.isfinite(bound) or (each.limit is None and not bound > 0):
-            return _NO_BOUND
-    return ProofClaim(each.name, each.sense, "boxes", bound, tree=record.boxes[each.name].tree(with_open=True))

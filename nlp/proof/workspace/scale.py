@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import LARGEST_TURN, Workspace
 from ...interruption import is_requested, one_call, within
+from ..statement.claims import CONSTRAINTS, REGULAR
 from ..statement.machine import workspace_of_case
-from .judge import Judgement, judge_workspace
+from .judge import judge_workspace
 from .robot.pose_box import PoseNumbers, scaled
 from .verdict import Outcome
 
@@ -52,56 +54,34 @@ def largest_scale(case: Case, *, time_limit: float | None = None, jobs: int | No
     Raises:
         CaseError: the case has no workspace, or a free dimension.
     """
+    workspace = workspace_of_case(case)
+    proved, failed, fault = 0.0, math.inf, None
     with within(time_limit):
-        return _largest(case, workspace_of_case(case), jobs)
-
-
-def _largest(case: Case, workspace: Workspace, jobs: int | None) -> Scale:
-    """Return the largest factor within the time left."""
-    proved, failed, fault = 0.0, float("inf"), None
-    factor, most = 1.0, min(_MOST, largest_factor(workspace))
-    while (failed == float("inf") or failed - proved > ACCURACY * failed) and not is_requested():
-        judged = judge_workspace(
-            case,
-            workspace=scaled(workspace, factor),
-            jobs=jobs,
-            with_objective=False,
-            until_fault=True,
-        )
-        if judged.is_proved:
-            proved = factor
-        elif is_requested() and not judged.is_refuted:  # a search that was stopped shows no fault
-            break
-        else:
-            failed, fault = factor, judged
-        if failed == float("inf"):
-            if factor >= most:
+        while (factor := _next(proved, failed, largest_factor(workspace))) is not None and not is_requested():
+            larger = scaled(workspace, factor)
+            judged = judge_workspace(case, workspace=larger, jobs=jobs, with_objective=False, until_fault=True)
+            if judged.is_proved:
+                proved = factor
+            elif is_requested() and not judged.is_refuted:  # a search that was stopped shows no fault
                 break
-            factor = min(2 * factor, most)
-        elif proved == 0:
-            factor = failed / 2
-            if factor < _LEAST:
-                break
-        else:
-            factor = (proved * failed) ** 0.5
-    claim, pose, refuted = "", None, False
-    if fault is not None:
-        claim, pose, refuted = _fault(fault)
-    return Scale(proved, failed, refuted, claim, pose)
+            else:
+                failed, fault = factor, judged
+    if fault is None:
+        return Scale(proved, failed, False, "", None)
+    names = [REGULAR, CONSTRAINTS][: len(fault.ranks)] + [f"{each.name}: {each.key}" for each in fault.extremes]
+    faults = [(name, each) for name, each in zip(names, fault.verdicts, strict=True) if each.fails]
+    # A refuted claim before an open one.
+    name, worst = min(faults, key=lambda each: each[1].outcome is not Outcome.REFUTED)
+    return Scale(proved, failed, worst.outcome is Outcome.REFUTED, f"{name}, {worst.outcome.value}", worst.pose)
 
 
-def _fault(judged: Judgement) -> tuple[str, PoseNumbers | None, bool]:
-    """Return the claim that fails, a pose of it, and whether it is refuted: a refuted one before an open one."""
-    faults: list[tuple[Outcome, str, PoseNumbers | None]] = []
-    for name, found in zip(("regular", "constraints regular"), judged.ranks, strict=False):
-        if found.outcome is not Outcome.PROVED:
-            faults.append((found.outcome, name, None if found.y is None else found.box.pose(found.y)))
-    faults += [(each.outcome, f"{each.name}: {each.key}", each.pose) for each in judged.extremes if each.fails]
-    if not faults:
-        return "regular poses", None, False
-    outcome, name, pose = min(faults, key=lambda each: each[0] is not Outcome.REFUTED)
-    is_refuted = outcome is Outcome.REFUTED
-    return f"{name}, {outcome.value}", pose, is_refuted
+def _next(proved: float, failed: float, most: float) -> float | None:
+    """Return the next factor to try, at most the given one; None where the factor is known."""
+    if failed == math.inf:
+        return min(2 * proved or 1.0, most) if proved < most else None
+    if proved == 0:
+        return failed / 2 if failed / 2 >= _LEAST else None
+    return (proved * failed) ** 0.5 if failed - proved > ACCURACY * failed else None
 
 
 def largest_factor(workspace: Workspace) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ....models import FloatArray
 from ..statement.machine import CentreErrors, JointErrors
-from .robot.pose_box import PoseBox
+from .robot.pose_box import PoseBox, PoseNumbers
 
 
 class Outcome(enum.Enum):
@@ -19,16 +19,16 @@ class Outcome(enum.Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Regularity:
-    """Verdict on the claim that J has full rank at every pose.
+class RankVerdict:
+    """Verdict on the claim that J, or the constraint wrenches, keep their rank at every pose.
 
     Attributes:
         outcome: the verdict.
         box: the box of poses.
         y: (6,) coordinates of a singular pose where the claim is refuted, and of the centre of the widest open box
             where it is open; None where it is proved.
-        sides: (2, 6) two poses of the workspace at which the determinant of the rows has opposite signs, without
-            rounding, where the claim is refuted so.
+        sides: (2, 6) two poses of the workspace at which the determinant of the rows is proved to have opposite signs,
+            where the claim is refuted so.
         engine: ``c``, or ``none`` where no search was made.
         boxes: number of boxes examined.
         open: number of boxes left.
@@ -52,3 +52,13 @@ class Regularity:
     reason: str
     errors: JointErrors | None = None
     centres: CentreErrors | None = None
+
+    @property
+    def pose(self) -> PoseNumbers | None:
+        """The pose with the coordinates ``y``; None without them."""
+        return None if self.y is None else self.box.pose(self.y)
+
+    @property
+    def fails(self) -> bool:
+        """Whether the claim is not proved."""
+        return self.outcome is not Outcome.PROVED

@@ -30,7 +30,7 @@ from screwsynth.nlp.proof.statement.standard_form import StandardForm
 from .first_order import enclose
 from .first_pass import LINEAR, Cuts, FirstPass, first_pass
 from .intervals import ULP
-from .quadratic_models import GradientModel, QuadraticModel, affine_ends_reaching, gradient_model, multipliers, ranges
+from .quadratic_models import GradientModel, QuadraticModel, gradient_model, multipliers
 from .squared_quotients import with_quotients
 
 #: Part of a side below which a contraction is not worth its leaf in a proof.
@@ -74,9 +74,6 @@ class NumpyEngine:
         tangents: whether the first pass has tangents to the squares of a minimum.
     """
 
-    #: Boxes that fit the processor's cache with all their registers.
-    block = 1024
-
     def __init__(
         self, form: StandardForm, jobs: int | None = None, *, apart: bool = False, tangents: bool = True
     ) -> None:
@@ -91,9 +88,6 @@ class NumpyEngine:
         self.functions = len(form.functions)
         self.equation, self._follows = np.array(form.is_equation), np.array(form.follows)
         self.depends = np.array(form.dependence, dtype=bool)
-
-    def close(self) -> None:
-        """Do nothing: this engine has no threads."""
 
     def examine(self, lower: FloatArray, upper: FloatArray, threshold: float) -> Examination:
         """Examine boxes, and close those whose bounds do not exceed a threshold.
@@ -166,7 +160,7 @@ class NumpyEngine:
         J = self.functions
         box = midpoints(lower, upper)
         model = self.model(lower, upper, box.radius)
-        low, high = ranges(model)
+        low, high = model.value.lo, model.value.hi
         middle, error = model.value.c, model.value.s
         defined = (error[:J] < np.inf).all(axis=0)
         bound = high[:J].min(axis=0)
@@ -269,7 +263,6 @@ class NumpyEngine:
                 if (r < J and sign < 0) or (r >= J and sign > 0 and not self.equation[r]):
                     continue
                 level = threshold if r < J else 0.0
-                keep(affine_ends_reaching(model.value, r, sign, level), r)
                 keep(model.expression_model(r, sign).ends_reaching(level), r)
         if len(self.equation) > 1:
             keep(L.ends_reaching(threshold), 0)

@@ -52,55 +52,21 @@ class _Result(NamedTuple):
     hi: FloatArray
 
 
-class _Factor(NamedTuple):
-    """A form without its rounding error.
+def _linear_product(a: FloatArray, ra: FloatArray, b: FloatArray, rb: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the range of the product of two linear parts (n, B), whose sums of sizes are ``ra`` and ``rb``.
 
-    Attributes:
-        c: (B,) centre.
-        a: (n, B) linear part.
-        rad: (B,) sum of ``|a|``.
-        p, q: (B,) least and largest of second order.
+    It has two bounds: ``e_i^2`` lies in [0, 1]; and ``4 A B = (A + B)^2 - (A - B)^2``, with both scaled to one size.
     """
-
-    c: FloatArray
-    a: FloatArray
-    rad: FloatArray
-    p: FloatArray
-    q: FloatArray
-
-
-class _SecondOrder(NamedTuple):
-    """Least and largest terms of second order of a product, and bounds of the sizes of its factors, (B,) each."""
-
-    p: FloatArray
-    q: FloatArray
-    size: FloatArray
-    other_size: FloatArray
-
-
-def _second_order(one: _Factor, other: _Factor) -> _SecondOrder:
-    """Return the terms of second order in the product of two forms.
-
-    The product of the linear parts has two bounds: ``e_i^2`` lies in [0, 1]; and ``4 A B = (A + B)^2 - (A - B)^2``,
-    with both scaled to the same size.
-    """
-    (cx, ax, rx, px, qx), (cy, ay, ry, py, qy) = one, other
-    products = ax * ay
+    products = a * b
     sizes = np.abs(products).sum(axis=0)
     balance = products.sum(axis=0)
-    both = rx * ry
+    both = ra * rb
     cross = both - sizes
     most, least = 0.5 * (sizes + balance) + cross, 0.5 * (sizes - balance) + cross
-    first, second = ax * ry, ay * rx
-    plus, minus = np.abs(first + second).sum(axis=0), np.abs(first - second).sum(axis=0)
+    plus, minus = np.abs(a * rb + b * ra).sum(axis=0), np.abs(a * rb - b * ra).sum(axis=0)
     quarter = 0.25 / np.where(both > 0, both, 1.0)
     # In this order: the square of a sum may underflow.
-    most, least = np.minimum(most, plus * (plus * quarter)), np.minimum(least, minus * (minus * quarter))
-    mx, my = np.maximum(-px, qx), np.maximum(-py, qy)
-    mixed = rx * my + ry * mx + mx * my
-    p = np.minimum(cx * py, cx * qy) + np.minimum(cy * px, cy * qx) - (least + mixed)
-    q = np.maximum(cx * py, cx * qy) + np.maximum(cy * px, cy * qx) + (most + mixed)
-    return _SecondOrder(p, q, np.abs(cx) + rx + mx, np.abs(cy) + ry + my)
+    return -np.minimum(least, minus * (minus * quarter)), np.minimum(most, plus * (plus * quarter))
 
 
 class _Interpreter:
@@ -181,22 +147,29 @@ class _Interpreter:
 
     def _product(self, x: int, y: int, span: slice) -> _Result:
         """Return the product of two registers."""
-        w = self.work
+        w, rx, ry = self.work, self.rad[x], self.rad[y]
         cx, cy, ax, ay = w.c[x], w.c[y], w.a[x, span], w.a[y, span]
-        p, q, big, other = _second_order(
-            _Factor(cx, ax, self.rad[x], w.p[x], w.q[x]), _Factor(cy, ay, self.rad[y], w.p[y], w.q[y])
-        )
+        least, most = _linear_product(ax, rx, ay, ry)
+        mx, my = self._rest(x), self._rest(y)
+        mixed = rx * my + ry * mx + mx * my
+        p = np.minimum(cx * w.p[y], cx * w.q[y]) + np.minimum(cy * w.p[x], cy * w.q[x]) + (least - mixed)
+        q = np.maximum(cx * w.p[y], cx * w.q[y]) + np.maximum(cy * w.p[x], cy * w.q[x]) + (most + mixed)
+        big, other = np.abs(cx) + rx + mx, np.abs(cy) + ry + my
         s = (big * w.s[y] + other * w.s[x] + w.s[x] * w.s[y]) + (self.slack * (big * other) + TINY)
         ends = interval_product(w.lo[x], w.hi[x], w.lo[y], w.hi[y])
         return _Result(cx * cy, cx * ay + cy * ax, p, q, s, *ends)
 
+    def _rest(self, x: int) -> FloatArray:
+        """Return the largest size of a register's terms of second order."""
+        return np.maximum(-self.work.p[x], self.work.q[x])
+
     def _square(self, x: int, span: slice) -> _Result:
-        """Return the square of a register; that of its linear part is not negative."""
+        """Return the square of a register; those of its linear part and of the rest are not negative."""
         w = self.work
         c, rad, p, q, s = w.c[x], self.rad[x], w.p[x], w.q[x], w.s[x]
-        m = np.maximum(-p, q)
-        mixed = 2 * rad * m + m * m
-        low, high = np.minimum(2 * c * p, 2 * c * q) - mixed, np.maximum(2 * c * p, 2 * c * q) + (rad * rad + mixed)
+        m = self._rest(x)
+        mixed, square = 2 * rad * m, rad * rad + m * m
+        low, high = np.minimum(2 * c * p, 2 * c * q) - mixed, np.maximum(2 * c * p, 2 * c * q) + (mixed + square)
         big = np.abs(c) + rad + m
         error = 2 * big * s + s * s + (self.slack * (big * big) + TINY)
         one, other = np.abs(w.lo[x]), np.abs(w.hi[x])
@@ -207,42 +180,29 @@ class _Interpreter:
         return _Result(c * c, 2 * c * w.a[x, span], low, high, error, lo, hi + (hi * ULP + TINY))
 
     def _quotient(self, x: int, y: int, span: slice) -> _Result:
-        """Return ``x / y`` as ``k + (x - k y) / y``, where ``k = c_x / c_y`` leaves the numerator without a centre.
+        """Return ``x / y`` as ``P + (x - P y) / y``, where P is the quotient's polynomial of first order.
 
-        ``1 / (c + Y) = 1 / c - Y / c^2 + Y^2 / (c^2 (c + Y))``.
+        ``x - P y`` has terms of second and higher order only.
         """
         w = self.work
-        low, high, c = w.lo[y], w.hi[y], w.c[y]
+        low, high, py, qy = w.lo[y], w.hi[y], w.p[y], w.q[y]
         positive = low > 0
         near, far = np.where(positive, low, -high), np.where(positive, high, -low)
         near = np.where(near > 0, near, np.nan)  # an interval with 0 in it has no inverse
         sign = np.where(positive, 1.0, -1.0)
-        my = np.maximum(-w.p[y], w.q[y])
-        inverse = 1.0 / c
-        steep = inverse * inverse
-        moved = self.rad[y] + my
-        curved = moved * moved * steep / near
-        pi, qi = -steep * w.q[y], -steep * w.p[y]
-        pi, qi = np.where(positive, pi, pi - curved), np.where(positive, qi + curved, qi)
-        ri = steep * self.rad[y]
-        size = np.abs(inverse) + ri + np.maximum(-pi, qi)
-        si = w.s[y] * steep * (1 + (2 * moved + w.s[y]) / near) + (self.slack * size + TINY)
-        k = w.c[x] / c
-        steepness = np.abs(k)
-        an = w.a[x, span] - k * w.a[y, span]
-        pn = w.p[x] - np.where(k >= 0, k * w.q[y], k * w.p[y])
-        qn = w.q[x] - np.where(k >= 0, k * w.p[y], k * w.q[y])
-        whole = np.abs(w.c[x]) + self.rad[x] + steepness * (np.abs(c) + self.rad[y])
-        sn = w.s[x] + steepness * w.s[y] + (self.slack * whole + TINY * (1 + np.abs(c)))
-        rn = np.abs(an).sum(axis=0)
-        nothing = np.zeros_like(k)
-        p, q, big, other = _second_order(
-            _Factor(nothing, an, rn, pn, qn), _Factor(inverse, -steep * w.a[y, span], ri, pi, qi)
-        )
-        s = big * si + other * sn + sn * si + (self.slack * (np.abs(k) + big * other) + TINY)
+        inverse, k, my = 1.0 / w.c[y], w.c[x] / w.c[y], self._rest(y)
+        a = (w.a[x, span] - k * w.a[y, span]) * inverse
+        moved = np.abs(a).sum(axis=0)
+        least, most = _linear_product(a, moved, w.a[y, span], self.rad[y])
+        p = w.p[x] - np.maximum(k * py, k * qy) - (most + moved * my)
+        q = w.q[x] - np.minimum(k * py, k * qy) - (least - moved * my)
+        whole, long, other = np.abs(k) + moved, np.abs(w.c[x]) + self.rad[x], np.abs(w.c[y]) + self.rad[y] + my
+        s = w.s[x] + whole * w.s[y] + (self.slack * (long + whole * other) + TINY * (1 + other))
+        s = s / near + (self.slack * whole + TINY)
+        p, q = np.where(positive, p, -q) / near, np.where(positive, q, -p) / near
         one, two = sign / far, sign / near
         ends = widen(np.minimum(one, two), np.maximum(one, two), TINY)
-        return _Result(k, inverse * an, p, q, s, *interval_product(w.lo[x], w.hi[x], *ends))
+        return _Result(k, a, p, q, s, *interval_product(w.lo[x], w.hi[x], *ends))
 
     def _univariate(self, op: int, x: int, span: slice) -> _Result:
         """Return a function of one variable as ``f(c) + f'(c) Y + [least, most] Y^2``."""

@@ -13,7 +13,6 @@ from screwsynth.nlp.proof.boxes.engine import LimbModels, Verdict
 from screwsynth.nlp.proof.enclosure.forms import midpoints
 
 from .bounding import NumpyEngine
-from .quadratic_models import ranges
 
 
 class NumpyLimbEngine:
@@ -38,7 +37,7 @@ class NumpyLimbEngine:
         J = engine.functions
         box = midpoints(lower, upper)
         model = engine.model(lower, upper, box.radius, least)
-        low, high = ranges(model)
+        low, high = model.value.lo, model.value.hi
         middle, error = model.value.c, model.value.s
         defined = np.asarray((error[:J] < np.inf).all(axis=0))
         L = model.sum_model(engine.multipliers(model, high, m))

@@ -161,7 +161,6 @@ class QuadraticModel(forms.QuadraticModel):
 
     def bound(self) -> FloatArray:
         """Return an upper bound (B,) over the box."""
-        mean = self.middle + np.maximum(np.abs(self.slope_lo), np.abs(self.slope_hi)).sum(axis=0)
         # Where the slope has a sign, the largest value is on that face.
         s = np.where(self.slope_lo >= 0, 1.0, np.where(self.slope_hi <= 0, -1.0, 0.0))
         free = s == 0
@@ -175,8 +174,7 @@ class QuadraticModel(forms.QuadraticModel):
         separate = fixed + (largest_on_unit_interval(np.abs(b) + w, diagonal) + 0.5 * others).sum(axis=0)
         shift = np.maximum(diagonal + others, 0.0)
         tangent = fixed + _tangent(b, H, diagonal - shift) + (0.5 * shift + w).sum(axis=0)
-        best = np.fmin(mean, np.fmin(separate, tangent))
-        return np.asarray(best + self.rounding)
+        return np.asarray(np.fmin(np.inf, np.fmin(separate, tangent)) + self.rounding)
 
     def ends_reaching(self, level: float | FloatArray) -> Ends:
         """Return the ends of the ``e_i`` for which the model can reach a level, one or (B,), for any other ``e_j``."""
@@ -245,22 +243,6 @@ def _ends_of_solutions(linear: FloatArray, quadratic: FloatArray, need: FloatArr
     )
     first = np.where(at_start, 0.0, np.where(at_end | peak, np.clip(small, 0.0, 1.0), 2.0))
     return first, last
-
-
-def affine_ends_reaching(value: Enclosures, r: int, sign: float, level: float) -> Ends:
-    """Return the ends of the ``e_i`` for which ``sign`` times an expression can reach a level, from its affine form.
-
-    In ``c + sum a_i e_i + q + s >= level``, the other terms bound each ``a_i e_i``.
-    """
-    a = sign * value.a[r]
-    rad = np.abs(a).sum(axis=0)
-    most = value.q[r] if sign > 0 else -value.p[r]
-    slack = most + value.s[r] + (np.abs(value.c[r]) + rad + most + abs(level)) * (64 * ULP) + TINY
-    needed = (level - sign * value.c[r] - slack - (rad - np.abs(a))) / a
-    margin = np.abs(needed) * (8 * ULP)
-    low = np.where((a > 0) & (needed > -1), needed - margin, -1.0)
-    high = np.where((a < 0) & (needed < 1), needed + margin, 1.0)
-    return Ends(low, high)
 
 
 def gradient_model(box: Enclosures, radius: FloatArray) -> GradientModel:
@@ -341,13 +323,3 @@ def multipliers(
     bad = weights[0] < 0
     weights[:J, bad], weights[0, bad] = 0.0, 1.0
     return weights
-
-
-def ranges(model: GradientModel) -> tuple[FloatArray, FloatArray]:
-    """Return lower and upper ends (R, B) of the expressions: of their forms, and by the mean value theorem."""
-    steep = np.maximum(np.abs(model.slope_lo), np.abs(model.slope_hi)).sum(axis=1) * (1 + 64 * ULP)
-    middle, error = model.value.c, model.value.s
-    spread = (error + (steep + TINY)) * (1 + ULP) + ULP * np.abs(middle)
-    high = np.fmin(model.value.hi, middle + spread * (1 + ULP) + ULP * np.abs(middle))
-    low = np.fmax(model.value.lo, middle - spread * (1 + ULP) - ULP * np.abs(middle))
-    return low, high

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.enclosure.forms import Encloser, Enclosures, Forms, forms_of
+from screwsynth.nlp.proof.enclosure.forms import Encloser, Enclosures, Forms, forms_of, halve_squares
 from screwsynth.nlp.proof.workspace.ranks.krawczyk import ROUNDING
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest, Tested
 
@@ -21,12 +21,8 @@ class NumpyRankTest(RankTest):
         """Return the verdict on boxes; the arguments are those of :meth:`.RankTest.examine_second`."""
         n, found = len(lower), enclose_second(encloser.tape, lower, upper)
         every = np.concatenate([found.a, found.Q], axis=1)
-        c, terms, r = forms_of(Enclosures(found.c, every, found.p, found.q, found.s, found.lo, found.hi))
-        # The square of a coordinate is a half, plus or minus as much.
-        squares = [n + n * i - i * (i - 1) // 2 for i in range(n)]
-        terms = terms.copy()
-        terms[:, :, squares] *= 0.5
-        middle, off = c + terms[:, :, squares].sum(axis=2), 0.0 if change is None else change.T
-        rest = (r + off) * (1 + ROUNDING) + ROUNDING * (np.abs(c) + np.abs(terms).sum(axis=2))
+        forms = forms_of(Enclosures(found.c, every, found.p, found.q, found.s, found.lo, found.hi))
+        (middle, terms, r), off = halve_squares(forms, n), 0.0 if change is None else change.T
+        rest = (r + off) * (1 + ROUNDING) + ROUNDING * (np.abs(middle) + np.abs(forms.a).sum(axis=2))
         tested = self.examine(Forms(middle, terms, rest), terms.shape[2])
         return tested._replace(shares=tested.shares[:, :n])

@@ -84,29 +84,6 @@ class OwnBoxes:
         return OwnBoxes(lower, upper, self.of[places], self.count)
 
 
-@dataclass(frozen=True, eq=False)
-class SharedBoxes:
-    """B boxes of shared variables with lists of own boxes.
-
-    Attributes:
-        lower, upper: (m, B) ends.
-        bound: (B,) upper bound of the value that is maximised.
-        own: lists of each limb.
-        good: (d, B) a point of each limb's own variables that is the best known.
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    bound: FloatArray
-    own: tuple[OwnBoxes, ...]
-    good: tuple[FloatArray, ...]
-
-    @property
-    def count(self) -> int:
-        """Number of shared boxes."""
-        return int(self.bound.size)
-
-
 class Tilt(NamedTuple):
     """A function ``g.e + 1/2 e'Q e`` of the shared variables over B boxes, e in [-1, 1]^m.
 
@@ -121,11 +98,14 @@ class Tilt(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LimbBound:
-    """Bounds of one limb over B boxes of shared variables and N boxes of its own ones.
+    """Bounds of one limb with d own variables over B boxes of shared variables and N boxes of its own ones.
 
     Attributes:
+        own: the own boxes.
+        good: (d, B) a point of the own variables that is the best known.
+        models: of the limb over the N boxes.
         tilt: what was taken off.
-        reached: (B,) lower bound, over the shared box, of the limb without its tilt at the point known to be good.
+        reached: (B,) lower bound, over the shared box, of the limb without its tilt at the good point.
         value_of_good: (B,) value of the limb there, at the centre of the shared box; -inf where it is not known.
         L: models of the N boxes without the tilt.
         bounds: (N,) upper bounds of the limb without its tilt; -inf where no optimum may lie.
@@ -133,6 +113,9 @@ class LimbBound:
         top: (B,) place of the box that has it.
     """
 
+    own: OwnBoxes
+    good: FloatArray
+    models: LimbModels
     tilt: Tilt
     reached: FloatArray
     value_of_good: FloatArray
@@ -151,61 +134,51 @@ def first_largest_of_lists(values: FloatArray, own: OwnBoxes) -> NDArray[np.intp
     return np.asarray(np.minimum.reduceat(places, starts))
 
 
-def bound_limb(models: LimbModels, good: LimbModels, fall: QuadraticModel, own: OwnBoxes, m: int) -> LimbBound:
+def bound_limb(
+    own: OwnBoxes, good: FloatArray, models: LimbModels, at_good: LimbModels, fall: QuadraticModel, m: int
+) -> LimbBound:
     """Return bounds of a limb whose first m variables are shared, with a tilt for each shared box.
 
     An own box in which the limb is nowhere as good as at the good point is dropped: no optimum lies in it.
 
     Args:
-        models: of the N own boxes.
-        good: of a good point of the limb in each of the B shared boxes.
-        fall: upper models of minus the limb's function there.
         own: the own boxes.
+        good: (d, B) a point of the own variables for each of the B shared boxes.
+        models: of the limb over the N own boxes.
+        at_good: of the limb at the good points.
+        fall: upper models of minus the limb's function there.
         m: number of shared variables.
     """
-    with np.errstate(all="ignore"):
-        L, usable = models.L, models.is_possible & models.defined
-        promise = np.where(usable, L.middle + np.abs(L.b[m:]).sum(axis=0), -np.inf)
-        chosen = first_largest_of_lists(promise, own)
-        is_known = good.holds & good.defined
-        g = np.where(is_known, good.L.b[:m], L.b[:m, chosen])
-        Q = np.where(is_known, good.L.H[:m, :m], L.H[:m, :m, chosen])
-        finite = np.isfinite(g).all(axis=0) & np.isfinite(Q).all(axis=(0, 1)) & (is_known | usable[chosen])
-        tilt = Tilt(np.where(finite, g, 0.0), np.where(finite, Q, 0.0))
-        reached = np.where(is_known, -_add(fall, tilt).bound(), -np.inf)
-        reached = np.where(np.isnan(reached), -np.inf, reached)
-        rest = without_tilt(L, Tilt(tilt.g[:, own.of], tilt.Q[:, :, own.of]))
-        bounds = np.where(models.defined, rest.bound(), np.inf)
-        # The bound of the limb itself, and that of minus its tilt.
-        apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
-        # The two may cancel: their rounding is in parts of their sizes.
-        other = models.high + apart[own.of] + (np.abs(models.high) + apart[own.of]) * (64 * ULP) + TINY
-        bounds = np.fmin(bounds, other)
-        is_possible = models.is_possible & ~(bounds < reached[own.of])
-        bounds = np.where(is_possible, np.where(np.isnan(bounds), np.inf, bounds), -np.inf)
-    return LimbBound(
-        tilt,
-        reached,
-        np.where(is_known, good.value, -np.inf),
-        rest,
-        bounds,
-        np.maximum.reduceat(bounds, own.starts),
-        first_largest_of_lists(bounds, own),
-    )
+    L, usable = models.L, models.is_possible & models.defined
+    promise = np.where(usable, L.middle + np.abs(L.b[m:]).sum(axis=0), -np.inf)
+    chosen = first_largest_of_lists(promise, own)
+    is_known = at_good.holds & at_good.defined
+    g = np.where(is_known, at_good.L.b[:m], L.b[:m, chosen])
+    Q = np.where(is_known, at_good.L.H[:m, :m], L.H[:m, :m, chosen])
+    finite = np.isfinite(g).all(axis=0) & np.isfinite(Q).all(axis=(0, 1)) & (is_known | usable[chosen])
+    tilt = Tilt(np.where(finite, g, 0.0), np.where(finite, Q, 0.0))
+    reached = np.where(is_known, -_add(fall, tilt).bound(), -np.inf)
+    reached = np.where(np.isnan(reached), -np.inf, reached)
+    rest = _add(L, Tilt(-tilt.g[:, own.of], -tilt.Q[:, :, own.of]))
+    bounds = np.where(models.defined, rest.bound(), np.inf)
+    # The bound of the limb itself, and that of minus its tilt.
+    apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
+    # The two may cancel: their rounding is in parts of their sizes.
+    other = models.high + apart[own.of] + (np.abs(models.high) + apart[own.of]) * (64 * ULP) + TINY
+    bounds = np.fmin(bounds, other)
+    is_possible = models.is_possible & ~(bounds < reached[own.of])
+    bounds = np.where(is_possible, np.where(np.isnan(bounds), np.inf, bounds), -np.inf)
+    value = np.where(is_known, at_good.value, -np.inf)
+    best, top = np.maximum.reduceat(bounds, own.starts), first_largest_of_lists(bounds, own)
+    return LimbBound(own, good, models, tilt, reached, value, rest, bounds, best, top)
 
 
-def without_tilt(L: QuadraticModel, tilt: Tilt) -> QuadraticModel:
-    """Return the models without tilts of their first variables, (m, N) and (m, m, N)."""
-    return _add(L, Tilt(-tilt.g, -tilt.Q))
-
-
-def tilts_of(parts: list[LimbBound]) -> FloatArray:
-    """Return the sum of the tilts and bests of all limbs over B boxes as :meth:`Engine.common_models` reads it."""
-    with np.errstate(all="ignore"):
-        best = np.array([part.best for part in parts])
-        g, Q = (np.array(each) for each in zip(*[part.tilt for part in parts], strict=True))
-        lost = 64 * ULP * (np.abs(g).sum(axis=(0, 1)) + np.abs(Q).sum(axis=(0, 1, 2)))
-        total = np.where(np.isfinite(best).all(axis=0), best.sum(axis=0), np.inf)
+def tilts_of(limbs: Sequence[LimbBound]) -> FloatArray:
+    """Return the sum of the tilts and bests of all limbs over B boxes as :meth:`Engine.limb_models` reads it."""
+    best = np.array([limb.best for limb in limbs])
+    g, Q = (np.array(each) for each in zip(*[limb.tilt for limb in limbs], strict=True))
+    lost = 64 * ULP * (np.abs(g).sum(axis=(0, 1)) + np.abs(Q).sum(axis=(0, 1, 2)))
+    total = np.where(np.isfinite(best).all(axis=0), best.sum(axis=0), np.inf)
     sums = g.sum(axis=0), Q.sum(axis=0).reshape(-1, best.shape[1])
     return np.concatenate([[total, np.abs(best).sum(axis=0), lost], *sums])
 

@@ -9,23 +9,21 @@ the limbs with the largest spread are refined, or the shared box is bisected. Se
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from .....models.arrays import first_largest
 from ...checker.tree import Node, leaf_bytes, node_bytes
 from ...enclosure.forms import ULP, midpoints
-from ..engine import Engine, LimbModels
-from ..optimum import LEAST_WIDTHS, reason_without_bound
-from ..rows import SMALL, WHOLE, Boxes, some
-from ..search import Order, Rule, Search, Verdicts
-from ..threads import Threads
+from ..engine import Engine, LimbModels, Threads
+from ..optimum import LEAST_WIDTHS
+from ..search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts, some
 from ..tree import TreeRecord, halves_of, keys_of
-from .decomposition import LimbBound, OwnBoxes, SharedBoxes, bound_limb, first_largest_of_lists, tilts_of
+from .decomposition import LimbBound, OwnBoxes, bound_limb, first_largest_of_lists, tilts_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,6 +33,7 @@ if TYPE_CHECKING:
     from ...statement.standard_form import StandardForm
     from ..incumbent import Incumbent
 
+Result = TypeVar("Result")
 #: Weight of a model's linear part beside its curved part in the choice of a variable, as in the kernel.
 _LINEAR = 0.3
 #: Own boxes are bisected where their bound is within this part of the limb's spread of the best.
@@ -60,28 +59,18 @@ class SharedSums:
     """Bounds of B shared boxes.
 
     Attributes:
-        models: of each limb.
-        parts: bounds of each limb.
+        limbs: bounds of each limb.
         common: models of the part with shared variables alone, with all tilts and bests, and what is left of the boxes.
         sums: (B,) upper bounds from these models: the limbs' bests, and the most that the common part adds to them.
         bound: (B,) upper bounds: the lesser of these and of those that the boxes had before.
         is_possible: (B,) whether the common conditions can hold and every limb has a box left.
     """
 
-    models: list[LimbModels]
-    parts: list[LimbBound]
+    limbs: list[LimbBound]
     common: LimbModels
     sums: FloatArray
     bound: FloatArray
     is_possible: NDArray[np.bool_]
-
-
-class Left(NamedTuple):
-    """The parts of B boxes that are left: ends (m, B), and whether anything is (B,)."""
-
-    lower: FloatArray
-    upper: FloatArray
-    alive: NDArray[np.bool_]
 
 
 class LeftOwn(NamedTuple):
@@ -107,12 +96,6 @@ class SharedColumns(NamedTuple):
 
     own: tuple[OwnBoxes, ...]
     good: tuple[FloatArray, ...]
-
-
-def view(boxes: Boxes[SharedColumns]) -> SharedBoxes:
-    """Return shared boxes as the bounds read them."""
-    ends = np.ascontiguousarray(boxes.lower.T), np.ascontiguousarray(boxes.upper.T)
-    return SharedBoxes(*ends, boxes.bound, boxes.more.own, tuple(np.ascontiguousarray(g.T) for g in boxes.more.good))
 
 
 def shared_search(
@@ -160,7 +143,7 @@ class SharedRule(Rule[SharedColumns]):
         if separation.common is None:
             raise ValueError("the limbs share no variable")
         self._form, self._separation, self._incumbent = form, separation, incumbent
-        self.common_form = separation.common
+        self.common_form, self.names = separation.common, separation.common.names
         self._m, self._turn = len(separation.shared), 0
         # Limbs are the parts that threads share: NumPy has a large part of their work, which cannot be cut into pieces.
         self._threads = Threads(jobs)
@@ -175,14 +158,6 @@ class SharedRule(Rule[SharedColumns]):
         """The part with shared variables alone."""
         return Engine(self.common_form, 1, self._m)
 
-    def fault(self, small: Sequence[Boxes[SharedColumns]]) -> str:
-        """Return the reason for stopping at boxes without a finite bound; empty without any."""
-        return reason_without_bound(self.common_form, small)
-
-    def close(self) -> None:
-        """Stop the threads."""
-        self._threads.close()
-
     def examine(self, boxes: Boxes[SharedColumns]) -> Verdicts[SharedColumns]:
         """Return bounds of shared boxes, and improve the incumbent; the first steps prepare one limb each."""
         if len(self._engines) < len(self._separation.limbs):
@@ -191,16 +166,16 @@ class SharedRule(Rule[SharedColumns]):
             self._opposites.append(Engine(replace(form, functions=(-form.functions[0],)), 1, self._m))
             self._engines.append(Engine(form, 1, self._m))
             return Verdicts(boxes, -math.inf, 0)
-        current, before = view(boxes), self._incumbent.value
+        before = self._incumbent.value
         self._turn += 1
         with np.errstate(all="ignore"):
             # A proof has no cuts of shared boxes, and no own boxes dropped for the sake of the other limbs.
             below = self.target if self._recorder is None else -math.inf
-            sums = self._examine(current, below)
-            self._improve(current, sums)
-            left, alive, emptied = self._branch(current, sums, below)
+            sums = self._sums(boxes, below)
+            self._improve(boxes, sums)
+            left, alive, emptied = self._branch(boxes, sums, below)
         # What contraction or dropping of own boxes excluded may reach the threshold.
-        examined, reasons = sum(own.of.size + own.count for own in current.own), (sums, alive, emptied)
+        examined, reasons = sum(own.of.size + own.count for own in boxes.more.own), (sums, alive, emptied)
         return Verdicts(left, self.target, examined, is_better=self._incumbent.value > before, reasons=reasons)
 
     def record(self, boxes: Boxes[SharedColumns], found: Verdicts[SharedColumns], split: NDArray[np.intp]) -> None:
@@ -208,7 +183,7 @@ class SharedRule(Rule[SharedColumns]):
         if self._recorder is None or found.reasons is None:
             return
         sums, alive, emptied = found.reasons
-        emptied = emptied | (np.array([part.best for part in sums.parts]) == -np.inf)
+        emptied = emptied | (np.array([limb.best for limb in sums.limbs]) == -np.inf)
         keys = keys_of(boxes.lower, boxes.upper)
         for k in np.flatnonzero(~alive).tolist():
             self._recorder.add(keys[k], _leaf(sums, k, emptied[:, k], self.target))
@@ -217,63 +192,60 @@ class SharedRule(Rule[SharedColumns]):
         for k, i, parts in zip(np.flatnonzero(alive)[cut].tolist(), split[cut].tolist(), halves, strict=True):
             self._recorder.add(keys[k], node_bytes(Node.HALF, i), *parts)
 
-    def _examine(self, boxes: SharedBoxes, below: float) -> SharedSums:
+    def _of_limbs(self, function: Callable[[int], Result]) -> list[Result]:
+        """Return the results of a function for the number of each limb; NumPy's warnings are off in each thread."""
+
+        def quiet(k: int) -> Result:
+            with np.errstate(all="ignore"):
+                return function(k)
+
+        return self._threads.map(quiet, range(len(self._engines)))
+
+    def _sums(self, boxes: Boxes[SharedColumns], below: float) -> SharedSums:
         """Return bounds of shared boxes, and their parts in which the sum can exceed a value."""
-        found = self._threads.map(lambda k: self._examine_limb(k, boxes), range(len(self._engines)))
-        models, parts = (list(each) for each in zip(*found, strict=True))
-        common = self._common.common_models(boxes.lower, boxes.upper, tilts_of(parts), below)
-        bound = common.L.bound()
-        known = common.defined & np.all([np.isfinite(part.best) for part in parts], axis=0)
-        sums = np.where(known & ~np.isnan(bound), bound, np.inf)
-        bound = np.fmin(sums, boxes.bound)
-        emptied = np.any([part.best == -np.inf for part in parts], axis=0)
-        return SharedSums(models, parts, common, sums, bound, common.is_possible & ~emptied)
+        limbs = self._of_limbs(lambda k: self._bound_limb(k, boxes))
+        common = self._common.limb_models(boxes.lower.T, boxes.upper.T, tilts=tilts_of(limbs), threshold=below)
+        bound, best = common.L.bound(), np.array([limb.best for limb in limbs])
+        known = common.defined & np.isfinite(best).all(axis=0) & ~np.isnan(bound)
+        sums = np.where(known, bound, np.inf)
+        is_possible = common.is_possible & ~(best == -np.inf).any(axis=0)
+        return SharedSums(limbs, common, sums, np.fmin(sums, boxes.bound), is_possible)
 
-    def _examine_limb(self, k: int, boxes: SharedBoxes) -> tuple[LimbModels, LimbBound]:
-        """Return models and bounds of a limb over shared boxes and its own boxes."""
-        engine, opposite, own, good = self._engines[k], self._opposites[k], boxes.own[k], boxes.good[k]
-        # NumPy's warnings are switched off for each thread by itself.
-        with np.errstate(all="ignore"):
-            place = [np.concatenate([ends, good]) for ends in (boxes.lower, boxes.upper)]
-            at_good, fall = engine.limb_models(*place), opposite.limb_models(*place).L
-            # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
-            known = at_good.holds & at_good.defined
-            least = np.where(known, -fall.bound(), -np.inf)
-            lower = np.concatenate([boxes.lower[:, own.of], own.lower])
-            upper = np.concatenate([boxes.upper[:, own.of], own.upper])
-            models = engine.limb_models(lower, upper, least[own.of])
-            return models, bound_limb(models, at_good, fall, own, self._m)
+    def _bound_limb(self, k: int, boxes: Boxes[SharedColumns]) -> LimbBound:
+        """Return bounds of a limb over shared boxes and its own boxes."""
+        engine, own, good = self._engines[k], boxes.more.own[k], boxes.more.good[k].T
+        place = np.concatenate([boxes.lower.T, good]), np.concatenate([boxes.upper.T, good])
+        at_good, fall = engine.limb_models(*place), self._opposites[k].limb_models(*place).L
+        # Whatever the shared variables are, an own point with a lesser value than the good one is no maximum.
+        least = np.where(at_good.holds & at_good.defined, -fall.bound(), -np.inf)
+        lower = np.concatenate([boxes.lower.T[:, own.of], own.lower])
+        upper = np.concatenate([boxes.upper.T[:, own.of], own.upper])
+        return bound_limb(own, good, engine.limb_models(lower, upper, least[own.of]), at_good, fall, self._m)
 
-    def _cut_limb(self, k: int, boxes: SharedBoxes, sums: SharedSums, threshold: float) -> LeftOwn:
-        """Return a limb's own boxes that are left."""
-        with np.errstate(all="ignore"):
-            parts = boxes.good[k], sums.models[k], sums.parts[k], boxes.own[k]
-            return cut_own(*parts, sums.sums, threshold)
-
-    def _improve(self, boxes: SharedBoxes, sums: SharedSums) -> None:
+    def _improve(self, boxes: Boxes[SharedColumns], sums: SharedSums) -> None:
         """Improve the incumbent from the best centre, and now and then from the box with the largest bound."""
         values = sums.common.value
-        places = [first_largest_of_lists(each.value, own) for each, own in zip(sums.models, boxes.own, strict=True)]
-        for each, place in zip(sums.models, places, strict=True):
-            values = values + each.value[place]
+        places = [first_largest_of_lists(limb.models.value, limb.own) for limb in sums.limbs]
+        for limb, place in zip(sums.limbs, places, strict=True):
+            values = values + limb.models.value[place]
         values = np.where(np.isnan(values), -np.inf, values)
         node = int(np.argmax(values))
         if values[node] > self._incumbent.value:
             self._incumbent.consider(self._point(boxes, node, [int(place[node]) for place in places]))
         if self._turn & (self._turn - 1) == 0:
             node = int(np.argmax(np.where(sums.is_possible & np.isfinite(sums.bound), sums.bound, -np.inf)))
-            self._incumbent.improve_near(self._point(boxes, node, [int(part.top[node]) for part in sums.parts]))
+            self._incumbent.improve_near(self._point(boxes, node, [int(limb.top[node]) for limb in sums.limbs]))
 
-    def _point(self, boxes: SharedBoxes, node: int, places: list[int]) -> FloatArray:
+    def _point(self, boxes: Boxes[SharedColumns], node: int, places: list[int]) -> FloatArray:
         """Return the point at the centres of a shared box and of one own box of each limb."""
         point = np.zeros(self._form.n)
-        point[list(self._separation.shared)] = 0.5 * boxes.lower[:, node] + 0.5 * boxes.upper[:, node]
-        for limb, own, place in zip(self._separation.limbs, boxes.own, places, strict=True):
+        point[list(self._separation.shared)] = 0.5 * boxes.lower[node] + 0.5 * boxes.upper[node]
+        for limb, own, place in zip(self._separation.limbs, boxes.more.own, places, strict=True):
             point[list(limb.own)] = 0.5 * own.lower[:, place] + 0.5 * own.upper[:, place]
         return point
 
     def _branch(
-        self, boxes: SharedBoxes, sums: SharedSums, below: float
+        self, boxes: Boxes[SharedColumns], sums: SharedSums, below: float
     ) -> tuple[Boxes[SharedColumns], NDArray[np.bool_], NDArray[np.bool_]]:
         """Drop and contract boxes, and refine the lists of those that are not to be bisected.
 
@@ -287,117 +259,109 @@ class SharedRule(Rule[SharedColumns]):
             # other arithmetic needs room up to the threshold.
             room = max(self.target - self._incumbent.value, 0.0)
             bounded = sums.sums <= (self.target - _RESERVE * room if math.isfinite(room) else self.target)
-        finite, common = np.isfinite(sums.bound), sums.common
-        left = Left(boxes.lower, boxes.upper, np.ones(boxes.count, dtype=bool))
+        finite, count = np.isfinite(sums.bound), len(bounded)
+        lower, upper, alive = boxes.lower.T, boxes.upper.T, np.ones(count, dtype=bool)
         if self._recorder is None:
-            fits = (common.lower <= common.upper).all(axis=0)
-            ends = [np.where(fits & finite, *each) for each in zip((common.lower, common.upper), left[:2], strict=True)]
-            left = collapse_monotone(self.common_form, boxes, sums, Left(ends[0], ends[1], fits | ~finite))
-        lower, upper, alive = left
-        lists = self._threads.map(lambda k: self._cut_limb(k, boxes, sums, below), range(len(self._engines)))
-        sizes = np.array([np.bincount(each.own.of, minlength=boxes.count) for each in lists])
+            lower, upper, alive = contracted(self.common_form, boxes, sums)
+        lists = self._of_limbs(lambda k: cut_own(sums.limbs[k], sums.sums, below))
+        sizes = np.array([np.bincount(each.own.of, minlength=count) for each in lists])
         alive = alive & sums.is_possible & ~bounded & (sizes > 0).all(axis=0)
         whole = (self.common_form.upper - self.common_form.lower)[:, None]
-        width = ((upper - lower) / whole).max(axis=0)
-        can_cut = width > np.where(finite, LEAST_WIDTHS[1], LEAST_WIDTHS[0])
+        can_cut = ((upper - lower) / whole).max(axis=0) > np.where(finite, LEAST_WIDTHS[1], LEAST_WIDTHS[0])
         change = self._shared_change(boxes, sums, lower, upper)
         spread = np.array([each.spread for each in lists])
         wider = (spread.sum(axis=0) > _PATIENCE * change.sum(axis=0)) & finite & (sizes.max(axis=0) < _LONGEST)
         refine = alive & (spread > 0).any(axis=0) & (wider | ~can_cut)
         cut = alive & ~refine & can_cut
         # A box that collapsed, or one of whose lists did, has not been examined as what is left of it.
-        moved = ((lower != boxes.lower) | (upper != boxes.upper)).any(axis=0)
-        for before, each in zip(boxes.own, lists, strict=True):
+        moved = ((lower != boxes.lower.T) | (upper != boxes.upper.T)).any(axis=0)
+        for before, each in zip(boxes.more.own, lists, strict=True):
             moved |= each.own.width < before.width
         split = np.where(cut, first_largest(change.T), np.where(refine | moved, WHOLE, SMALL))
+        refined = refine & (spread >= _SPREAD * spread.max(axis=0))
         own = tuple(
-            _refined(each, refine & (spread[k] >= _SPREAD * spread.max(axis=0))) for k, each in enumerate(lists)
+            each.own.bisect(each.is_near & which[each.own.of], each.along)
+            for each, which in zip(lists, refined, strict=True)
         )
         columns = SharedColumns(own, tuple(each.good.T for each in lists))
         return some(Boxes(lower.T, upper.T, sums.bound, split, columns), alive), alive, sizes == 0
 
-    def _shared_change(self, boxes: SharedBoxes, sums: SharedSums, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    def _shared_change(
+        self, boxes: Boxes[SharedColumns], sums: SharedSums, lower: FloatArray, upper: FloatArray
+    ) -> FloatArray:
         """Return how much (m, B) the bound can change along each shared variable of the part that is left."""
         m, M = self._m, sums.common.L
         change = _LINEAR * np.abs(M.b) + np.abs(M.H).sum(axis=0) + M.w
-        for part in sums.parts:
-            change = change + part.L.w[:m, part.top] + np.abs(part.L.H[:m, :, part.top]).sum(axis=1)
-        width = boxes.upper - boxes.lower
+        for limb in sums.limbs:
+            change = change + limb.L.w[:m, limb.top] + np.abs(limb.L.H[:m, :, limb.top]).sum(axis=1)
+        width = (boxes.upper - boxes.lower).T
         change = change * (upper - lower) / np.where(width > 0, width, 1.0)
         relative = (upper - lower) / (self.common_form.upper - self.common_form.lower)[:, None]
         return np.where(np.isfinite(change).all(axis=0) & (change > 0).any(axis=0), change, relative)
 
 
-def _refined(each: LeftOwn, which: NDArray[np.bool_]) -> OwnBoxes:
-    """Return a limb's lists, those of some shared boxes (B,) with their best boxes bisected."""
-    return each.own.bisect(each.is_near & which[each.own.of], each.along)
-
-
 def _leaf(sums: SharedSums, k: int, emptied: NDArray[np.bool_], target: float) -> bytes:
     """Return the node of closed box number k, in which some limbs (K,) may have no feasible point."""
-    parts = sums.parts
+    limbs = sums.limbs
     if emptied.any():
-        zero = np.zeros((len(parts), len(parts[0].tilt.g)))
+        zero = np.zeros((len(limbs), len(limbs[0].tilt.g)))
         bounds = np.where(np.cumsum(emptied) * emptied == 1, -np.inf, np.inf)
         return leaf_bytes(bounds, zero, zero[:, :, None] * zero[:, None])
     if not sums.sums[k] <= target:
         return bytes([Node.INFEASIBLE])
-    room = (target - sums.sums[k]) / (len(parts) + 1)
-    g, Q = (np.array([each[..., k] for each in ends]) for ends in zip(*[part.tilt for part in parts], strict=True))
-    return leaf_bytes(np.array([part.best[k] for part in parts]) + room, g, Q)
+    room = (target - sums.sums[k]) / (len(limbs) + 1)
+    g, Q = (np.array([each[..., k] for each in ends]) for ends in zip(*[limb.tilt for limb in limbs], strict=True))
+    return leaf_bytes(np.array([limb.best[k] for limb in limbs]) + room, g, Q)
 
 
-def collapse_monotone(form: StandardForm, boxes: SharedBoxes, sums: SharedSums, left: Left) -> Left:
-    """Return shared boxes collapsed on faces of the whole box, or dropped, where the sum rises along a variable.
+def contracted(
+    form: StandardForm, boxes: Boxes[SharedColumns], sums: SharedSums
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return what is left of B shared boxes, as ends (m, B), and whether anything is (B,).
 
-    The argument is that of the search of whole boxes: no condition may stop a point, of the common part or of a limb.
+    That is the part where the common conditions can hold and the sum can exceed the threshold, collapsed on a face of
+    the whole box, or dropped, where the sum rises along a variable. The argument is that of the search of whole boxes:
+    no condition may stop a point, of the common part or of a limb.
     """
-    lower, upper, alive = left.lower.copy(), left.upper.copy(), left.alive.copy()
-    parts = [*zip(sums.models, [own.starts for own in boxes.own], strict=True), (sums.common, np.arange(boxes.count))]
+    finite, fits = np.isfinite(sums.bound), (sums.common.lower <= sums.common.upper).all(axis=0)
+    lower = np.where(fits & finite, sums.common.lower, boxes.lower.T)
+    upper = np.where(fits & finite, sums.common.upper, boxes.upper.T)
+    alive, count = fits | ~finite, len(finite)
+    parts = [*((limb.models, limb.own.starts) for limb in sums.limbs), (sums.common, np.arange(count))]
     for i in range(form.n):
         for side in (1, -1):
-            slope, size = np.zeros(boxes.count), np.zeros(boxes.count)
-            stopped = np.zeros(boxes.count, dtype=bool)
+            slope, size, stopped = np.zeros(count), np.zeros(count), np.zeros(count, dtype=bool)
             for found, starts in parts:
                 each = found.slope_lo[i] if side > 0 else -found.slope_hi[i]
                 least = np.minimum.reduceat(np.where(found.is_possible, each, np.inf), starts)
                 slope, size = slope + least, size + np.abs(least)
                 stops = found.is_possible & (found.stops_up[i] if side > 0 else found.stops_down[i])
                 stopped |= np.logical_or.reduceat(stops, starts)
-            rises = (slope - _SUM * size > 0) & ~stopped & alive & (boxes.upper[i] > boxes.lower[i])
+            rises = (slope - _SUM * size > 0) & ~stopped & alive & (boxes.upper[:, i] > boxes.lower[:, i])
             whole = form.upper[i] if side > 0 else form.lower[i]
             at_face = rises & ((upper[i] if side > 0 else lower[i]) == whole)
             alive &= ~(rises & ~at_face)
             (lower if side > 0 else upper)[i, at_face] = whole
-    return Left(lower, upper, alive)
+    return lower, upper, alive
 
 
-def cut_own(
-    good: FloatArray,
-    found: LimbModels,
-    part: LimbBound,
-    own: OwnBoxes,
-    sums: FloatArray,
-    threshold: float,
-) -> LeftOwn:
+def cut_own(limb: LimbBound, sums: FloatArray, threshold: float) -> LeftOwn:
     """Return a limb's own boxes that can exceed a threshold together with the best of everything else.
 
     Args:
-        good: (d, B) the best point known of the own variables.
-        found: models of the limb.
-        part: its bounds.
-        own: its boxes.
+        limb: its bounds.
         sums: (B,) upper bounds of the shared boxes, each the sum of the limbs' bests and of what the common part adds.
             A lesser bound of the whole, from elsewhere, would say nothing of the other limbs.
         threshold: the threshold.
     """
-    m = len(found.lower) - len(own.lower)
+    own, L, found = limb.own, limb.L, limb.models
+    m = len(L.b) - len(own.lower)
     # The others give at most ``sums - best``, so this limb must give the rest.
-    level = threshold - (sums - part.best)
-    level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(part.best))
-    level = np.fmax(np.where(np.isfinite(level), level, -np.inf), part.reached)
-    keep = (part.bounds > -np.inf) & ~(part.bounds < level[own.of])
-    ends = part.L.ends_reaching(level[own.of])
+    level = threshold - (sums - limb.best)
+    level = level - _SUM * (abs(threshold) + np.abs(sums) + np.abs(limb.best))
+    level = np.fmax(np.where(np.isfinite(level), level, -np.inf), limb.reached)
+    keep = (limb.bounds > -np.inf) & ~(limb.bounds < level[own.of])
+    ends = L.ends_reaching(level[own.of])
     centre, radius = midpoints(own.lower, own.upper)
     margin = (np.abs(centre) + radius) * (4 * ULP)
     low = centre + radius * ends.low[m:] - margin
@@ -410,15 +374,14 @@ def cut_own(
     keep &= alive
     lower, upper = np.where(alive, lower, old_lower), np.where(alive, upper, old_upper)
     width = np.where(own.upper > own.lower, own.upper - own.lower, 1.0)
-    change = _LINEAR * np.abs(part.L.b[m:]) + np.abs(part.L.H[m:]).sum(axis=1) + part.L.w[m:]
+    change = _LINEAR * np.abs(L.b[m:]) + np.abs(L.H[m:]).sum(axis=1) + L.w[m:]
     change = np.where(upper > lower, change * (upper - lower) / width, 0.0)
     change = np.where(np.isfinite(change), change, np.where(upper > lower, upper - lower, 0.0))
     total = change.sum(axis=0)
-    spread = np.where(np.isfinite(part.best), total[part.top], 0.0)
-    is_near = (part.bounds > (part.best - _NEAR * total[part.top])[own.of]) & (total > 0)
+    spread = np.where(np.isfinite(limb.best), total[limb.top], 0.0)
+    is_near = (limb.bounds > (limb.best - _NEAR * total[limb.top])[own.of]) & (total > 0)
     # The centre of the best box becomes the good point where its value is larger.
     best = first_largest_of_lists(found.value, own)
-    better = found.value[best] > part.value_of_good
-    good = np.where(better, centre[:, best], good)
+    good = np.where(found.value[best] > limb.value_of_good, centre[:, best], limb.good)
     left = OwnBoxes(lower[:, keep], upper[:, keep], own.of[keep], own.count)
     return LeftOwn(left, spread, good, is_near[keep], first_largest(change.T)[keep])

@@ -8,7 +8,7 @@ forms (:mod:`.forms`), and signs of determinants with fractions.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,6 +17,7 @@ from casadi import SX
 
 from .....models import Dimension
 from ....case.case import Case
+from ....case.limits.constraint import LENGTH
 from ....case.task import Sense
 from ....errors import InputError, UncoveredError
 from ....program.layout import Layout
@@ -25,17 +26,18 @@ from ...statement.machine import Legs, check_leg_error, workspace_of_case
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
 from ..check import check_proof
-from ..proof_file import Proof, ProofClaim, ProofError, Statement, Unproved, WorkspaceProof
+from ..proof_file import Proof, ProofClaim, ProofError, Statement, WorkspaceProof
 from ..tree import Node
-from .leg_claims import ClearanceClaim, ErrorClaim, SingularClaim, whole_errors
-from .motion_matrix import PosedRobot, posed_robot
+from .motion_matrix import PosedRobot
+from .number_claims import ClearanceClaim, ErrorClaim, SecondOrderClaim, SingularClaim, change_of_jacobian, whole_errors
 from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
 from .ranks import rank_claim
-from .statement import ERRORS, ExpectedClaim, expected_claims, hold_premises, leg_error_of, robot_claims
-from .tolerance import Machines, change_of_jacobian, refuse_unless_singular
+from .statement import ERRORS, ExpectedClaim, Machines, expected_claims, hold_premises, leg_error_of, robot_claims
 
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
+#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
+_ON_LIMIT = 1e-9
 #: The tree of one leaf.
 _WHOLE = bytes([Node.BOUNDED])
 
@@ -68,14 +70,12 @@ class VerifiedWorkspace:
 
     Attributes:
         claims: what it proves.
-        unproved: claims of the case that it does not prove, with the reasons that the file gives.
         numbers_at: assemblies that the claims about numbers cover; empty for a robot without loops.
         leaves: number of claims about boxes in it.
         pieces: number of boxes that were evaluated to show them.
     """
 
     claims: tuple[CheckedClaim, ...]
-    unproved: tuple[Unproved, ...]
     numbers_at: str
     leaves: int
     pieces: int
@@ -112,82 +112,54 @@ def check_workspace_proof(proof: WorkspaceProof, case: Case, *, leg_error: float
             claims.append(checker.check(expected[key], given[key]))
         except ProofError as error:
             raise ProofError(f"{' '.join(key).strip()}: {error}") from None
-    return VerifiedWorkspace(tuple(claims), proof.unproved, checker.numbers_at, checker.leaves, checker.pieces)
+    return VerifiedWorkspace(tuple(claims), checker.robot.numbers_at, checker.leaves, checker.pieces)
 
 
 class _Checker:
-    """A check of claims one after the other; later ones use the bounds of earlier ones.
-
-    Args:
-        proof: the proof.
-        case: the case.
-        leg_error: largest error of a leg's length, length.
-
-    Raises:
-        ProofError: the proof is for another workspace, other joint centres or other errors.
-    """
+    """A check of claims one after the other; later ones use the bounds of earlier ones."""
 
     def __init__(self, proof: WorkspaceProof, case: Case, leg_error: float) -> None:
         workspace = workspace_of_case(case)
-        robot = robot_claims(case, workspace, {each.name for each in proof.claims})
+        self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         hold_premises(case, workspace, robot.legs, leg_error, proof)
-        self._tolerance = case.joint_centre_tolerance or 0.0
-        self._case, self._proof, self._legs = case, proof, robot.legs
-        self._layout, self._model, self._root = robot.layout, robot.model, pose_root(workspace)
-        self._eps, self.numbers_at = leg_error_of(case, leg_error), robot.numbers_at
+        self._case, self._root, self._tolerance = case, pose_root(workspace), case.joint_centre_tolerance or 0.0
+        self._firsts = {
+            each.name: each.bound for each in proof.claims if each.name in ERRORS and each.bound is not None
+        }
+        self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
+        self._eps = leg_error_of(case, leg_error)
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
         try:
             self.expected = expected_claims(case, robot, proof.quantities, leg_error)
         except InputError as error:
             raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
-        self._machines = robot.machines
-        self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
 
     def check(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check one claim.
-
-        Raises:
-            ProofError: it could not be shown.
-        """
-        rules = {
-            ("regular", "regular"): self._check_rank,
-            ("regular", "singular"): self._check_sides,
-            ("regular", "singular machine"): self._check_machine,
-            ("constraints", "regular"): self._check_rank,
-            ("number", "program"): self._check_program,
-            ("stroke", "lengths"): self._check_stroke,
-            ("stroke", "one machine"): self._check_stroke,
-            ("dead length", "lengths"): self._check_stroke,
-            ("dead length", "one machine"): self._check_stroke,
-            ("error", "boxes"): self._check_error,
-            ("clearance", "boxes"): self._check_clearance,
-            ("singular value", "boxes"): self._check_singular,
-            ("condition", "boxes"): self._check_singular,
+        """Check one claim."""
+        rules: dict[tuple[str, str], Callable[[ExpectedClaim, ProofClaim], float]] = {
+            ("number", "program"): self._number,
+            ("lengths", "lengths"): self._lengths,
+            ("lengths", "one machine"): self._lengths,
+            ("error", "boxes"): self._error,
+            ("clearance", "boxes"): self._clearance,
+            ("singular value", "boxes"): self._singular,
         }
+        if self._tolerance and self.robot.machines is None:
+            raise ProofError("errors of joint centres take freedoms from this robot")
+        if each.kind == "rank" and given.reason in ("regular", "singular"):
+            return self._rank(each, given)
         if (each.kind, given.reason) not in rules:
             raise ProofError(f"'{given.reason}' is no reason of this claim")
-        if self._tolerance and self._machines is None:
-            raise ProofError("errors of joint centres take freedoms from this robot")
-        if each.kind not in ("regular", "constraints") and (given.bound is None or not math.isfinite(given.bound)):
-            raise ProofError("the claim has no bound")
-        return rules[each.kind, given.reason](each, given)
-
-    @cached_property
-    def _robot(self) -> PosedRobot:
-        """The robot as expressions of the pose."""
-        return posed_robot(self._case, self._model, self._root)
-
-    @property
-    def _joints(self) -> Legs:
-        """Joint centres of the case's legs.
-
-        Raises:
-            ProofError: the robot is not six straight legs.
-        """
-        if self._legs is None:
-            raise ProofError("the case's robot is not six straight legs")
-        return self._legs
+        _stated(given)
+        bound, limit, read = rules[each.kind, given.reason](each, given), each.limit, each.reading.from_value
+        if limit is not None:
+            beyond = bound - limit if each.sense == Sense.MAX.value else limit - bound
+            if not beyond <= _ON_LIMIT * max(abs(limit), abs(bound)):
+                raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {limit:.10g}")
+        self._bounds[each.key] = bound
+        kept = None if limit is None else read(limit)
+        return CheckedClaim(each.name, each.sense, each.reading.dimension, read(bound), kept)
 
     def _show(self, claim: BoxClaim, tree: bytes) -> None:
         """Show a claim on every leaf of a tree."""
@@ -195,177 +167,141 @@ class _Checker:
         self.leaves += leaves
         self.pieces += pieces
 
-    def _check_rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check that J, or the constraint wrenches, keep their rank."""
-        built = None if self._machines is None or self._legs is not None else self._machines.symbols.built
-        claim = rank_claim(self._case, self._model, self._root, each.name, self._tolerance, built)
-        self._show(claim, given.tree)
-        claim.finish()
-        return CheckedClaim(each.name, each.sense)
-
-    def _check_sides(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check that two poses of the workspace have determinants of opposite signs."""
-        sides = [np.array(side, dtype=float) for side in given.sides]
-        if len(sides) != 2 or any(side.shape != (COORDINATES,) or not np.isfinite(side).all() for side in sides):
-            raise ProofError("the claim has no two poses")
-        if not all(self._root.holds(side) for side in sides):
-            raise ProofError("a pose is not one of the workspace")
-        rank_claim(self._case, self._model, self._root, each.name).show_sign_change(self._root, *sides)
-        return CheckedClaim(each.name, each.sense, is_refuted=True)
-
-    def _check_machine(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check that a machine within the tolerance is singular at a pose of the workspace."""
-        if not self._tolerance:
+    def _rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+        """Check that J, or the constraint wrenches, keep their rank, or that J is singular between two points."""
+        is_refuted, machines = given.reason == "singular", self.robot.machines
+        by_machine = is_refuted and any(len(side) > COORDINATES for side in given.sides)
+        if by_machine and machines is None:
             raise ProofError("the claim is about the exact machine")
-        refuse_unless_singular(self._root, self._joints, given.sides)
-        return CheckedClaim(each.name, each.sense, is_refuted=True, by_machine=True)
+        tolerance = self._tolerance if by_machine or not is_refuted else 0.0
+        # The errors of six straight legs have a bound in their rows that shows larger boxes.
+        has_errors = by_machine or self.robot.legs is None
+        built = machines.symbols.built if machines is not None and tolerance and has_errors else None
+        claim = rank_claim(self._case, self.robot.model, self._root, each.name, tolerance, built)
+        if is_refuted:
+            claim.show_sign_change(self._root, given.sides)
+        else:
+            self._show(claim, given.tree)
+            claim.finish()
+        return CheckedClaim(each.name, each.sense, is_refuted=is_refuted, by_machine=by_machine)
 
-    def _bound_of(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout | None = None) -> float:
-        """Return the bound of an expression that a tree of ``certify`` proves, in a layout or that of the case."""
-        if given.reason != "program" or given.bound is None or not math.isfinite(given.bound):
-            raise ProofError("the claim has no bound")
-        nlp = extreme_program(layout or self._layout, expression, sense)
-        checked = check_proof(Proof("", given.name, Statement(), given.graph, given.bound, given.tree), nlp)
+    def _program(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout) -> float:
+        """Return the bound of an expression in the symbols of a layout that a tree of ``certify`` proves."""
+        nlp = extreme_program(layout, expression, sense)
+        checked = check_proof(Proof("", given.name, Statement(), given.graph, _stated(given), given.tree), nlp)
         self.leaves += checked.leaves
         self.pieces += checked.pieces
         return -nlp.sign * checked.bound
 
-    def _check_program(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check a tree of ``certify`` for a number."""
-        claim = each.claim
-        if claim is None:
+    def _number(self, each: ExpectedClaim, given: ProofClaim) -> float:
+        """Return the bound of a number that a tree of ``certify`` proves, of all machines with a lemma."""
+        claim, layout = each.claim, each.layout
+        if claim is None or layout is None:
             raise ProofError("the claim has no number")
-        if self._machines is None:
-            bound = self._bound_of(claim.expression, claim.sense, given, each.layout or self._layout)
-        else:
-            bound = self._bound_of_machines(self._machines, claim, given)
-        each.keep_limit(bound)
-        self._bounds[each.key] = bound
-        read = claim.reading.from_value
-        limit = None if claim.limit is None else read(claim.limit)
-        return CheckedClaim(each.name, each.sense, claim.reading.dimension, read(bound), limit)
-
-    def _bound_of_machines(self, machines: Machines, claim: Claim, given: ProofClaim) -> float:
-        """Return the bound of a number over all machines that a tree of ``certify``, and a lemma, prove.
-
-        Raises:
-            ProofError: the lemma is missing, one of them could not be shown, or a limb has no proof of its reach.
-        """
-        reaches = [each for each in self.expected if each.claim is not None and each.claim.key == REACH]
-        if claim.key != REACH and any(each.key not in self._bounds for each in reaches):
+        if self.robot.machines is None:
+            return self._program(claim.expression, claim.sense, given, layout)
+        if claim.key != REACH and any(reach.key not in self._bounds for reach in self.robot.reaches):
             raise ProofError("the reach of limbs of every machine has no proof")
+        return self._of_machines(self.robot.machines, claim, given)
+
+    def _of_machines(self, machines: Machines, claim: Claim, given: ProofClaim) -> float:
+        """Return the bound of a number over all machines that a tree of ``certify``, and a lemma, prove."""
         if not machines.varies(claim):
-            return self._bound_of(machines.number(claim, 0.0), claim.sense, given, machines.design)
-        lemma = self._lemmas.get((second_order_name(claim.name), claim.sense.value))
-        if lemma is None or lemma.bound is None or not math.isfinite(lemma.bound):
-            raise ProofError("the terms of second order have no bound")
-        bound = self._bound_of(machines.number(claim, lemma.bound), claim.sense, given, machines.design)
+            return self._program(machines.number(claim, 0.0), claim.sense, given, machines.design)
+        lemma = self._lemma(second_order_name(claim.name), claim.sense)
+        rest = _stated(lemma)
+        bound = self._program(machines.number(claim, rest), claim.sense, given, machines.design)
         try:
-            self._show(machines.second_order(claim, lemma.bound), _WHOLE)
+            self._show(SecondOrderClaim(machines, claim.expression, rest), _WHOLE)
         except UncoveredError as error:
             raise ProofError(f"the check has no rule for {error}") from None
         except ProofError as error:
             raise ProofError(f"{lemma.name}: {error}") from None
         return bound
 
-    def _length(self, leg: str, sense: str) -> float:
-        """Return the proven shortest or longest length of a leg, of all machines that are meant.
+    def _lemma(self, name: str, sense: Sense) -> ProofClaim:
+        """Return a lemma, or refuse a proof without it."""
+        if (name, sense.value) not in self._lemmas:
+            raise ProofError(f"{name}: has no proof")
+        return self._lemmas[name, sense.value]
 
-        Raises:
-            ProofError: there is no proof of it.
-        """
-        key = f"leg_length limb {leg}", sense
+    def _length(self, leg: str, sense: Sense) -> float:
+        """Return the proven shortest or longest length of a leg, of all machines that are meant."""
+        key = f"leg_length limb {leg}", sense.value
         if key not in self._bounds:
             raise ProofError(f"the lengths of limb {leg} have no proof")
-        outwards = _ROUNDING if sense == Sense.MAX.value else -_ROUNDING
+        outwards = _ROUNDING if sense is Sense.MAX else -_ROUNDING
         return math.sqrt(max(self._bounds[key], 0.0)) * (1 + outwards)
 
-    def _shortest(self) -> float:
-        """Return a length than which no leg of the machines that are meant is shorter.
+    def _of_legs(self) -> tuple[Legs, float]:
+        """Return the joint centres of six straight legs, and a length than which none of any machine is shorter."""
+        if self.robot.legs is None:
+            raise ProofError("the case's robot is not six straight legs")
+        return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
 
-        Raises:
-            ProofError: there is no proof of it.
-        """
-        return min(self._length(leg.name, "min") for leg in self._case.model.legs)
-
-    def _check_stroke(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check a limit on a telescoping leg from the lengths of the leg."""
-        leg, is_stroke = each.legs[0], each.kind == "stroke"
-        if given.reason == "one machine":
-            weights = {Sense.MAX: 1.0, Sense.MIN: -1.0} if is_stroke else {Sense.MAX: -1.0, Sense.MIN: 2.0}
-            bound = self._lengths_of_one_machine(each, leg, weights, given)
+    def _lengths(self, each: ExpectedClaim, given: ProofClaim) -> float:
+        """Return the bound of a number made of the longest and the shortest length of a leg."""
+        senses, machines = (Sense.MAX, Sense.MIN), self.robot.machines
+        left, (leg,) = 0.0, each.legs
+        if given.reason == "lengths":
+            lengths = [self._length(self._case.model.legs[leg].name, sense) for sense in senses]
         else:
-            name = self._case.model.legs[leg].name
-            short, long = self._length(name, "min"), self._length(name, "max")
-            off = 8 * _ROUNDING * long
-            bound = long - short + off if is_stroke else 2 * short - long - off
-        return self._limited(each, Dimension.LENGTH, bound)
-
-    def _lengths_of_one_machine(
-        self, each: ExpectedClaim, leg: int, weights: Mapping[Sense, float], given: ProofClaim
-    ) -> float:
-        """Return the bound of a number made from the lengths of a leg at two poses, whose errors are the same.
-
-        Args:
-            each: the claim.
-            leg: index of the leg.
-            weights: of the longest and of the shortest length.
-            given: the claim with the directions c_b and c_p.
-
-        Raises:
-            ProofError: the directions or the lengths are missing, or a length could not be shown.
-        """
-        if self._machines is None:
-            raise ProofError("the claim is about the exact machine")
-        sides = [np.array(side, dtype=float) for side in given.sides]
-        if len(sides) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in sides):
-            raise ProofError("the claim has no two directions")
-        parts = []
-        for sense, weight in weights.items():
-            claim = length_of_one_machine(self._machines.symbols, leg, sense, Directions(each.name, *sides))
-            lemma = self._lemmas.get((claim.name, sense.value))
-            if lemma is None:
-                raise ProofError("the lengths of the leg of one machine have no proof")
-            parts.append(weight * self._bound_of_machines(self._machines, claim, lemma))
-        # The part of the errors that is the same at both poses, of as many lengths as are left.
-        left = abs(sum(weights.values())) * self._tolerance * sum(float(np.linalg.norm(side)) for side in sides)
+            # Lengths of one machine at two poses, without the part along c_b and c_p of its errors.
+            about = [np.array(side, dtype=float) for side in given.sides]
+            if machines is None:
+                raise ProofError("the claim is about the exact machine")
+            if len(about) != 2 or any(side.shape != (3,) or not np.isfinite(side).all() for side in about):
+                raise ProofError("the claim has no two directions")
+            directions = Directions(each.name, *about)
+            claims = [length_of_one_machine(machines.symbols, leg, sense, directions) for sense in senses]
+            lengths = [self._of_machines(machines, one, self._lemma(one.name, one.sense)) for one in claims]
+            # This part is the same at both poses, of as many lengths as are left.
+            left = abs(sum(each.weights)) * self._tolerance * sum(float(np.linalg.norm(side)) for side in about)
+        parts = [weight * length for weight, length in zip(each.weights, lengths, strict=True)]
         off = left + 16 * _ROUNDING * (abs(parts[0]) + abs(parts[1]) + left)
         return sum(parts) + (off if each.sense == Sense.MAX.value else -off)
 
-    def _check_clearance(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check a distance between two legs, which are nearer by twice the tolerance."""
-        bound, nearer = float(given.bound or 0.0), 2 * self._tolerance
+    def _clearance(self, each: ExpectedClaim, given: ProofClaim) -> float:
+        """Return the bound of a distance between two legs, which are nearer by twice the tolerance."""
+        bound, nearer = _stated(given), 2 * self._tolerance
         least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
-        self._show(ClearanceClaim(self._robot, (each.legs[0], each.legs[1]), least), given.tree)
-        return self._limited(each, Dimension.LENGTH, bound)
+        self._show(ClearanceClaim(self._posed, each.legs, least), given.tree)
+        return bound
 
-    def _check_singular(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check the smallest singular value of J, or its condition number."""
-        bound, is_condition = float(given.bound or 0.0), each.kind == "condition"
-        change = 0.0
+    def _singular(self, each: ExpectedClaim, given: ProofClaim) -> float:
+        """Return the bound of the smallest singular value of J, or of its condition number."""
+        bound, change = _stated(given), 0.0
         if self._tolerance:
-            change = change_of_jacobian(self._joints, self._tolerance, each.length, self._shortest())
-        self._show(SingularClaim(self._robot, each.length, bound, is_condition=is_condition, change=change), given.tree)
-        return self._limited(each, Dimension.NUMBER, bound)
+            legs, shortest = self._of_legs()
+            change = change_of_jacobian(legs, self._tolerance, each.length, shortest)
+        is_condition = each.sense == Sense.MAX.value
+        self._show(SingularClaim(self._posed, each.length, bound, is_condition=is_condition, change=change), given.tree)
+        return bound
 
-    def _limited(self, each: ExpectedClaim, dimension: Dimension, bound: float) -> CheckedClaim:
-        """Return a claim whose bound keeps its limit."""
-        each.keep_limit(bound)
-        return CheckedClaim(each.name, each.sense, dimension, bound, each.limit)
-
-    def _check_error(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
-        """Check an error of the pose: its part of first order by a tree, the whole from both parts and the lengths."""
-        firsts = {one.name: one.bound for one in self._proof.claims if one.name in ERRORS}
-        position, rotation = (firsts.get(name) for name in ERRORS)
-        if position is None or rotation is None:
+    def _error(self, each: ExpectedClaim, given: ProofClaim) -> float:
+        """Return the bound of an error of the pose: its part of first order by a tree, the whole from both parts."""
+        if len(self._firsts) < len(ERRORS):
             raise ProofError("one of the two errors has no proof")
-        is_rotation = each.name == ERRORS[1]
-        most = rotation if is_rotation else position
-        self._show(ErrorClaim(self._robot, most, is_rotation=is_rotation), given.tree)
+        position, rotation = (self._firsts[name] for name in ERRORS)
+        is_rotation = each.reading is not LENGTH
+        self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.tree)
+        legs, shortest = self._of_legs()
         # That of the design.
-        shortest = (self._shortest() + 2 * self._tolerance) * (1 - _ROUNDING)
-        reach = float(np.linalg.norm(self._joints.platform, axis=1).max()) * (1 + _ROUNDING)
+        shortest = (shortest + 2 * self._tolerance) * (1 - _ROUNDING)
+        reach = float(np.linalg.norm(legs.platform, axis=1).max()) * (1 + _ROUNDING)
         whole = whole_errors(position, rotation, self._eps * (1 + _ROUNDING), shortest, reach)[is_rotation]
         if not math.isfinite(whole):
             raise ProofError("the errors are too large for a bound of their part of second order")
-        return CheckedClaim(each.name, each.sense, Dimension.ANGLE if is_rotation else Dimension.LENGTH, whole)
+        return whole
+
+    @cached_property
+    def _posed(self) -> PosedRobot:
+        """The robot as expressions of the pose."""
+        return PosedRobot(self._case, self.robot.model, self._root)
+
+
+def _stated(given: ProofClaim) -> float:
+    """Return the bound of a claim, or refuse one without."""
+    if given.bound is None or not math.isfinite(given.bound):
+        raise ProofError("the claim has no bound")
+    return given.bound

@@ -27,8 +27,9 @@ from .....models import FloatArray
 from .....models.rows import independent_rows
 from ..polynomials import middles
 from ..proof_file import ProofError
-from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
+from .forms import PRODUCT, UP, AffineMatrix, FormArithmetic, Forms, inverses, off_identity
 from .motion_matrix import PosedRobot
+from .pose_boxes import box_words
 
 #: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
 _CLOSED = 1e-10
@@ -49,12 +50,7 @@ _BLOCK = 512
 
 
 class LoopPoints:
-    """Points with closed loops.
-
-    Args:
-        robot: the robot.
-        equations: (k, 1) those that count.
-    """
+    """Points at which some equations (k, 1) of a robot's loops hold."""
 
     def __init__(self, robot: PosedRobot, equations: SX) -> None:
         self._size, self._count = robot.size, int(equations.numel())
@@ -66,82 +62,51 @@ class LoopPoints:
         g, J = (each.full() for each in self._function(z.T))
         return g.T, np.asarray(J.reshape(self._count, *z.shape).transpose(1, 0, 2) * self._size)
 
-    def closed(self, z: FloatArray, moving: Sequence[int]) -> FloatArray:
-        """Return closed points (B, n) near points, in which as many coordinates move as equations; NaN without one."""
-        z = z.copy()
-        with np.errstate(all="ignore"):
-            for _ in range(_STEPS):
+    @np.errstate(all="ignore")
+    def closed(
+        self,
+        z: FloatArray,
+        moving: Sequence[int],
+        to: FloatArray | None = None,
+        steps: int = 1,
+        zero: float | None = None,
+    ) -> FloatArray:
+        """Return closed points (B, n) at the ends of ways from points, along which left sides fall to 0; NaN without.
+
+        Args:
+            z: the points.
+            moving: coordinates that follow from the others, by Newton's method.
+            to: (B, f) values that the others have at the ends; None for those at the points.
+            steps: of the way.
+            zero: of slopes, for :func:`.forms.inverses`; None for as many moving coordinates as equations, all needed.
+        """
+        z, others = z.copy(), [k for k in range(z.shape[1]) if k not in moving]
+        to = z[:, others] if to is None else to
+        first, way = self.at(z)[0], to - z[:, others]
+        for k in range(1, steps + 1):
+            left = 1 - k / steps
+            z[:, others] = to - left * way
+            for _ in range(2 if left else _STEPS):
                 g, J = self.at(z)
+                g = g - left * first
                 if not np.nanmax(np.abs(g), initial=0.0) > 1e-3 * _CLOSED:
                     break
-                z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving]) @ g[:, :, None])[:, :, 0]
-            residual = np.abs(self.at(z)[0]).max(axis=1, initial=0.0)
-        z[~(residual <= _CLOSED)] = np.nan
+                z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving], zero) @ g[:, :, None])[:, :, 0]
+        z[~(np.abs(self.at(z)[0]).max(axis=1, initial=0.0) <= _CLOSED)] = np.nan
         return z
-
-    def moved(self, z: FloatArray, to: FloatArray, free: Sequence[int], moving: Sequence[int]) -> FloatArray:
-        """Return the closed points (B, n) on the way from closed points to other independent coordinates (B, f)."""
-        z = z.copy()
-        if not moving:
-            z[:, free] = to
-            return z
-        way = to - z[:, free]
-        with np.errstate(all="ignore"):
-            for k in range(_WAY):
-                J = self.at(z)[1]
-                step = (way / _WAY) if k < _WAY - 1 else to - z[:, free]
-                turned = inverses(J[:, :, moving]) @ J[:, :, free] @ (step / self._size[free])[:, :, None]
-                z[:, moving] -= self._size[moving] * turned[:, :, 0]
-                z[:, free] += step
-                z = self.closed(z, moving)
-        z[:, free] = to
-        return z
-
-    def _step(self, z: FloatArray, moving: Sequence[int], rest: FloatArray | float = 0.0) -> float:
-        """Return the largest residual beyond a rest at a point (n,), which moves by a step of Newton's towards it.
-
-        NaN, and no step, where the equations have no value.
-        """
-        g, J = (each[0] for each in self.at(z[None]))
-        g = g - rest
-        if not (np.isfinite(g).all() and np.isfinite(J).all()):
-            return np.nan
-        z[moving] -= self._size[moving] * np.linalg.lstsq(J[:, moving], g, rcond=_ZERO)[0]
-        return float(np.abs(g).max(initial=0.0))
-
-    def near(self, z: FloatArray, moving: Sequence[int]) -> FloatArray | None:
-        """Return a closed point (n,) near a point in which some coordinates move; None where none is found."""
-        z = z.copy()
-        for _ in range(_STEPS):
-            before = z.copy()
-            if self._step(z, moving) <= _CLOSED:
-                return before
-        return None
-
-    def from_home(self, z: FloatArray, moving: Sequence[int]) -> FloatArray | None:
-        """Return closed loops on a way along which the residuals at a point fall to 0; None where it ends before."""
-        first, z = self.at(z[None])[0][0], z.copy()
-        if float(np.abs(first).max(initial=0.0)) <= _CLOSED:
-            # Slopes of equations that hold by themselves are rounding, along which there is no step.
-            return z
-        for step in range(2, 2 * _FROM_HOME + 2):
-            if np.isnan(self._step(z, moving, first * (1 - (step // 2) / _FROM_HOME))):
-                return None
-        return self.near(z, moving)
 
 
 def start_of(robot: PosedRobot) -> FloatArray:
-    """Return closed loops (n,) in home's assembly, in the middle of the workspace or near it.
-
-    Raises:
-        ProofError: none are found.
-    """
-    points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(robot.centre)
+    """Return closed loops (n,) in home's assembly, in the middle of the workspace or near it, or refuse the robot."""
+    points, centre, n = LoopPoints(robot, robot.equations), robot.centre[None], len(robot.centre)
+    unknowns = list(range(len(robot.free), n))
+    # Slopes of equations that hold by themselves are rounding, along which there is no step.
+    is_closed = np.abs(points.at(centre)[0]).max(initial=0.0) <= _CLOSED
     # Numbers of the pose move only where the unknowns alone do not close the loops.
-    for moving in [list(range(count, n))] * (n > count) + [list(range(n))]:
-        found = points.from_home(robot.centre, moving)
-        if found is not None and is_home(robot, found):
-            return found
+    for moving in [unknowns] * bool(unknowns) + [list(range(n))]:
+        (found,) = centre if is_closed else points.closed(centre, moving, steps=_FROM_HOME, zero=_ZERO)
+        if is_home(robot, found):
+            return np.asarray(found)
     raise ProofError("no closed loops are found in the middle of the workspace, in the assembly of home")
 
 
@@ -156,36 +121,12 @@ def needed_equations(robot: PosedRobot, start: FloatArray) -> list[int]:
     if not robot.equations.numel():
         return []
     points, count, n = LoopPoints(robot, robot.equations), len(robot.free), len(start)
-    rng = np.random.default_rng(_SEED)
-    slopes = [points.at(start[None])[1][0]]
-    for _ in range(_POINTS):
-        z = start.copy()
-        z[:count] += _SPREAD * robot.size[:count] * rng.uniform(-1, 1, count)
-        found = points.near(z, list(range(count, n))) if n > count else None
-        found = points.near(z, list(range(n))) if found is None else found
-        if found is not None:
-            slopes.append(points.at(found[None])[1][0])
-    return sorted(independent_rows(slopes)) if any(np.abs(each).max() > _ZERO for each in slopes) else []
-
-
-def dependent_coordinates(points: LoopPoints, robot: PosedRobot, start: FloatArray, count: int) -> list[int]:
-    """Return the coordinates that k equations determine: numbers of the pose where there are more, and all unknowns.
-
-    Raises:
-        ProofError: the equations leave an unknown free, or are singular at the start.
-    """
-    poses, n = len(robot.free), len(start) - robot.errors
-    unknowns = list(range(poses, n))
-    if count < len(unknowns):
-        raise ProofError("the loops leave a passive joint free")
-    J = points.at(start[None])[1][0]
-    basis = np.linalg.svd(J[:, unknowns])[0] if unknowns else np.eye(count)
-    rest = basis[:, len(unknowns) :].T @ J[:, :poses]
-    chosen = [*(sorted(independent_rows([rest.T])) if count > len(unknowns) else []), *unknowns]
-    values = np.linalg.svd(J[:, chosen], compute_uv=False) if len(chosen) == count else np.zeros(1)
-    if not values.min(initial=1.0) > _ZERO * values.max(initial=0.0):
-        raise ProofError("the loops are singular in the middle of the workspace")
-    return chosen
+    z = np.repeat(start[None], _POINTS, axis=0)
+    z[:, :count] += _SPREAD * robot.size[:count] * np.random.default_rng(_SEED).uniform(-1, 1, (_POINTS, count))
+    near = points.closed(z, list(range(count, n)), zero=_ZERO)
+    near = np.where(np.isfinite(near), near, points.closed(z, list(range(n)), zero=_ZERO))
+    slopes = points.at(np.concatenate([start[None], near[np.isfinite(near).all(axis=1)]]))[1]
+    return sorted(independent_rows(list(slopes))) if (np.abs(slopes) > _ZERO).any() else []
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,18 +150,13 @@ class Enclosed:
     shares: FloatArray
     is_known: NDArray[np.bool_]
 
-    def known(self) -> Enclosed:
-        """Return those over the boxes of which they are known."""
-        return Enclosed(*(each[self.is_known] for each in vars(self).values()))
+    def only(self, which: NDArray[np.bool_]) -> Enclosed:
+        """Return those over some boxes."""
+        return Enclosed(*(each[which] for each in vars(self).values()))
 
 
 class Assembly:
-    """The closed loops of a robot that change continuously from those at a start.
-
-    Args:
-        robot: the robot.
-        equations: (k, 1) those that count; none for a robot without loops.
-        start: (n,) closed loops.
+    """The closed loops of a robot that change continuously from those at a start (n,), by k equations that count.
 
     Raises:
         UncoveredError: an equation holds an operation without a rule.
@@ -228,9 +164,9 @@ class Assembly:
     """
 
     def __init__(self, robot: PosedRobot, equations: SX, start: FloatArray) -> None:
-        self._size, self._count = robot.size, int(equations.numel())
+        self._robot, self._size, self._count = robot, robot.size, int(equations.numel())
         self.points = LoopPoints(robot, equations)
-        self.dependent = dependent_coordinates(self.points, robot, start, self._count) if self._count else []
+        self.dependent = self._determined(start) if self._count else []
         self.independent = [k for k in range(len(start)) if k not in self.dependent]
         # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
         (middle,) = self.moved(start[None], robot.centre[None][:, self.independent])
@@ -238,17 +174,42 @@ class Assembly:
         columns = ca.jacobian(equations, robot.z)[:, self.dependent]
         self._arithmetic = FormArithmetic(robot.z, ca.vertcat(SX(0, 1), equations, ca.vec(ca.densify(columns))))
 
+    def _determined(self, start: FloatArray) -> list[int]:
+        """Return the coordinates that follow from others: all unknowns, and numbers of the pose as far as needed."""
+        poses, count = len(self._robot.free), self._count
+        unknowns = list(range(poses, len(start) - self._robot.errors))
+        if count < len(unknowns):
+            raise ProofError("the loops leave a passive joint free")
+        J = self.points.at(start[None])[1][0]
+        basis = np.linalg.svd(J[:, unknowns])[0] if unknowns else np.eye(count)
+        rest = basis[:, len(unknowns) :].T @ J[:, :poses]
+        chosen = [*(sorted(independent_rows([rest.T])) if count > len(unknowns) else []), *unknowns]
+        values = np.linalg.svd(J[:, chosen], compute_uv=False) if len(chosen) == count else np.zeros(1)
+        if not values.min(initial=1.0) > _ZERO * values.max(initial=0.0):
+            raise ProofError("the loops are singular in the middle of the workspace")
+        return chosen
+
     def moved(self, z: FloatArray, to: FloatArray) -> FloatArray:
-        """Return the closed points (B, n) reached from closed points at other independent coordinates (B, f)."""
-        return self.points.moved(z, to, self.independent, self.dependent)
+        """Return the closed points (B, n) on the way from closed points to other independent coordinates (B, f)."""
+        return self.points.closed(z, self.dependent, to=to, steps=_WAY)
 
-    def near(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """Return closed points (B, n) at the centres of independent coordinates (B, f), reached from the start."""
-        z = np.broadcast_to(self.start, (len(lower), len(self.start)))
-        return self.moved(z, middles(lower, upper)[0])
+    def followed(self, forms: Forms, closed: Enclosed) -> Forms:
+        """Return forms of all coordinates as forms of the independent ones, along closed points."""
+        dependent, slopes = forms.a[:, :, self.dependent], forms.a[:, :, self.independent]
+        size, most = np.abs(dependent), np.abs(closed.off) + np.abs(closed.T).sum(axis=2)
+        terms = np.abs(forms.c) + np.abs(slopes).sum(axis=2) + (size @ most[:, :, None])[:, :, 0]
+        rest = (forms.r + (size @ closed.rho[:, :, None])[:, :, 0] + PRODUCT * terms) * UP
+        middle = forms.c + (dependent @ closed.off[:, :, None])[:, :, 0]
+        return Forms(middle, slopes - dependent @ closed.T, rest)
 
-    def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray) -> Enclosed:
-        """Return the closed points over boxes of independent coordinates (B, f), from those (B, n) at their centres."""
+    @np.errstate(all="ignore")
+    def enclosed(self, lower: FloatArray, upper: FloatArray, near: FloatArray | None = None) -> Enclosed:
+        """Return the closed points over boxes of independent coordinates (B, f).
+
+        Those at the centres (B, n) are computed from the start where they are not given.
+        """
+        if near is None:
+            near = self.moved(np.broadcast_to(self.start, (len(lower), len(self.start))), middles(lower, upper)[0])
         free, D, size = self.independent, self.dependent, self._size
         (B, f), k = lower.shape, self._count
         low, high = np.full_like(near, np.nan), np.full_like(near, np.nan)
@@ -257,17 +218,16 @@ class Assembly:
         found = Enclosed(low, high, *relation, near, np.zeros((B, f)), np.full(B, not k))
         if not k:
             return found
-        with np.errstate(all="ignore"):
-            J = self.points.at(near)[1]
-            moved = np.abs(inverses(J[:, :, D]) @ J[:, :, free]) * (0.5 * (upper - lower) / size[free])[:, None]
-            found.shares[:] = moved.sum(axis=1)
-            width = size[D] * np.maximum(_WIDER * moved.sum(axis=2), _LEAST)
-            for _ in range(_ATTEMPTS):
-                rows = np.flatnonzero(~found.is_known & (width <= _MOST * size[D]).all(axis=1))
-                if rows.size:
-                    z = near[rows][:, D]
-                    low[rows[:, None], D], high[rows[:, None], D] = z - width[rows], z + width[rows]
-                    width[rows] = self._show(found, rows)
+        J = self.points.at(near)[1]
+        moved = np.abs(inverses(J[:, :, D]) @ J[:, :, free]) * (0.5 * (upper - lower) / size[free])[:, None]
+        found.shares[:] = moved.sum(axis=1)
+        width = size[D] * np.maximum(_WIDER * moved.sum(axis=2), _LEAST)
+        for _ in range(_ATTEMPTS):
+            rows = np.flatnonzero(~found.is_known & (width <= _MOST * size[D]).all(axis=1))
+            if rows.size:
+                z = near[rows][:, D]
+                low[rows[:, None], D], high[rows[:, None], D] = z - width[rows], z + width[rows]
+                width[rows] = self._show(found, rows)
         missing = np.flatnonzero(~found.is_known)[:, None]
         low[missing, D] = high[missing, D] = np.nan
         return found
@@ -290,9 +250,7 @@ class Assembly:
             end.reshape(k, k, -1).transpose(2, 1, 0) * radius[:, None] for end in values.ends(slice(k, None))
         )
         J = 0.5 * (least + most)
-        spread = 0.5 * (most - least) + PRODUCT * (np.abs(least) + np.abs(most))
-        defect = (off_identity(Y, J) + size @ spread) * UP
-        single, _ = contraction(np.where(np.isfinite(defect), defect, np.inf))
+        single, _, _ = AffineMatrix(J, np.zeros((len(J), 0, k, k)), 0.5 * (most - least)).contracted(Y)
         # Ends may be nearer to the centre on one side, by rounding.
         room = np.nextafter(np.minimum(high[:, D] - centre, centre - low[:, D]), 0.0)
         good = np.asarray((reach * radius * UP < room).all(axis=1) & single & np.isfinite(reach).all(axis=1))
@@ -313,38 +271,27 @@ class Assembly:
 
         Over each box the closed point changes continuously. A small box about one, which surely holds it, ties two
         boxes with a common value of the independent coordinates where it lies between the ends of both: there their
-        closed points are the same.
-
-        Raises:
-            ProofError: a box is not reached from the one that holds the start.
+        closed points are the same. All must be reached in this way from the box that holds the start.
         """
         lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
         start = np.broadcast_to(self.start, boxes.near.shape)
         at = start[:, self.independent]
         is_reached = ((lower <= at) & (at <= upper)).all(axis=1) & self.holds(boxes, np.arange(len(lower)), start)
-        border = np.flatnonzero(is_reached).tolist()
-        while border:
-            pairs = [
-                (one, other)
-                for one in border
-                for other in np.flatnonzero(
-                    ~is_reached & (lower <= upper[one]).all(axis=1) & (upper >= lower[one]).all(axis=1)
-                ).tolist()
-            ]
-            border = []
+        border = np.flatnonzero(is_reached)
+        while border.size:
+            touches = ((lower[border, None] <= upper) & (upper[border, None] >= lower)).all(axis=2) & ~is_reached
+            pairs, before = np.argwhere(touches), is_reached.copy()
             for begin in range(0, len(pairs), _BLOCK):
-                block = [pair for pair in pairs[begin : begin + _BLOCK] if not is_reached[pair[1]]]
-                if block:
-                    first, second = np.array(block).T
-                    common = middles(np.maximum(lower[first], lower[second]), np.minimum(upper[first], upper[second]))
-                    near = self.moved(boxes.near[first], common[0])
-                    tied = self.holds(boxes, first, near) & self.holds(boxes, second, near)
-                    new = np.unique(second[tied])
-                    is_reached[new] = True
-                    border += new.tolist()
+                block = pairs[begin : begin + _BLOCK]
+                first, second = block[~is_reached[block[:, 1]]].T
+                first = border[first]
+                common = middles(np.maximum(lower[first], lower[second]), np.minimum(upper[first], upper[second]))
+                near = self.moved(boxes.near[first], common[0])
+                tied = self.holds(boxes, first, near) & self.holds(boxes, second, near)
+                is_reached[second[tied]] = True
+            border = np.flatnonzero(is_reached & ~before)
         if not is_reached.all():
-            ends = zip(lower[~is_reached][0], upper[~is_reached][0], strict=True)
-            box = ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in ends)
+            box = box_words(lower[~is_reached][0], upper[~is_reached][0])
             raise ProofError(
                 f"the loops closed in the box {box} are not shown to be of the same assembly as the others"
             )

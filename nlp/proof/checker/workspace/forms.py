@@ -1,4 +1,4 @@
-"""Affine forms of expressions over boxes, from polynomials with a ball, and facts about matrices with a proof.
+"""Affine forms of expressions over boxes, from polynomials with a ball, and of matrices, and their contractions.
 
 Over a box of coordinates ``z_i = c_i + r_i e_i``, ``|e_i| <= 1``, an expression is ``c + sum_i a_i e_i`` and a rest.
 """
@@ -20,35 +20,53 @@ from ..polynomials import UNIT, Polynomial, places
 UP = 1 + 1024 * UNIT
 #: Rounding of a product of matrices with fewer than 400 terms, in parts of the product of sizes.
 PRODUCT = 512 * UNIT
-#: Steps of the power method.
-_STEPS = 12
-#: Part of the trace that is taken off before Cholesky's factorisation: many times the bound of its rounding for
-#: matrices (6, 6), which is 8 roundings. A factorisation that ends proves the matrix positive definite (S. M. Rump,
-#: *Verification of positive definiteness*, BIT 46 (2006)).
-_CHOLESKY = 1e-13
+#: Steps of the power method, and part of the largest singular value below which others are zero.
+_STEPS, _FLAT = 12, 1e-14
+
+
+class AffineMatrix(NamedTuple):
+    """Matrices over B boxes: in ``M + sum_k A_k e_k + [-E, E]``, with (B, m, c), (B, n, m, c) and (B, m, c)."""
+
+    M: FloatArray
+    A: FloatArray
+    E: FloatArray
+
+    @property
+    def rest(self) -> FloatArray:
+        """The rest (B, m, c), with the rounding of a product with M and A."""
+        return np.asarray(self.E + PRODUCT * (np.abs(self.M) + np.abs(self.A).sum(axis=1)))
+
+    def contracted(
+        self, C: FloatArray, moved: FloatArray | None = None
+    ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+        """Return where C (B, c, m) times the matrices has an inverse, bounds of ``|I - C M|``, and shares (B, n) of CA.
+
+        ``moved`` (B, k, c, c) are bounds of parts of ``C A`` in another grouping; None for the size of each.
+        """
+        moved = np.abs(C[:, None] @ self.A) if moved is None else moved
+        bound = (off_identity(C, self.M) + np.abs(C) @ self.rest + moved.sum(axis=1)) * UP
+        holds, v = contraction(bound)
+        return holds, bound, np.asarray((moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3)))
 
 
 class Forms(NamedTuple):
-    """R expressions over B boxes: in ``c + sum_i a_i e_i + [-r, r]``, with NaN where an expression may be undefined.
-
-    Attributes:
-        c: (B, R).
-        a: (B, R, n).
-        r: (B, R).
-    """
+    """Expressions over B boxes: in ``c + sum_i a_i e_i + [-r, r]``, (B, R), (B, R, n) and (B, R), NaN if undefined."""
 
     c: FloatArray
     a: FloatArray
     r: FloatArray
 
+    def matrix(self, at: NDArray[np.intp], shape: tuple[int, int]) -> AffineMatrix:
+        """Return matrices (B, m, c) with these as entries at rows and columns (2, R), and 0 elsewhere."""
+        B, (rows, columns) = len(self.c), at
+        M, A, E = np.zeros((B, *shape)), np.zeros((B, self.a.shape[2], *shape)), np.zeros((B, *shape))
+        M[:, rows, columns], E[:, rows, columns] = self.c, self.r
+        A[:, :, rows, columns] = self.a.transpose(0, 2, 1)
+        return AffineMatrix(M, A, E)
+
 
 class Values(NamedTuple):
-    """Polynomials of R expressions over boxes.
-
-    Attributes:
-        polynomials: R of them.
-        shape: (B, n) of the ends of the boxes.
-    """
+    """Polynomials of R expressions over boxes with ends of a shape (B, n)."""
 
     polynomials: list[Polynomial]
     shape: tuple[int, int]
@@ -88,46 +106,36 @@ class FormArithmetic:
         return Values(self._arithmetic(lower.T, upper.T), lower.shape)
 
 
+@np.errstate(all="ignore")
 def contraction(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
     """Return which nonnegative matrices (B, k, k) have a spectral radius below 1, and v with ``B v < v`` there."""
+    B = np.where(np.isfinite(B), B, np.inf)
     v, holds = np.ones(B.shape[:2]), np.zeros(len(B), dtype=bool)
-    with np.errstate(all="ignore"):
-        for _ in range(_STEPS):
-            w = np.einsum("bij,bj->bi", B, v) * UP
-            holds |= (w < v).all(axis=1)
-            if (holds | (w >= v).all(axis=1)).all():
-                break
-            following = w / w.sum(axis=1, keepdims=True) + 1e-12
-            v = np.where(holds[:, None], v, following)
+    for _ in range(_STEPS):
+        w = np.einsum("bij,bj->bi", B, v) * UP
+        holds |= (w < v).all(axis=1)
+        if (holds | (w >= v).all(axis=1)).all():
+            break
+        following = w / w.sum(axis=1, keepdims=True) + 1e-12
+        v = np.where(holds[:, None], v, following)
     return holds, v
 
 
-def inverses(matrices: FloatArray) -> FloatArray:
-    """Return approximate inverses of matrices (B, n, n); NaN where there is none."""
+def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
+    """Return approximate left inverses (B, c, m) of matrices (B, m, c); NaN where there is none.
+
+    Singular values below a part ``zero`` of the largest count as 0; None for rounding alone.
+    """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    good &= np.linalg.det(np.where(good[:, None, None], matrices, 0.0)) != 0
-    found = np.full_like(matrices, np.nan)
-    found[good] = np.linalg.inv(matrices[good])
+    found = np.full_like(np.swapaxes(matrices, 1, 2), np.nan)
+    if zero is None and matrices.shape[1] == matrices.shape[2]:
+        good &= np.linalg.det(np.where(good[:, None, None], matrices, 0.0)) != 0
+        found[good] = np.linalg.inv(matrices[good])
+    else:
+        found[good] = np.linalg.pinv(matrices[good], rcond=zero or _FLAT)
     return np.asarray(found)
 
 
 def off_identity(C: FloatArray, M: FloatArray) -> FloatArray:
     """Return sizes of ``I - C M``, but for the rounding of the product."""
     return np.asarray(np.abs(np.eye(C.shape[-2]) - C @ M) * (1 + 2 * UNIT) + 2 * UNIT)
-
-
-def are_positive(matrices: FloatArray) -> NDArray[np.bool_]:
-    """Return whether symmetric matrices (..., n, n) are positive definite; their lower triangles are read."""
-    M = np.array(matrices)
-    n = M.shape[-1]
-    good = np.asarray(np.isfinite(M).all(axis=(-2, -1)))
-    shift = _CHOLESKY * np.abs(np.trace(M, axis1=-2, axis2=-1))
-    for k in range(n):
-        M[..., k, k] -= shift
-    with np.errstate(all="ignore"):
-        for k in range(n):
-            pivot = M[..., k, k]
-            good = np.asarray(good & (pivot > 0))
-            column = M[..., k + 1 :, k] / np.sqrt(np.where(good, pivot, 1.0))[..., None]
-            M[..., k + 1 :, k + 1 :] -= column[..., :, None] * column[..., None, :]
-    return good

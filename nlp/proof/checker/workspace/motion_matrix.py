@@ -22,20 +22,21 @@ by that number, so that they are polynomials.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import reduce
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import Actuator, FloatArray, Member, Model, Substitution, Wrench, WrenchKind, rate_relations
+from .....models import Actuator, FloatArray, Model, Substitution, Wrench, WrenchKind, rate_relations
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
 from ....case.pose import Free
 from ....case.workspace import TurnKind
+from ...statement.machine import has_straight_legs
 from ..proof_file import ProofError
 from .pose_boxes import PoseRoot
 
@@ -43,22 +44,26 @@ from .pose_boxes import PoseRoot
 _ZERO = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
 class PosedRobot:
     """A robot with its dimensions over a workspace.
 
+    Args:
+        case: with fixed dimensions.
+        model: its robot, some of whose unknowns may have been replaced by expressions; further parameters than the
+            case's are components of errors of joint centres, and come last.
+        root: the box of coordinates.
+
     Attributes:
         z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns, then errors.
-        errors: number of components of errors of joint centres, which are the last coordinates.
-        free: indices of these coordinates among the six.
-        middle: (6,) the middle of the workspace: the values of the others.
-        size: (n,) by which coordinates are comparable: half ranges, and sizes of the unknowns.
+        errors: number of components of errors.
+        free: indices of the varying coordinates among the six.
+        centre: (n,) the middle of the workspace, with unknowns and errors of 0.
+        size: (n,) by which coordinates are comparable: half ranges, sizes of the unknowns, and the tolerance.
         length: by which rotations are multiplied, length: any positive number.
         position: (3, 1) the platform's origin, length.
         scale: (1, 1) by which rows are multiplied that are linear in the rotation; at least 1.
         rows: rows of limbs, one wrench each, with moments about the platform's origin.
-        members: members of limbs.
-        actuators: actuated joints.
+        members, actuators: of the robot.
         legs: base joint (3, 1) of each straight leg, and its platform joint a in the world, ``scale R a``.
         nested: (m, k) each, the conditions of nested loops on rates of a member's passive joints.
         equations: (k, 1) that are 0 where the loops are closed, of order 1.
@@ -66,93 +71,64 @@ class PosedRobot:
         signs: (s, 1) numbers that are positive in home's working mode.
     """
 
-    z: SX
-    errors: int
-    free: tuple[int, ...]
-    middle: FloatArray
-    size: FloatArray
-    length: float
-    position: SX
-    scale: SX
-    rows: tuple[Wrench, ...]
-    members: tuple[Member, ...]
-    actuators: tuple[Actuator, ...]
-    legs: tuple[tuple[SX, SX], ...]
-    nested: tuple[SX, ...]
-    equations: SX
-    loops: SX
-    signs: SX
+    def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
+        middle, symbols = 0.5 * root.lower + 0.5 * root.upper, Substitution.identity(model).all
+        self.free: list[int] = np.flatnonzero(root.upper > root.lower).tolist()
+        y = [SX.sym(f"y{k}") if k in self.free else SX(float(middle[k])) for k in range(6)]
+        unknowns = ca.vertcat(SX(0, 1), *[SX.sym(item.name) for item in model.unknowns])
+        values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
+        errors = SX.sym("errors", symbols[0].numel() - len(values))
+        turned, self.scale = turned_rotation(root, y[3:])
+        self.model, self.length, self.position = model, case.characteristic_length, ca.vertcat(*y[:3])
+        self.z, self.errors = ca.vertcat(SX(0, 1), *[y[k] for k in self.free], unknowns, errors), errors.numel()
 
-    @property
-    def centre(self) -> FloatArray:
-        """(n,) the middle of the workspace, with unknowns of 0 as at home."""
-        return np.concatenate([self.middle[list(self.free)], np.zeros(self.z.numel() - len(self.free))])
+        def put(expressions: Iterable[SX], rotation: SX = turned / self.scale) -> list[SX]:
+            """Return expressions of the model with those of the coordinates in the place of its symbols."""
+            numbers = [ca.vertcat(SX(0, 1), *values, errors), unknowns, rotation, self.position]
+            return list(ca.Function("robot", symbols, list(expressions)).call(numbers))
+
+        def scaled(vectors: Iterable[SX]) -> list[SX]:
+            """Return vectors, those that are linear in the rotation as multiples without the inverse of the scale."""
+            inverse = SX.sym("inverse")
+            found = put(map(ca.densify, vectors), inverse * turned)
+            for k, vector in enumerate(found):
+                slope = ca.jacobian(vector, inverse)
+                if ca.depends_on(slope, inverse) or not ca.depends_on(vector, inverse):
+                    found[k] = ca.substitute(vector, inverse, 1 / self.scale)
+                else:
+                    found[k] = self.scale * ca.substitute(vector, inverse, 0) + slope
+            return found
+
+        def stacked(expressions: Iterable[SX]) -> SX:
+            """Return numbers of the robot as a column."""
+            return ca.vertcat(SX(0, 1), *put(expressions))
+
+        sizes = np.array(ca.evalf(stacked(each.size for each in model.unknowns))).ravel()
+        ends = np.full(self.errors, case.joint_centre_tolerance or 0.0)
+        self.centre = np.concatenate([middle[self.free], np.zeros(len(sizes) + len(ends))])
+        self.size = np.concatenate([(0.5 * (root.upper - root.lower))[self.free], sizes, ends])
+        arms = scaled(model.pose.rotation @ leg.platform for leg in model.legs)
+        self.legs = tuple(zip(put(leg.base for leg in model.legs), arms, strict=True))
+        if has_straight_legs(model):
+            # The line of a leg passes its platform joint: u x (s (p - b) + u) / s is its moment about the origin.
+            spans = [(self.position - foot, arm) for foot, arm in self.legs]
+            rows = [ca.vertcat(self.scale * d + u, ca.cross(u, d)) for d, u in spans]
+        else:
+            about = [row.moment - ca.cross(model.pose.position, row.force) for row in model.wrenches]
+            rows = scaled(ca.vertcat(row.force, moment) for row, moment in zip(model.wrenches, about, strict=True))
+        self.rows = [replace(old, force=row[:3], moment=row[3:]) for old, row in zip(model.wrenches, rows, strict=True)]
+        parts = iter(put(part for each in model.members for part in (each.centre, each.screws)))
+        self.members = [replace(each, centre=next(parts), screws=next(parts), slide=None) for each in model.members]
+        parts = iter(put(part for each in model.actuators for part in (each.screws, each.relations)))
+        self.actuators = [replace(each, screws=next(parts), relations=next(parts)) for each in model.actuators]
+        self.nested = put(each.loops[:, each.passive] for each in model.nested)
+        self.equations = stacked(each.scaled for each in model.closure)
+        self.loops = stacked(each.scaled for each in model.loops)
+        self.signs = stacked(each.value for each in model.signs)
 
     def at(self, expression: SX, z: FloatArray) -> FloatArray:
         """Return the values of a matrix of expressions at a point (n,)."""
         return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
-
-
-def posed_robot(case: Case, model: Model, root: PoseRoot, errors: int = 0) -> PosedRobot:
-    """Return a robot over a workspace.
-
-    Args:
-        case: with fixed dimensions.
-        model: its robot, some of whose unknowns may have been replaced by expressions.
-        root: the box of coordinates.
-        errors: number of components of errors of joint centres, the last parameters of the robot.
-    """
-    middle = 0.5 * root.lower + 0.5 * root.upper
-    free = tuple(np.flatnonzero(root.upper > root.lower).tolist())
-    y = [SX.sym(f"y{k}") if k in free else SX(float(middle[k])) for k in range(6)]
-    unknowns = [SX.sym(item.name) for item in model.unknowns]
-    position, inverse = ca.vertcat(*y[:3]), SX.sym("inverse")
-    turned, scale = turned_rotation(root, y[3:])
-    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    off = SX.sym("errors", errors)
-    numbers = Substitution(
-        ca.vertcat(SX(0, 1), *values, off), ca.vertcat(SX(0, 1), *unknowns), turned / scale, position
-    )
-    symbols = Substitution.identity(model).all
-    about = [row.moment - ca.cross(model.pose.position, row.force) for row in model.wrenches]
-    vectors = [ca.vertcat(row.force, moment) for row, moment in zip(model.wrenches, about, strict=True)]
-    vectors += [model.pose.rotation @ leg.platform for leg in model.legs]
-    divided = ca.Function("rows", symbols, vectors).call(replace(numbers, rotation=inverse * turned).all)
-    without = [_without_division(ca.densify(each), inverse, scale) for each in divided]
-    rows, arms = without[: len(model.wrenches)], without[len(model.wrenches) :]
-    outputs = [
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *[leg.base for leg in model.legs],
-        *[each.loops[:, each.passive] for each in model.nested],
-        *[each.scaled for each in (*model.closure, *model.loops)],
-        *[each.value for each in model.signs],
-        *[each.size for each in model.unknowns],
-    ]
-    following = iter(ca.Function("robot", symbols, outputs).call(numbers.all))
-    ranges = (0.5 * (root.upper - root.lower))[list(free)]
-    robot = PosedRobot(
-        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns, off),
-        errors=errors,
-        free=free,
-        middle=middle,
-        size=ranges,
-        length=case.characteristic_length,
-        position=position,
-        scale=scale,
-        rows=tuple(replace(old, force=row[:3], moment=row[3:]) for old, row in zip(model.wrenches, rows, strict=True)),
-        members=tuple(
-            replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members
-        ),
-        actuators=tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators),
-        legs=tuple((next(following), arm) for arm in arms),
-        nested=tuple(next(following) for _ in model.nested),
-        equations=ca.vertcat(SX(0, 1), *[next(following) for _ in model.closure]),
-        loops=ca.vertcat(SX(0, 1), *[next(following) for _ in model.loops]),
-        signs=ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs]),
-    )
-    sizes = [float(next(following)) for _ in model.unknowns]
-    return replace(robot, size=np.concatenate([ranges, sizes, np.full(errors, case.joint_centre_tolerance or 0.0)]))
 
 
 def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
@@ -169,37 +145,28 @@ def turned_rotation(root: PoseRoot, turn: list[SX]) -> tuple[SX, SX]:
     return of_quaternion(ca.vertcat(*turn) if root.kind is TurnKind.ANY_AXIS else turn[0] * SX(root.axis.tolist()))
 
 
-def _without_division(row: SX, inverse: SX, scale: SX) -> SX:
-    """Return a row, or for one that is linear in the rotation its multiple without the inverse of the scale."""
-    slope = ca.jacobian(row, inverse)
-    if ca.depends_on(slope, inverse) or not ca.depends_on(row, inverse):
-        return ca.substitute(row, inverse, 1 / scale)
-    return scale * ca.substitute(row, inverse, 0) + slope
-
-
-def motion_matrix(model: Model, robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> tuple[SX, int]:
+def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> tuple[SX, int]:
     """Return the matrix (m, c), and the dimensions of its null space claimed to be all: freedoms and idle rates.
 
-    With free actuators the matrix of a robot given by its rows is that of its couples, which are constraints.
+    With locked actuators there are none. With free ones the matrix of a robot given by its rows is that of its couples.
 
     Args:
-        model: the robot's model.
         robot: the robot.
         start: (n,) closed loops, at which those screws of each member are chosen that are independent.
-        is_locked: whether the actuators are locked, and there are no freedoms.
+        is_locked: whether the actuators are locked.
 
     Raises:
         ProofError: the screws or loops of a member are singular at the start, or all freedoms of a platform are left.
     """
     if is_locked:
-        return _whole_matrix(model, robot, start, ()), 0
+        return _whole_matrix(robot, start, ()), 0
     if robot.actuators:
-        matrix = _whole_matrix(model, robot, start, robot.actuators)
+        matrix = _whole_matrix(robot, start, robot.actuators)
     else:
-        couples = [_work(robot, row) for row in robot.rows if row.kind is WrenchKind.COUPLE]
-        matrix = ca.vertcat(SX(0, 6), *couples)
-    if model.generic is not None:
-        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
+        matrix = ca.vertcat(SX(0, 6), *[_work(robot, row) for row in robot.rows if row.kind is WrenchKind.COUPLE])
+    generic = robot.model.generic
+    if generic is not None:
+        freedoms, idle = 6 - generic.constraints, generic.idle
     else:
         values = np.linalg.svd(robot.at(matrix, start), compute_uv=False)
         freedoms, idle = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0])), 0
@@ -208,75 +175,51 @@ def motion_matrix(model: Model, robot: PosedRobot, start: FloatArray, *, is_lock
     return matrix, freedoms + idle
 
 
-def _work(robot: PosedRobot, row: Wrench) -> SX:
-    """Return the work (1, 6) of a limb's row in motions."""
-    return ca.horzcat(row.force.T, row.moment.T / robot.length)
-
-
-def _whole_matrix(model: Model, robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
+def _whole_matrix(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
     """Return the matrix (m, c), with columns of the platform, of passive joints, of actuators and of nested loops.
 
     Of each member as many screws are taken as have its rank: where these are independent, they span all.
-
-    Raises:
-        ProofError: the screws or the loops of a member have another rank at the start.
     """
-    members, loops = [], []
+    # What limbs see of a motion, by the names of those that actuators move, and the motions of their passive joints.
+    limbs = [(row.label.member, _work(robot, row), SX(6, 0)) for row in robot.rows]
     for each in robot.members:
-        if each.rank < each.screws.shape[1]:
+        kept = list(range(each.screws.shape[1]))
+        if each.rank < len(kept):
             columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
-            whose = f"the passive joints of limb {each.label}"
-            chosen = _independent(robot.at(columns, start).T, each.rank, whose)
-            members.append(replace(each, screws=each.screws[:, chosen], groups=()))
-        else:
-            members.append(each)
-    for path, conditions in zip(model.nested, robot.nested, strict=True):
-        whose = f"the nested loops of limb {path.member}"
-        kept = _independent(robot.at(conditions, start), path.loop_rank, whose)
+            kept = _independent(robot.at(columns, start).T, each.rank, f"the passive joints of limb {each.label}")
+        # The velocity of a pinned member's centre is v + omega x arm.
+        arm = (each.centre - robot.position) / robot.length
+        seen = ca.horzcat(SX.eye(3), -ca.skew(arm)) if each.is_pinned else SX.eye(6)
+        limbs.append((each.label, seen, _motions(robot, each.screws[:, kept])))
+    passive, at, blocks = sum(own.shape[1] for _, _, own in limbs), 0, []
+    for label, seen, own in limbs:
+        screws = (each.screw_in(label) for each in actuators)
+        driven = [SX(6, 1) if screw is None else _motions(robot, screw) for screw in screws]
+        after = SX(6, passive - at - own.shape[1])
+        blocks.append(seen @ ca.horzcat(SX.eye(6), SX(6, at), -own, after, *(-each for each in driven)))
+        at += own.shape[1]
+    relations, loops = rate_relations(actuators), []
+    blocks.append(ca.horzcat(SX(relations.shape[0], 6 + passive), relations))
+    for path, conditions in zip(robot.model.nested, robot.nested, strict=True):
+        kept = _independent(robot.at(conditions, start), path.loop_rank, f"the nested loops of limb {path.member}")
         loops += [conditions[kept, :].T] if kept else []
-    return ca.diagcat(_matrix(robot, members, actuators), *loops)
+    return ca.sparsify(ca.diagcat(ca.vertcat(*blocks), *loops))
 
 
 def _independent(rows: FloatArray, rank: int, whose: str) -> list[int]:
-    """Return as many independent rows as their rank; rows that loops hold still are rounding errors.
-
-    Raises:
-        ProofError: they have another rank.
-    """
+    """Return as many independent rows as their rank; rows that loops hold still are rounding errors."""
     chosen = sorted(independent_rows([rows])) if rank else []
     if len(chosen) != rank:
         raise ProofError(f"{whose} are singular in the middle of the workspace")
     return chosen
 
 
-def _matrix(robot: PosedRobot, members: Sequence[Member], actuators: Sequence[Actuator]) -> SX:
-    """Return the matrix (m, c), with columns of the platform, of passive joints and of actuators."""
-    passive = sum(each.screws.shape[1] for each in members)
-    blocks, at = [], 6
-
-    def driven(member: str, seen: SX) -> list[SX]:
-        """Return the columns of all actuators: those that do not move a member are 0."""
-        screws = [each.screw_in(member) for each in actuators]
-        return [SX(seen.shape[0], 1) if screw is None else -seen @ _motion(robot, screw) for screw in screws]
-
-    for row in robot.rows:
-        work = _work(robot, row)
-        blocks.append(ca.horzcat(work, SX(1, passive), *driven(row.label.member, work)))
-    for each in members:
-        # The velocity of a pinned member's centre is v + omega x arm.
-        arm = (each.centre - robot.position) / robot.length
-        seen = ca.horzcat(SX.eye(3), -ca.skew(arm)) if each.is_pinned else SX.eye(6)
-        count = each.screws.shape[1]
-        columns = [-seen @ _motion(robot, each.screws[:, j]) for j in range(count)]
-        before, after = SX(each.size, at - 6), SX(each.size, 6 + passive - at - count)
-        blocks.append(ca.horzcat(seen, before, *columns, after, *driven(each.label, seen)))
-        at += count
-    relations = rate_relations(actuators)
-    blocks.append(ca.horzcat(SX(relations.shape[0], 6 + passive), relations))
-    return ca.sparsify(ca.vertcat(SX(0, 6 + passive + len(actuators)), *blocks))
+def _work(robot: PosedRobot, row: Wrench) -> SX:
+    """Return the work (1, 6) of a limb's row in motions."""
+    return ca.horzcat(row.force.T, row.moment.T / robot.length)
 
 
-def _motion(robot: PosedRobot, screw: SX) -> SX:
-    """Return the motion (6, 1) of a screw: a twist with the world's origin as reference."""
-    omega, v = screw[:3], screw[3:]
-    return ca.vertcat(v + ca.cross(omega, robot.position), robot.length * omega)
+def _motions(robot: PosedRobot, screws: SX) -> SX:
+    """Return the motions (6, n) of screws: twists with the world's origin as reference."""
+    omega, v = screws[:3, :], screws[3:, :]
+    return ca.vertcat(v - ca.skew(robot.position) @ omega, robot.length * omega)

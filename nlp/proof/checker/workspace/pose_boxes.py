@@ -36,62 +36,53 @@ class PoseRoot:
     Attributes:
         kind: coordinates of rotations.
         axis: (3,) of rotations about one axis.
+        values: (6,) the ends of each coordinate that varies; the number of one that does not, or the angle.
         lower, upper: (6,) ends, which hold every pose of the workspace.
-        inner_lower, inner_upper: (6,) ends between which every pose is one of the workspace; a fixed angle's are those
-            of its box.
+        inner: (6,) pairs of ends between which every pose is one of the workspace; of a fixed angle those of its box.
         ball, inner_ball: the same of the squared size of a Cayley vector; infinite without a ball.
     """
 
     kind: TurnKind
     axis: FloatArray
+    values: tuple[Value, ...]
     lower: FloatArray
     upper: FloatArray
-    inner_lower: tuple[Fraction, ...]
-    inner_upper: tuple[Fraction, ...]
+    inner: tuple[tuple[Fraction, Fraction], ...]
     ball: float
     inner_ball: Fraction | None
 
     def holds(self, y: FloatArray) -> bool:
         """Return whether a point (6,) is surely a pose of the workspace."""
         at = [Fraction(each) for each in y.tolist()]
-        inside = all(
-            low <= each <= high for low, each, high in zip(self.inner_lower, at, self.inner_upper, strict=True)
-        )
+        inside = all(low <= each <= high for (low, high), each in zip(self.inner, at, strict=True))
         return inside and (self.inner_ball is None or sum(each * each for each in at[3:]) <= self.inner_ball)
 
-    def is_outside(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
-        """Return whether no pose of the workspace is in boxes (B, 6)."""
+    def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Return boxes (B, 6) with their ends moved to the ball, never past a pose, and which (B,) may have poses."""
         if not math.isfinite(self.ball):
-            return np.zeros(len(lower), dtype=bool)
-        least = np.maximum(np.maximum(lower[:, 3:], -upper[:, 3:]), 0.0)
-        # Three squares and two sums round by less than 2^-50 of the result.
-        return np.asarray((least * least).sum(axis=1) * (1 - 2.0**-50) > self.ball)
-
-    def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return boxes (B, 6) with their ends moved to the ball, never past a pose of the workspace."""
-        if not math.isfinite(self.ball):
-            return lower, upper
+            return lower, upper, np.ones(len(lower), dtype=bool)
         least = np.maximum(np.maximum(lower[:, 3:], -upper[:, 3:]), 0.0)
         squares = least * least
         whole = squares.sum(axis=1, keepdims=True)
-        # Sums and differences of three squares round by a few 2^-53 of the largest number in them.
-        room = np.maximum(self.ball - (whole - squares) + 2.0**-48 * (self.ball + whole), 0.0)
+        # Sums and differences of three squares round by less than 8 parts in 2^53 of the numbers in them.
+        room = np.maximum(self.ball - (whole - squares) + 2.0**-50 * (self.ball + whole), 0.0)
         most = np.sqrt(room) * (1 + 2.0**-50)
         low, high = np.maximum(lower[:, 3:], -most), np.minimum(upper[:, 3:], most)
-        # A crossed pair would be no box: the ends stay where they were.
-        crossed = (low > high).any(axis=1, keepdims=True)
-        low, high = np.where(crossed, lower[:, 3:], low), np.where(crossed, upper[:, 3:], high)
-        return np.concatenate([lower[:, :3], low], axis=1), np.concatenate([upper[:, :3], high], axis=1)
+        has_poses = (low <= high).all(axis=1)
+        return np.hstack([lower[:, :3], low]), np.hstack([upper[:, :3], high]), np.asarray(has_poses)
 
 
 def pose_root(workspace: Workspace) -> PoseRoot:
     """Return the box of coordinates of a workspace."""
     turns = workspace.turns
-    outer = [(Fraction(low), Fraction(high)) for low, high in map(_ends, workspace.position)]
+    spans = [_ends(each) for each in workspace.position]
+    outer = [(Fraction(low), Fraction(high)) for low, high in spans]
     inner = list(outer)
     ball, inner_ball = math.inf, None
     if turns.kind is TurnKind.ANY_AXIS:
-        least, most = tangent_ends(max(abs(end) for end in _ends(turns.angles[0])))
+        largest = max(map(abs, _ends(turns.angles[0])))
+        least, most = tangent_ends(largest)
+        spans += [(-largest, largest)] * 3
         outer += [(-most, most)] * 3
         inner += [(-most, most)] * 3
         ball, inner_ball = _up(most * most), least * least
@@ -99,22 +90,19 @@ def pose_root(workspace: Workspace) -> PoseRoot:
         for low, high in map(_ends, turns.angles):
             (below, start), (end, above) = tangent_ends(low), tangent_ends(high)
             wide = below - _AXIS * abs(below), above + _AXIS * abs(above)
+            spans.append((low, high))
             outer.append(wide)
             narrow = start + _AXIS * abs(start), end - _AXIS * abs(end)
             inner.append(wide if low == high else narrow)
-        flat = [(Fraction(0), Fraction(0))] * (6 - len(outer))
-        outer += flat
-        inner += flat
-    return PoseRoot(
-        turns.kind,
-        np.array(turns.axis, dtype=float),
-        np.array([_down(low) for low, _ in outer]),
-        np.array([_up(high) for _, high in outer]),
-        tuple(low for low, _ in inner),
-        tuple(high for _, high in inner),
-        ball,
-        inner_ball,
+    flat = [(Fraction(0), Fraction(0))] * (COORDINATES - len(outer))
+    ends = [(_down(Fraction(low)), _up(Fraction(high))) for low, high in outer + flat]
+    lower, upper = np.array(ends).T
+    values = (
+        Free(*each) if low < high else low
+        for (low, high), each in zip(spans + [(0.0, 0.0)] * len(flat), ends, strict=True)
     )
+    axis = np.array(turns.axis, dtype=float)
+    return PoseRoot(turns.kind, axis, tuple(values), lower, upper, tuple(inner + flat), ball, inner_ball)
 
 
 def _ends(value: Value) -> tuple[float, float]:
@@ -125,7 +113,7 @@ def _ends(value: Value) -> tuple[float, float]:
 def _down(value: Fraction) -> float:
     """Return a double that is not above a fraction."""
     number = float(value)
-    return number if Fraction(number) <= value else math.nextafter(number, -math.inf)
+    return number if number <= value else math.nextafter(number, -math.inf)
 
 
 def _up(value: Fraction) -> float:
@@ -138,7 +126,7 @@ class Attempt(NamedTuple):
 
     Attributes:
         holds: (B,) whether it is shown.
-        shares: (B, 6) share of each coordinate in what is missing.
+        shares: (B, n) share of each varying coordinate in what is missing.
         is_wrong: (B,) whether the number at the centre is clearly beyond the bound; None where that is not asked.
     """
 
@@ -148,38 +136,27 @@ class Attempt(NamedTuple):
 
 
 class BoxClaim(Protocol):
-    """A claim about boxes of poses."""
+    """A claim about boxes of poses; ``free`` are indices among the six coordinates of those that vary in it."""
+
+    free: list[int]
 
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
 
 
 def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, int]:
-    """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined.
-
-    Raises:
-        ProofError: the bytes are no tree of the workspace, a leaf is not outside of it as it is claimed to be, or the
-            claim could not be shown.
-    """
-    reader, lows, highs, leaves = TreeReader(tree), [], [], [0]
-
-    def leaf(kind: int, _: int, low: FloatArray, high: FloatArray) -> None:
-        """Count a leaf, and keep it unless it is outside of the workspace."""
-        leaves[0] += 1
-        if kind == Node.BOUNDED:
-            lows.append(low)
-            highs.append(high)
-        elif kind != Node.OUTSIDE:
-            raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
-        elif not root.is_outside(low[None], high[None])[0]:
-            raise ProofError(f"the box {_words(low, high)} is not outside of the workspace")
-
-    reader.walk(root.lower, root.upper, leaf, frozenset({Node.CUT}))
+    """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined."""
+    reader = TreeReader(tree)
+    leaves = list(reader.walk(root.lower, root.upper, frozenset({Node.CUT})))
     reader.finish()
-    if not lows:
-        return leaves[0], 0
-    rule = _PoseRule(claim, root, np.array(lows).T, np.array(highs).T)
-    return leaves[0], show(rule, rule.lower, rule.upper)
+    for kind, _, low, high in leaves:
+        if kind not in (Node.BOUNDED, Node.OUTSIDE):
+            raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
+        if kind == Node.OUTSIDE and root.contracted(low[None], high[None])[2][0]:
+            raise ProofError(f"the box {box_words(low, high)} is not outside of the workspace")
+    boxes = [box for kind, _, *box in leaves if kind == Node.BOUNDED]
+    rule = _PoseRule(claim, root, *np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0))
+    return len(leaves), show(rule, rule.lower, rule.upper)
 
 
 class _PoseRule:
@@ -193,24 +170,23 @@ class _PoseRule:
 
     def examine(self, lower: FloatArray, upper: FloatArray, _: NDArray[np.intp]) -> Shown:
         """Examine pieces with ends (6, N)."""
-        low, high = lower.T, upper.T
-        kept = ~np.asarray(self._root.is_outside(low, high), dtype=bool)
-        low, high = self._root.contracted(low, high)
+        low, high, kept = self._root.contracted(lower.T, upper.T)
         holds, shares, is_wrong = ~kept, np.zeros(low.shape), np.zeros(len(low), dtype=bool)
-        if kept.any():
-            found = self._claim.attempt(low[kept], high[kept])
-            holds[kept], shares[kept] = found.holds, found.shares
+        at = np.flatnonzero(kept)
+        if at.size:
+            found = self._claim.attempt(low[at], high[at])
+            holds[at], shares[at[:, None], self._claim.free] = found.holds, found.shares
             if found.is_wrong is not None:
-                at = np.flatnonzero(kept)[found.is_wrong]
+                at = at[found.is_wrong]
                 # A claim about a box is wrong only at a pose of the workspace.
                 is_wrong[at] = [self._root.holds(y) for y in 0.5 * low[at] + 0.5 * high[at]]
         return Shown(holds, shares.T, low.T, high.T, is_wrong)
 
     def sentence(self, claim: int) -> str:
         """Return the sentence that a claim could not be shown."""
-        return f"the claim could not be shown for the box {_words(self.lower[:, claim], self.upper[:, claim])}"
+        return f"the claim could not be shown for the box {box_words(self.lower[:, claim], self.upper[:, claim])}"
 
 
-def _words(lower: FloatArray, upper: FloatArray) -> str:
+def box_words(lower: FloatArray, upper: FloatArray) -> str:
     """Return a box in words."""
     return ", ".join(f"[{low:.6g}, {high:.6g}]" for low, high in zip(lower, upper, strict=True))

@@ -7,9 +7,17 @@ dependent coordinates, and C near a pseudo-inverse of M_0, every ``C M`` has an 
 
 M has full column rank then. A matrix with d freedoms gets d further rows first, a basis of the null space of M_0: full
 column rank then says that there are no more freedoms anywhere in the box.
+
+Of six straight legs, with e and f the errors of both joints of a leg in the world frame, the row
+``(s (p - b) + u, u x (p - b))`` changes by ``(s (f - e), s f x (p - b) - u x e - s f x e)``. A component of a vector
+product with f is at most the tolerance times the size of the two other components of the other vector. The errors of
+other robots are coordinates of the forms, which are never cut.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
 
 import casadi as ca
 import numpy as np
@@ -25,18 +33,19 @@ from ...statement.tolerance import BuiltModel
 from ..fractions import sign_of_determinant
 from ..proof_file import ProofError
 from .closed_loops import Assembly, Enclosed, needed_equations, start_of
-from .forms import PRODUCT, UP, FormArithmetic, contraction, inverses, off_identity
-from .motion_matrix import PosedRobot, motion_matrix, posed_robot
-from .pose_boxes import Attempt, PoseRoot
-from .tolerance import change_of_rows
+from .forms import UP, AffineMatrix, FormArithmetic, inverses
+from .motion_matrix import PosedRobot, motion_matrix
+from .pose_boxes import COORDINATES, Attempt, PoseRoot
 
 #: Errors at which equations and screws that were left out are tested, in parts of the robot's length, part of the
 #: workspace about its middle in which the poses lie, number of tests, and largest residual of a closed loop.
 _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
-#: Largest number of parts of the way between two poses.
-_PARTS = 4096
+#: Numbers of parts of the way between two poses that are tried.
+_PARTS = (1, 16, 256, 4096)
+#: Indices after a component, and before it, of a vector.
+_AFTER, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 def rank_claim(
@@ -59,15 +68,15 @@ def rank_claim(
         ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
             free, an expression has an operation without a rule, or errors take freedoms from the robot.
     """
-    robot = posed_robot(case, model, root)
+    robot = PosedRobot(case, model, root)
     start = start_of(robot)
     needed = needed_equations(robot, start)
     if built is not None:
-        model, robot = built.model, posed_robot(case, built.model, root, 3 * len(built.names))
+        robot = PosedRobot(case, built.model, root)
         start = np.concatenate([start, np.zeros(robot.errors)])
     try:
         assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
-        matrix, freedoms = motion_matrix(model, robot, start, is_locked=name != CONSTRAINTS)
+        matrix, freedoms = motion_matrix(robot, start, is_locked=name != CONSTRAINTS)
         if built is not None:
             _refuse_other_freedoms(robot, assembly)
         return RankClaim(robot, matrix, freedoms, assembly, tolerance)
@@ -76,11 +85,7 @@ def rank_claim(
 
 
 def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
-    """Refuse machines in which equations or screws that were left out do not follow from the others.
-
-    Raises:
-        ProofError: they do not follow at random errors.
-    """
+    """Refuse machines in which, at random errors, equations or screws that were left out do not follow from others."""
     rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
     poses = [j for j in assembly.independent if j < n]
     for _ in range(_TESTS):
@@ -99,14 +104,9 @@ def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
 
 
 class RankClaim:
-    """The claim that a matrix of motions has no more freedoms than it is claimed to have.
+    """The claim that a sparse matrix of motions (m, c) has no more freedoms than it is claimed to have.
 
-    Args:
-        robot: the robot.
-        matrix: (m, c) sparse, m not below c less the freedoms.
-        freedoms: dimensions of its null space that are claimed to be all.
-        assembly: its closed loops.
-        tolerance: largest error of each joint centre, of six straight legs or in the robot's coordinates.
+    Errors of joint centres within a tolerance are those of six straight legs, or coordinates of the robot.
 
     Raises:
         UncoveredError: an entry holds an operation without a rule.
@@ -117,46 +117,30 @@ class RankClaim:
     ) -> None:
         self._freedoms, self._assembly, self._tolerance, self._length = freedoms, assembly, tolerance, robot.length
         # Independent coordinates as those of poses.
-        self._errors = robot.errors
-        self._free = [robot.free[j] for j in assembly.independent if j < len(robot.free)]
-        self._constant = np.zeros(matrix.shape)
-        places, entries = [], []
-        for k, place in enumerate(zip(*matrix.sparsity().get_triplet(), strict=True)):
-            if matrix.nz[k].is_constant():
-                self._constant[place] = float(matrix.nz[k])
-            else:
-                places.append(place)
-                entries.append(matrix.nz[k])
-        self._at = tuple(np.array(places, dtype=int).reshape(-1, 2).T)
+        self.free = [robot.free[j] for j in assembly.independent if j < len(robot.free)]
+        self._errors, self._shape = robot.errors, matrix.shape
+        self._at = np.array(matrix.sparsity().get_triplet(), dtype=np.intp)
         # The errors of joint centres change rows of legs by a part of these.
         of_rows = bool(tolerance) and not robot.errors
-        parts = [ca.horzcat(robot.position - foot, arm) for foot, arm in robot.legs * of_rows]
-        changes = ca.vertcat(robot.scale, *[ca.vec(each) for each in parts]) if parts else SX(0, 1)
-        self._count = len(entries)
-        self._entries = FormArithmetic(robot.z, ca.vertcat(SX(0, 1), *entries, changes))
+        parts = [ca.vec(each) for foot, arm in robot.legs * of_rows for each in (robot.position - foot, arm)]
+        self._entries = FormArithmetic(robot.z, ca.vertcat(matrix.nz[:], *([robot.scale, *parts] if parts else [])))
         self._shown: list[Enclosed] = []
 
+    @np.errstate(all="ignore")
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6)."""
         closed = self._closed(lower, upper)
-        holds, shares = np.zeros(len(lower), dtype=bool), np.zeros((len(lower), 6))
-        shares[:, self._free] = closed.shares[:, : len(self._free)]
-        rows = np.flatnonzero(closed.is_known)
-        if rows.size:
-            known = closed.known()
-            good, shares[rows[:, None], self._free] = self._examined(*self._matrices(known))
-            holds[rows] = good
+        holds, shares = closed.is_known.copy(), closed.shares[:, : len(self.free)].copy()
+        if holds.any():
+            known = closed.only(holds)
+            good, shares[holds] = self._examined(self._matrices(known))
+            holds[holds] = good
             if self._assembly.dependent:
-                known.is_known[:] = good
-                self._shown.append(known.known())
+                self._shown.append(known.only(good))
         return Attempt(holds, shares)
 
     def finish(self) -> None:
-        """Refuse boxes with closed loops that do not belong together, after all were shown.
-
-        Raises:
-            ProofError: they are not shown to be those of one assembly.
-        """
+        """Refuse boxes with closed loops that are not shown to be those of one assembly, after all were shown."""
         if self._shown:
             every = zip(*(vars(each).values() for each in self._shown), strict=True)
             self._assembly.refuse_apart(Enclosed(*map(np.concatenate, every)))
@@ -164,104 +148,105 @@ class RankClaim:
     @property
     def is_square(self) -> bool:
         """Whether the matrix is J itself, with rows that are neither normalised nor zero, over poses without loops."""
-        return self._constant.shape == (6, 6) and not self._freedoms and not self._assembly.dependent
+        return self._shape == (6, 6) and not self._freedoms and not self._assembly.dependent
 
     def values_at(self, y: FloatArray) -> FloatArray:
         """Return the matrices (K, m, c) at poses (K, 6) without loops: computed numbers."""
-        return self._matrices(self._closed(y, y))[0]
+        return self._matrices(self._closed(y, y)).M
 
-    def show_sign_change(self, root: PoseRoot, one: FloatArray, other: FloatArray) -> None:
-        """Show that the determinant has opposite signs at two poses (6,), and that there is a way between them.
+    def show_sign_change(self, root: PoseRoot, sides: Sequence[Sequence[float]]) -> None:
+        """Show that the determinant has opposite signs at two points (6 + e,): a pose, and errors of joint centres.
 
-        The entries have values along the whole way in the workspace, which is convex in its coordinates: the
-        determinant changes continuously, and is 0 at a pose.
-
-        Raises:
-            ProofError: it could not be shown.
+        The entries have values along the whole way between them, and poses and errors are convex in their coordinates:
+        the determinant changes continuously, and is 0 at a point.
         """
         if not self.is_square:
             raise ProofError("a singular pose has a proof for robots with six rows, without loops, alone")
-        signs = self._signs_at(np.stack([one, other]))
+        points = [np.array(each, dtype=float) for each in sides]
+        if len(points) != 2 or any(y.shape != (COORDINATES + self._errors,) for y in points):
+            raise ProofError("the claim has no two poses")
+        if not all(np.isfinite(y).all() and root.holds(y[:COORDINATES]) for y in points):
+            raise ProofError("a pose is not one of the workspace")
+        for error in np.concatenate([y[COORDINATES:] for y in points]).reshape(-1, 3).tolist():
+            if sum(Fraction(each) ** 2 for each in error) > Fraction(self._tolerance) ** 2:
+                raise ProofError("a joint centre of the machine is off by more than the tolerance")
+        signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
             raise ProofError("the determinant has not opposite signs at the two poses")
-        waiting, parts = [(one, other)], 0
-        while waiting:
-            begin, end = waiting.pop()
-            parts += 1
-            closed = self._closed(np.minimum(begin, end)[None], np.maximum(begin, end)[None])
-            if all(np.isfinite(each).all() for each in self._matrices(closed)):
-                continue
-            middle = 0.5 * begin + 0.5 * end
-            if parts > _PARTS or not root.holds(middle):
-                raise ProofError("the determinant is not shown to change continuously between the two poses")
-            waiting += [(begin, middle), (middle, end)]
+        for count in _PARTS:
+            way = points[0] + np.linspace(0, 1, count + 1)[:, None] * (points[1] - points[0])
+            way[[0, -1]] = points
+            matrices = self._matrices(self._closed(np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])))
+            if all(np.isfinite(each).all() for each in matrices) and all(root.holds(y[:COORDINATES]) for y in way):
+                return
+        raise ProofError("the determinant is not shown to change continuously between the two poses")
 
+    @np.errstate(all="ignore")
     def _signs_at(self, y: FloatArray) -> list[int]:
-        """Return the signs of the determinant at poses (K, 6); 0 where a sign is not shown.
+        """Return the signs of the determinant at points (K, 6 + e); 0 where a sign is not shown.
 
-        With ``|I - C M|`` of a spectral radius below 1 the determinant of ``C M`` is positive: that of M has the sign
-        of that of C, which is computed in fractions.
+        Where ``C M`` is near I its determinant is positive: that of M has the sign of that of C, in fractions.
         """
-        M, E, _ = self._matrices(self._closed(y, y))
-        C = inverses(M)
-        with np.errstate(all="ignore"):
-            bound = (off_identity(C, M) + np.abs(C) @ (E + PRODUCT * np.abs(M))) * UP
-        known, _ = contraction(np.where(np.isfinite(bound), bound, np.inf))
+        matrices = self._matrices(self._closed(y, y))
+        C = inverses(matrices.M)
+        known = matrices.contracted(C)[0]
         return [sign_of_determinant(each.tolist()) if good else 0 for each, good in zip(C, known, strict=True)]
 
     def _closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
-        """Return the closed loops over boxes (B, 6), for all errors."""
-        errors = np.full((len(lower), self._errors), self._tolerance)
-        low, high = np.hstack([lower[:, self._free], -errors]), np.hstack([upper[:, self._free], errors])
-        return self._assembly.enclosed(low, high, self._assembly.near(low, high))
+        """Return the closed loops over boxes (B, 6) for all errors, or over boxes (B, 6 + e) of poses and errors."""
+        if lower.shape[1] == COORDINATES:
+            errors = np.full((len(lower), self._errors), self._tolerance)
+            lower, upper = np.hstack([lower, -errors]), np.hstack([upper, errors])
+        own = [*self.free, *range(COORDINATES, COORDINATES + self._errors)]
+        return self._assembly.enclosed(lower[:, own], upper[:, own])
 
-    def _matrices(self, closed: Enclosed) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the forms of the matrix: (B, m, c) middles, (B, m, c) rests, and (B, f, m, c) of each coordinate."""
-        values = self._entries(closed.lower, closed.upper)
-        c, a, r = values.forms(slice(0, self._count))
-        dependent, slopes = a[:, :, self._assembly.dependent], a[:, :, self._assembly.independent]
-        size = np.abs(dependent)
-        with np.errstate(all="ignore"):
-            most = np.abs(closed.off) + np.abs(closed.T).sum(axis=2)
-            terms = np.abs(c) + np.abs(slopes).sum(axis=2) + (size @ most[:, :, None])[:, :, 0]
-            rest = (r + (size @ closed.rho[:, :, None])[:, :, 0] + PRODUCT * terms) * UP
-            middle = c + (dependent @ closed.off[:, :, None])[:, :, 0]
-            slopes = slopes - dependent @ closed.T
-        shape = (len(c), *self._constant.shape)
-        M, E = np.broadcast_to(self._constant, shape).copy(), np.zeros(shape)
-        A = np.zeros((len(c), slopes.shape[2], *self._constant.shape))
-        rows, columns = self._at
-        M[:, rows, columns], E[:, rows, columns] = middle, rest
-        A[:, :, rows, columns] = slopes.transpose(0, 2, 1)
+    @np.errstate(all="ignore")
+    def _matrices(self, closed: Enclosed) -> AffineMatrix:
+        """Return the forms of the matrix, whose coordinates are the independent ones."""
+        values, count = self._entries(closed.lower, closed.upper), self._at.shape[1]
+        matrices = self._assembly.followed(values.forms(slice(0, count)), closed).matrix(self._at, self._shape)
         if self._tolerance and not self._errors:
-            most = np.abs(values.ends(slice(self._count, None))).max(axis=0).T
-            legs = most[:, 1:].reshape(len(c), -1, 2, 3)
-            E += change_of_rows(most[:, 0], legs[:, :, 0], legs[:, :, 1], self._tolerance, self._length)
-        return M, E, A
+            most = np.abs(values.ends(slice(count, None))).max(axis=0).T
+            legs = most[:, 1:].reshape(len(most), -1, 2, 3)
+            change = change_of_rows(most[:, 0], legs[:, :, 0], legs[:, :, 1], self._tolerance, self._length)
+            matrices = matrices._replace(E=matrices.E + change)
+        return matrices
 
-    def _examined(self, M: FloatArray, E: FloatArray, A: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    def _examined(self, matrices: AffineMatrix) -> tuple[NDArray[np.bool_], FloatArray]:
         """Return where the rank is shown (B,), and shares (B, f), from the forms of the matrix."""
-        B, _, columns = M.shape
-        known = np.asarray(np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2)))
-        known &= np.isfinite(A).all(axis=(1, 2, 3))
-        M = np.where(known[:, None, None], M, 0.0)
-        E, A = np.where(known[:, None, None], E, 0.0), np.where(known[:, None, None, None], A, 0.0)
+        M, A, E = matrices
         # Rows are made comparable by a power of two, which rounds nothing.
         sizes = np.sqrt((M * M).sum(axis=2, keepdims=True))
         scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
         M, E, A = M * scale, E * scale, A * scale[:, None]
         if self._freedoms:
-            null = np.linalg.svd(M, full_matrices=True)[2][:, columns - self._freedoms :]
-            M, E = np.concatenate([M, null], axis=1), np.concatenate([E, np.zeros_like(null)], axis=1)
-            A = np.concatenate([A, np.zeros((B, A.shape[1], *null.shape[1:]))], axis=2)
-        with np.errstate(all="ignore"):
-            C = np.asarray(np.linalg.pinv(M, rcond=1e-14), dtype=float)
-            moved, p = np.abs(C[:, None] @ A), len(self._free)
-            # The error of a centre is no larger than the tolerance in any direction.
-            whole = np.sqrt((moved[:, p:].reshape(B, -1, 3, *moved.shape[2:]) ** 2).sum(axis=2)).sum(axis=1)
-            moved = moved[:, :p]
-            rest = E + PRODUCT * (np.abs(M) + np.abs(A).sum(axis=1))
-            bound = (off_identity(C, M) + np.abs(C) @ rest + whole + moved.sum(axis=1)) * UP
-            holds, v = contraction(np.where(known[:, None, None] & np.isfinite(bound), bound, np.inf))
-            shares = (moved * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
-        return np.asarray(holds & known), np.where(known[:, None], shares, np.nan)
+            known = np.asarray(np.isfinite(M).all(axis=(1, 2)))
+            null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._freedoms :]
+            none = np.zeros((len(M), A.shape[1], *null.shape[1:]))
+            rows = (M, null), (E, np.zeros_like(null)), (A, none)
+            M, E, A = (np.concatenate(each, axis=-2) for each in rows)
+        C, p = inverses(M), len(self.free)
+        moved = np.abs(C[:, None] @ A)
+        # The error of a centre is no larger than the tolerance in any direction.
+        centres = np.sqrt((moved[:, p:].reshape(len(M), -1, 3, *moved.shape[2:]) ** 2).sum(axis=2))
+        holds, _, shares = AffineMatrix(M, A, E).contracted(C, np.concatenate([moved[:, :p], centres], axis=1))
+        return holds, shares[:, :p]
+
+
+def change_of_rows(
+    scale: FloatArray, span: FloatArray, arm: FloatArray, tolerance: float, length: float = 1.0
+) -> FloatArray:
+    """Return bounds (B, 6, 6) of the change of the rows of six legs, entry by entry, by errors within a tolerance.
+
+    Args:
+        scale: (B,) largest s.
+        span: (B, 6, 3) largest sizes of ``p - b``.
+        arm: (B, 6, 3) largest sizes of ``u``.
+        tolerance: of each joint centre.
+        length: by which moments are divided.
+    """
+    s = scale[:, None, None]
+    across, along = (np.hypot(each[..., _AFTER], each[..., _BEFORE]) for each in (span, arm))
+    # The size of f x e is at most the tolerance squared, and so is each of its components.
+    moments = (s * (across + tolerance) + along) * UP / length
+    return np.concatenate([np.broadcast_to(2 * s, moments.shape), moments], axis=2) * tolerance * UP

@@ -5,14 +5,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
+import casadi as ca
 import numpy as np
+from casadi import SX
 
-from .....models import Model, WrenchKind
+from .....models import Dimension, Model, WrenchKind
 from .....models.joints import RobotError
 from .....models.joints.closedform import closed_form
 from ....case.case import Case
 from ....case.limits.clearance import LegClearance
+from ....case.limits.constraint import LENGTH, NUMBER, Reading
 from ....case.limits.legs import Actuator
 from ....case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ....case.task import Sense
@@ -21,15 +25,14 @@ from ....program.layout import Layout
 from ...statement.claims import CONSTRAINTS, REGULAR, SPECTRAL, Claim, asked_name, asked_spectra, claims_of
 from ...statement.machine import Legs, legs_of
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
+from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
 from ..premises import exact
 from ..proof_file import ProofError, WorkspaceProof, workspace_numbers
-from .pose_boxes import pose_root
-from .tolerance import Machines
+from .motion_matrix import turned_rotation
+from .pose_boxes import PoseRoot, pose_root
 
-#: Names of the errors of the pose: of its position and of its rotation.
-ERRORS = ("position error", "rotation error")
-#: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
-_ON_LIMIT = 1e-9
+#: Errors of the pose, of its position and of its rotation, and how they read.
+ERRORS = {"position error": LENGTH, "rotation error": Reading(Dimension.ANGLE)}
 #: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
 _SAME = 1e-9
 
@@ -41,41 +44,86 @@ class ExpectedClaim:
     Attributes:
         name: in the words of the command.
         sense: ``min`` or ``max`` for a number, else empty.
-        kind: ``regular``, ``constraints``, ``number``, ``stroke``, ``dead length``, ``clearance``, ``singular value``,
-            ``condition`` or ``error``.
-        limit: of the number, in the unit of its search; None without one.
+        kind: ``rank``, ``number``, ``lengths`` of a leg, ``clearance``, ``singular value`` or ``error``.
+        reading: how the number of its search reads in results.
+        limit: of this number; None without one.
         claim: of a number that the search of ``certify`` bounds.
-        legs: indices of the two legs of a clearance, or of the leg of a stroke.
+        layout: whose symbols this claim has.
+        legs: indices of the two legs of a clearance, or of the leg of whose lengths the number is made.
+        weights: of the longest and of the shortest length of this leg.
         length: by which moments are divided.
-        layout: whose symbols the claim has; None for those of the other claims.
     """
 
     name: str
     sense: str
     kind: str
+    reading: Reading = NUMBER
     limit: float | None = None
     claim: Claim | None = None
-    legs: tuple[int, ...] = ()
-    length: float = 1.0
     layout: Layout | None = None
+    legs: tuple[int, ...] = ()
+    weights: tuple[float, float] = (0.0, 0.0)
+    length: float = 1.0
 
     @property
     def key(self) -> tuple[str, str]:
         """Name and sense, which tell claims apart."""
         return self.name, self.sense
 
-    def keep_limit(self, bound: float) -> None:
-        """Refuse a bound beyond the limit of the case.
 
-        Raises:
-            ProofError: it is beyond.
-        """
-        if self.limit is None:
-            return
-        sign = 1.0 if self.sense == Sense.MAX.value else -1.0
-        slack = _ON_LIMIT * max(abs(self.limit), abs(bound))
-        if not sign * (bound - self.limit) <= slack:
-            raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {self.limit:.10g}")
+class Machines:
+    """Every machine within a tolerance on joint centres, as the check states it.
+
+    With the derivatives g_j of a number g by the error of centre j, and the blocks H_jk of its second derivatives, the
+    number of a machine within the tolerance t differs from that of the design by at most
+
+        t sum_j |g_j| + t^2 / 2 sum_jk |H_jk|
+
+    at each pose. The first sum is an expression of the pose. The second is shown to be at most the bound that the proof
+    gives, over all poses and errors (:class:`~.number_claims.SecondOrderClaim`).
+
+    Attributes:
+        model: the robot of a case with fixed dimensions, without unknowns in closed form.
+        root: the box of coordinates.
+        symbols: the machines as symbols of one pose.
+
+    Raises:
+        RobotError: the robot cannot be put together with errors of its joint centres.
+    """
+
+    def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
+        self._case, self.model, self.root = case, model, root
+
+        def rotation(turn: SX) -> SX:
+            """Return the rotation (3, 3) with coordinates (3, 1)."""
+            turned, scale = turned_rotation(root, ca.vertsplit(turn))
+            return turned / scale
+
+        self._at = PoseCoordinates(root.values, rotation, root.ball)
+        tolerance = case.joint_centre_tolerance or 0.0
+        self.symbols: MachineLayout = machine_layout(case, built_model(case.model), tolerance, self._at)
+
+    @cached_property
+    def design(self) -> Layout:
+        """The design as symbols of the pose; refuses a robot of which coordinates follow from others."""
+        if self.model.unknowns:
+            raise ProofError("numbers of machines with loops that are not in closed form have no proof")
+        return design_layout(self._case, self.model, self._at)
+
+    def varies(self, claim: Claim) -> bool:
+        """Return whether a number changes with the errors."""
+        errors = self.symbols.errors
+        return bool(errors.numel()) and any(ca.which_depends(claim.expression, errors, 1, True))
+
+    def number(self, claim: Claim, rest: float) -> SX:
+        """Return a bound (1, 1) of a number over all machines in the symbols of the design, from the rest's bound."""
+        errors, pose = self.symbols.errors, self.design.table.variables_vector
+        slopes, sign = ca.densify(ca.gradient(claim.expression, errors)), 1.0 if claim.sense is Sense.MAX else -1.0
+        squares = [ca.sumsqr(slopes[k : k + 3]) for k in range(0, errors.numel(), 3)]
+        small = self.symbols.near_zero(claim.expression, self.design).tolist()
+        first = sum((ca.sqrt(each + size**2) for each, size in zip(squares, small, strict=True)), SX(0))
+        whole = claim.expression + sign * (self.symbols.tolerance * first + rest)
+        return self.symbols.of(whole, SX.zeros(errors.numel()), pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,119 +135,104 @@ class RobotClaims:
         layout: the case as symbols of the pose in which its numbers are bounded: without the unknowns that follow in
             closed form, where all limbs reach every pose.
         model: the robot without these unknowns, over whose poses its ranks are claimed.
-        more: claims about constraint wrenches and reach; none about six straight legs.
+        reaches: claims that limbs reach every pose.
         numbers_at: assemblies that its numbers are about, in words; empty for a robot without unknowns.
-        machines: every machine within the tolerance, in whose symbols the numbers and ``more`` are then; None where
+        machines: every machine within the tolerance, in whose symbols the numbers and ``reaches`` are then; None where
             the design is meant, or machines cannot be put together.
     """
 
     legs: Legs | None
     layout: Layout
     model: Model
-    more: tuple[ExpectedClaim, ...] = ()
+    reaches: tuple[ExpectedClaim, ...] = ()
     numbers_at: str = ""
     machines: Machines | None = None
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
-    """Return the robot of a case, with the claims that robots beside six straight legs have.
-
-    Args:
-        case: with fixed dimensions.
-        workspace: the poses.
-        reached: names of those claims about reach that are proved.
-    """
-    legs, machines = legs_of(case), _machines(case, workspace)
-    if machines is not None:
-        reaches, _ = machines.symbols.claims(())
-        more = [*_of_constraints(machines.model), *map(_of_number, reaches)]
-        home = "the assembly of home" if case.model.unknowns else ""
-        return RobotClaims(legs, machines.symbols.layout, machines.model, tuple(more), home, machines)
-    closed = closed_form(case.model)
-    more = _of_constraints(closed.model)
-    numbers_at, layout = "every assembly" if case.model.unknowns else "", None
+    """Return the robot of a case with fixed dimensions, and the claims about its reach, of which some are proved."""
+    legs, closed, is_open = legs_of(case), closed_form(case.model), bool(case.model.unknowns)
+    if case.joint_centre_tolerance:
+        try:
+            machines = Machines(case, closed.model, pose_root(workspace))
+        except RobotError:
+            pass
+        else:
+            layout, home = machines.symbols.layout, "the assembly of home" if is_open else ""
+            reaches, _ = machines.symbols.claims(())
+            return RobotClaims(legs, layout, closed.model, _of_numbers(reaches, layout), home, machines)
+    claims: tuple[ExpectedClaim, ...] = ()
     if closed.reaches:
-        place, claims = reach_claims(case, closed, workspace)
-        more += [_of_number(each, place) for each in claims]
-        if all(each.name in reached for each in claims):
-            layout = closed_layout(case, closed, workspace)
+        place, every = reach_claims(case, closed, workspace)
+        claims = _of_numbers(every, place)
+        if all(each.name in reached for each in every):
             partly = "every assembly in which limbs in closed form are as at home"
             numbers_at = partly if closed.model.unknowns else "the assembly of home"
-    return RobotClaims(legs, layout or posed_layout(case, workspace), closed.model, tuple(more), numbers_at)
+            return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, claims, numbers_at)
+    numbers_at = "every assembly" if is_open else ""
+    return RobotClaims(legs, posed_layout(case, workspace), closed.model, claims, numbers_at)
 
 
-def _of_constraints(model: Model) -> list[ExpectedClaim]:
-    """Return the claim about the rank of a robot's constraint wrenches, if it has some."""
-    return [ExpectedClaim(CONSTRAINTS, "", "constraints")] if has_constraints(model) else []
+def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[ExpectedClaim]:
+    """Return the claims about a case over its workspace, and about measures that were asked for.
+
+    Raises:
+        InputError: the robot has no measure of a name.
+    """
+    ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
+    claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
+    every = [*(ExpectedClaim(name, "", "rank") for name in ranks), *robot.reaches, *_of_numbers(claims, robot.layout)]
+    return every if robot.legs is None else [*every, *_of_legs(case, quantities, leg_error)]
 
 
-def _machines(case: Case, workspace: Workspace) -> Machines | None:
-    """Return every machine within the case's tolerance; None for the design, or where machines are not known."""
-    if not case.joint_centre_tolerance:
-        return None
-    try:
-        return Machines(case, closed_form(case.model).model, workspace, pose_root(workspace))
-    except RobotError:
-        return None
-
-
-def has_constraints(model: Model) -> bool:
+def _has_constraints(model: Model) -> bool:
     """Return whether a robot has constraint wrenches, of which a rank is claimed."""
     if model.generic is not None:
         return 0 < model.generic.constraints < 6
     return not model.members and any(row.kind is WrenchKind.COUPLE for row in model.wrenches)
 
 
-def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[ExpectedClaim]:
-    """Return the claims about a case over its workspace.
-
-    Args:
-        case: the case.
-        robot: its robot.
-        quantities: measures that were asked for.
-        leg_error: largest error of a leg's length.
-
-    Raises:
-        InputError: the robot has no measure of a name.
-    """
-    claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
-    every = [ExpectedClaim(REGULAR, "", "regular"), *robot.more, *map(_of_number, claims)]
-    return every if robot.legs is None else [*every, *_of_legs(case, quantities, leg_error)]
-
-
-def _of_number(claim: Claim, layout: Layout | None = None) -> ExpectedClaim:
-    """Return the claim about a number that the search of ``certify`` bounds."""
-    return ExpectedClaim(claim.name, claim.sense.value, "number", claim.limit, claim, layout=layout)
+def _of_numbers(claims: Sequence[Claim], layout: Layout) -> tuple[ExpectedClaim, ...]:
+    """Return the claims about numbers that the search of ``certify`` bounds, in the symbols of a layout."""
+    return tuple(
+        ExpectedClaim(each.name, each.sense.value, "number", each.reading, each.limit, each, layout) for each in claims
+    )
 
 
 def _of_legs(case: Case, quantities: Sequence[str], leg_error: float) -> Iterator[ExpectedClaim]:
     """Yield the claims about six straight legs that have rules of their own."""
     names = [leg.name for leg in case.model.legs]
-    stroke = next((each for each in case.limits if isinstance(each, Actuator)), None)
-    for k, name in enumerate(names if stroke is not None else ()):
-        for end, sense, kind in (("stroke_max", "max", "stroke"), ("dead_length", "min", "dead length")):
-            limit = getattr(stroke, end)
-            if limit is not None:
-                yield ExpectedClaim(f"actuator.{end} limb {name}", sense, kind, limit, legs=(k,))
-    yield from _of_limits(case, names)
-    for name in asked_spectra(case, quantities):
-        sense, kind = ("max", "condition") if name == ConditionNumber.key else ("min", "singular value")
-        yield ExpectedClaim(asked_name(case, name), sense, kind, length=case.characteristic_length)
-    if leg_error_of(case, leg_error) > 0:
-        yield from (ExpectedClaim(name, "max", "error") for name in ERRORS)
-
-
-def _of_limits(case: Case, names: Sequence[str]) -> Iterator[ExpectedClaim]:
-    """Yield the limits on singular values, and on distances between legs with these names."""
     for each in case.limits:
-        if isinstance(each, SmallestSingularValue):
-            yield ExpectedClaim("smallest_singular_value", "min", "singular value", each.min, length=each.length)
+        if isinstance(each, Actuator):
+            yield from _of_strokes(each, names)
+        elif isinstance(each, SmallestSingularValue):
+            yield _of_spectrum(each.key, each.key, each.length, each.min)
         elif isinstance(each, ConditionNumber):
-            yield ExpectedClaim("condition_number", "max", "condition", each.max, length=each.length)
+            yield _of_spectrum(each.key, each.key, each.length, each.max)
         elif isinstance(each, LegClearance):
             for i, j in itertools.combinations(range(len(names)), 2):
-                name = f"leg_clearance limbs {names[i]} and {names[j]}"
-                yield ExpectedClaim(name, "min", "clearance", each.min, legs=(i, j))
+                name = f"{each.key} limbs {names[i]} and {names[j]}"
+                yield ExpectedClaim(name, "min", "clearance", LENGTH, each.min, legs=(i, j))
+    for key in asked_spectra(case, quantities):
+        yield _of_spectrum(asked_name(case, key), key, case.characteristic_length)
+    if leg_error_of(case, leg_error) > 0:
+        yield from (ExpectedClaim(name, "max", "error", reading) for name, reading in ERRORS.items())
+
+
+def _of_strokes(limit: Actuator, names: Sequence[str]) -> Iterator[ExpectedClaim]:
+    """Yield the claims about the stroke of each leg with these names, and about its dead length."""
+    for k, name in enumerate(names):
+        for end, sense, weights in (("stroke_max", "max", (1.0, -1.0)), ("dead_length", "min", (-1.0, 2.0))):
+            most = getattr(limit, end)
+            if most is not None:
+                full = f"{limit.key}.{end} limb {name}"
+                yield ExpectedClaim(full, sense, "lengths", LENGTH, most, legs=(k,), weights=weights)
+
+
+def _of_spectrum(name: str, key: str, length: float, limit: float | None = None) -> ExpectedClaim:
+    """Return the claim about the smallest singular value of J, or its condition number."""
+    sense = "max" if key == ConditionNumber.key else "min"
+    return ExpectedClaim(name, sense, "singular value", limit=limit, length=length)
 
 
 def leg_error_of(case: Case, leg_error: float) -> float:
@@ -207,28 +240,21 @@ def leg_error_of(case: Case, leg_error: float) -> float:
     return leg_error + 2 * (case.joint_centre_tolerance or 0.0)
 
 
+def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
+    """Return joint centres (12, 3), base before platform; none for a robot that is not six straight legs."""
+    return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
+
+
 def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, proof: WorkspaceProof) -> None:
-    """Refuse a proof whose file names other premises than those of the case; the check does without the file's.
-
-    Args:
-        case: the case.
-        workspace: its poses.
-        legs: its joint centres; None for a robot that is not six straight legs.
-        leg_error: largest error of a leg's length.
-        proof: the proof.
-
-    Raises:
-        ProofError: it is for another workspace, other joint centres or other errors.
-    """
+    """Refuse a proof whose file names other premises than those of the case; the check does without the file's."""
     if workspace_numbers(workspace) != proof.workspace:
         raise ProofError("the proof is for another workspace than this case's")
     if proof.leg_error != leg_error:
         stated = f"the proof is for legs that are off by at most {exact(proof.leg_error)} {case.units.length}"
         raise ProofError(f"{stated}, and not {exact(leg_error)}: see --leg-error")
-    numbers = np.zeros((0, 3)) if legs is None else np.concatenate([legs.base, legs.platform])
-    given = [list(each) for each in proof.legs]
-    same = len(numbers) == len(given) and all(len(each) == 3 for each in given)
-    if not same or not np.allclose(given or numbers, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
+    numbers, given = legs_numbers(legs), proof.legs
+    same = list(map(len, numbers)) == list(map(len, given))
+    if not same or not np.allclose(given, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
         raise ProofError("the proof is for other joint centres than this case's")
     if (case.joint_centre_tolerance or 0.0) != proof.tolerance:
         raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")

@@ -64,46 +64,38 @@ static void reach_quadratic(Box *x, double sign, double middle, const double *b,
     }
 }
 
-static void reach_affine(Box *x, int r, double sign, double level)
-{
-    int n = x->n;
-    const double *a = x->a + r * n;
-    double rad = 0.0, most = sign > 0 ? x->q[r] : -x->p[r];
-    for (int i = 0; i < n; i++)
-        rad += fabs(a[i]);
-    double slack = most + x->s[r] + (fabs(x->c[r]) + rad + most + fabs(level)) * (64 * ULP) + TINY;
-    for (int i = 0; i < n; i++) {
-        double along = sign * a[i], needed = (level - sign * x->c[r] - slack - (rad - fabs(along))) / along;
-        double margin = fabs(needed) * (8 * ULP);
-        keep(x, i, along > 0 && needed > -1 ? needed - margin : -1.0, along < 0 && needed < 1 ? needed + margin : 1.0, r);
-    }
-}
-
-static void reach_expression(Box *x, int r, double sign, double level)
+/* Moves the ends past points where sign times a row cannot reach a level. */
+static void reach_row(Box *x, int r, double sign, double level)
 {
     int n = x->n;
     const double *A = x->gA + r * n * n;
-    double lost = 0.0, more = 0.0;
-    int squares = x->squares && r < x->J;
-    reach_affine(x, r, sign, level);
+    double middle = sign * x->c[r] + x->s[r], lost = x->is_second ? size_of_row(x, r) : fabs(x->c[r]);
+    if (x->is_second)
+        middle += sign > 0 ? x->q[r] : -x->p[r];
     for (int i = 0; i < n; i++) {
         int at = r * n + i;
         double p = sign > 0 ? x->gp[at] : -x->gq[at], q = sign > 0 ? x->gq[at] : -x->gp[at], across = 0.0;
         double low = 0.0, high = 0.0; /* the model's slopes are not used here */
+        x->fb[i] = sign * x->gb[at], x->fw[i] = 0.0;
+        if (x->is_second)
+            continue;
         for (int j = 0; j < n; j++)
             across += fabs(A[i * n + j]);
-        x->fb[i] = sign * x->gb[at];
-        lost += finish_model(x->fb + i, x->fw + i, &low, &high, across, p, q, x->gs[at]);
-        if (squares) {
-            x->fw[i] += x->sw[at], more += x->sw[at];
-            for (int j = 0; j < n; j++) {
-                double h = x->sH[at * n + j];
-                x->fH[i * n + j] = A[i * n + j] + h, more += fabs(h);
-            }
-        }
+        lost += finish_model(x->fb + i, x->fw + i, &low, &high, across, p, q, x->gs[at], 0.0);
     }
-    double rounding = 64 * ULP * (fabs(x->c[r]) + lost) + TINY + 64 * ULP * more;
-    reach_quadratic(x, sign, sign * x->c[r] + x->s[r], x->fb, squares ? x->fH : A, x->fw, rounding, level, r);
+    reach_quadratic(x, sign, middle, x->fb, A, x->fw, 64 * ULP * lost + TINY, level, r);
+}
+
+/* Moves the ends past points where no function, unless it has tilts, or not the Lagrangian can reach the threshold, or a
+ * condition cannot hold. */
+static void contract(const Form *form, Box *x, double threshold, int tilted)
+{
+    for (int r = 0; r < x->R; r++)
+        for (int side = 1; side >= -1; side -= 2)
+            if (r < x->J ? side > 0 && !tilted : side < 0 || form->equation[r] == 1)
+                reach_row(x, r, side, r < x->J ? threshold : 0.0);
+    if (x->R > 1 || tilted)
+        reach_quadratic(x, 1.0, x->q_middle, x->qb, x->H, x->qw, x->q_rounding, threshold, 0);
 }
 
 #endif

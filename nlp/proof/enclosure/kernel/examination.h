@@ -33,7 +33,7 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
     Py_ssize_t B = report->B;
     int holds = 1; /* whether every condition holds on the whole box */
     for (int r = J; r < R; r++)
-        holds = holds && form->equation[r] != 1 && x->high[r] < 0;
+        holds = holds && form->equation[r] != 1 && x->hi[r] < 0;
     *to = defined + 2 * holds, *(to += B) = x->q_middle, *(to += B) = x->q_rounding;
     for (int k = 0; k < 4; k++)
         for (int i = 0; i < n; i++)
@@ -47,7 +47,7 @@ static void write_model(const Form *form, const Box *x, Report *report, Py_ssize
             double least = x->grad_lo[r * n + i], most = x->grad_hi[r * n + i];
             if (r < J)
                 low = smaller(low, least), high = larger(high, most);
-            else if (form->depends[r * n + i] && !(x->high[r] < 0))
+            else if (form->depends[r * n + i] && !(x->hi[r] < 0))
                 up |= form->equation[r] == 1 || !(most < 0), down |= form->equation[r] == 1 || !(least > 0);
         }
         *(to += B) = low, *(to += B) = high, *(to += B) = up, *(to += B) = down;
@@ -74,36 +74,50 @@ static void add_tilts(Box *x, const Report *report, Py_ssize_t at)
     }
 }
 
+/* A box by the ranges of its expressions, and what an earlier pass has found. */
+typedef struct {
+    int defined, impossible; /* whether every function is; a condition that cannot hold, or -1 */
+    double bound, value;
+} Look;
+
+static Look look_at(const Form *form, const Box *x, const Report *report, Py_ssize_t at, int passed)
+{
+    Look found = {1, -1, passed ? report->bound[at] : INFINITY, passed ? report->value[at] : INFINITY};
+    for (int r = 0; r < x->R; r++)
+        if (r < x->J) {
+            found.defined = found.defined && x->s[r] < INFINITY;
+            found.bound = smaller(found.bound, x->hi[r]);
+            found.value = passed ? found.value : smaller(found.value, x->c[r] - x->s[r]);
+        } else {
+            if (found.impossible < 0 && (x->lo[r] > 0 || (form->equation[r] == 1 && x->hi[r] < 0)))
+                found.impossible = r;
+            if (!passed && !(x->c[r] + x->s[r] <= 0))
+                found.value = -INFINITY;
+        }
+    return found;
+}
+
+/* Improves a bound by that of the Lagrangian, whose model is left in the box. */
+static void weigh(const Form *form, Box *x, const Report *report, Py_ssize_t at, int passed, int first, Look *found)
+{
+    choose_multipliers(x, form->equation, first);
+    combine(x);
+    double lagrangian = report->models ? INFINITY : quadratic_bound(x);
+    found->bound = lagrangian < found->bound ? lagrangian : found->bound;
+    if (!found->defined)
+        found->bound = passed ? report->bound[at] : INFINITY;
+}
+
 /* Examines a box by forms of first order of its gradients. Where a first pass came before, the report holds its results.
  *
  * With scores, those of the variables from the first pass, x holds the functions alone: returns whether the gradients of
  * the conditions are needed too, which is where the functions rise along a variable. */
-static int judge(const Form *form, Box *x, const double *centre, const double *radius, Report *report, Py_ssize_t at,
-                 double threshold, int passed, const double *scores)
+static int judge(const Form *form, Box *x, Report *report, Py_ssize_t at, double threshold, int passed, const double *scores)
 {
-    int n = x->n, J = x->J, R = x->R, verdict = OPEN, reason = 0, defined = 1, impossible = -1;
+    int n = x->n, J = x->J, R = x->R, verdict = OPEN, reason = 0;
     Py_ssize_t B = report->B;
-    double bound = passed ? report->bound[at] : INFINITY, value = passed ? report->value[at] : INFINITY;
-    for (int r = 0; r < R; r++) {
-        double steep = 0.0, middle = x->c[r], error = x->s[r];
-        for (int i = 0; i < n; i++)
-            steep += larger(fabs(x->slope_lo[r * n + i]), fabs(x->slope_hi[r * n + i]));
-        steep = steep * (1 + 64 * ULP) + TINY;
-        double ends = ULP * fabs(middle), spread = (error + steep) * (1 + ULP) + ends;
-        double high = middle + (spread * (1 + ULP) + ends), low = middle - (spread * (1 + ULP) + ends);
-        x->high[r] = high < x->hi[r] ? high : x->hi[r];
-        x->low[r] = low > x->lo[r] ? low : x->lo[r];
-        if (r < J) {
-            defined = defined && error < INFINITY;
-            bound = smaller(bound, x->high[r]);
-            value = passed ? value : smaller(value, middle - error);
-        } else {
-            if (impossible < 0 && (x->low[r] > 0 || (form->equation[r] == 1 && x->high[r] < 0)))
-                impossible = r;
-            if (!passed && !(middle + error <= 0))
-                value = -INFINITY;
-        }
-    }
+    Look found = look_at(form, x, report, at, passed);
+    int defined = found.defined, impossible = found.impossible;
     for (int i = 0; i < n && defined && scores; i++) {
         int rises = report->upper[i * B + at] > report->lower[i * B + at], falls = rises;
         for (int r = 0; r < J; r++)
@@ -113,22 +127,16 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
     }
     if (report->tilts)
         add_tilts(x, report, at);
-    choose_multipliers(x, form->equation, report->tilts ? 0 : report->shared, x->gs, n);
-    combine(x);
+    weigh(form, x, report, at, passed, report->tilts ? 0 : report->shared, &found);
     if (report->models)
         write_model(form, x, report, at, defined);
-    double lagrangian = report->models ? INFINITY : quadratic_bound(x);
-    bound = lagrangian < bound ? lagrangian : bound;
-    if (!defined)
-        bound = passed ? report->bound[at] : INFINITY;
-
     for (int i = 0; i < n; i++) {
         Py_ssize_t end = i * B + at;
         x->e_lo[i] = passed ? report->left_lower[end] : -1.0, x->e_hi[i] = passed ? report->left_upper[end] : 1.0;
         x->why_lo[i] = passed ? report->cut_lower[end] : -2, x->why_hi[i] = passed ? report->cut_upper[end] : -2;
         report->left_lower[end] = report->lower[end], report->left_upper[end] = report->upper[end];
         report->cut_lower[end] = report->cut_upper[end] = -2;
-        report->centre[end] = centre[i];
+        report->centre[end] = x->centre[i];
     }
     /* Monotonicity. */
     for (int i = report->shared; i < n && defined; i++)
@@ -139,7 +147,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
                 double low = x->grad_lo[r * n + i], high = x->grad_hi[r * n + i];
                 if (r < J)
                     applies = side > 0 ? low > 0 : high < 0;
-                else if (form->depends[r * n + i] && !(x->high[r] < 0) && r != impossible)
+                else if (form->depends[r * n + i] && !(x->hi[r] < 0) && r != impossible)
                     applies = form->equation[r] != 1 && (side > 0 ? high < 0 : low > 0);
             }
             if (!applies)
@@ -152,21 +160,15 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
             else
                 report->left_upper[end] = whole, report->cut_upper[end] = -1;
         }
-    /* Contraction. */
-    for (int r = 0; r < R && defined; r++) {
-        if (r < J ? !report->tilts : form->equation[r] == 1)
-            reach_expression(x, r, 1.0, r < J ? threshold : 0.0);
-        if (r >= J)
-            reach_expression(x, r, -1.0, 0.0);
-    }
-    if ((R > 1 || report->tilts) && defined)
-        reach_quadratic(x, 1.0, x->q_middle, x->qb, x->H, x->qw, x->q_rounding, threshold, 0);
+    if (defined)
+        contract(form, x, threshold, report->tilts != NULL);
     int emptied = -1;
     for (int i = 0; i < n && defined; i++) {
         Py_ssize_t end = i * B + at;
         double *lo = report->left_lower + end, *hi = report->left_upper + end;
-        double worth = WORTH * (*hi - *lo), margin = (fabs(centre[i]) + radius[i]) * (4 * ULP);
-        double new_lo = centre[i] + radius[i] * x->e_lo[i] - margin, new_hi = centre[i] + radius[i] * x->e_hi[i] + margin;
+        double worth = WORTH * (*hi - *lo), centre = x->centre[i], radius = x->radius[i];
+        double margin = (fabs(centre) + radius) * (4 * ULP);
+        double new_lo = centre + radius * x->e_lo[i] - margin, new_hi = centre + radius * x->e_hi[i] + margin;
         int collapsed = report->cut_lower[end] == -1 || report->cut_upper[end] == -1;
         if (x->why_lo[i] >= 0 && !collapsed && new_lo - *lo > worth)
             *lo = new_lo, report->cut_lower[end] = x->why_lo[i];
@@ -179,7 +181,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         verdict = EMPTIED, reason = emptied;
     if (impossible >= 0)
         verdict = INFEASIBLE, reason = impossible;
-    if (bound <= threshold && !report->tilts)
+    if (found.bound <= threshold && !report->tilts)
         verdict = BOUNDED, reason = 0;
     /* The variable to bisect next. */
     double most = -1.0;
@@ -206,7 +208,7 @@ static int judge(const Form *form, Box *x, const double *centre, const double *r
         if (x->left[i] >= (1 - TIE) * most)
             split = i;
     report->verdict[at] = verdict, report->reason[at] = reason, report->split[at] = split;
-    report->bound[at] = bound, report->value[at] = value;
+    report->bound[at] = found.bound, report->value[at] = found.value;
     return 0;
 }
 

@@ -11,20 +11,40 @@
 /* Enclosures of the expressions over one box, and an upper model middle + b e + 1/2 e'He + w |e| of a weighted sum. */
 typedef struct {
     int n, J, R;
-    double *c, *p, *q, *s, *lo, *hi, *a;  /* (R), a: (R, n): enclosures of the expressions */
-    double *gb, *gA, *gp, *gq, *gs;       /* (R, n), gA: (R, n, n): forms of their gradients, times r_i */
+    int is_second;                        /* whether the expressions have forms of second order, or their gradients forms */
+    double *centre, *radius;              /* (n) of the box */
+    double *c, *p, *q, *s, *lo, *hi;      /* (R) enclosures of the expressions */
+    double *gb, *gA, *gp, *gq, *gs;       /* (R, n), gA: (R, n, n): gradients at the centre and matrices; forms of gradients, times r_i */
     double *slope_lo, *slope_hi;  /* (R, n) interval gradients, times r_i */
     double *grad_lo, *grad_hi;    /* (R, n) interval gradients */
-    double *weights, *size, *left, *high, *low; /* (R), (R), (n), (R), (R) */
+    double *weights, *size, *left;              /* (R), (R), (n) */
     double *qb, *qw, *qlo, *qhi, *H;            /* (n), H: (n, n): the Lagrangian's model */
     double *sign, *fb, *fw, *fH, *diagonal, *t, *gradient; /* (n), fH: (n, n) */
     double *e_lo, *e_hi;
     int *why_lo, *why_hi;
     double q_middle, q_rounding;
-    int squares;          /* whether functions have quotients: quotients.h */
-    double *sH, *sw;      /* (J, n, n), (J, n): matrices and remainders of their models, whose linear part is in gb */
+    int squares;          /* whether functions have quotients, whose models are in gb, gA and gs: quotients.h */
     double *aE, *HN, *HD, *bN, *bD, *wN, *wD; /* (n), HN and HD: (n, n) */
 } Box;
+
+/* Lays a box with E rows over memory. */
+static Box lay_box(int variables, size_t E, Room *room)
+{
+    Box x = {.n = variables};
+    size_t n = (size_t)variables;
+    double **rows[] = {&x.c, &x.p, &x.q, &x.s, &x.lo, &x.hi, &x.weights, &x.size};
+    double **vectors_of_rows[] = {&x.gb, &x.gp, &x.gq, &x.gs, &x.slope_lo, &x.slope_hi, &x.grad_lo, &x.grad_hi};
+    double **vectors[] = {&x.centre, &x.radius, &x.left, &x.qb, &x.qw, &x.qlo, &x.qhi, &x.sign, &x.fb, &x.fw, &x.diagonal,
+                          &x.t, &x.gradient, &x.e_lo, &x.e_hi, &x.aE, &x.bN, &x.bD, &x.wN, &x.wD};
+    double **matrices[] = {&x.H, &x.fH, &x.HN, &x.HD};
+    CARVE(rows, E);
+    CARVE(vectors_of_rows, E * n);
+    CARVE(vectors, n);
+    CARVE(matrices, n * n);
+    x.gA = carve(room, E * n * n);
+    x.why_lo = (int *)carve(room, n), x.why_hi = (int *)carve(room, n);
+    return x;
+}
 
 /* Size of all terms of a form of second order. */
 static double size_of_row(const Box *x, int r)
@@ -38,11 +58,12 @@ static double size_of_row(const Box *x, int r)
     return size;
 }
 
-/* The gradient is made small in the variables from number first on; rounding errors, m for each expression, are those
- * of these gradients, or of the values: quadratic_models.py's multipliers. */
-static void choose_multipliers(Box *x, const int *equation, int first, const double *rounding, int m)
+/* The gradient is made small in the variables from number first on; rounding errors are those of the gradients' forms, or
+ * of the values: quadratic_models.py's multipliers. */
+static void choose_multipliers(Box *x, const int *equation, int first)
 {
-    int n = x->n, J = x->J, R = x->R;
+    int n = x->n, J = x->J, R = x->R, m = x->is_second ? 1 : n;
+    const double *rounding = x->is_second ? x->s : x->gs;
     for (int r = 0; r < R; r++) {
         x->weights[r] = r == 0;
         x->size[r] = 0.0;
@@ -60,7 +81,7 @@ static void choose_multipliers(Box *x, const int *equation, int first, const dou
     for (int round = 0; round < (R > 1 ? MULTIPLIER_ROUNDS : 0); round++)
         for (int r = 1; r < R; r++) {
             /* A condition that follows from others has no weight: 2 in the place of whether it is an equation. */
-            if (!(x->size[r] > 0 && x->size[r] < INFINITY && (r < J || x->high[r] >= 0)) || equation[r] == 2)
+            if (!(x->size[r] > 0 && x->size[r] < INFINITY && (r < J || x->hi[r] >= 0)) || equation[r] == 2)
                 continue;
             double product = 0.0, weight = x->weights[r];
             for (int i = first; i < n; i++)
@@ -88,10 +109,12 @@ static void choose_multipliers(Box *x, const int *equation, int first, const dou
             x->weights[r] = r == 0;
 }
 
-/* One variable's part of a model, from the parts of a gradient's form: quadratic_models.py's integral. */
-static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s)
+/* One variable's part of a model, from the parts of a gradient's form and the size of what cancelled in them:
+ * quadratic_models.py's integral. */
+static double finish_model(double *b, double *w, double *low, double *high, double across, double p, double q, double s,
+                           double size)
 {
-    double margin = 64 * ULP * (fabs(*b) + across + q - p + s) + TINY;
+    double margin = 64 * ULP * (fabs(*b) + across + q - p + s + size) + TINY;
     double least = *b - across + p - s, most = *b + across + q + s;
     *low = (*low > least || isnan(least) ? *low : least) - margin;
     *high = (*high < most || isnan(most) ? *high : most) + margin;
@@ -100,51 +123,46 @@ static double finish_model(double *b, double *w, double *low, double *high, doub
     return lost;
 }
 
+/* Weighted sum of the rows: an upper model, whose remainder is constant in forms of second order. */
 static void combine(Box *x)
 {
     int n = x->n, R = x->R;
     double largest = 0.0, lost = 0.0, middle = 0.0, error = 0.0;
     for (int r = 0; r < R; r++)
         if (x->weights[r] != 0) {
-            double size = fabs(x->weights[r]);
-            middle += x->c[r] * x->weights[r], error += x->s[r] * size;
-            largest += fabs(x->c[r]) * size;
+            double weight = x->weights[r], size = fabs(weight);
+            middle += x->c[r] * weight, error += x->s[r] * size;
+            error += x->is_second ? (weight > 0 ? x->q[r] : x->p[r]) * weight : 0.0;
+            largest += (x->is_second ? size_of_row(x, r) : fabs(x->c[r])) * size;
         }
     x->q_middle = middle + error;
     for (int i = 0; i < n; i++) {
-        double b = 0.0, s = 0.0, p = 0.0, q = 0.0, low = 0.0, high = 0.0, across = 0.0;
-        double *H = x->H + i * n;
+        double b = 0.0, s = 0.0, p = 0.0, q = 0.0, across = 0.0;
+        double low = x->is_second ? -INFINITY : 0.0, high = -low, *H = x->H + i * n;
         memset(H, 0, (size_t)n * sizeof(double));
         for (int r = 0; r < R; r++) {
             double weight = x->weights[r];
             int at = r * n + i, up = weight > 0;
             if (weight == 0)
                 continue;
-            b += x->gb[at] * weight, s += x->gs[at] * fabs(weight);
-            p += (up ? x->gp[at] : x->gq[at]) * weight, q += (up ? x->gq[at] : x->gp[at]) * weight;
-            low += (up ? x->slope_lo[at] : x->slope_hi[at]) * weight;
-            high += (up ? x->slope_hi[at] : x->slope_lo[at]) * weight;
+            b += x->gb[at] * weight;
             for (int j = 0; j < n; j++)
                 H[j] += x->gA[at * n + j] * weight;
+            if (x->is_second)
+                continue;
+            s += x->gs[at] * fabs(weight), p += (up ? x->gp[at] : x->gq[at]) * weight, q += (up ? x->gq[at] : x->gp[at]) * weight;
+            low += (up ? x->slope_lo[at] : x->slope_hi[at]) * weight;
+            high += (up ? x->slope_hi[at] : x->slope_lo[at]) * weight;
         }
         for (int j = 0; j < n; j++)
             across += fabs(H[j]);
         x->qb[i] = b, x->qlo[i] = low, x->qhi[i] = high;
-        lost += finish_model(x->qb + i, x->qw + i, x->qlo + i, x->qhi + i, across, p, q, s);
+        lost += finish_model(x->qb + i, x->qw + i, x->qlo + i, x->qhi + i, across, p, q, s, x->is_second ? largest : 0.0);
         if (x->squares) { /* the linear part is that of an upper model: the slopes are in the other enclosure alone */
             double margin = 64 * ULP * (fabs(b) + across + q - p + s) + TINY;
             x->qlo[i] = low - margin, x->qhi[i] = high + margin;
         }
     }
-    for (int r = 0; x->squares && r < x->J; r++)
-        for (int i = 0; i < n && x->weights[r] != 0; i++) {
-            double weight = x->weights[r], w = x->sw[r * n + i] * weight;
-            x->qw[i] += w, lost += w;
-            for (int j = 0; j < n; j++) {
-                double h = x->sH[(r * n + i) * n + j] * weight;
-                x->H[i * n + j] += h, lost += fabs(h);
-            }
-        }
     x->q_rounding = 64 * ULP * (largest + lost) + TINY;
     for (int i = 0; i < n; i++)
         for (int j = 0; j < i; j++)
@@ -162,11 +180,9 @@ static double largest_of(double linear, double quadratic)
 static double quadratic_bound(Box *x)
 {
     int n = x->n;
-    double mean = x->q_middle, fixed = x->q_middle, separate = 0.0, shifts = 0.0, plane = 0.0;
-    for (int i = 0; i < n; i++) {
-        mean += larger(fabs(x->qlo[i]), fabs(x->qhi[i]));
+    double fixed = x->q_middle, separate = 0.0, shifts = 0.0, plane = 0.0;
+    for (int i = 0; i < n; i++)
         x->sign[i] = x->qlo[i] >= 0 ? 1.0 : x->qhi[i] <= 0 ? -1.0 : 0.0;
-    }
     for (int i = 0; i < n; i++) {
         double Hs = 0.0;
         for (int j = 0; j < n; j++)
@@ -206,10 +222,8 @@ static double quadratic_bound(Box *x)
             Ct += x->fH[i * n + j] * x->t[j];
         plane += fabs(x->fb[i] + Ct) - 0.5 * (x->t[i] * Ct);
     }
-    double best = mean, other = fixed + separate, third = fixed + plane + shifts;
-    best = other < best || isnan(best) ? other : best;
-    best = third < best || isnan(best) ? third : best;
-    return best + x->q_rounding;
+    double one = fixed + separate, other = fixed + plane + shifts, best = one < INFINITY ? one : INFINITY;
+    return (other < best ? other : best) + x->q_rounding;
 }
 
 #endif

@@ -121,9 +121,8 @@ static void take_ratio(Box *x, Ratio *to)
     to->is_defined = to->is_defined && (rho == 0 || (size > 1 / LARGEST && size < LARGEST));
 }
 
-/* Adds the model of a quotient to row j, whose linear part is in gb: its matrix to one of (n, n), and its remainder to
- * one of (n). */
-static double add_square(Box *x, const Ratio *ratio, int j, int sign, double *matrix, double *remainder)
+/* Adds the model of a quotient to row j. */
+static void add_square(Box *x, const Ratio *ratio, int j, int sign)
 {
     const RowModel *N = &ratio->N, *D = &ratio->D;
     int n = x->n, known = ratio->rest < ratio->reach, is_defined = ratio->is_defined;
@@ -137,11 +136,11 @@ static double add_square(Box *x, const Ratio *ratio, int j, int sign, double *ma
         for (int l = 0; l < n; l++) {
             double square = x->aE[i] * x->aE[l] * kept;
             double H = 2 * rho * N->H[i * n + l] - rho * rho * D->H[i * n + l], entry = sign * (H + square);
-            matrix[i * n + l] += entry;
+            x->gA[(j * n + i) * n + l] += entry;
             across += fabs(H), added += fabs(square), whole += fabs(entry);
         }
         w += SUM * (fabs(b) + across + w);
-        remainder[i] += is_defined ? w : INFINITY, x->a[j * n + i] += sign * b;
+        x->gs[j * n + i] += is_defined ? w : INFINITY;
         x->gb[j * n + i] += sign * b;
         whole += 2 * w;
     }
@@ -157,13 +156,14 @@ static double add_square(Box *x, const Ratio *ratio, int j, int sign, double *ma
     most = (other < most || isnan(most) ? other : most) * (1 + SUM) + lost;
     x->c[j] += 0.5 * (high + low), x->s[j] += is_defined && !isnan(half) ? half : INFINITY;
     x->lo[j] += sign > 0 ? fewest : -most, x->hi[j] += sign > 0 ? most : -fewest;
-    return 0.5 * whole * (1 + SUM);
+    x->q[j] += 0.5 * whole * (1 + SUM);
 }
 
 /* Adds the ends of a quotient's gradient to row j; those that are not times a radius are for points that matter. */
-static void add_slopes(Box *x, const Ratio *ratio, int j, int sign, const double *radius, const double *least)
+static void add_slopes(Box *x, const Ratio *ratio, int j, int sign, const double *least)
 {
     int n = x->n;
+    const double *radius = x->radius;
     double p_lo = ratio->lo, p_hi = ratio->hi;
     if (least)
         where_it_matters(&p_lo, &p_hi, &ratio->D, sign, *least);
@@ -182,26 +182,16 @@ static void add_slopes(Box *x, const Ratio *ratio, int j, int sign, const double
     }
 }
 
-static Ratio empty_ratio(const Box *x)
-{
-    return (Ratio){.N = {.b = x->bN, .w = x->wN, .H = x->HN}, .D = {.b = x->bD, .w = x->wD, .H = x->HD}};
-}
-
 /* Adds the quotients to the rows of their functions. */
-static void add_quotients(const Form *form, Box *x, const double *radius, const double *least)
+static void add_quotients(const Form *form, Box *x, const double *least)
 {
-    int n = x->n;
-    if (!form->quotients)
-        return;
-    memset(x->sH, 0, sizeof(double) * (size_t)x->J * n * n);
-    memset(x->sw, 0, sizeof(double) * (size_t)x->J * n);
+    Ratio ratio = {.N = {.b = x->bN, .w = x->wN, .H = x->HN}, .D = {.b = x->bD, .w = x->wD, .H = x->HD}};
     for (int k = 0; k < form->quotients; k++) {
         int j = form->whose[2 * k], sign = form->whose[2 * k + 1], row = form->expressions + 2 * k;
-        Ratio ratio = empty_ratio(x);
         read_row(x, row, &ratio.N), read_row(x, row + 1, &ratio.D);
         take_ratio(x, &ratio);
-        x->q[j] += add_square(x, &ratio, j, sign, x->sH + (size_t)j * n * n, x->sw + j * n);
-        add_slopes(x, &ratio, j, sign, radius, form->quotients == 1 ? least : NULL);
+        add_square(x, &ratio, j, sign);
+        add_slopes(x, &ratio, j, sign, form->quotients == 1 ? least : NULL);
     }
 }
 

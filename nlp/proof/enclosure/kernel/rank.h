@@ -2,7 +2,7 @@
 #ifndef RANK_H
 #define RANK_H
 
-#include "blocks.h"
+#include "runs.h"
 
 /* Part of the sum of the sizes of all terms by which a computed sum of products may be off: fewer than 400 roundings. */
 #define PRODUCTS 1e-13
@@ -34,6 +34,17 @@ typedef struct {
     double *A, *inverse, *work, *B, *v, *w, *t;
 } RankParts;
 
+/* Applies the reflection in column k of a matrix (rows, columns), from row k on, to a vector with a step between entries. */
+static void apply_reflection(const double *M, int rows, int columns, int k, double factor, double *vector, int step)
+{
+    double sum = 0;
+    for (int i = k; i < rows; i++)
+        sum += M[i * columns + k] * vector[i * step];
+    sum *= factor;
+    for (int i = k; i < rows; i++)
+        vector[i * step] -= sum * M[i * columns + k];
+}
+
 /* Turns column k of a matrix (rows, columns), from row k on, to its first entry by a reflection, and the later columns
  * with it. The reflection's vector stays in the column, its factor is returned; 0 for a column of zeros. */
 static double reflect(double *M, int rows, int columns, int k, double *diagonal)
@@ -45,25 +56,19 @@ static double reflect(double *M, int rows, int columns, int k, double *diagonal)
     *diagonal = 0;
     if (!(size > 0) || !isfinite(size))
         return 0;
-    double head = M[k * columns + k], turned = head > 0 ? -size : size, factor = 1 / (size * (size + fabs(head)));
-    *diagonal = turned;
-    M[k * columns + k] = head - turned;
-    for (int j = k + 1; j < columns; j++) {
-        double sum = 0;
-        for (int i = k; i < rows; i++)
-            sum += M[i * columns + k] * M[i * columns + j];
-        sum *= factor;
-        for (int i = k; i < rows; i++)
-            M[i * columns + j] -= sum * M[i * columns + k];
-    }
+    double head = M[k * columns + k], factor = 1 / (size * (size + fabs(head)));
+    *diagonal = head > 0 ? -size : size;
+    M[k * columns + k] = head - *diagonal;
+    for (int j = k + 1; j < columns; j++)
+        apply_reflection(M, rows, columns, k, factor, M + j, columns);
     return factor;
 }
 
 /* Writes an orthonormal basis (nullity, columns) of what the rows of a matrix miss, from reflections of its columns'
  * space with the longest row first. */
-static void null_space(const double *A, int rows, int columns, int nullity, double *basis, double *work)
+static void null_space(const double *A, int rows, int columns, int nullity, double *basis, double *M)
 {
-    double *M = work, diagonal, factors[64];
+    double diagonal, factors[64];
     int rank = columns - nullity;
     for (int i = 0; i < rows; i++)
         for (int j = 0; j < columns; j++)
@@ -88,14 +93,8 @@ static void null_space(const double *A, int rows, int columns, int nullity, doub
         double *row = basis + d * columns;
         for (int j = 0; j < columns; j++)
             row[j] = j == rank + d;
-        for (int k = rank - 1; k >= 0; k--) {
-            double sum = 0;
-            for (int j = k; j < columns; j++)
-                sum += M[j * rows + k] * row[j];
-            sum *= factors[k];
-            for (int j = k; j < columns; j++)
-                row[j] -= sum * M[j * rows + k];
-        }
+        for (int k = rank - 1; k >= 0; k--)
+            apply_reflection(M, columns, rows, k, factors[k], row, 1);
     }
 }
 
@@ -103,7 +102,7 @@ static void null_space(const double *A, int rows, int columns, int nullity, doub
  * sign of the determinant of a square A: each reflection changes it. */
 static int left_inverse(const double *A, int rows, int columns, double *C, double *work)
 {
-    double *M = work, *diagonal = work + rows * columns, *factors = diagonal + columns;
+    double *M = work, *diagonal = work + rows * columns, *factors = diagonal + columns, *column = factors + columns;
     int sign = 1;
     memcpy(M, A, (size_t)(rows * columns) * sizeof(double));
     for (int k = 0; k < columns; k++) {
@@ -114,17 +113,10 @@ static int left_inverse(const double *A, int rows, int columns, double *C, doubl
     }
     for (int r = 0; r < rows; r++) {
         /* Column r of the transposed reflections, then back substitution. */
-        double *column = factors + columns;
         for (int i = 0; i < rows; i++)
             column[i] = i == r;
-        for (int k = 0; k < columns; k++) {
-            double sum = 0;
-            for (int i = k; i < rows; i++)
-                sum += M[i * columns + k] * column[i];
-            sum *= factors[k];
-            for (int i = k; i < rows; i++)
-                column[i] -= sum * M[i * columns + k];
-        }
+        for (int k = 0; k < columns; k++)
+            apply_reflection(M, rows, columns, k, factors[k], column, 1);
         for (int k = columns - 1; k >= 0; k--) {
             double sum = column[k];
             for (int j = k + 1; j < columns; j++)
@@ -188,24 +180,17 @@ static int is_contracting(const double *B, int c, double *v, double *w)
     return 0;
 }
 
-static size_t memory_of_rank(const Matrix *m, int n)
-{
-    size_t rows = (size_t)(m->rows + m->nullity), c = (size_t)m->columns;
-    return LANES * (rows * c + (1 + (size_t)n) * c * c + 2 * c + 3 * (size_t)m->entries) + 3 * rows * c + c * c + 7 * (rows + c);
-}
-
-static RankParts carve_rank(const Matrix *m, int n, double *memory)
+static RankParts lay_parts(const Matrix *m, int n, Room *room)
 {
     size_t rows = (size_t)(m->rows + m->nullity), c = (size_t)m->columns, E = (size_t)m->entries;
-    double *rest = memory;
     RankParts x;
-    x.C = (Lane *)carve(&rest, rows * c * LANES), x.bound = (Lane *)carve(&rest, c * c * LANES);
-    x.linear = (Lane *)carve(&rest, (size_t)n * c * c * LANES), x.row = (Lane *)carve(&rest, c * LANES);
-    x.turn = (Lane *)carve(&rest, c * LANES);
-    x.middle = (Lane *)carve(&rest, E * LANES), x.rest = (Lane *)carve(&rest, E * LANES);
-    x.size = (Lane *)carve(&rest, E * LANES);
-    x.A = carve(&rest, rows * c), x.inverse = carve(&rest, rows * c), x.work = carve(&rest, rows * c + 2 * (rows + c));
-    x.B = carve(&rest, c * c), x.v = carve(&rest, rows + c), x.w = carve(&rest, rows + c), x.t = carve(&rest, c);
+    x.C = (Lane *)carve(room, rows * c * LANES), x.bound = (Lane *)carve(room, c * c * LANES);
+    x.linear = (Lane *)carve(room, (size_t)n * c * c * LANES), x.row = (Lane *)carve(room, c * LANES);
+    x.turn = (Lane *)carve(room, c * LANES);
+    x.middle = (Lane *)carve(room, E * LANES), x.rest = (Lane *)carve(room, E * LANES);
+    x.size = (Lane *)carve(room, E * LANES);
+    x.A = carve(room, rows * c), x.inverse = carve(room, rows * c), x.work = carve(room, rows * c + 2 * (rows + c));
+    x.B = carve(room, c * c), x.v = carve(room, rows + c), x.w = carve(room, rows + c), x.t = carve(room, c);
     return x;
 }
 
@@ -214,18 +199,17 @@ static RankParts carve_rank(const Matrix *m, int n, double *memory)
 static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py_ssize_t start, RankParts x)
 {
     for (int e = 0; e < m->entries; e++) {
-        Form2 *form = form2_of(out, e);
-        const Value *v = &form->v;
-        const Lane *terms = terms_of_form2(form);
+        const Value *v = value_of(out, e);
+        const Lane *terms = terms_of(v);
         double scale = m->scale[e];
         double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
         EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        EACH_OF(i, 0, form->terms.linear)
+        EACH_OF(i, 0, v->terms.linear)
         {
             EACH size[l] += fabs(terms[i][l]);
-            EACH_OF(j, i, form->terms.pairs[i])
+            EACH_OF(j, i, v->terms.pairs[i])
             {
-                const double *term = terms[n + row_of(n, i) + j];
+                const double *term = terms[row_of(n, i) + j];
                 if (i == j)
                     EACH middle[l] += 0.5 * term[l], size[l] += 0.5 * fabs(term[l]);
                 else
@@ -343,10 +327,10 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
                 double part = a >= n && b == a - n ? 0.5 : 1.0;
                 memset(x.row, 0, (size_t)c * sizeof(Lane));
                 for (int e = 0; e < m->entries; e++) {
-                    Form2 *v = form2_of(out, e);
+                    const Value *v = value_of(out, e);
                     if (!((a < n ? v->terms.linear >> a : v->terms.pairs[a - n] >> b) & 1))
                         continue;
-                    const double *term = terms_of_form2(v)[t], *by = C[m->at[2 * e]];
+                    const double *term = terms_of(v)[t], *by = C[m->at[2 * e]];
                     double *to = x.row[m->at[2 * e + 1]], scale = part * m->scale[e];
                     EACH to[l] += by[l] * (term[l] * scale);
                 }
@@ -386,15 +370,14 @@ static int judge_lane(const Matrix *m, int n, int l, RankParts x, double *shares
     return good;
 }
 
-static size_t memory_for_ranks(const Tape *tape, const Matrix *m, int n) { return memory_of_run(tape, n, 2) + memory_of_rank(m, n); }
-
-static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, double *memory)
+/* Judges boxes; without memory, what they need of it is counted only. */
+static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, Room *room)
 {
-    Run run = prepare(tape, n, 2, memory);
-    RankParts parts = carve_rank(m, n, memory + memory_of_run(tape, n, 2));
+    Run run = prepare(tape, n, 2, room);
+    RankParts parts = lay_parts(m, n, room);
     /* V makes what does not become small with the box larger. */
     double near = found->change ? 0 : NEAR_SINGULAR;
-    for (Py_ssize_t start = 0; start < found->B; start += LANES) {
+    for (Py_ssize_t start = 0; room->at && start < found->B; start += LANES) {
         run_block(&run, found->lower, found->upper, found->B, NULL, start, found->B);
         middles_of(m, n, run.out, found, start, parts);
         int ready[LANES] = {0};

@@ -1,11 +1,11 @@
-/* Functions of one variable: f(c) + f'(c) Y + [least, most] Y^2, and their ranges; univariate.py. */
+/* Functions of one variable: f(c) + f'(c) Y + [least, most] Y^2, half the second derivative at c, and ranges; univariate.py. */
 #ifndef UNIVARIATE_H
 #define UNIVARIATE_H
 
 #include "values.h"
 
 typedef struct {
-    double value, slope, least, most, error, slope_error, lo, hi;
+    double value, slope, curve, least, most, error, slope_error, lo, hi;
 } Rule;
 
 #define LIBRARY 8.0
@@ -19,17 +19,18 @@ static Rule wave(double c, double lo, double hi, int shifted)
     spread = spread + 2 * OFF * (1 + spread);
     double least = larger(centred - spread, -1.0), most = smaller(centred + spread, 1.0);
     double sine = sin(c), cosine = cos(c);
-    Rule r = {shifted ? cosine : sine, shifted ? -sine : cosine, -0.5 * most, -0.5 * least, 4 * OFF, 4 * OFF, least, most};
+    double value = shifted ? cosine : sine;
+    Rule r = {value, shifted ? -sine : cosine, -0.5 * value, -0.5 * most, -0.5 * least, 4 * OFF, 4 * OFF, least, most};
     return r;
 }
 
 static Rule rule_of(int op, double c, double lo, double hi)
 {
-    Rule r = {NAN, NAN, NAN, NAN, NAN, 0.0, NAN, NAN};
+    Rule r = {NAN, NAN, 0.0, NAN, NAN, NAN, 0.0, NAN, NAN};
     lo = smaller(lo, c), hi = larger(hi, c);
     if (op == SQRT && lo >= 0) { /* below 0 it stays NaN: smaller and larger would lose a NaN of least alone */
         double root = sqrt(c), low = sqrt(lo), high = sqrt(hi), slope = 0.5 / root;
-        r.value = root, r.slope = slope, r.error = OFF * root;
+        r.value = root, r.slope = slope, r.curve = -0.25 * slope / c, r.error = OFF * root;
         r.least = -slope / ((low + root) * (low + root)), r.most = -slope / ((high + root) * (high + root));
         r.lo = low - fabs(low) * ULP, r.hi = high + fabs(high) * ULP;
     } else if (op == SIN || op == COS) {
@@ -37,10 +38,10 @@ static Rule rule_of(int op, double c, double lo, double hi)
     } else if (op == EXP) {
         r.value = r.slope = exp(c), r.error = r.slope_error = 2 * OFF * r.value;
         r.lo = larger(exp(lo) * (1 - OFF) - TINY, 0.0), r.hi = exp(hi) * (1 + OFF) + TINY;
-        r.least = 0.5 * r.lo, r.most = 0.5 * r.hi;
+        r.curve = 0.5 * r.value, r.least = 0.5 * r.lo, r.most = 0.5 * r.hi;
     } else if (op == LOG && lo > 0) {
         double low = log(lo), high = log(hi), grown = 1 + OFF;
-        r.value = log(c), r.slope = 1 / c, r.error = 2 * OFF * fabs(r.value);
+        r.value = log(c), r.slope = 1 / c, r.curve = -0.5 * r.slope * r.slope, r.error = 2 * OFF * fabs(r.value);
         r.least = -0.5 * grown / (lo * lo), r.most = -0.5 / (grown * hi * hi);
         r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);
     } else if (op == RAMP) {
@@ -54,7 +55,7 @@ static Rule rule_of(int op, double c, double lo, double hi)
         r.value = 0.5 * (r.lo + r.hi), r.error = 0.5 * (r.hi - r.lo), r.slope = r.least = r.most = 0.0;
     } else if (op == ATAN) {
         double low = atan(lo), high = atan(hi);
-        r.value = atan(c), r.slope = 1 / (1 + c * c), r.error = r.slope_error = 2 * OFF * (fabs(r.value) + 1);
+        r.value = atan(c), r.slope = 1 / (1 + c * c), r.curve = -c * r.slope * r.slope, r.error = r.slope_error = 2 * OFF * (fabs(r.value) + 1);
         r.most = lo >= 0 ? 0.0 : smaller(0.325, -lo * (1 + ULP));
         r.least = hi <= 0 ? 0.0 : larger(-0.325, -hi * (1 + ULP));
         r.lo = low - (fabs(low) * OFF + TINY), r.hi = high + (fabs(high) * OFF + TINY);

@@ -25,11 +25,6 @@ enum { CONSTANT, INPUT, OUTPUT, ADD, SUB, MUL, DIV, SHIFT, SCALE, SQUARE, SQRT, 
 
 typedef double Lane[LANES];
 
-/* An enclosure over LANES boxes: form, interval, and the sum of |a|. The n coefficients a follow it in memory. */
-typedef struct {
-    Lane c, p, q, s, lo, hi, rad;
-} Value;
-
 typedef struct {
     const int *code; /* op, to, a, b, first, last */
     const double *k;
@@ -50,14 +45,23 @@ typedef struct {
     Tape objective; /* the functions and their derivatives; without instructions where all are evaluated at once */
 } Form;
 
+/* Memory that is laid out in parts, all 0 at first; without an address they are counted only. */
 typedef struct {
-    double *memory;
-    size_t stride; /* doubles of a value with its coefficients */
-} Store;
+    double *at;
+    size_t used;
+} Room;
+
+static double *carve(Room *room, size_t count)
+{
+    double *part = room->at ? room->at + room->used : NULL;
+    room->used += count;
+    return part;
+}
+
+#define COUNT(array) (sizeof(array) / sizeof *(array))
+#define CARVE(parts, count) for (size_t part = 0; part < COUNT(parts); part++) *parts[part] = carve(room, count)
 
 static inline int rows_of(const Form *form) { return form->expressions + 2 * form->quotients; }
-static inline Value *value_of(Store s, int i) { return (Value *)(s.memory + (size_t)i * s.stride); }
-static inline Lane *terms_of(Value *v) { return (Lane *)(v + 1); }
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
 

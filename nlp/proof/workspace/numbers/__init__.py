@@ -1,7 +1,7 @@
 """Proven smallest and largest values of numbers over a workspace.
 
-``extremes`` (by the certificate's search) bounds expressions, and ``loop_limits`` limits in home's assembly.
-``bound_search`` is branch and bound of a number with bounds of its own over boxes: ``left_inverse`` and
-``singular_values``, ``clearance``, ``pose_error``. ``searched`` has the claims about these, and ``strokes`` those that
-follow from lengths of legs.
+The modules import each other in this order: ``bound_search`` (the search of numbers over boxes), ``extremes`` (what is
+found of a claim, and the certificate's search); ``expressions`` (of all machines), ``jacobian_numbers`` (singular
+values and the worst error of the pose to first order), ``clearance`` (of legs); ``searched`` (claims about the last
+two), ``strokes`` (claims that follow from lengths of legs), ``pose_error`` (the whole errors of the pose).
 """

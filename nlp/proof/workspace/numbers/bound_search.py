@@ -1,39 +1,47 @@
-"""Smallest value of a function over a box of poses, from bounds of it over boxes: best-first bisection.
+"""Smallest values of numbers of a robot over a workspace, from bounds of them over boxes: bisection.
 
-The function is given by an :class:`Oracle`: lower bounds over boxes, and values at points. Its value at a point is an
-upper bound of the smallest value, improved by random steps from the best point known; what is proved rests on the
-bounds alone.
+A :class:`Number` has lower bounds over boxes, and values at points. A value at a point is an upper bound of the
+smallest one; what is proved rests on the bounds alone. One number is searched with the boxes of the smallest bounds
+first. Several with limits share one cover by boxes: following closed loops there costs more than bounds of numbers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
-from .....models.arrays import first_largest
 from ....interruption import one_search
-from ...boxes.rows import Boxes, Columns, bisected, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Rule, Search, Verdicts
-from ...enclosure.forms import Encloser, Forms
-from ..ranks.covering import APART, Followed, LoopRule
-from ..ranks.loop_boxes import Examiner, LoopBoxes, are_between
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
+from ...enclosure.forms import Forms
+from ..ranks.loop_boxes import (
+    APART,
+    Examined,
+    Examiner,
+    Followed,
+    LoopBoxes,
+    LoopRule,
+    are_between,
+    coordinates_to_split,
+)
 from ..ranks.rank_rule import Tested
-from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import ToleranceModel
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...boxes.tree import TreeRecord
 
-#: Number of boxes examined at once.
-_BLOCK = 512
+#: Number of boxes examined at once, and number of those with the smallest bounds at which values are computed.
+_BLOCK, _TRIED = 256, 8
+#: Widths of a box, in parts of the whole box, below which it is not bisected.
+_LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Value below which gaps are parts of this one.
 _NEAR_ZERO = 1e-6
 #: Random points from which the search of a small value begins, steps from the best of them, and points in each step.
@@ -41,110 +49,90 @@ _POINTS, _STEPS, _AROUND = 256, 24, 32
 #: Factor of the size of steps from one to the next.
 _SHRINK = 0.7
 _SEED = 0
-#: Of a search that follows loops: number of boxes examined at once, number of those with the smallest bounds at which
-#: values are computed, and widths of a box, in parts of the whole box, below which it is not bisected.
-_FOLLOWED_BLOCK, _TRIED = 256, 8
-_LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Part of itself by which a value may be off by rounding: the first of several that are the same is taken.
 _TIE = 1e-11
 
 
 class Bounds(NamedTuple):
-    """Lower bounds (B,) over boxes, -inf without one, and the share (B, 6) of each coordinate in their slack."""
+    """Lower bounds (B, K) over boxes, -inf without one, and the shares (B, K, f) of coordinates in their slack."""
 
     lower: FloatArray
     shares: FloatArray
 
 
-class Oracle(Protocol):
-    """Bounds and values of a function of the pose."""
+class Number(ABC):
+    """K numbers of a robot whose smallest values are looked for: a test of boxes, and values at points.
 
-    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
-        """Return lower bounds over boxes (B, 6)."""
-
-    def values(self, points: FloatArray) -> FloatArray:
-        """Return the values (K,) at points (K, 6)."""
-
-
-class Bounded(Protocol):
-    """A number of which forms of expressions give bounds.
+    Args:
+        problem: the design, or all machines that are meant.
+        entries: (E, 1) expressions of its coordinates whose forms give bounds.
+        count: K.
 
     Attributes:
-        entries: (E, 1) the expressions, in the coordinates of a robot or of all machines.
+        problem, entries, count: as given.
+        levels: (K,) bounds from which on a number has no part in where boxes are bisected.
     """
 
-    entries: SX
+    def __init__(self, problem: Problem, entries: SX, count: int = 1) -> None:
+        self.problem, self.entries, self.count = problem, entries, count
+        self.levels = np.full(count, np.inf)
 
-    def over(self, forms: Forms, count: int, errors: int) -> Bounds:
-        """Return lower bounds over B boxes, and the share (B, f) of each independent coordinate in their slack.
+    @abstractmethod
+    def over(self, forms: Forms, count: int) -> Bounds:
+        """Return lower bounds over B boxes.
 
         Args:
             forms: of the entries.
-            count: number f of the first terms, which are the independent coordinates.
-            errors: number of the last terms, which are errors of joint centres; those between are products of two
-                coordinates.
+            count: number f of the first terms, which are the independent coordinates. The last terms are the errors of
+                joint centres; those between are products of two coordinates.
         """
 
-
-class Number(Bounded, Protocol):
-    """A number with bounds and values.
-
-    Attributes:
-        family: all machines in whose coordinates the entries are; None for the design alone.
-    """
-
-    family: ToleranceModel | None
-
+    @abstractmethod
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the values (K,) at points (K, n) of the design."""
+        """Return the values (P, K) at closed points (P, n)."""
 
+    @cached_property
+    def examiner(self) -> Examiner:
+        """The examination of boxes by bounds of the numbers, which are the ``smallest`` of its results.
 
-class OverPoses:
-    """Bounds and values of a number of a robot without dependent coordinates.
+        Raises:
+            UncoveredError: an expression holds an operation without a rule.
+        """
+        return Examiner(self.problem, self)
 
-    Args:
-        number: the number.
-        problem: the robot.
+    def examine(self, forms: Forms, f: int) -> Tested:
+        """Return the lower bounds (B, K) of boxes; none is regular."""
+        lower, shares = self.over(forms, f)
+        shares = np.nan_to_num(shares, posinf=0.0)
+        shares /= np.maximum(shares.sum(axis=2, keepdims=True), np.finfo(float).tiny)
+        none = self.unknown(len(lower), f)
+        return none._replace(shares=(shares * ~(lower >= self.levels)[:, :, None]).sum(axis=1), smallest=lower)
 
-    Raises:
-        UncoveredError: an expression holds an operation without a rule.
-    """
+    def unknown(self, count: int, f: int) -> Tested:
+        """Return the results for boxes of which nothing is known."""
+        nothing = np.zeros(count, dtype=np.int32)
+        return Tested(nothing.astype(bool), np.zeros((count, f)), np.full((count, self.count), -np.inf), nothing)
 
-    def __init__(self, number: Number, problem: Problem) -> None:
-        family = number.family
-        self._number, self._box, self._free = number, problem.box, list(problem.free)
-        # A single pose has no coordinate, and forms need one.
-        coordinates = problem.z if family is None else family.coordinates
-        self._encloser = Encloser(coordinates if coordinates.numel() else SX.sym("none"), number.entries)
-        self._errors = np.zeros(0) if family is None else np.full(family.errors.numel(), family.tolerance)
+    def bounds(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
+        """Return lower bounds (B, K) over boxes (B, n) of the design, without dependent coordinates."""
+        tolerance = np.full((len(lower), len(self.problem.of_errors)), self.problem.tolerance)
+        ends = np.hstack([lower, -tolerance]), np.hstack([upper, tolerance])
+        return self.examiner.examine(LoopBoxes(*ends, ends[0], np.ones(len(lower), dtype=bool))).smallest
 
-    def values(self, points: FloatArray) -> FloatArray:
-        """Return the values (K,) at points (K, 6)."""
-        return self._number.values(points[:, self._free])
+    def near(self, boxes: LoopBoxes, which: NDArray[np.intp]) -> FloatArray:  # noqa: ARG002 - for numbers with slopes
+        """Return points (S, P, n) at which number ``which[k]`` may be small in box k of P, closed or NaN."""
+        return self.closed(boxes.centre)[None]
 
-    def forms(self, lower: FloatArray, upper: FloatArray) -> Forms:
-        """Return forms of the number's entries over boxes (B, 6): coordinates, their products or errors of centres."""
-        errors = np.tile(self._errors, (len(lower), 1))
-        ends = np.hstack([lower[:, self._free], -errors]).T, np.hstack([upper[:, self._free], errors]).T
-        if not len(ends[0]):
-            ends = np.zeros((1, len(lower))), np.zeros((1, len(lower)))
-        return self._encloser(*ends) if errors.size else self._encloser.second(*ends).as_terms()
-
-    def bounds(self, lower: FloatArray, upper: FloatArray) -> Bounds:
-        """Return lower bounds over boxes (B, 6)."""
-        found = self._number.over(self.forms(lower, upper), len(self._free), len(self._errors))
-        shares = np.zeros(lower.shape)
-        shares[:, self._free] = found.shares
-        whole = self._box.upper - self._box.lower
-        wide = (upper - lower) / np.where(whole > 0, whole, np.inf)
-        return Bounds(found.lower, np.where(shares.any(axis=1, keepdims=True), shares, wide))
+    def closed(self, z: FloatArray) -> FloatArray:
+        """Return points (P, n) with closed loops near points; one that does not close is NaN."""
+        return self.problem.loops.all_closed(z.T, list(self.problem.dependent)).T if self.problem.dependent else z
 
 
 class Minimum(NamedTuple):
-    """The smallest value of a function over the workspace.
+    """The smallest value of a number over a workspace.
 
     Attributes:
-        bound: proven: no pose, and no machine that is meant, has a smaller value.
+        bound: proven: no pose, and no machine that is meant, has a smaller value; -inf where nothing is proved.
         value: the smallest value known; infinite without one.
         at: coordinates of the point that has it.
         boxes, open: number of boxes examined, and of boxes left.
@@ -152,42 +140,13 @@ class Minimum(NamedTuple):
         reason: for stopping before the gap was met; else empty.
     """
 
-    bound: float
-    value: float
-    at: FloatArray
-    boxes: int
-    open: int
-    seconds: float
-    reason: str
-
-
-def prove_minimum(
-    oracle: Oracle,
-    box: PoseBox,
-    *,
-    gap: float,
-    limit: float | None = None,
-    slack: float = 0.0,
-    time_limit: float | None = None,
-    recorder: TreeRecord | None = None,
-) -> Minimum:
-    """Prove the smallest value of a function over a box of poses.
-
-    Args:
-        oracle: the function.
-        box: the poses.
-        gap: allowed distance of the bound from the best value known, in the function's unit.
-        limit: the search ends, with a wider gap, once the bound is at least this, and not before, whatever the gap is,
-            while no value below it is known.
-        slack: how far a value may be below the limit and still count as on it.
-        time_limit: seconds after which the search stops with the bound reached.
-        recorder: records the boxes for a proof; every leaf has a bound of at least that of the result.
-    """
-    with one_search(time_limit):
-        rule = _OracleRule(oracle, box, Goal(gap, limit, slack), recorder)
-        lower, upper = box.lower[None], box.upper[None]
-        root = Boxes(lower, upper, np.array([math.inf]), rule.split(lower, upper, oracle.bounds(lower, upper)), ())
-        return searched(rule, root, box.upper - box.lower, (0.0, 0.0))
+    bound: float = -math.inf
+    value: float = math.inf
+    at: FloatArray = np.zeros(0)
+    boxes: int = 0
+    open: int = 0
+    seconds: float = 0.0
+    reason: str = ""
 
 
 class Goal(NamedTuple):
@@ -195,253 +154,174 @@ class Goal(NamedTuple):
 
     Attributes:
         gap: allowed distance of the bound from the smallest value known.
-        limit: the search ends once the bound is at least this; None without one.
+        part: the same as a part of the value, which is added.
+        limit: a bound of this is enough while no smaller value is known, and not less; None without one.
         slack: how far a value may be below the limit and still count as on it.
-        is_relative: whether the gap is a part of the value, and is to be met where the limit is decided too.
+        is_enough: whether such a bound is enough whatever the gap is.
     """
 
-    gap: float
-    limit: float | None
-    slack: float
-    is_relative: bool = False
+    gap: float = 0.0
+    part: float = 0.0
+    limit: float | None = None
+    slack: float = 0.0
+    is_enough: bool = True
 
-    def bounds(self, value: float) -> tuple[float, float]:
+    def levels(self, value: float) -> tuple[float, float]:
         """Return the bounds at which a box is closed, and at which the search ends, for the smallest value known."""
-        gap = self.gap * max(abs(value), _NEAR_ZERO) if self.is_relative else self.gap
-        met = value - gap if math.isfinite(value) else math.inf
+        met = value - self.gap - self.part * max(abs(value), _NEAR_ZERO) if math.isfinite(value) else math.inf
         if self.limit is None or value < self.limit - self.slack:
             return met, met
-        undecided = self.limit if value >= self.limit else self.limit - self.slack
-        closing = max(met, undecided) if math.isfinite(met) else undecided
-        return closing, closing if self.is_relative else undecided
+        decided = self.limit if value >= self.limit else self.limit - self.slack
+        closing = max(met, decided) if math.isfinite(met) else decided
+        return closing, decided if self.is_enough else closing
 
 
-class Value(NamedTuple):
-    """A value, and the point that has it."""
+class _Best(NamedTuple):
+    """The smallest values (K,) known, infinite without one, and the points (K, n) that have them."""
 
-    value: float
+    value: FloatArray
     at: FloatArray
 
 
-class SmallestValue(Rule[Columns]):
-    """Rule of the smallest value of a function over boxes; what is maximised is its negative.
+class SmallestValues(LoopRule):
+    """Rule of the smallest values of numbers; boxes carry their bounds.
 
     Args:
-        goal: the bound that is to be reached.
-        best: the smallest value known.
-    """
-
-    def __init__(self, goal: Goal, best: Value) -> None:
-        self._goal, self.best = goal, best
-
-    def verdicts(self, left: Boxes[Columns]) -> Verdicts[Columns]:
-        """Close boxes whose bounds are good enough."""
-        done = -left.bound >= self._goal.bounds(self.best.value)[0]
-        return Verdicts(some(left, ~done), float(left.bound[done].max(initial=-math.inf)), len(left.split))
-
-    def ending(self, search: Search[Any]) -> Callable[[], str | None]:
-        """Return the function that ends a search: at its goal, or at a box that is too small for it."""
-
-        def reason() -> str | None:
-            state = search.state
-            if -search.bound >= self._goal.bounds(self.best.value)[1]:
-                return ""
-            small = max((float(each.bound.max()) for each in state.small), default=-math.inf)
-            return TOO_SMALL if state.small and small >= search.bound else None
-
-        return reason
-
-
-def searched(
-    rule: SmallestValue[Columns], root: Boxes[Columns], whole: FloatArray, least: tuple[float, float]
-) -> Minimum:
-    """Return the smallest value that a rule finds from a root, the boxes with the smallest bounds first.
-
-    Args:
-        rule: the rule.
-        root: one box.
-        whole: (n,) its widths.
-        least: parts of them below which a box is not bisected, and is put last.
-    """
-    effort = Effort()
-    search = Search(rule, root, whole=whole, least=least, order=Order.LARGEST)
-    reason = effort.run(search, rule.ending(search))
-    value, at = rule.best
-    return Minimum(min(-search.bound, value), value, at, search.boxes, search.left, effort.seconds, reason)
-
-
-class _OracleRule(SmallestValue[tuple[()]]):
-    """Rule of a function of the pose."""
-
-    block = _BLOCK
-
-    def __init__(self, oracle: Oracle, box: PoseBox, goal: Goal, recorder: TreeRecord | None) -> None:
-        super().__init__(goal, _good_point(oracle, box))
-        self._oracle, self._box, self._recorder = oracle, box, recorder
-
-    @staticmethod
-    def split(lower: FloatArray, upper: FloatArray, found: Bounds) -> NDArray[np.intp]:
-        """Return the coordinates (B,) with the largest shares in the slack of the bounds of boxes."""
-        return first_largest(np.where(upper > lower, found.shares, -1.0))
-
-    def divided(self, boxes: Boxes[tuple[()]]) -> Boxes[tuple[()]]:
-        """Return the halves of boxes."""
-        if self._recorder is not None:
-            self._recorder.cuts(boxes.lower, boxes.upper, boxes.split)
-        return bisected(boxes)
-
-    def examine(self, boxes: Boxes[tuple[()]]) -> Verdicts[tuple[()]]:
-        """Return bounds of boxes, contracted to the workspace, and take note of small values in them."""
-        parts = self._box.contracted(boxes.lower, boxes.upper)
-        if self._recorder is not None:
-            self._recorder.contractions((boxes.lower, boxes.upper), (parts.lower, parts.upper), parts.outside)
-        kept = ~parts.outside
-        lower, upper = parts.lower[kept], parts.upper[kept]
-        found = self._oracle.bounds(lower, upper)
-        centres = self._box.clipped(0.5 * lower + 0.5 * upper)
-        values = self._oracle.values(centres)
-        if len(values) and is_smaller(float(np.fmin.reduce(values)), self.best.value):
-            best = first_smallest(values)
-            self.best = Value(float(values[best]), centres[best])
-        bound = np.fmin(-found.lower, boxes.bound[kept])
-        return self.verdicts(Boxes(lower, upper, bound, self.split(lower, upper, found), ()))
-
-
-def is_smaller(value: float, known: float) -> bool:
-    """Return whether a value is smaller than a known one by more than rounding."""
-    return value < (known - _TIE * abs(known) if math.isfinite(known) else known)
-
-
-def first_smallest(values: FloatArray) -> int:
-    """Return the place of the first of the smallest values (K,), up to rounding; NaN are left out."""
-    least = float(np.fmin.reduce(values))
-    return int(np.argmax(values <= least + _TIE * abs(least)))
-
-
-def _good_point(oracle: Oracle, box: PoseBox) -> Value:
-    """Return a small value."""
-    rng = np.random.default_rng(_SEED)
-    points = np.concatenate([box.random(_POINTS, rng), _corners(box)])
-    values = oracle.values(points)
-    best = first_smallest(values)
-    y, value, step = points[best], float(values[best]), 0.3
-    for _ in range(_STEPS):
-        around = box.clipped(y + step * (box.upper - box.lower) * rng.normal(size=(_AROUND, 6)))
-        values = oracle.values(around)
-        best = first_smallest(values)
-        if is_smaller(float(values[best]), value):
-            y, value = around[best], float(values[best])
-        else:
-            step *= _SHRINK
-    return Value(value, y)
-
-
-def _corners(box: PoseBox) -> FloatArray:
-    """Return the corners (64, 6) of the box, moved into the workspace."""
-    sides = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
-    return box.clipped(box.lower + sides * (box.upper - box.lower))
-
-
-class _NumberTest:
-    """A number as a test of boxes: its bounds are their smallest values."""
-
-    def __init__(self, number: Bounded) -> None:
-        self.entries, self._number = number.entries, number
-
-    def examine(self, forms: Forms, f: int) -> Tested:
-        """Return the lower bounds of boxes; none is regular."""
-        found = self._number.over(forms, f, forms.a.shape[2] - f)
-        none = np.zeros(len(found.lower), dtype=np.int32)
-        return Tested(none.astype(bool), np.nan_to_num(found.shares), found.lower, none)
-
-
-class FollowedRule(LoopRule, SmallestValue[Followed]):
-    """Rule of a number of a robot whose dependent coordinates are followed, or of all machines.
-
-    Args:
-        problem: the robot.
-        family: all machines that are meant; None for the design alone.
-        number: the number, in the coordinates of the problem or of the machines.
-        smallest_in: returns the smallest value known at points of boxes.
-        goal: the bound that is to be reached.
+        number: the numbers.
+        goals: the bounds that are to be reached.
+        recorder: records the boxes for a proof.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    block = _FOLLOWED_BLOCK
+    def __init__(self, number: Number, goals: Sequence[Goal], recorder: TreeRecord | None = None) -> None:
+        super().__init__(number.problem, number.examiner, recorder)
+        self._number, self._goals, self.block = number, goals, _BLOCK if number.problem.dependent else 2 * _BLOCK
+        self._best = _Best(np.full(len(goals), np.inf), np.tile(number.problem.start, (len(goals), 1)))
+        self._closed = np.full(len(goals), np.inf)
+        if not self._problem.dependent:
+            self._start_from_poses()
 
-    def __init__(
-        self,
-        problem: Problem,
-        family: ToleranceModel | None,
-        number: Bounded,
-        smallest_in: Callable[[LoopBoxes], Value | None],
-        goal: Goal,
-    ) -> None:
-        LoopRule.__init__(self, problem, Examiner(problem, _NumberTest(number), family))
-        SmallestValue.__init__(self, goal, Value(math.inf, problem.start if family is None else family.start))
-        self._smallest_in = smallest_in
+    @property
+    def root(self) -> Boxes[Followed]:
+        """The whole workspace."""
+        root = super().root
+        return root._replace(more=root.more._replace(more=np.full((1, len(self._goals)), -np.inf)))
+
+    def _levels(self) -> FloatArray:
+        """Return the bounds (K,) at which boxes are closed: of several numbers those that are enough."""
+        pairs = [goal.levels(value) for goal, value in zip(self._goals, self._best.value.tolist(), strict=True)]
+        return np.array(pairs)[:, 1 if len(pairs) > 1 else 0]
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return bounds of boxes, and take note of small values in them."""
+        self._number.levels = self._levels()
         found = self.examined(boxes)
-        known = np.flatnonzero(found.boxes.is_known & np.isfinite(found.smallest))
-        if known.size:
-            order = np.argsort(found.smallest[known])[:_TRIED]
-            best = self._smallest_in(some(found.boxes, known[order]))
-            if best is not None and best.value < self.best.value:
-                self.best = best
-        width = self.widths(found)
-        score = found.shares * np.sqrt(width / width.max(axis=1, keepdims=True))
-        split = first_largest(np.where(width > 0, score, -1.0))
-        # Nothing is known of a box in which dependent coordinates are not.
-        bound = np.where(found.boxes.is_known, -found.smallest, np.inf)
-        return self.verdicts(self.boxes_of(found, bound, split))
+        self._try(found)
+        done = found.boxes.is_known & (found.smallest >= self._levels()).all(axis=1)
+        self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
+        left = some(found, np.flatnonzero(~done))
+        width, shares = self.widths(left), left.shares
+        if self._problem.dependent:
+            # Relations over long and narrow boxes are wide.
+            shares = shares * np.sqrt(width / width.max(axis=1, keepdims=True))
+        split = coordinates_to_split(shares, width)
+        parts = self.boxes_of(left, (-left.smallest).max(axis=1), split)
+        parts = parts._replace(more=parts.more._replace(more=left.smallest))
+        return Verdicts(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
 
-    def minimum(self) -> Minimum:
-        """Return the smallest value over the workspace."""
-        found = searched(self, self.root, self.whole, _LEAST_WIDTHS)
-        if not math.isfinite(found.bound):
-            return found._replace(bound=-math.inf)
-        return found if self.is_one_assembly() else found._replace(bound=-math.inf, reason=APART)
+    def _try(self, found: Examined) -> None:
+        """Take note of values in the boxes with the smallest bounds of each number."""
+        known, count = np.flatnonzero(found.boxes.is_known), len(self._goals)
+        if not known.size:
+            return
+        rows = np.argsort(found.smallest[known], axis=0, kind="stable")[: max(1, _TRIED // count)].T
+        which, boxes = np.repeat(np.arange(count), rows.shape[1]), some(found.boxes, known[rows.ravel()])
+        with np.errstate(all="ignore"):
+            sets = self._number.near(boxes, which)
+            every = some(boxes, np.tile(np.arange(len(which)), len(sets)))
+            z, problem = sets.reshape(-1, sets.shape[2]), self._problem
+            inside = np.isfinite(z).all(axis=1) & are_between(z, every, problem.dependent)
+            inside[inside] = [problem.box.holds(each) for each in problem.pose_of(z[inside])]
+        self._note(z[inside])
+
+    def _start_from_poses(self) -> None:
+        """Take note of values at random poses and at corners, and near the best of them; without dependent ones."""
+        box, free, rng, step = self._problem.box, list(self._problem.free), np.random.default_rng(_SEED), 0.3
+        sides = np.array(np.meshgrid(*[[0, 1]] * 6)).reshape(6, -1).T
+        points = np.concatenate([box.random(_POINTS, rng), box.clipped(box.lower + sides * (box.upper - box.lower))])
+        for _ in range(1 + _STEPS):
+            before = self._best
+            z = np.tile(before.at[0], (len(points), 1))
+            z[:, : len(free)] = points[:, free]
+            self._note(z)
+            step *= _SHRINK if self._best is before else 1.0
+            y = self._problem.pose_of(self._best.at[0])
+            points = box.clipped(y + step * (box.upper - box.lower) * rng.normal(size=(_AROUND, 6)))
+
+    def _note(self, z: FloatArray) -> None:
+        """Take note of the values at points (P, n)."""
+        if not len(z):
+            return
+        known, at = self._best
+        with np.errstate(all="ignore"):
+            values = self._number.values(z)
+            values = np.where(np.isfinite(values), values, np.inf)
+            least = values.min(axis=0)
+            better = np.isfinite(least) & ~(least >= known - _TIE * np.abs(known))
+            first = np.argmax(values <= least + _TIE * np.abs(least), axis=0)
+        if better.any():
+            self._best = _Best(np.where(better, least, known), np.where(better[:, None], z[first], at))
+
+    def is_one_assembly(self) -> bool:
+        """Return whether all boxes surely have the assembly of the middle."""
+        if not self._roots:
+            return True
+        roots, start = joined(self._roots), self._problem.start
+        inside = (roots.lower <= start) & (roots.upper >= start)
+        here, same = (inside[:, list(which)].all(axis=1) for which in (self._independent, self._problem.dependent))
+        return bool((same | ~here).all()) and super().is_one_assembly()
+
+    def minima(self) -> list[Minimum]:
+        """Search the workspace; return the smallest value of each number."""
+        effort, is_one = Effort(), len(self._goals) == 1
+        order = Order.LARGEST if is_one else Order.NEWEST
+        search = Search(self, self.root, whole=self.whole, least=_LEAST_WIDTHS, order=order)
+
+        def ending() -> str | None:
+            if is_one and -search.bound >= self._goals[0].levels(float(self._best.value[0]))[1]:
+                return ""
+            small = max((float(each.bound.max()) for each in search.state.small), default=-math.inf)
+            return TOO_SMALL if search.state.small and (small >= search.bound or not is_one) else None
+
+        reason = effort.run(search, ending)
+        bounds = np.min([self._closed, *(each.more.more.min(axis=0) for each in search.state.left)], axis=0)
+        if np.isfinite(bounds).any() and not self.is_one_assembly():
+            reason, bounds = APART, np.full(len(bounds), -np.inf)
+        return [
+            Minimum(
+                min(bound, value) if bound < math.inf else -math.inf,
+                *(value, at, search.boxes, search.left, effort.seconds, reason),
+            )
+            for bound, value, at in zip(bounds.tolist(), self._best.value.tolist(), self._best.at, strict=True)
+        ]
 
 
-def smallest_number(
-    number: Number,
-    problem: Problem,
-    *,
-    gap: float,
-    limit: float | None = None,
-    slack: float = 0.0,
-    recorder: TreeRecord | None = None,
-) -> Minimum:
-    """Prove the smallest value of a number of a robot over its poses; the point found is that of a pose (6,).
+def smallest_values(
+    number: Number, goals: Sequence[Goal], *, time_limit: float | None = None, recorder: TreeRecord | None = None
+) -> list[Minimum]:
+    """Prove the smallest values of numbers of a robot over its poses.
 
     Args:
-        number: the number.
-        problem: the robot.
-        gap: allowed distance of the bound from the best value known, in the number's unit.
-        limit: the search ends once the bound is at least this.
-        slack: how far a value may be below the limit and still count as on it.
-        recorder: records the boxes for a proof, without dependent coordinates.
+        number: K numbers.
+        goals: K bounds that are to be reached.
+        time_limit: seconds after which the search stops with the bounds reached.
+        recorder: records the boxes for a proof, without dependent coordinates; every leaf has a bound of at least that
+            of the result.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    if not problem.dependent:
-        over = OverPoses(number, problem)
-        return prove_minimum(over, problem.box, gap=gap, limit=limit, slack=slack, recorder=recorder)
-    loops, D, box = problem.loops, list(problem.dependent), problem.box
-
-    def smallest_in(boxes: LoopBoxes) -> Value | None:
-        """Return the smallest value of the design in the middle of boxes."""
-        z = loops.all_closed(boxes.centre.T, D).T
-        inside = are_between(z, boxes, D) & np.array([box.holds(each) for each in problem.pose_of(z)])
-        values = np.where(inside, number.values(np.where(inside[:, None], z, problem.start)), np.nan)
-        k = first_smallest(values) if np.isfinite(values).any() else -1
-        return None if k < 0 else Value(float(values[k]), z[k])
-
-    with one_search():
-        found = FollowedRule(problem, number.family, number, smallest_in, Goal(gap, limit, slack)).minimum()
-    return found._replace(at=problem.pose_of(found.at[: len(problem.start)]))
+    with one_search(time_limit):
+        return SmallestValues(number, goals, recorder).minima()

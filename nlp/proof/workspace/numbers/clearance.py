@@ -11,16 +11,17 @@ twice the tolerance: that of two legs that are moved towards each other.
 from __future__ import annotations
 
 import itertools
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
-from ..robot.posed_robot import PosedModel
-from ..robot.tolerance_model import ToleranceModel
-from .bound_search import Bounds
+from ...statement.machine import JointErrors, Legs
+from ..robot.posed_model import PosedModel
+from ..robot.posed_robot import Problem
+from ..tolerance.leg_errors import along
+from .bound_search import Bounds, Number
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
 _ROUNDING = 1e-13
@@ -28,104 +29,107 @@ _ROUNDING = 1e-13
 _PARALLEL = 1e-12
 
 
-class Clearance:
+class Clearance(Number):
     """Distance between two straight legs.
 
+    The entries are 13: the ends of the first leg, then of the second, times the scale s of a rotation, and s.
+
     Args:
-        posed: the robot.
+        problem: the robot.
+        posed: the same in the coordinates of the problem.
         model: its model, with legs.
         places: those of the two legs.
-        tolerance: largest error of each of their joint centres, length.
-
-    Attributes:
-        entries: (13, 1) ends of the first leg, then of the second, times the scale of a rotation, and the scale.
+        legs: joint centres of its legs, with the tolerance that is meant; None for the design alone.
     """
 
-    def __init__(self, posed: PosedModel, model: Model, places: tuple[int, int], *, tolerance: float = 0.0) -> None:
-        self.family: ToleranceModel | None = None
-        self._nearer = 2 * tolerance
+    def __init__(
+        self, problem: Problem, posed: PosedModel, model: Model, places: tuple[int, int], *, legs: Legs | None = None
+    ) -> None:
         R, p = model.pose.rotation, model.pose.position
         ends = ca.vertcat(*[end for k in places for end in (model.legs[k].base, p + R @ model.legs[k].platform)])
         plain, scaled = posed.scaled_points(ends)
-        self.entries = ca.densify(ca.vertcat(scaled, posed.scale))
-        self._ends = ca.Function("ends", [posed.z], [ca.densify(plain)])
+        super().__init__(problem, ca.densify(ca.vertcat(scaled, posed.scale)))
+        self._nearer, self._ends = 0.0, ca.Function("ends", [posed.z], [ca.densify(plain)])
+        self._legs, self._places = legs if legs is not None and legs.tolerance else None, places
+        if self._legs is not None:
+            self._nearer = 2 * self._legs.tolerance
 
     def values(self, z: FloatArray) -> FloatArray:
-        """Return the distances (K,) at points (K, n)."""
-        distances = np.linalg.norm(self.between(z), axis=1)
+        """Return the distances (P, 1) at points (P, n)."""
+        distances = np.linalg.norm(self.between(z), axis=1, keepdims=True)
         return np.asarray(np.maximum(distances - self._nearer, 0.0))
 
     def between(self, z: FloatArray) -> FloatArray:
-        """Return the vectors (K, 3) from the nearest point of the second leg to that of the first."""
+        """Return the vectors (P, 3) from the nearest point of the second leg to that of the first."""
         return _between(self._ends(z.T).full().T)
 
-    def over(self, forms: Forms, count: int, errors: int) -> Bounds:  # noqa: ARG002 - the tolerance has them
+    def worst(self, y: FloatArray) -> JointErrors | None:
+        """Return the errors with which the legs are nearest to each other at a pose (6,); None for the design."""
+        if self._legs is None:
+            return None
+        between = self.between(y[None, list(self.problem.free)])
+        moved = np.zeros_like(self._legs.base)
+        moved[list(self._places)] = np.array([[-1.0], [1.0]]) * between
+        errors = along(self._legs, self.problem.box.pose(y).rotation, moved, moved)
+        # Legs that the whole errors would move through each other touch with a part of them.
+        part = min(1.0, float(np.linalg.norm(between)) / self._nearer)
+        return JointErrors(part * errors.base, part * errors.platform)
+
+    def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
-        at = _EndsOver.of(forms)
-        between = _between(at.ends.reshape(-1, 12))
+        ends, moved, rest, (least_scale, rest_of_scale), rounding = _ends_over(forms)
+        between = _between(ends.reshape(-1, 12))
         size = np.linalg.norm(between, axis=1, keepdims=True)
         n = np.divide(between, size * (1 + 1e-15), out=np.zeros_like(between), where=size > 0)
-        least, falls = np.full(len(n), np.inf), np.zeros(at.of_scale.shape)
-        with np.errstate(all="ignore"):
-            for one, other in itertools.product((0, 1), (2, 3)):
-                # n.(x - y) times the scale, less its middle times the scale.
-                middle = (n * (at.ends[:, one] - at.ends[:, other])).sum(axis=1)
-                along = np.einsum("bk,bkt->bt", n, at.terms[:, one] - at.terms[:, other])
-                along -= middle[:, None] * at.of_scale
-                fall = np.abs(along).sum(axis=1) + np.abs(middle) * at.rest_of_scale
-                fall += (np.abs(n) * (at.rest[:, one] + at.rest[:, other])).sum(axis=1)
-                bound = middle - fall / at.least_scale
-                falls = np.where((bound < least)[:, None], np.abs(along), falls)
-                least = np.minimum(least, bound)
-        bound = np.maximum(least - at.rounding - self._nearer, 0.0)
-        return Bounds(np.where(np.isfinite(bound), bound, 0.0), np.nan_to_num(_shares(falls, count)))
+        bounds, falls = [], []
+        for one, other in itertools.product((0, 1), (2, 3)):
+            # n.(x - y) times the scale, less its middle times the scale.
+            along = np.einsum("bk,bkt->bt", n, moved[:, one] - moved[:, other])
+            middle = (n * (ends[:, one] - ends[:, other])).sum(axis=1)
+            fall = np.abs(along).sum(axis=1) + (np.abs(n) * (rest[:, one] + rest[:, other])).sum(axis=1)
+            bounds.append(middle - (fall + np.abs(middle) * rest_of_scale) / least_scale)
+            falls.append(np.abs(along))
+        least = np.argmin(bounds, axis=0)
+        every = np.arange(len(least))
+        bound = np.maximum(np.array(bounds)[least, every] - rounding - self._nearer, 0.0)
+        shares = np.nan_to_num(_shares(np.array(falls)[least, every], count))
+        return Bounds(np.where(np.isfinite(bound), bound, 0.0)[:, None], shares[:, None])
 
-    def most(self, forms: Forms) -> FloatArray:
-        """Return upper bounds (B,) of the distance of the design over boxes, from forms of the entries."""
-        at = _EndsOver.of(forms)
-        moved = np.abs(at.terms - at.ends[..., None] * at.of_scale[:, None, None]).sum(axis=3)
-        moved += at.rest + np.abs(at.ends) * at.rest_of_scale[:, None, None]
-        farthest = (np.linalg.norm(moved, axis=2) / at.least_scale[:, None]).reshape(-1, 2, 2).max(axis=2).sum(axis=1)
-        found = np.linalg.norm(_between(at.ends.reshape(-1, 12)), axis=1) + farthest + at.rounding
+    def most(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
+        """Return upper bounds (B,) of the distance over boxes (B, n), of the design; infinite with open loops."""
+        if self.examiner.second is None:
+            return np.full(len(lower), np.inf)
+        forms = self.examiner.second.second(lower.T, upper.T)
+        ends, moved, rest, (least_scale, rest_of_scale), rounding = _ends_over(forms)
+        rest += np.abs(ends) * rest_of_scale[:, None, None]
+        farthest = np.linalg.norm(np.abs(moved).sum(axis=3) + rest, axis=2) / least_scale[:, None]
+        found = np.linalg.norm(_between(ends.reshape(-1, 12)), axis=1) + rounding
+        found += farthest.reshape(-1, 2, 2).max(axis=2).sum(axis=1)
         return np.where(np.isfinite(found), found, np.inf)
 
 
-class _EndsOver(NamedTuple):
-    """Ends of two legs over B boxes.
+def _ends_over(
+    forms: Forms,
+) -> tuple[FloatArray, FloatArray, FloatArray, tuple[FloatArray, FloatArray], FloatArray]:
+    """Return the ends of two legs over B boxes.
 
-    Attributes:
-        ends: (B, 4, 3) in the middle.
-        terms, rest: (B, 4, 3, t) and (B, 4, 3) of the ends times the scale.
-        of_scale, rest_of_scale, least_scale: (B, t) terms, (B,) rests and (B,) smallest values of the scale.
-        rounding: (B,) by which computed distances may be off; infinite where nothing is known.
+    Args:
+        forms: of the entries of a clearance.
+
+    Returns:
+        (B, 4, 3) ends m in the middle; (B, 4, 3, t) terms of the ends times the scale less m times the scale; (B, 4, 3)
+        rests of the ends times the scale; (B,) smallest values and (B,) rests of the scale; (B,) by which computed
+        distances may be off, infinite where nothing is known.
     """
-
-    ends: FloatArray
-    terms: FloatArray
-    rest: FloatArray
-    of_scale: FloatArray
-    rest_of_scale: FloatArray
-    least_scale: FloatArray
-    rounding: FloatArray
-
-    @classmethod
-    def of(cls, forms: Forms) -> _EndsOver:
-        """Return the ends from forms of the entries of a clearance."""
-        known = np.isfinite(forms.c).all(axis=1) & np.isfinite(forms.r).all(axis=1)
-        c, a, r = (np.where(known.reshape(-1, *[1] * (each.ndim - 1)), each, 1.0) for each in forms)
-        B, _, t = a.shape
-        # The scale of a rotation is at least 1.
-        least = np.maximum(1.0, (c[:, 12] - np.abs(a[:, 12]).sum(axis=1) - r[:, 12]) * (1 - _ROUNDING))
-        terms = 4 * _ROUNDING * (np.abs(c) + np.abs(a).sum(axis=2) + r).sum(axis=1)
-        return cls(
-            ends=(c[:, :12] / c[:, 12:]).reshape(B, 4, 3),
-            terms=a[:, :12].reshape(B, 4, 3, t),
-            rest=r[:, :12].reshape(B, 4, 3),
-            of_scale=a[:, 12],
-            rest_of_scale=r[:, 12],
-            least_scale=least,
-            rounding=np.where(known, terms, np.inf),
-        )
+    known = np.isfinite(forms.c).all(axis=1) & np.isfinite(forms.r).all(axis=1)
+    c, a, r = (np.where(known.reshape(-1, *[1] * (each.ndim - 1)), each, 1.0) for each in forms)
+    ends, shape = c[:, :12] / c[:, 12:], (len(c), 4, 3)
+    moved = (a[:, :12] - ends[:, :, None] * a[:, 12:]).reshape(*shape, -1)
+    # The scale of a rotation is at least 1.
+    least = np.maximum(1.0, (c[:, 12] - np.abs(a[:, 12]).sum(axis=1) - r[:, 12]) * (1 - _ROUNDING))
+    terms = 4 * _ROUNDING * (np.abs(c) + np.abs(a).sum(axis=2) + r).sum(axis=1)
+    rest, rounding = r[:, :12].reshape(shape), np.where(known, terms, np.inf)
+    return ends.reshape(shape), moved, rest, (least, r[:, 12]), rounding
 
 
 def _shares(falls: FloatArray, count: int) -> FloatArray:

@@ -8,10 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from casadi import SX
 
 from .....models import Dimension, FloatArray, axis_angle_from_matrix, frozen_array
 from ....case.task import Sense
@@ -27,11 +26,12 @@ from ...statement.machine import CentreErrors, JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome
+from .bound_search import Goal, Minimum
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
-#: Returns the errors of the machine that is worst at a pose, to first order, and its number as people read it.
+#: Returns the errors of the machine that is worst at a pose, to first order, and the value of its expression.
 WorstMachine = Callable[[PoseNumbers], tuple[CentreErrors, float]]
 #: Gap of a bound as a part of the value, where none is asked for.
 GAP = 1e-3
@@ -89,12 +89,59 @@ class Extreme:
         return self.limit is not None and self.outcome is not Outcome.PROVED
 
 
-def nothing_known(
-    name: str, sense: Sense, dimension: Dimension, reason: str, *, key: str = "", limit: float | None = None
+def extreme_of(
+    claim: Claim,
+    found: Minimum,
+    pose: PoseNumbers | None = None,
+    *,
+    errors: JointErrors | None = None,
+    centres: CentreErrors | None = None,
 ) -> Extreme:
-    """Return the extreme of a number of which nothing is proved."""
-    bound = math.inf if sense is Sense.MAX else -math.inf
-    return Extreme(name, sense, dimension, key, limit, bound, math.nan, None, Outcome.OPEN, 0, 0.0, reason)
+    """Return the extreme of a number from the smallest value of its expression, or of minus it for the largest one.
+
+    Args:
+        claim: the number, with its limit.
+        found: without a reason where it is as good as asked for.
+        pose: at which the value is reached.
+        errors: of the machine that reaches it, as for :class:`Extreme`.
+        centres: likewise.
+    """
+    sign, read, limit = (1.0 if claim.sense is Sense.MAX else -1.0), claim.reading.from_value, claim.limit
+    is_bounded, is_reached, reason = math.isfinite(found.bound), math.isfinite(found.value), found.reason
+    bound = read(-sign * found.bound) if is_bounded else sign * math.inf
+    outcome = Outcome.PROVED if is_bounded and not reason else Outcome.OPEN
+    if limit is not None:
+        least, slack = -sign * limit, slack_of(limit)
+        outcome = Outcome.PROVED if is_bounded and found.bound >= least - slack else Outcome.OPEN
+        outcome = Outcome.REFUTED if found.value < least - slack else outcome
+        reason = reason or CLOSE
+    if claim.uncovered:
+        # What is proved of the exact machine is nothing about the others, and refutes all the same.
+        bound, reason = sign * math.inf, claim.uncovered
+        outcome = outcome if outcome is Outcome.REFUTED else Outcome.OPEN
+    return Extreme(
+        name=claim.name,
+        sense=claim.sense,
+        dimension=claim.reading.dimension,
+        key=claim.key,
+        limit=None if limit is None else read(limit),
+        bound=bound,
+        reached=read(-sign * found.value) if is_reached else math.nan,
+        pose=pose,
+        outcome=outcome,
+        boxes=found.boxes,
+        seconds=found.seconds,
+        reason=reason if outcome is Outcome.OPEN else "",
+        errors=errors,
+        centres=centres,
+    )
+
+
+def goal_of(claim: Claim, gap: float = 0.0, part: float = 0.0, *, is_enough: bool = True) -> Goal:
+    """Return what a search of minus a claim's number, or of it for a smallest one, is to reach."""
+    if claim.limit is None:
+        return Goal(gap, part)
+    return Goal(gap, part, claim.limit if claim.sense is Sense.MIN else -claim.limit, slack_of(claim.limit), is_enough)
 
 
 def prove_extreme(
@@ -106,7 +153,6 @@ def prove_extreme(
     jobs: int | None = None,
     machine: WorstMachine | None = None,
     paper: PaperRecord | None = None,
-    again: bool = False,
 ) -> Extreme:
     """Prove the smallest or the largest value of a number over a workspace.
 
@@ -120,82 +166,59 @@ def prove_extreme(
         jobs: threads.
         machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
         paper: records the search for a proof.
-        again: whether the record takes the place of an earlier one of the same number.
     """
+    sign = 1.0 if claim.sense is Sense.MAX else -1.0
     if is_requested():
-        return _extreme(claim, _Found(reason=why_stopped()), machine)
+        return extreme_of(claim, Minimum(reason=why_stopped()))
     nlp = extreme_program(layout, claim.expression, claim.sense)
+    x: FloatArray | None
     if not varies(layout, [claim.expression])[0]:
         value = nlp.evaluate(nlp.start).F
         if paper is not None:
             paper.constant(claim, nlp, value)
-        return _extreme(claim, _Found(value, value, _pose(nlp, nlp.start), is_met=True), machine)
-    record = None if paper is None else _Record(paper, again)
-    try:
-        with one_search(time_limit):
-            return _extreme(claim, _search(nlp, claim, gap, jobs, record), machine)
-    except UncoveredError as error:
-        return _extreme(claim, _Found(reason=str(error)), machine)
-
-
-class _Record(NamedTuple):
-    """Where a search is recorded, and whether in the place of an earlier one of the same number."""
-
-    paper: PaperRecord
-    again: bool
-
-
-class _Found(NamedTuple):
-    """Result of a search in terms of its expression.
-
-    Attributes:
-        bound, reached, pose, boxes, seconds, reason: as for :class:`Extreme`.
-        is_met: whether the gap asked for is met.
-    """
-
-    bound: float = math.inf
-    reached: float = math.nan
-    pose: PoseNumbers | None = None
-    boxes: int = 0
-    seconds: float = 0.0
-    reason: str = ""
-    is_met: bool = False
+        found, x = Minimum(-sign * value, -sign * value), np.array(nlp.start)
+    else:
+        try:
+            with one_search(time_limit):
+                found, x = _search(nlp, claim, gap, jobs, paper)
+        except UncoveredError as error:
+            return extreme_of(claim, Minimum(reason=str(error)))
+    pose = None if x is None else _pose(nlp, x)
+    if pose is None or machine is None:
+        return extreme_of(claim, found, pose)
+    centres, value = machine(pose)
+    return extreme_of(claim, found._replace(value=-sign * value), pose, centres=centres)
 
 
 def _search(
-    nlp: Nlp,
-    claim: Claim,
-    gap: float,
-    jobs: int | None,
-    record: _Record | None,
-) -> _Found:
-    """Return the bound of an expression, to the gap or, where that leaves its limit open, as fine as the limit needs.
+    nlp: Nlp, claim: Claim, gap: float, jobs: int | None, paper: PaperRecord | None
+) -> tuple[Minimum, FloatArray | None]:
+    """Return the bound of an expression, to the gap or as fine as its limit needs, and the point of its best value.
 
     Raises:
         UncoveredError: the expression holds an operation without a rule.
     """
     # A program of a claim has one function, and its search is that of certify with or without a record.
-    writer = None if record is None else TreeRecord()
+    sign, writer = 1.0 if claim.sense is Sense.MAX else -1.0, None if paper is None else TreeRecord()
     found = certify_program(nlp, gap=gap, jobs=jobs, recorder=writer)
     boxes, seconds = found.boxes, found.seconds
     while (finer := _finer_gap(nlp, claim, found)) is not None and not is_requested():
-        finer_writer = None if record is None else TreeRecord()
-        again = certify_program(nlp, found.x, gap=finer, jobs=jobs, recorder=finer_writer)
-        boxes, seconds = boxes + again.boxes, seconds + again.seconds
-        sign = 1.0 if claim.sense is Sense.MAX else -1.0
-        if sign * again.bound <= sign * found.bound:
-            writer = finer_writer
+        finer_writer = None if paper is None else TreeRecord()
+        more = certify_program(nlp, found.x, gap=finer, jobs=jobs, recorder=finer_writer)
+        boxes, seconds = boxes + more.boxes, seconds + more.seconds
+        if sign * more.bound <= sign * found.bound:
+            found, writer = more, finer_writer
         else:
-            again = replace(again, bound=found.bound)
-        found = again
-    if record is not None and writer is not None and found.status is not CertificateStatus.INFEASIBLE:
-        record.paper.program(claim, found, writer, again=record.again)
+            found = replace(more, bound=found.bound)
     if found.status is CertificateStatus.INFEASIBLE:
-        return _Found(boxes=boxes, seconds=seconds, reason="the robot has no pose there")
+        return Minimum(boxes=boxes, seconds=seconds, reason="the robot has no pose there"), None
+    if paper is not None and writer is not None:
+        paper.program(claim, found, writer)
     # A search that ends early has a bound too, which may be as good as asked for.
-    met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
-    pose = None if found.x is None else _pose(nlp, found.x)
-    return _Found(found.bound, found.incumbent, pose, boxes, seconds, found.reason, met)
+    is_met = found.status is CertificateStatus.PROVED or found.gap <= found.allowed
+    value = math.inf if math.isnan(found.incumbent) else -sign * found.incumbent
+    reason = "" if is_met else found.reason
+    return Minimum(-sign * found.bound, value, boxes=boxes, seconds=seconds, reason=reason), found.x
 
 
 def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
@@ -217,46 +240,6 @@ def slack_of(limit: float) -> float:
     It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
     """
     return ON_LIMIT * abs(limit)
-
-
-def _extreme(claim: Claim, found: _Found, machine: WorstMachine | None) -> Extreme:
-    """Return the extreme of a claim from numbers of its expression."""
-    sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
-    bound, reached, pose = found.bound, found.reached, found.pose
-    shown_bound = read(bound) if math.isfinite(bound) else sign * math.inf
-    shown_reached = read(reached) if math.isfinite(reached) else math.nan
-    centres = None
-    if machine is not None and pose is not None:
-        centres, shown_reached = machine(pose)
-        reached = float(claim.reading.to_value(SX(shown_reached)))
-    outcome, reason = Outcome.PROVED if found.is_met else Outcome.OPEN, found.reason
-    if claim.limit is not None:
-        slack = slack_of(claim.limit)
-        if sign * (reached - claim.limit) > slack:
-            outcome = Outcome.REFUTED
-        else:
-            outcome = Outcome.PROVED if sign * (bound - claim.limit) <= slack and math.isfinite(bound) else Outcome.OPEN
-            reason = reason or (CLOSE if outcome is Outcome.OPEN else "")
-    if claim.uncovered:
-        # What is proved of the exact machine is nothing about the others, and refutes all the same.
-        shown_bound = sign * math.inf
-        if outcome is not Outcome.REFUTED:
-            outcome, reason = Outcome.OPEN, claim.uncovered
-    return Extreme(
-        name=claim.name,
-        sense=claim.sense,
-        dimension=claim.reading.dimension,
-        key=claim.key,
-        limit=None if claim.limit is None else read(claim.limit),
-        bound=shown_bound,
-        reached=shown_reached,
-        pose=pose,
-        outcome=outcome,
-        boxes=found.boxes,
-        seconds=found.seconds,
-        reason="" if outcome is not Outcome.OPEN else reason,
-        centres=centres,
-    )
 
 
 def _pose(nlp: Nlp, x: FloatArray) -> PoseNumbers:

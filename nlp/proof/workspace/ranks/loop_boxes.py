@@ -1,21 +1,27 @@
-"""Boxes of a search: ends of the independent coordinates, and where the dependent ones are known, theirs."""
+"""Boxes of a robot over a workspace, in which dependent coordinates follow from independent ones, and their search.
+
+Each pose of a box has one closed point between the ends of its dependent coordinates, which moves continuously with the
+pose. Two boxes with a pose in common have one assembly of the robot's joints where the closed point of the one at that
+pose is that of the other. All boxes have one where each is reached from the first.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from .....models import FloatArray
+from .....models.arrays import first_largest
 from ...boxes.engine import MOST_VARIABLES
-from ...boxes.rows import some
+from ...boxes.search import Boxes, Rule, bisected, joined, some
 from ...enclosure.forms import Encloser, Forms
 from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import ToleranceModel
-from .entry_change import EntryChange, is_polynomial
 from .krawczyk import (
     Coordinates,
     Relation,
@@ -26,10 +32,12 @@ from .krawczyk import (
     relation_of,
     with_relation,
 )
-from .rank_rule import RankTest, Tested
+from .rank_rule import EntryChange, RankTest, Tested, is_polynomial
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ...boxes.tree import TreeRecord
 
 #: Factors by which widths of dependent coordinates are made wider: the first guess, from slopes at the middle of a box,
 #: and later ones, from the relation that was found with the guess before.
@@ -46,6 +54,10 @@ _ROUNDING = 1e-14
 _CLOSE = 1e-9
 #: Contractions of the closed point at the common face of two boxes: each one squares its width.
 _CONTRACTIONS = 3
+#: Reason for which nothing is claimed although every box is closed.
+APART = "the assemblies in two neighbouring boxes are not proved to be the same"
+#: Number of boxes beyond which pairs of them are too many, and number of pairs that are compared at once.
+_MANY, _PAIRS = 6000, 512
 
 
 class LoopBoxes(NamedTuple):
@@ -68,23 +80,14 @@ class LoopBoxes(NamedTuple):
         return np.clip(0.5 * self.lower + 0.5 * self.upper, self.lower, self.upper)
 
 
-def are_between(z: FloatArray, boxes: LoopBoxes, dependent: Sequence[int]) -> NDArray[np.bool_]:
-    """Return whether closed points (B, n) are those of boxes: others may be of another assembly of the joints."""
-    lower, upper, own = boxes.lower[:, dependent], boxes.upper[:, dependent], z[:, dependent]
-    room = _CLOSE * (upper - lower)
-    return np.asarray(((own >= lower - room) & (own <= upper + room)).all(axis=1))
-
-
 class Examined(NamedTuple):
     """Results for B boxes.
 
     Attributes:
         boxes: the boxes, with dependent coordinates where they are known.
         relation: of these; its rest is infinite where they are not known.
-        is_regular: (B,) whether the matrix has full rank at every pose of the box.
-        shares: (B, f) share of each independent coordinate in the bounds.
-        smallest: (B,) smallest singular value at the middle, in parts of the largest; infinite where it is not known.
-        signs: (B,) those of :class:`~.rank_rule.Tested`.
+        is_regular, shares, smallest, signs: those of :class:`~.rank_rule.Tested`; nothing is known of ``smallest``
+            where it is infinite. Of K numbers it is (B, K), their lower bounds.
     """
 
     boxes: LoopBoxes
@@ -102,7 +105,10 @@ class Test(Protocol):
         entries: (R, 1) the expressions.
     """
 
-    entries: ca.SX
+    entries: SX
+
+    def unknown(self, count: int, f: int) -> Tested:
+        """Return the results for boxes of which nothing is known."""
 
     def examine(self, forms: Forms, f: int) -> Tested:
         """Return the results for boxes from forms of the entries in f independent coordinates, then errors."""
@@ -113,8 +119,7 @@ class Examiner:
 
     Args:
         problem: the robot.
-        test: its entries are in the coordinates of the problem, or of all machines.
-        family: all machines that are meant; None for the design alone.
+        test: its entries are in the coordinates of the problem.
 
     Attributes:
         of: the coordinates.
@@ -125,52 +130,44 @@ class Examiner:
         UncoveredError: an expression holds an operation without a rule.
     """
 
-    def __init__(self, problem: Problem, test: Test, family: ToleranceModel | None = None) -> None:
-        self.problem, self._test, self._family = problem, test, family
-        n, coordinates = int(problem.z.numel()), problem.z if family is None else family.coordinates
-        errors = list(range(n, int(coordinates.numel())))
-        self.of = Coordinates(list(problem.independent), list(problem.dependent), errors)
-        self._tolerance = 0.0 if family is None else family.tolerance
-        self._rank: RankTest | None = None
+    def __init__(self, problem: Problem, test: Test) -> None:
+        self.problem, self.loops, self._test = problem, problem.loops, test
+        self.of = Coordinates(list(problem.independent), list(problem.dependent), problem.of_errors)
         self.second: Encloser | None = None
+        self._rank: RankTest | None = None
         self._change: EntryChange | None = None
-        if isinstance(test, RankTest) and not problem.dependent and n <= MOST_VARIABLES:
-            self._use_second_order(test)
-        if self.second is None:
+        is_short = not problem.dependent and len(problem.independent) <= MOST_VARIABLES
+        # With errors, forms of second order are those of the polynomials of a matrix alone.
+        is_rank = isinstance(test, RankTest)
+        if is_short and (not problem.names or (is_rank and is_polynomial(test.entries, problem.z))):
+            self._rank = test if isinstance(test, RankTest) else None
+            self._change = EntryChange(problem, test.entries) if problem.names else None
+            exact = test.entries if self._change is None else self._change.exact
+            self.second = Encloser(problem.problem.z, exact)
+        else:
             _ = self._encloser  # refuses an operation without a rule at once
-        self._machines = None if family is None else family.loops
-        self.loops = problem.loops
 
     @cached_property
     def _encloser(self) -> Encloser:
         """Forms of first order of the equations, their derivatives by dependent coordinates, and the entries."""
-        z = self.problem.z
-        equations, coordinates = (
-            (self.problem.equations, z) if self._family is None else (self._family.equations, self._family.coordinates)
-        )
-        slopes = [ca.jacobian(equations, z)[:, k] for k in self.of.dependent]
-        own = ca.densify(ca.vertcat(ca.SX(0, 1), *slopes))
+        problem = self.problem
+        slopes = [ca.jacobian(problem.equations, problem.z)[:, k] for k in self.of.dependent]
+        own = ca.densify(ca.vertcat(SX(0, 1), *slopes))
         # A last entry that is not used, for a matrix that is constant.
-        return Encloser(coordinates, ca.vertcat(equations, own, self._test.entries, z[0]))
-
-    def _use_second_order(self, test: RankTest) -> None:
-        """Examine by forms of second order; with errors, of polynomials alone."""
-        family = self._family
-        if family is not None and not is_polynomial(test.entries, family.coordinates):
-            return
-        self._rank, self._change = test, None if family is None else EntryChange(family, test.entries)
-        self.second = Encloser(self.problem.z, test.entries if self._change is None else self._change.exact)
+        return Encloser(problem.z, ca.vertcat(problem.equations, own, self._test.entries, problem.z[0]))
 
     def examine(self, boxes: LoopBoxes) -> Examined:
         """Examine boxes."""
         B, f, k = len(boxes.lower), len(self.of.independent), len(self.of.dependent)
         relation = no_relation(B, self.of)
-        if self.second is not None and self._rank is not None and B:
-            ends = boxes.lower.T, boxes.upper.T
+        if self.second is not None and B:
+            ends = boxes.lower.T[:f], boxes.upper.T[:f]
+            if self._rank is None:
+                return Examined(boxes, relation, *self._test.examine(self.second.second(*ends), f))
             change = None if self._change is None else self._change.over(*ends)
             return Examined(boxes, relation, *self._rank.examine_second(self.second, *ends, change))
         lower, upper, near, known = some(boxes, np.arange(B))
-        tested = Tested(np.zeros(B, dtype=bool), np.zeros((B, f)), np.full(B, np.inf), np.zeros(B, dtype=np.int32))
+        tested = self._test.unknown(B, f)
         columns: tuple[NDArray[Any], ...] = (*relation, *tested)
         new = np.flatnonzero(~known)
         if new.size:
@@ -180,7 +177,7 @@ class Examiner:
             rows = np.flatnonzero(known if attempt == 0 else ~known & np.isfinite(lower).all(axis=1))
             if not rows.size:
                 continue
-            forms = self._forms(lower[rows], upper[rows])
+            forms = self._encloser(lower[rows].T, upper[rows].T)
             own = relation_of(forms.part(slice(0, k)), self.of)
             if attempt:
                 good = self._is_single(forms, own, lower[rows], upper[rows])
@@ -199,11 +196,6 @@ class Examiner:
         near = np.where(finite[:, None], near, boxes.near)
         return Examined(LoopBoxes(lower, upper, near, known), relation, *tested)
 
-    def _forms(self, lower: FloatArray, upper: FloatArray) -> Forms:
-        """Return the forms of all entries over boxes (B, n), for all machines."""
-        errors = np.full((len(lower), len(self.of.errors)), self._tolerance)
-        return self._encloser(np.hstack([lower, -errors]).T, np.hstack([upper, errors]).T)
-
     def _guess(self, rows: NDArray[np.int64], lower: FloatArray, upper: FloatArray, near: FloatArray) -> FloatArray:
         """Set ends of dependent coordinates about closed loops at the middle of boxes; return shares (rows, f)."""
         (own, D, errors), size = self.of, self.problem.size
@@ -218,11 +210,8 @@ class Examiner:
             slopes = self.loops.slopes(z.T) * size
             Y = inverses(slopes[:, :, D])
             reach = np.abs(Y @ slopes[:, :, own]) * (half / size[own])[:, None, :]
-            whole = reach.sum(axis=2)
-            if self._machines is not None:
-                # Errors move dependent coordinates too, here to first order.
-                points = np.hstack([z, np.zeros((len(z), len(errors)))])
-                whole += by_centres(Y @ self._machines.slopes(points.T)[:, :, errors] * self._tolerance)
+            # Errors move dependent coordinates too, here to first order; their sizes are their tolerances.
+            whole = reach.sum(axis=2) + by_centres(Y @ slopes[:, :, errors])
         near[rows] = z
         self._set_widths(rows, z[:, D], _WIDER * whole, lower, upper)
         shares = np.nan_to_num(reach.sum(axis=1))
@@ -270,7 +259,7 @@ class Examiner:
         place = 0.5 * np.maximum(one.lower, other.lower) + 0.5 * np.minimum(one.upper, other.upper)
         lower[:, own] = upper[:, own] = place[:, own]
         for _ in range(_CONTRACTIONS):
-            relation = relation_of(self._forms(lower, upper).part(slice(0, len(D))), self.of)
+            relation = relation_of(self._encloser(lower.T, upper.T).part(slice(0, len(D))), self.of)
             lower[:, D], upper[:, D] = _parts(lower[:, D], upper[:, D], relation.off, relation.rho + relation.of_errors)
         return np.asarray(((lower >= other.lower) & (upper <= other.upper))[:, D].all(axis=1))
 
@@ -308,3 +297,201 @@ def _parts(
         low = middle + half * np.maximum(centre - reach, -1.0) - slack
         high = middle + half * np.minimum(centre + reach, 1.0) + slack
     return np.minimum(low, high), np.maximum(low, high)
+
+
+def are_between(z: FloatArray, boxes: LoopBoxes, dependent: Sequence[int]) -> NDArray[np.bool_]:
+    """Return whether closed points (B, n) are those of boxes: others may be of another assembly of the joints."""
+    lower, upper, own = boxes.lower[:, dependent], boxes.upper[:, dependent], z[:, dependent]
+    room = _CLOSE * (upper - lower)
+    return np.asarray(((own >= lower - room) & (own <= upper + room)).all(axis=1))
+
+
+def whole_workspace(problem: Problem) -> LoopBoxes:
+    """Return the whole workspace as one box; its dependent coordinates are not known."""
+    box, free = problem.box, list(problem.free)
+    ends = np.full((2, len(problem.start)), np.nan)
+    ends[:, : len(free)] = box.lower[free], box.upper[free]
+    ends[:, problem.of_errors] = np.array([[-problem.tolerance], [problem.tolerance]])
+    ends[:, list(problem.dependent)] = np.nan
+    return LoopBoxes(ends[:1], ends[1:], problem.start[None].copy(), np.full(1, not problem.dependent))
+
+
+def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return boxes contracted to the workspace.
+
+    Returns:
+        (B,) the boxes; whether each holds poses of the workspace; whether a number of the pose that follows from others
+        is outside of its range.
+    """
+    box, free = problem.box, list(problem.free)
+    # Numbers of the pose that are not known yet may be any of the workspace.
+    lower, upper = problem.pose_of(boxes.lower), problem.pose_of(boxes.upper)
+    lower, upper = np.where(np.isnan(lower), box.lower, lower), np.where(np.isnan(upper), box.upper, upper)
+    beyond = np.asarray((lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1))
+    lower, upper, outside = box.contracted(lower, upper)
+    own = [j for j in problem.independent if j < len(free)]
+    columns = [free[j] for j in own]
+    found = boxes._replace(lower=boxes.lower.copy(), upper=boxes.upper.copy())
+    found.lower[:, own], found.upper[:, own] = lower[:, columns], upper[:, columns]
+    return found, ~(beyond | outside), beyond
+
+
+def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.intp]:
+    """Return the places (B,) of the coordinates to bisect.
+
+    Args:
+        shares: (B, f) share of each coordinate in what is missing.
+        width: (B, f) widths in parts of the whole box.
+    """
+    score = np.where(width > 0, shares, -1.0)
+    flat = ~(score > 0).any(axis=1)
+    score[flat] = width[flat]
+    # A coordinate that counts for little is divided where it is much wider than all others.
+    score += 1e-3 * score.max(axis=1, keepdims=True, initial=0.0) * width
+    return first_largest(score)
+
+
+class Followed(NamedTuple):
+    """Columns of boxes of a robot.
+
+    Attributes:
+        near, is_known: those of :class:`LoopBoxes`.
+        relation: of the dependent coordinates.
+        more: further columns (B, ...) of a rule, as a tuple.
+    """
+
+    near: FloatArray
+    is_known: NDArray[np.bool_]
+    relation: Relation
+    more: Any = ()
+
+
+class LoopRule(Rule[Followed]):
+    """Rule for boxes of a robot, in which dependent coordinates are followed.
+
+    Args:
+        problem: the robot.
+        examiner: follows the dependent coordinates, and has the test.
+        recorder: records the boxes for a proof.
+
+    Attributes:
+        whole: (n,) widths of the whole workspace along independent coordinates; 0 for others.
+    """
+
+    def __init__(self, problem: Problem, examiner: Examiner, recorder: TreeRecord | None = None) -> None:
+        self._problem, self._examiner, self._independent = problem, examiner, list(problem.independent)
+        self._recorder = recorder
+        self._start = whole_workspace(problem)
+        self.whole: FloatArray = np.zeros(len(problem.start))
+        self.whole[self._independent] = (self._start.upper - self._start.lower)[0, self._independent]
+        # The boxes in which dependent coordinates became known.
+        self._roots: list[LoopBoxes] = []
+
+    @property
+    def root(self) -> Boxes[Followed]:
+        """The whole workspace."""
+        lower, upper, near, is_known = self._start
+        columns = Followed(near, is_known, no_relation(1, self._examiner.of))
+        return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), columns)
+
+    def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
+        """Return the parts of boxes, with their dependent coordinates."""
+        if self._recorder is not None:
+            along = np.array(self._problem.free)[boxes.split]
+            self._recorder.cuts(*self._poses(boxes.lower, boxes.upper), along)
+        parts = self.parts(boxes)
+        shape = (len(parts.split) // max(len(boxes.split), 1), 1)
+        sides = 1.0 * (parts.lower > np.tile(boxes.lower, shape)) - 1.0 * (parts.upper < np.tile(boxes.upper, shape))
+        found = self._examiner.narrowed(loop_boxes_of(parts), parts.more.relation, sides[:, self._independent])
+        return parts._replace(lower=found.lower, upper=found.upper)
+
+    def parts(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
+        """Return the halves of boxes, all lower ones first."""
+        return bisected(boxes)
+
+    def examined(self, boxes: Boxes[Followed]) -> Examined:
+        """Return the results for the boxes that hold poses of the workspace."""
+        inside = self._contracted(loop_boxes_of(boxes))
+        found = self._examiner.examine(inside)
+        new = np.flatnonzero(found.boxes.is_known & ~inside.is_known)
+        if new.size:
+            self._roots.append(some(found.boxes, new))
+        return found
+
+    def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
+        """Return boxes contracted to the workspace, and record where they lead."""
+        found, kept, beyond = contracted_boxes(self._problem, boxes)
+        if self._recorder is not None:
+            before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
+            self._recorder.contractions(before, after, ~kept)
+            self._recorder.lacks_boxes |= bool(beyond.any())
+        return some(found, kept)
+
+    def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
+        box, free = self._problem.box, self._problem.free
+        low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
+        for j in self._independent:
+            if j < len(free):
+                low[:, free[j]], high[:, free[j]] = lower[:, j], upper[:, j]
+        return low, high
+
+    def boxes_of(self, found: Examined, bound: FloatArray, split: NDArray[np.intp]) -> Boxes[Followed]:
+        """Return examined boxes, with bounds (B,) and places (B,) among the independent coordinates to bisect."""
+        lower, upper, near, is_known = found.boxes
+        columns = np.array(self._independent)[split]
+        return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation))
+
+    def widths(self, found: Examined) -> FloatArray:
+        """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""
+        own, whole = self._independent, self.whole[self._independent]
+        return (found.boxes.upper - found.boxes.lower)[:, own] / np.where(whole > 0, whole, np.inf)
+
+    def is_one_assembly(self) -> bool:
+        """Return whether the boxes surely belong to one assembly."""
+        if not self._roots:
+            return True
+        roots = joined(self._roots)
+        count = len(roots.lower)
+        if count > _MANY:
+            return False
+        lower, upper = roots.lower[:, self._independent], roots.upper[:, self._independent]
+        touching = [
+            np.flatnonzero((lower[k + 1 :] <= upper[k]).all(axis=1) & (upper[k + 1 :] >= lower[k]).all(axis=1)) + k + 1
+            for k in range(count)
+        ]
+        pairs = np.stack([np.repeat(np.arange(count), [len(each) for each in touching]), np.concatenate(touching)])
+        return bool(one_assembly(self._examiner, roots, pairs.T, np.arange(count) == 0).all())
+
+
+def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:
+    """Return the boxes of a search without their bounds."""
+    return LoopBoxes(boxes.lower, boxes.upper, boxes.more.near, boxes.more.is_known)
+
+
+def one_assembly(
+    examiner: Examiner, boxes: LoopBoxes, pairs: NDArray[np.intp], is_reached: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return for each box (B,) whether its closed points surely belong to the assembly of some boxes.
+
+    Args:
+        examiner: of the robot.
+        boxes: with known dependent coordinates where they are in pairs.
+        pairs: (P, 2) boxes that touch.
+        is_reached: (B,) those boxes.
+    """
+    is_reached, tried = is_reached.copy(), np.zeros(len(pairs), dtype=bool)
+    while True:
+        # Pairs of a box that is reached and one that is not: the first of each that is left is tried.
+        which = np.flatnonzero((is_reached[pairs[:, 0]] != is_reached[pairs[:, 1]]) & ~tried)
+        if not which.size:
+            return is_reached
+        turned = is_reached[pairs[which, 1]]
+        one = np.where(turned, pairs[which, 1], pairs[which, 0])
+        new = np.where(turned, pairs[which, 0], pairs[which, 1])
+        _, order = np.unique(new, return_index=True)
+        for begin, end in itertools.pairwise([*range(0, len(order), _PAIRS), len(order)]):
+            part = order[begin:end]
+            tried[which[part]] = True
+            tied = examiner.tied(some(boxes, one[part]), some(boxes, new[part]))
+            is_reached[new[part[tied]]] = True

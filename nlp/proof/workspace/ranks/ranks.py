@@ -4,34 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .....models import FloatArray, Model, frozen_array
+from .....models import Model, frozen_array
 from ....errors import UncoveredError
 from ....interruption import one_search
-from ...boxes.rows import Boxes, joined, some
-from ...boxes.search import TOO_SMALL, Effort, Order, Search, Verdicts
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
 from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
-from ...statement.machine import Legs
+from ...statement.machine import has_straight_legs
 from ..home_poses import Homes
-from ..robot.motion_matrix import RankMatrix
 from ..robot.pose_box import PoseBox
+from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
-from ..robot.tolerance_model import ToleranceModel
-from ..verdict import Outcome, Regularity
-from .covering import APART, Followed, LoopRule, contracted_boxes, coordinates_to_split
-from .loop_boxes import Examiner, LoopBoxes
+from ..tolerance.leg_errors import of_legs
+from ..verdict import Outcome, RankVerdict
+from .loop_boxes import APART, Examined, Examiner, Followed, LoopRule, coordinates_to_split
 from .rank_rule import RankTest
-from .signs import SignRefuter
-from .singular_pose import NewtonRefuter, Refuter, Singular, singular_at
+from .singular_pose import Singular, SingularSearch
 
 if TYPE_CHECKING:
     from ...boxes.tree import TreeRecord
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024
@@ -39,20 +35,21 @@ _BLOCK = 1024
 _LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Callback with seconds, number of boxes examined, and number of boxes open.
 RankProgress = Callable[[float, int, int], None]
+#: Search for a singular pose from the boxes that were examined last, and the number of all.
+Look = Callable[[Examined, int], Singular | None]
 
 
 class Ranks(NamedTuple):
     """Verdicts on J, and on the constraint wrenches; None for a robot without them."""
 
-    regular: Regularity
-    constraints: Regularity | None
+    regular: RankVerdict
+    constraints: RankVerdict | None
 
 
 def prove_ranks(
     model: Model,
     homes: Homes,
     *,
-    legs: Legs | None = None,
     progress: RankProgress | None = None,
     paper: PaperRecord | None = None,
 ) -> Ranks:
@@ -61,80 +58,70 @@ def prove_ranks(
     Args:
         model: the robot, without unknowns that follow in closed form.
         homes: the case, its poses and the machines that are meant.
-        legs: joint centres of six straight legs; None for another robot.
         progress: called during them.
         paper: records the searches for a proof.
     """
+    found = []
     try:
-        family = None if homes.machines is None else homes.machines.family
-        problem = build_problem(homes.case, model, homes.box) if family is None else family.problem
-        found = []
+        problem = build_problem(homes.case, model, homes.box) if homes.machines is None else homes.machines.family
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is None:
                 continue
-            recorder = None if paper is None else paper.own(name)
-            is_shown = partial(_is_shown, problem, family, homes, constraints=name == CONSTRAINTS)
-            newton = partial(NewtonRefuter, problem, matrix, None if legs else family, is_shown)
-            refuter = newton() if legs is None else SignRefuter(legs, problem)
-            verdict = prove_rank(problem, matrix, family=family, progress=progress, recorder=recorder, refuter=refuter)
+
+            def is_shown(at: Singular, *, constraints: bool = name == CONSTRAINTS) -> bool:
+                return homes.is_singular(at.y, at.centres, constraints=constraints)
+
+            recorder, search = None if paper is None else paper.own(name), SingularSearch(problem, matrix, is_shown)
+            verdict = prove_rank(problem, matrix, progress=progress, recorder=recorder, look=search.look)
             if name == REGULAR and verdict.outcome is Outcome.OPEN and not problem.dependent:
-                at = newton().from_random()
-                if at is not None:
-                    verdict = replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, centres=at.centres)
+                verdict = _refuted(verdict, search.from_random())
+            if verdict.centres is not None and has_straight_legs(homes.case.model):
+                verdict = replace(verdict, errors=of_legs(verdict.centres), centres=None)
             found.append(verdict)
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(homes.box, str(error)), None)
     return Ranks(found[0], found[1] if len(found) > 1 else None)
 
 
-def _is_shown(
-    problem: Problem, family: ToleranceModel | None, homes: Homes, z: FloatArray, *, constraints: bool
-) -> bool:
-    """Return whether a singular point, or one of another machine, is singular in home's assembly."""
-    at = singular_at(problem, family, z)
-    return homes.is_singular(at.y, at.centres, constraints=constraints)
+def _refuted(verdict: RankVerdict, at: Singular | None) -> RankVerdict:
+    """Return a verdict that a singular pose refutes; the same without one."""
+    if at is None:
+        return verdict
+    return replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, sides=at.sides, centres=at.centres)
 
 
-def not_judged(box: PoseBox, reason: str) -> Regularity:
+def not_judged(box: PoseBox, reason: str) -> RankVerdict:
     """Return the verdict on a robot that no search covers."""
-    return Regularity(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
+    return RankVerdict(Outcome.OPEN, box, None, None, "none", 0, 1, 1.0, 0.0, reason)
 
 
 def prove_rank(
     problem: Problem,
     matrix: RankMatrix,
     *,
-    family: ToleranceModel | None = None,
     time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
-    refuter: Refuter | None = None,
-) -> Regularity:
+    look: Look | None = None,
+) -> RankVerdict:
     """Prove that a matrix keeps its rank at every pose of a workspace, or find a pose at which it does not.
 
     Args:
         problem: the robot.
         matrix: one of its two matrices.
-        family: all machines that are meant; None for the design alone.
         time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
         recorder: records the boxes for a proof.
-        refuter: looks for singular poses; Newton's method if left out.
+        look: looks for singular poses; a search of its own if left out.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
     effort = Effort(most_boxes)
     with one_search(time_limit):
-        rule = _RankRule(
-            problem,
-            matrix,
-            family,
-            recorder,
-            NewtonRefuter(problem, matrix, family) if refuter is None else refuter,
-        )
+        rule = _RankRule(problem, matrix, recorder, look or SingularSearch(problem, matrix).look)
         search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
 
         def ending() -> str | None:
@@ -149,41 +136,36 @@ def prove_rank(
         if progress is not None:
             effort = replace(effort, progress=lambda seconds: progress(seconds, search.boxes, search.left))
         reason = effort.run(search, ending)
-    singular, left = rule.singular, search.state.left
-    outcome, y, share = Outcome.PROVED, None, 0.0
-    if singular is not None:
-        outcome, reason, y = Outcome.REFUTED, singular.reason, singular.y
-    elif left:
-        outcome, own = Outcome.OPEN, np.flatnonzero(rule.whole > 0)
-        boxes = joined(left)
+    left, y, share = [] if rule.singular else search.state.left, None, 0.0
+    if left:
+        own, boxes = np.flatnonzero(rule.whole > 0), joined(left)
         widths = (boxes.upper - boxes.lower)[:, own] / rule.whole[own]
         share = float(widths.prod(axis=1).sum())
         widest = int(np.argmax(widths.max(axis=1, initial=0.0)))
         centre = 0.5 * boxes.lower[widest] + 0.5 * boxes.upper[widest]
         y = problem.pose_of(np.where(np.isfinite(centre), centre, boxes.more.near[widest]))
     elif reason:
-        outcome, y = Outcome.OPEN, problem.pose_of(problem.start)
-    return Regularity(
-        outcome=outcome,
+        y = problem.pose_of(problem.start)
+    verdict = RankVerdict(
+        outcome=Outcome.PROVED if y is None else Outcome.OPEN,
         box=problem.box,
         y=None if y is None else frozen_array(y, (6,)),
-        sides=None if singular is None else singular.sides,
+        sides=None,
         engine=ENGINE,
         boxes=search.boxes,
         open=search.left,
         share=share,
         seconds=effort.seconds,
-        reason="" if outcome is Outcome.PROVED else reason,
-        errors=None if singular is None else singular.errors,
-        centres=None if singular is None else singular.centres,
+        reason=reason,
     )
+    return _refuted(verdict, rule.singular)
 
 
 class _RankRule(LoopRule):
     """Rule of the rank of a matrix.
 
     Args:
-        problem, matrix, family, recorder, refuter: as in :func:`prove_rank`.
+        problem, matrix, recorder, look: as in :func:`prove_rank`.
 
     Attributes:
         singular: a singular pose; None while none is known.
@@ -191,27 +173,10 @@ class _RankRule(LoopRule):
 
     block = _BLOCK
 
-    def __init__(
-        self,
-        problem: Problem,
-        matrix: RankMatrix,
-        family: ToleranceModel | None,
-        recorder: TreeRecord | None,
-        refuter: Refuter,
-    ) -> None:
-        test = RankTest(matrix, problem.z, problem.start)
-        if family is not None:
-            test = RankTest(family.matrix(matrix), family.coordinates, family.start)
-        super().__init__(problem, Examiner(problem, test, family))
+    def __init__(self, problem: Problem, matrix: RankMatrix, recorder: TreeRecord | None, look: Look) -> None:
+        super().__init__(problem, Examiner(problem, RankTest(matrix, problem.z, problem.start)), recorder)
         self.singular: Singular | None = None
-        self._recorder, self._refuter, self._examined = recorder, refuter, 0
-
-    def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes."""
-        if self._recorder is not None:
-            along = np.array(self._problem.free)[boxes.split]
-            self._recorder.cuts(*self._ends(boxes.lower, boxes.upper), along)
-        return super().divided(boxes)
+        self._look, self._examined = look, 0
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return the boxes over which the rank is not proved to be full."""
@@ -219,25 +184,7 @@ class _RankRule(LoopRule):
         count = len(found.is_regular)
         self._examined += count
         if count:
-            self.singular = self._refuter.look(found, self._examined)
+            self.singular = self._look(found, self._examined)
         found = some(found, np.flatnonzero(~found.is_regular))
         split = coordinates_to_split(found.shares, self.widths(found))
         return Verdicts(self.boxes_of(found, np.zeros(len(split)), split), 0.0, count)
-
-    def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
-        """Return boxes contracted to the workspace, and record where they lead."""
-        found, kept, beyond = contracted_boxes(self._problem, boxes)
-        if self._recorder is not None:
-            before, after = (self._ends(each.lower, each.upper) for each in (boxes, found))
-            self._recorder.contractions(before, after, ~kept)
-            self._recorder.lacks_boxes |= bool(beyond.any())
-        return some(found, kept)
-
-    def _ends(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""
-        box, free = self._problem.box, self._problem.free
-        low, high = (np.broadcast_to(each, (len(lower), 6)).copy() for each in (box.lower, box.upper))
-        for j in self._independent:
-            if j < len(free):
-                low[:, free[j]], high[:, free[j]] = lower[:, j], upper[:, j]
-        return low, high

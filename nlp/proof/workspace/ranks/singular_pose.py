@@ -1,38 +1,55 @@
-"""A singular pose by Newton's method, from poses at which the smallest singular value is small.
+"""Singular poses: by signs of determinants, and by Newton's method from poses with a small smallest singular value.
 
 A pose is singular where ``M(z) v = 0`` for a unit vector v, with closed loops: equations in z and v, solved by Newton's
 method with steps of least squares. It converges where the determinant changes its sign, and more slowly where it
 touches 0 without a change of sign. What it finds is computed, not proved: J at the pose, with unit rows and moments
 divided by a length, has a singular value of at most 1e-10 of the largest.
 
+The workspace is convex in its coordinates: where the determinant of six rows is positive at one pose, negative at
+another, and the rows have values along the segment between the two, a pose of it is singular. With C near the inverse
+of the rows at a pose, the sign of their determinant is that of det C where ``|I - C M|`` has a spectral radius below 1.
+det C is computed in whole numbers.
+
+Of all machines within a tolerance on joint centres, one may be singular although the design is not. The smallest
+singular value is made smaller by errors of the centres, each along its derivative: the method of Frank and Wolfe [1],
+whose steps stay within the tolerance. From each machine on the way a singular one is looked for.
+
 Source: 1. M. Frank, P. Wolfe, *An algorithm for quadratic programming*, Naval Research Logistics Quarterly 3 (1956).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from .....models import FloatArray, frozen_array
-from ...statement.machine import CentreErrors, JointErrors
-from ..robot.motion_matrix import RankMatrix
-from ..robot.posed_robot import Problem
-from ..robot.tolerance_model import ToleranceModel
-from .loop_boxes import Examined, LoopBoxes
+from .....models.arrays import first_largest
+from ...enclosure.forms import Encloser
+from ...statement.machine import CentreErrors
+from ..robot.posed_model import RankMatrix
+from ..robot.posed_robot import Problem, steepest
+from .krawczyk import are_contractions, inverses
+from .loop_boxes import Examined
+from .rank_rule import RankTest
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Singular value, in parts of the largest, below which a pose counts as singular.
 SINGULAR = 1e-10
+#: How a singular pose of Newton's method is known.
+BY_NEWTON = "found singular to 1e-10 by Newton's method"
 #: Steps of Newton's method: where a determinant touches 0, each one halves the distance.
 _STEPS = 60
 #: Steps in which the smallest singular value must become smaller by a tenth: at the edge of a workspace it does not.
 _PATIENCE = 8
 #: Singular value of M, in parts of the largest, below which J is looked at.
 _NEAR = 1e-6
-#: Steps toward machines with smaller singular values.
-_MACHINES = 6
 #: Largest step of a coordinate, in parts of its size.
 _STEP = 0.25
 #: Largest residual of closed loops.
@@ -41,166 +58,26 @@ _CLOSED = 1e-9
 _DEPENDENT = 1e-12
 #: Smallest part of the platform's motion in the null vector: below, passive joints alone move.
 _MOVES = 1e-3
-
-
-#: Smallest singular value, in parts of the largest, from which Newton's method looks for a singular pose, and most
-#: attempts.
+#: Smallest singular value, in parts of the largest, from which Newton's method is tried, and most attempts.
 _SMALL, _MOST = 0.1, 24
-#: Number of boxes after which a singular machine is looked for first; later ones are twice as many each.
-_FIRST = 64
 #: Part of the value before at which it tries again.
 _SMALLER = 0.6
 #: Random poses from which Newton's method looks for a singular one, and number of the worst that are tried.
 _POSES, _TRIED, _SEED = 2048, 8, 0
-#: How a singular pose of Newton's method is known.
-BY_NEWTON = "found singular to 1e-10 by Newton's method"
-
-
-class SingularPose:
-    """Newton's method for a singular pose of one matrix of a robot, or of a machine within a tolerance.
-
-    Args:
-        problem: the robot.
-        matrix: whose rank is judged.
-        family: all machines, whose errors are further coordinates; None for the design alone.
-    """
-
-    def __init__(self, problem: Problem, matrix: RankMatrix, family: ToleranceModel | None = None) -> None:
-        self._problem, self._matrix, self._family = problem, matrix, family
-        meant = problem if family is None else family
-        self._size = meant.size
-        z = problem.z if family is None else family.coordinates
-        M = ca.densify(matrix.matrix)
-        v = ca.SX.sym("v", M.shape[1])
-        product = M @ v
-        self._values = ca.Function("values", [z], [M])
-        self._equations = ca.Function(
-            "singular", [z, v], [meant.equations, product, ca.jacobian(meant.equations, z), ca.jacobian(product, z)]
-        )
-        self._jacobian = ca.Function("J", [z], [ca.densify(meant.scaled.jacobian)])
-
-    def smallest(self, z: FloatArray) -> float:
-        """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""
-        M = self._values(z).full()
-        J = self._jacobian(z).full()
-        rank = M.shape[1] - self._matrix.nullity
-        if not (np.isfinite(M).all() and np.isfinite(J).all()) or rank < 1 or len(M) < rank:
-            return float("inf")
-        values, right = np.linalg.svd(M)[1:]
-        found = float(values[rank - 1] / values[0])
-        if not self._matrix.nullity:
-            values = np.linalg.svd(J, compute_uv=False)
-            found = float(values[5] / values[0]) if len(values) > 5 else 0.0
-        return found if float(np.abs(right[rank - 1, :6]).max()) > _MOVES else float("inf")
-
-    def search(self, z: FloatArray) -> FloatArray | None:
-        """Return a singular pose (n,) of the workspace near a point (n,); None where none is found.
-
-        Points of a family are (n + 3 m,), with the errors of a machine within the tolerance.
-        """
-        z, size = z.copy(), self._size
-        M = self._values(z).full()
-        if not np.isfinite(M).all():
-            return None
-        # The direction that M shrinks most, among those across its null space.
-        v = np.linalg.svd(M)[2][M.shape[1] - self._matrix.nullity - 1]
-        seen: list[float] = []
-        for _ in range(_STEPS):
-            _, values, right = np.linalg.svd(M)
-            rank = len(v) - self._matrix.nullity
-            seen.append(float(values[rank - 1] / values[0]) if len(values) >= rank else 0.0)
-            if seen[-1] <= _NEAR and self.is_singular(z):
-                return z
-            if len(seen) > _PATIENCE and not seen[-1] < 0.9 * seen[-1 - _PATIENCE]:
-                return None
-            parts = [each.full() for each in self._equations(z, v)]
-            if not all(np.isfinite(each).all() for each in parts):
-                return None
-            g, r, by_z, turned = parts
-            k, n, c = len(g), len(z), len(v)
-            basis = right[c - self._matrix.nullity :]
-            rows = np.zeros((k + len(r) + 1 + len(basis), n + c))
-            rows[:k, :n], rows[k : k + len(r), :n], rows[k : k + len(r), n:] = by_z * size, turned * size, M
-            rows[k + len(r), n:], rows[k + len(r) + 1 :, n:] = v, basis
-            right = np.concatenate([g.ravel(), r.ravel(), [0.5 * (v @ v - 1)], basis @ v])
-            step = np.linalg.lstsq(rows, -right, rcond=_DEPENDENT)[0]
-            step *= min(1.0, _STEP / max(float(np.abs(step[:n]).max(initial=0.0)), 1e-300))
-            z, v = self._inside(z + size * step[:n]), v + step[n:]
-            v /= np.linalg.norm(v)
-            M = self._values(z).full()
-            if not np.isfinite(M).all():
-                return None
-        return z if self.is_singular(z) else None
-
-    def slopes(self, z: FloatArray) -> FloatArray | None:
-        """Return the derivatives (n + 3 m,) of the smallest singular value at a closed point; None without any.
-
-        To first order it is ``u . M v`` with its vectors u and v; dependent coordinates follow from the others.
-        """
-        M = self._values(z).full()
-        if not np.isfinite(M).all():
-            return None
-        rank = M.shape[1] - self._matrix.nullity
-        left, _, right = np.linalg.svd(M)
-        _, _, by_z, turned = (each.full() for each in self._equations(z, right[rank - 1]))
-        found = left[:, rank - 1] @ turned
-        dependent = list(self._problem.dependent)
-        if dependent:
-            found = found - found[dependent] @ np.linalg.pinv(by_z[:, dependent]) @ by_z
-        return found if np.isfinite(found).all() else None
-
-    def is_singular(self, z: FloatArray) -> bool:
-        """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
-        problem = self._problem
-        if problem.equations.numel():
-            g = self._equations(z, np.zeros(self._matrix.matrix.shape[1]))[0].full()
-            if not float(np.abs(g).max()) <= _CLOSED:
-                return False
-        return problem.box.holds(problem.pose_of(z)) and self.smallest(z) <= SINGULAR
-
-    def _inside(self, z: FloatArray) -> FloatArray:
-        """Return a point with the numbers of its pose moved into the workspace."""
-        free = self._problem.free
-        z = z.copy()
-        z[: len(free)] = self._problem.box.clipped(self._problem.pose_of(z)[None])[0][list(free)]
-        return z if self._family is None else self._family.within(z)
-
-
-class SingularMachine:
-    """Search for a machine within a tolerance that is singular at a pose.
-
-    The smallest singular value of the design is made smaller by errors of the joint centres, each along its derivative:
-    the method of Frank and Wolfe [1], whose steps stay within the tolerance. From each machine on the way Newton's
-    method looks for a singular one, at the pose or near it.
-
-    Args:
-        family: the machines.
-        matrix: whose rank is judged, one of the two of the family.
-    """
-
-    def __init__(self, family: ToleranceModel, matrix: RankMatrix) -> None:
-        self._family, self._newton, self._loops = family, SingularPose(family.problem, matrix, family), family.loops
-
-    def search(self, z: FloatArray) -> FloatArray | None:
-        """Return the coordinates (n + 3 m,) of a singular machine and its pose, near a pose (n,); None without one."""
-        family, n = self._family, len(self._family.problem.start)
-        dependent = list(family.problem.dependent)
-        machine: FloatArray | None = family.exact(z)
-        for step in range(_MACHINES):
-            if dependent and machine is not None:
-                machine = self._loops.closed(machine, dependent)
-            slopes = None if machine is None else self._newton.slopes(machine)
-            if machine is None or slopes is None:
-                return None
-            parts = slopes[n:].reshape(-1, 3)
-            sizes = np.linalg.norm(parts, axis=1, keepdims=True)
-            unit = np.divide(parts, sizes, out=np.zeros_like(parts), where=sizes > 0)
-            machine = machine.copy()
-            machine[n:] += 2 / (step + 2) * (-family.tolerance * unit.ravel() - machine[n:])
-            found = self._newton.search(family.within(machine))
-            if found is not None:
-                return found
-        return None
+#: Steps toward machines with smaller singular values, and number of boxes after which the first ones are made; later
+#: ones after twice as many each.
+_MACHINES, _FIRST = 6, 64
+#: Random poses whose determinants are computed at once; of those with the largest ones of either sign, the number from
+#: which larger ones are looked for, and of steps; distance for derivatives, in parts of the workspace.
+_SAMPLES, _KEPT, _DESCENTS, _APART = 256, 8, 6, 1e-4
+#: Number of poses of each sign that are kept, and of points on the way between two that are tried first.
+_SIGNED, _ON_WAY = 4, 64
+#: Distances from a computed singular pose, in parts of the workspace, at which both signs are looked for.
+_DISTANCES = (1e-4, 1e-3, 1e-2, 1e-1)
+#: Halvings between two points: more than a double has digits; and largest number of parts of the way between them.
+_HALVINGS, _PARTS = 60, 1024
+#: Part of a sum of products of a row and a column by which it may be off.
+_PRODUCT = 2.0**-48
 
 
 class Singular(NamedTuple):
@@ -209,102 +86,376 @@ class Singular(NamedTuple):
     Attributes:
         y: (6,) its coordinates.
         reason: how it is known, where that is no proof; else empty.
-        sides: (2, 6) two poses at which the determinant has opposite signs, without rounding; None without them.
-        errors: of the joint centres of the machine that is singular, of six straight legs; None for the design.
-        centres: the same for another robot.
+        sides: (2, 6) two poses at which the determinant is proved to have opposite signs; None without them.
+        centres: errors of the joint centres of the machine that is singular; None for the design.
     """
 
     y: FloatArray
     reason: str = ""
     sides: FloatArray | None = None
-    errors: JointErrors | None = None
     centres: CentreErrors | None = None
 
 
-class Refuter(Protocol):
-    """Search for a singular pose."""
-
-    def look(self, found: Examined, boxes: int) -> Singular | None:
-        """Return a singular pose, or None.
-
-        Args:
-            found: the boxes that were examined last.
-            boxes: number of all that were examined.
-        """
-
-
-class NewtonRefuter:
-    """Newton's method from the boxes whose matrices are nearest to a singular one.
+class SingularPose:
+    """Newton's method for a singular point of a matrix: a pose, and errors of a machine within the tolerance.
 
     Args:
         problem: the robot.
-        matrix: whose rank is judged.
-        family: all machines that are meant; None for the design alone.
-        is_shown: whether a singular point (n,), or (n + 3 m,) of another machine, is one in home's assembly.
+        matrix: whose rank is judged, in its coordinates.
+    """
+
+    def __init__(self, problem: Problem, matrix: RankMatrix) -> None:
+        self._problem, self._rank = problem, matrix.matrix.shape[1] - matrix.nullity
+        z, M = problem.z, ca.densify(matrix.matrix)
+        v = ca.SX.sym("v", M.shape[1])
+        product = M @ v
+        self._values = ca.Function("values", [z], [M])
+        self._equations = ca.Function(
+            "singular", [z, v], [problem.equations, product, ca.jacobian(problem.equations, z), ca.jacobian(product, z)]
+        )
+        self._jacobian = ca.Function("J", [z], [ca.densify(problem.scaled.jacobian)])
+
+    def smallest(self, z: FloatArray) -> float:
+        """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""
+        M, J, rank = self._values(z).full(), self._jacobian(z).full(), self._rank
+        if not (np.isfinite(M).all() and np.isfinite(J).all()) or rank < 1 or len(M) < rank:
+            return float("inf")
+        _, values, right = np.linalg.svd(M)
+        if not float(np.abs(right[rank - 1, :6]).max()) > _MOVES:
+            return float("inf")
+        if rank == M.shape[1]:
+            values = np.linalg.svd(J, compute_uv=False)
+            return float(values[5] / values[0]) if len(values) > 5 else 0.0
+        return float(values[rank - 1] / values[0])
+
+    def search(self, z: FloatArray, moving: int | None = None) -> FloatArray | None:
+        """Return a singular point (n,) of the workspace near a point (n,); None where none is found.
+
+        Args:
+            z: the point.
+            moving: number of the first coordinates that move; all if left out.
+        """
+        z, size, rank = z.copy(), self._problem.size[:moving], self._rank
+        M, n, v = self._values(z).full(), len(size), np.zeros(0)
+        seen: list[float] = []
+        for _ in range(_STEPS):
+            if not np.isfinite(M).all():
+                return None
+            _, values, right = np.linalg.svd(M)
+            # The direction that M shrinks most, among those across its null space.
+            v = v if v.size else right[rank - 1]
+            seen.append(float(values[rank - 1] / values[0]) if len(values) >= rank else 0.0)
+            if seen[-1] <= _NEAR and self.is_singular(z):
+                return z
+            if len(seen) > _PATIENCE and not seen[-1] < 0.9 * seen[-1 - _PATIENCE]:
+                return None
+            g, r, by_z, turned = (each.full() for each in self._equations(z, v))
+            if not all(np.isfinite(each).all() for each in (g, r, by_z, turned)):
+                return None
+            basis = right[rank:]
+            rows = np.block(
+                [
+                    [by_z[:, :n] * size, np.zeros((len(g), len(v)))],
+                    [turned[:, :n] * size, M],
+                    [np.zeros((1 + len(basis), n)), np.vstack([v, basis])],
+                ]
+            )
+            residual = np.concatenate([g.ravel(), r.ravel(), [0.5 * (v @ v - 1)], basis @ v])
+            step = np.linalg.lstsq(rows, -residual, rcond=_DEPENDENT)[0]
+            step *= min(1.0, _STEP / max(float(np.abs(step[:n]).max(initial=0.0)), 1e-300))
+            z[:n] += size * step[:n]
+            z, v = self._problem.within(z), v + step[n:]
+            v /= np.linalg.norm(v)
+            M = self._values(z).full()
+        return z if np.isfinite(M).all() and self.is_singular(z) else None
+
+    def slopes(self, z: FloatArray) -> FloatArray | None:
+        """Return the derivatives (n,) of the smallest singular value at a closed point (n,); None without any.
+
+        To first order it is ``u . M v`` with its vectors u and v; dependent coordinates follow from the others.
+        """
+        M = self._values(z).full()
+        if not np.isfinite(M).all():
+            return None
+        left, _, right = np.linalg.svd(M)
+        _, _, by_z, turned = (each.full() for each in self._equations(z, right[self._rank - 1]))
+        found: FloatArray = left[:, self._rank - 1] @ turned
+        dependent = list(self._problem.dependent)
+        if dependent:
+            found -= found[dependent] @ np.linalg.pinv(by_z[:, dependent]) @ by_z
+        return found if np.isfinite(found).all() else None
+
+    def is_singular(self, z: FloatArray) -> bool:
+        """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
+        problem = self._problem
+        closed = np.abs(problem.loops.values(z[:, None])).max(initial=0.0) <= _CLOSED
+        return bool(closed) and problem.box.holds(problem.pose_of(z)) and self.smallest(z) <= SINGULAR
+
+    def machines(self, z: FloatArray) -> Iterator[FloatArray]:
+        """Yield points (n,) of machines with smaller and smaller singular values, from a point of the design."""
+        problem, machine = self._problem, z.copy()
+        errors = problem.of_errors
+        for step in range(_MACHINES):
+            closed = problem.loops.closed(machine, list(problem.dependent)) if problem.dependent else machine
+            slopes = None if closed is None else self.slopes(closed)
+            if closed is None or slopes is None:
+                return
+            machine, end = closed.copy(), steepest(-slopes[errors].reshape(-1, 3), problem.tolerance).ravel()
+            machine[errors] += 2 / (step + 2) * (end - machine[errors])
+            yield machine
+
+
+class DeterminantSigns:
+    """Signs of the determinant of six rows at points of a robot none of whose coordinates follows from others.
+
+    Args:
+        problem: the robot.
+        matrix: the rows (6, 6).
+    """
+
+    def __init__(self, problem: Problem, matrix: RankMatrix) -> None:
+        self._problem, self._matrix = problem, matrix
+        self._values = ca.Function("rows", [problem.z], [ca.densify(matrix.matrix)])
+
+    @cached_property
+    def _test(self) -> RankTest:
+        return RankTest(self._matrix, self._problem.z, self._problem.start)
+
+    @cached_property
+    def _encloser(self) -> Encloser:
+        return Encloser(self._problem.z, self._test.entries)
+
+    def computed(self, points: FloatArray) -> FloatArray:
+        """Return the determinants (K,) of unit rows at points (K, n): computed numbers, 0 where rows have no value."""
+        flat = self._values(points.T).full()
+        rows = np.nan_to_num(flat.reshape(6, len(points), 6).transpose(1, 0, 2), posinf=0.0, neginf=0.0)
+        sizes = np.linalg.norm(rows, axis=2).prod(axis=1)
+        return np.asarray(np.linalg.det(rows) / np.where(sizes > 0, sizes, 1.0))
+
+    def proved(self, z: FloatArray) -> int:
+        """Return the sign at a point (n,); 0 where it is not proved."""
+        M, _, R = self._test.matrices(self._encloser(z[:, None], z[:, None]))
+        C = inverses(M)
+        with np.errstate(all="ignore"):
+            bound = np.abs(C @ M - np.eye(6)) + np.abs(C) @ (R + _PRODUCT * np.abs(M))
+        is_known, _ = are_contractions(np.where(np.isfinite(bound), bound, np.inf))
+        return _sign_of_determinant(C[0]) if is_known[0] else 0
+
+    def change(self, one: FloatArray, other: FloatArray) -> FloatArray | None:
+        """Return a point (n,) next to where the sign changes between two points; it has the sign of the other one.
+
+        None where their signs are not proved to be opposite, or the rows to have values along the whole way.
+        """
+        values = self.computed(one + np.linspace(0, 1, _ON_WAY)[:, None] * (other - one))
+        if not (values.all() and values[0] * values[-1] < 0 and self.proved(one) * self.proved(other) < 0):
+            return None
+        waiting, parts = [(one, other)], 0
+        while waiting:
+            begin, end = waiting.pop()
+            parts += 1
+            ends = np.minimum(begin, end)[:, None], np.maximum(begin, end)[:, None]
+            if not np.isfinite(self._encloser(*ends).r).all():
+                if parts > _PARTS:
+                    return None
+                middle = 0.5 * begin + 0.5 * end
+                waiting += [(begin, middle), (middle, end)]
+        low, high, sign = 0.0, 1.0, self.proved(other)
+        for _ in range(_HALVINGS):
+            share = 0.5 * (low + high)
+            is_beyond = sign * self.computed((one + share * (other - one))[None])[0] > 0
+            low, high = (low, share) if is_beyond else (share, high)
+        # Very near to the change no sign is proved.
+        shares = np.minimum(high + 2.0 ** np.arange(-52, 1), 1.0)
+        points = (one + share * (other - one) for share in shares)
+        return next((z for z in points if self.proved(z) == sign), other)
+
+    def extremes(self) -> FloatArray:
+        """Return points (K, n) with the smallest and the largest determinants that few steps from random poses find.
+
+        The determinant changes little but linearly over a box: each step tries corners that its derivatives point to.
+        """
+        box = self._problem.box
+        width, parts = box.upper - box.lower, np.array([1.0, 0.5, 0.25])[:, None, None]
+        every = box.random(_SAMPLES, np.random.default_rng(_SEED))
+
+        def values(y: FloatArray) -> FloatArray:
+            """Return the determinants (...) at poses (..., 6)."""
+            return self.computed(self._points(y.reshape(-1, 6))).reshape(y.shape[:-1])
+
+        order = np.argsort(values(every))
+        y, sign = every[np.r_[order[:_KEPT], order[-_KEPT:]]], np.repeat([1.0, -1.0], _KEPT)
+        for _ in range(_DESCENTS):
+            # Derivatives, times the sign with which the determinant is to fall.
+            near = sign * values(y + _APART * width * np.eye(7, 6)[:, None])
+            slopes = (near[:6] - near[6]).T
+            end = np.where(slopes > 0, box.lower, box.upper)
+            if box.ball < np.inf:
+                size = np.linalg.norm(slopes[:, 3:], axis=1, keepdims=True)
+                end[:, 3:] = -slopes[:, 3:] / np.maximum(size, np.finfo(float).tiny) * np.sqrt(box.ball)
+            tried = np.concatenate([y[None], y + parts * (end - y)])
+            y = tried[np.argmin(sign * values(tried), axis=0), np.arange(len(y))]
+        return self._points(y)
+
+    def around(self, z: FloatArray) -> FloatArray:
+        """Return random points (K, n) of the design around one, at several distances."""
+        y, box = self._problem.pose_of(z), self._problem.box
+        away = np.random.default_rng(_SEED).uniform(-1, 1, (len(_DISTANCES), _SAMPLES, 6)) * (box.upper - box.lower)
+        return self._points((y + np.array(_DISTANCES)[:, None, None] * away).reshape(-1, 6))
+
+    def _points(self, y: FloatArray) -> FloatArray:
+        """Return the points (K, n) of the design at poses (K, 6) moved into the workspace."""
+        return self._problem.exact(self._problem.box.clipped(y)[:, list(self._problem.free)])
+
+
+def _sign_of_determinant(matrix: FloatArray) -> int:
+    """Return the sign of a determinant, by elimination in whole numbers (Bareiss)."""
+    ratios = [[each.as_integer_ratio() for each in row] for row in matrix.tolist()]
+    # Denominators are powers of two: the largest of a row is a multiple of the others.
+    common = [max(denominator for _, denominator in row) for row in ratios]
+    whole = [[a * (by // b) for a, b in row] for row, by in zip(ratios, common, strict=True)]
+    sign, before = 1, 1
+    for k in range(len(whole) - 1):
+        pivot = next((i for i in range(k, len(whole)) if whole[i][k]), None)
+        if pivot is None:
+            return 0
+        if pivot != k:
+            whole[k], whole[pivot], sign = whole[pivot], whole[k], -sign
+        for i in range(k + 1, len(whole)):
+            for j in range(k + 1, len(whole)):
+                whole[i][j] = (whole[i][j] * whole[k][k] - whole[i][k] * whole[k][j]) // before
+        before = whole[k][k]
+    last: int = whole[-1][-1]
+    return sign * ((last > 0) - (last < 0))
+
+
+class SingularSearch:
+    """Search for a singular pose from boxes: by signs where the matrix has six rows, else by Newton's method.
+
+    Args:
+        problem: the robot.
+        matrix: whose rank is judged, in its coordinates.
+        is_shown: whether a singular pose is one in home's assembly.
     """
 
     def __init__(
-        self,
-        problem: Problem,
-        matrix: RankMatrix,
-        family: ToleranceModel | None = None,
-        is_shown: Callable[[FloatArray], bool] = lambda _: True,
+        self, problem: Problem, matrix: RankMatrix, is_shown: Callable[[Singular], bool] = lambda _: True
     ) -> None:
-        self._problem, self._family, self._is_shown = problem, family, is_shown
-        self._newton = SingularPose(problem, matrix)
-        self._machine = None if family is None else SingularMachine(family, family.matrix(matrix))
-        self._attempts, self._last = 0, _SMALL
-        # Number of boxes from which a singular machine is looked for, although no pose of the design is near to one.
-        self._due = _FIRST
+        self._problem, self._matrix, self._is_shown = problem, matrix, is_shown
+        has_signs = matrix.matrix.shape == (6, 6) and not (matrix.nullity or problem.dependent)
+        self._signs = DeterminantSigns(problem, matrix) if has_signs else None
+        # Poses with each sign of the determinant.
+        self._signed: dict[int, list[FloatArray]] = {1: [], -1: []}
+        self._is_sampled = False
+        self._attempts, self._last, self._due = 0, _SMALL, _FIRST
+
+    @cached_property
+    def _newton(self) -> SingularPose:
+        return SingularPose(self._problem, self._matrix)
 
     def look(self, found: Examined, boxes: int) -> Singular | None:
-        """Return a singular pose from the worst of these boxes."""
-        values = np.where(found.is_regular, np.inf, found.smallest)
-        order = np.argsort(values)[:2]
-        for k in order:
-            if not values[k] < self._last or self._attempts >= _MOST:
-                break
-            self._attempts += 1
-            near = self._newton.search(self._middle(found.boxes, k))
-            shown = self._if_shown(near)
-            if shown is not None:
-                return shown
-            # A singular pose of another assembly says nothing about where one of home's is.
-            self._last = _SMALLER * float(values[k]) if near is None else self._last
-        if self._machine is None or boxes < self._due or not np.isfinite(values[order[0]]):
-            return None
+        """Return a singular pose from the boxes that were examined last, of so many; at first from random poses too."""
+        worst = np.argsort(np.where(found.is_regular, np.inf, found.smallest))[:2].tolist()
+        singular = self._by_newton(found, worst) if self._signs is None else self._by_signs(self._signs, found)
+        if singular is not None or not self._problem.names or boxes < self._due or found.is_regular.all():
+            return singular
         self._due = 2 * boxes
-        return self._if_shown(self._machine.search(self._middle(found.boxes, order[0])))
+        return self._machine(self._middle(found, worst[0]))
 
     def from_random(self) -> Singular | None:
         """Return a singular pose near random ones, from those with the smallest singular values."""
-        points = self._problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(self._problem.free)]
+        problem = self._problem
+        y = problem.box.random(_POSES, np.random.default_rng(_SEED))
+        points = problem.exact(y[:, list(problem.free)])
         values = np.array([self._newton.smallest(each) for each in points])
         worst = [points[k] for k in np.argsort(values)[:_TRIED] if np.isfinite(values[k])]
-        searches: list[Callable[[FloatArray], FloatArray | None]] = [self._newton.search]
-        if self._machine is not None:
-            searches.append(self._machine.search)
-        for search in searches:
-            for point in worst:
-                shown = self._if_shown(search(point))
-                if shown is not None:
-                    return shown
+        found = (self._pose(point) for point in worst)
+        machines = (self._machine(point) for point in worst if problem.names)
+        return next((each for each in itertools.chain(found, machines) if each is not None), None)
+
+    def _by_signs(self, signs: DeterminantSigns, found: Examined) -> Singular | None:
+        """Return a singular pose between two with opposite signs: random ones, and the centres of boxes."""
+        if self._is_sampled:
+            return self._between(signs, found.boxes.centre, found.signs)
+        self._is_sampled = True
+        points = signs.extremes()
+        values = signs.computed(points)
+        between = self._between(signs, points, values)
+        if between is not None or not self._problem.names:
+            return between
+        nearest = first_largest(1 / np.where(values, np.abs(values), np.inf))
+        return self._machine(points[nearest])
+
+    def _between(
+        self, signs: DeterminantSigns, points: FloatArray, values: FloatArray | NDArray[np.int32]
+    ) -> Singular | None:
+        """Return a singular pose between points (K, n) with computed determinants (K,), and those known before."""
+        problem = self._problem
+        for sign, known in self._signed.items():
+            new = points[np.sign(values) == sign][:_SIGNED]
+            held = [each for each in new if problem.box.holds(problem.pose_of(each))]
+            known[:] = [*held, *known][:_SIGNED]
+        for ends in itertools.product(*self._signed.values()):
+            sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
+            shown = self._shown(signs.change(*ends), "", sides)
+            if shown is not None:
+                return shown
         return None
 
-    def _if_shown(self, z: FloatArray | None) -> Singular | None:
-        """Return a singular pose if it is one in home's assembly: Newton's method may end in another one."""
-        return singular_at(self._problem, self._family, z) if z is not None and self._is_shown(z) else None
+    def _by_newton(self, found: Examined, worst: Sequence[int]) -> Singular | None:
+        """Return a singular pose from the boxes whose matrices are nearest to a singular one."""
+        for k in worst:
+            value = float(found.smallest[k])
+            if found.is_regular[k] or not value < self._last or self._attempts >= _MOST:
+                break
+            self._attempts += 1
+            near = self._newton.search(self._middle(found, k), self._count)
+            shown = self._shown(near, BY_NEWTON)
+            if shown is not None:
+                return shown
+            # A singular pose of another assembly says nothing about where one of home's is.
+            self._last = _SMALLER * value if near is None else self._last
+        return None
 
-    def _middle(self, boxes: LoopBoxes, k: np.int64) -> FloatArray:
+    def _pose(self, z: FloatArray) -> Singular | None:
+        """Return a singular pose of the design near a point, between two poses of opposite signs if there are any."""
+        near = self._newton.search(z, self._count)
+        if near is None:
+            return None
+        between = None
+        if self._signs is not None:
+            points = self._signs.around(near)
+            between = self._between(self._signs, points, self._signs.computed(points))
+        return between or self._shown(near, BY_NEWTON)
+
+    def _machine(self, z: FloatArray) -> Singular | None:
+        """Return a singular machine at a point of the design, or near it."""
+        signs, is_held = self._signs, self._problem.box.holds(self._problem.pose_of(z))
+        for machine in self._newton.machines(z):
+            if signs is None:
+                found = self._shown(self._newton.search(machine), BY_NEWTON)
+            else:
+                found = self._shown(signs.change(z, machine) if is_held else None, "")
+            if found is not None:
+                return found
+        return None
+
+    def _shown(self, z: FloatArray | None, reason: str, sides: FloatArray | None = None) -> Singular | None:
+        """Return the singular pose at a point (n,), between two others (2, 6), if it is one in home's assembly."""
+        if z is None:
+            return None
+        centres = self._problem.errors_of(z)
+        y = frozen_array(self._problem.pose_of(z), (6,))
+        found = Singular(y, reason, sides, centres if centres.vectors.any() else None)
+        return found if self._is_shown(found) else None
+
+    @property
+    def _count(self) -> int:
+        """Number of coordinates of the design."""
+        return len(self._problem.problem.start)
+
+    def _middle(self, found: Examined, k: int) -> FloatArray:
         """Return a point (n,) in the middle of a box, with closed loops or near them."""
-        z: FloatArray = boxes.near[k].copy()
+        z: FloatArray = found.boxes.near[k].copy()
         own = [*self._problem.independent, *self._problem.dependent]
-        z[own] = boxes.centre[k, own]
+        z[own] = found.boxes.centre[k, own]
         return z
-
-
-def singular_at(problem: Problem, family: ToleranceModel | None, z: FloatArray) -> Singular:
-    """Return the singular pose at a point (n,), or (n + 3 m,) of another machine."""
-    is_machine = family is not None and len(z) > len(problem.start)
-    centres = family.errors_of(z) if family is not None and is_machine else None
-    return Singular(frozen_array(problem.pose_of(z), (6,)), BY_NEWTON, centres=centres)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cached_property
+
 import casadi as ca
 import numpy as np
 from casadi import SX
@@ -26,14 +29,27 @@ class Loops:
         equations: (k, 1) expressions that are 0 where the loops are closed.
         every: all equations, those that follow from others too.
         signs: (s, 1) expressions that are positive in home's assembly.
-        size: (n,) sizes of the coordinates.
+        size: (n,) by which coordinates are comparable: of the order of their ranges.
     """
 
     def __init__(self, z: SX, equations: SX, every: SX, signs: SX, size: FloatArray) -> None:
-        self.count, self.size = int(equations.numel()), size
-        slopes = ca.jacobian(equations, z)
-        self._function = ca.Function("loops", [z], [ca.densify(equations), ca.densify(slopes)])
-        self._every = ca.Function("every", [z], [ca.densify(every), ca.densify(signs)])
+        self.z, self.equations, self.every, self.signs, self.size = z, equations, every, signs, size
+        self.count = int(equations.numel())
+
+    def some(self, which: Sequence[int]) -> Loops:
+        """Return some of the equations."""
+        return Loops(
+            self.z, ca.vertcat(SX(0, 1), *[self.equations[k] for k in which]), self.every, self.signs, self.size
+        )
+
+    @cached_property
+    def _function(self) -> ca.Function:
+        slopes = ca.jacobian(self.equations, self.z)
+        return ca.Function("loops", [self.z], [ca.densify(self.equations), ca.densify(slopes)])
+
+    @cached_property
+    def _every(self) -> ca.Function:
+        return ca.Function("every", [self.z], [ca.densify(self.every), ca.densify(self.signs)])
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the left sides (B, k) at points (n, B)."""
@@ -54,18 +70,24 @@ class Loops:
 
     def closed(self, z: FloatArray, moving: list[int]) -> FloatArray | None:
         """Return a closed point (n,) near a point, from which some coordinates move; None where there is none."""
-        z = z.copy()
         for _ in range(_STEPS):
-            residual = self.values(z[:, None])[0]
-            if not np.isfinite(residual).all():
-                return None
-            if float(np.abs(residual).max(initial=0.0)) <= _CLOSED:
+            if float(np.abs(self.values(z[:, None])).max(initial=0.0)) <= _CLOSED:
                 return z
-            slopes = (self.slopes(z[:, None])[0] * self.size)[:, moving]
-            if not np.isfinite(slopes).all():
+            moved = self.moved(z, moving, np.zeros(self.count))
+            if moved is None:
                 return None
-            z[moving] -= self.size[moving] * np.linalg.lstsq(slopes, residual, rcond=_DEPENDENT)[0]
+            z = moved
         return None
+
+    def moved(self, z: FloatArray, moving: list[int], left: FloatArray) -> FloatArray | None:
+        """Return a point (n,) after a step toward left sides (k,) of the equations; None where there is no step."""
+        residual = self.values(z[:, None])[0] - left
+        slopes = (self.slopes(z[:, None])[0] * self.size)[:, moving]
+        if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
+            return None
+        z = z.copy()
+        z[moving] -= self.size[moving] * np.linalg.lstsq(slopes, residual, rcond=_DEPENDENT)[0]
+        return z
 
     def all_closed(self, z: FloatArray, moving: list[int]) -> FloatArray:
         """Return closed points (n, B) near points, in which the same coordinates move, as many as equations.
@@ -102,27 +124,12 @@ def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | Non
         z: (n,) coordinates of the pose, then zeros.
         pose: number of the pose's coordinates. They move only where the unknowns alone do not close the loops.
     """
-    unknowns, every = list(range(pose, len(z))), list(range(len(z)))
-    for moving in [unknowns, every] if unknowns else [[], every]:
-        found = _followed(loops, z, moving)
+    unknowns, every, first = list(range(pose, len(z))), list(range(len(z))), loops.values(z[:, None])[0]
+    for moving in (unknowns, every):
+        found: FloatArray | None = z
+        for share in np.repeat(np.linspace(1, 0, _WAY + 1)[1:], 2):
+            found = None if found is None else loops.moved(found, moving, share * first)
+        found = None if found is None else loops.closed(found, moving)
         if found is not None and loops.is_closed(found):
             return found
     return None
-
-
-def _followed(loops: Loops, start: FloatArray, moving: list[int]) -> FloatArray | None:
-    """Return closed loops on the way of falling residuals; None where it ends before."""
-    z = start.copy()
-    first = loops.values(z[:, None])[0]
-    if not np.isfinite(first).all():
-        return None
-    if not moving:
-        return z if float(np.abs(first).max(initial=0.0)) <= _CLOSED else None
-    for step in range(1, _WAY + 1):
-        for _ in range(2):
-            residual = loops.values(z[:, None])[0] - first * (1 - step / _WAY)
-            slopes = (loops.slopes(z[:, None])[0] * loops.size)[:, moving]
-            if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
-                return None
-            z[moving] -= loops.size[moving] * np.linalg.lstsq(slopes, residual, rcond=_DEPENDENT)[0]
-    return loops.closed(z, moving)

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -50,14 +51,6 @@ class PoseNumbers:
     angle: float
 
 
-class Contracted(NamedTuple):
-    """Boxes (B, 6) contracted to the poses of a workspace, and whether nothing is left of each, (B,)."""
-
-    lower: FloatArray
-    upper: FloatArray
-    outside: NDArray[np.bool_]
-
-
 @dataclass(frozen=True, eq=False)
 class PoseBox:
     """A box of poses.
@@ -80,34 +73,26 @@ class PoseBox:
         """Indices of the coordinates that vary."""
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
 
+    @cached_property
+    def _inner(self) -> tuple[FloatArray, FloatArray, float]:
+        """Ends, and the largest squared size of a Cayley vector, of poses that are surely those of the workspace.
+
+        Ends of rotations are about 4 roundings outwards; the ball's square as many again.
+        """
+        sizes = np.maximum(np.abs(self.lower), np.abs(self.upper)) * np.repeat([0.0, 1.0], 3)
+        slack = np.where(self.upper > self.lower, 8 * _TANGENT * sizes, 0.0)
+        return self.lower + slack, self.upper - slack, self.ball * (1 - 16 * _TANGENT)
+
     def holds(self, y: FloatArray) -> bool:
         """Return whether a point (6,) is surely a pose of the workspace, and not only of the box rounded outwards."""
-        # Ends of rotations are about 4 roundings outwards; the ball's square as many again.
-        slack = np.array([0.0, 0.0, 0.0, *(8 * _TANGENT * np.abs(self.upper[3:]))])
-        fixed = self.upper == self.lower
-        inside = (y >= self.lower + slack) & (y <= self.upper - slack)
-        return bool((inside | (fixed & (y == self.lower))).all()) and float(y[3:] @ y[3:]) <= self.ball * (
-            1 - 16 * _TANGENT
-        )
-
-    def quaternions(self, points: FloatArray) -> FloatArray:
-        """Return quaternions (K, 4) of the rotations at points (K, 6), of any size."""
-        a, b, c = points[:, 3:].T
-        one = np.ones(len(points))
-        if self.kind is TurnKind.ANY_AXIS:
-            return np.stack([one, a, b, c], axis=1)
-        if self.kind is TurnKind.AXIS:
-            return np.concatenate([one[:, None], a[:, None] * self.axis], axis=1)
-        # The product of the quaternions of yaw, pitch and roll, in this order.
-        return np.stack([1 + a * b * c, a - b * c, b + a * c, c - a * b], axis=1)
+        lower, upper, ball = self._inner
+        return bool(((y >= lower) & (y <= upper)).all()) and float(y[3:] @ y[3:]) <= ball
 
     def rotations(self, points: FloatArray) -> FloatArray:
         """Return the rotation matrices (K, 3, 3) at points (K, 6)."""
-        whole = self.quaternions(points)
-        w, x, y, z = (whole / np.linalg.norm(whole, axis=1, keepdims=True)).T
-        zero = np.zeros_like(w)
-        cross = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-        return np.asarray(np.eye(3) + 2 * w[:, None, None] * cross + 2 * cross @ cross)
+        turn = SX.sym("turn", 3)
+        flat = ca.Function("rotation", [turn], [ca.densify(rotation_of(self, turn))])(points[:, 3:].T).full()
+        return np.asarray(flat.reshape(3, len(points), 3).transpose(1, 0, 2))
 
     def pose(self, y: FloatArray) -> PoseNumbers:
         """Return the pose at a point (6,)."""
@@ -134,11 +119,11 @@ class PoseBox:
         both = [np.tan(0.5 * np.array(each)) for each in ((roll, pitch, yaw), other)]
         return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
 
-    def contracted(self, lower: FloatArray, upper: FloatArray) -> Contracted:
-        """Return boxes (B, 6) with their ends moved to the ball of rotations."""
+    def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+        """Return boxes (B, 6) with their ends moved to the ball of rotations, and whether nothing is left, (B,)."""
         lower, upper = np.array(lower), np.array(upper)
         if not self.ball < np.inf:
-            return Contracted(lower, upper, np.zeros(len(lower), dtype=bool))
+            return lower, upper, np.zeros(len(lower), dtype=bool)
         low, high = lower[:, 3:], upper[:, 3:]
         least = np.where(low > 0, low, np.where(high < 0, -high, 0.0)) ** 2
         whole = least.sum(axis=1, keepdims=True)
@@ -146,15 +131,16 @@ class PoseBox:
         most = np.sqrt(np.maximum(self.ball - (whole - least) + slack, 0)) * (1 + _ULP)
         lower[:, 3:], upper[:, 3:] = np.maximum(low, -most), np.minimum(high, most)
         outside = (whole > self.ball + slack)[:, 0] | (lower > upper).any(axis=1)
-        return Contracted(lower, np.maximum(lower, upper), outside)
+        return lower, np.maximum(lower, upper), outside
 
     def clipped(self, points: FloatArray) -> FloatArray:
         """Return points (K, 6) moved into the workspace."""
-        points = np.clip(points, self.lower, self.upper)
-        sizes = np.sqrt((points[:, 3:] ** 2).sum(axis=1, keepdims=True))
-        # A little inside, so that rounding leaves no point outside.
-        radius = math.sqrt(self.ball) * (1 - 16 * _TANGENT)
-        if math.isfinite(radius):
+        lower, upper, ball = self._inner
+        points = np.clip(points, lower, upper)
+        if math.isfinite(ball):
+            # A little inside, so that rounding leaves no point outside.
+            radius = math.sqrt(ball) * (1 - _TANGENT)
+            sizes = np.sqrt((points[:, 3:] ** 2).sum(axis=1, keepdims=True))
             points[:, 3:] *= np.minimum(1.0, radius / np.maximum(sizes, radius))
         return np.asarray(points)
 
@@ -162,7 +148,7 @@ class PoseBox:
         """Return random points (count, 6) of the workspace, those of rotations within the ball."""
         points = rng.uniform(self.lower, self.upper, (count, 6))
         while math.isfinite(self.ball):
-            outside = np.flatnonzero((points[:, 3:] ** 2).sum(axis=1) > self.ball * (1 - 16 * _TANGENT))
+            outside = np.flatnonzero((points[:, 3:] ** 2).sum(axis=1) > self._inner[2])
             if not outside.size:
                 break
             points[outside] = rng.uniform(self.lower, self.upper, (outside.size, 6))

@@ -4,34 +4,38 @@ The coordinates z are those numbers of a :class:`~.pose_box.PoseBox` that vary, 
 that follow from others in this workspace are left out. Of the coordinates as many are *dependent* as there are
 equations: all unknowns, and numbers of the pose that a robot with fewer freedoms has no choice of.
 
-Rows that are linear in the rotation R, such as those of straight legs, are multiplied by the s of ``R = (s R) / s`` and
-so lose the division: their forms over a box are then exact but for terms of third order.
+Where every machine within a tolerance on joint centres is meant, the errors of each centre are three further
+coordinates, with the design's choice of equations and screws. They are never bisected: an expression's linear part in
+the error of a centre, a vector, changes it by at most the vector's length times the tolerance.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Model, Substitution, WrenchKind, frozen_array, jacobian
-from .....models.instance import homogenised, sizes_at
+from .....models import FloatArray, Model, frozen_array
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
-from ....case.pose import Free
+from ...statement.machine import INSIDE, CentreErrors
+from ...statement.tolerance import BuiltModel
 from .closed_loops import Loops, closed_from_home
-from .motion_matrix import Limbs, RankMatrix, free_matrix, locked_matrix
-from .pose_box import PoseBox, polynomial_rotation, rotation_of
+from .pose_box import PoseBox
+from .posed_model import Chosen, Limbs, PosedModel, RankMatrix, ScaledRows, free_matrix, posed_model
 
-#: Points of the workspace at which the equations that are needed are found, beside its middle, and the part of the
-#: workspace, about its middle, in which they lie.
-_POINTS, _SPREAD = 4, 0.5
-#: Singular values below this part of the largest are zero at the middle of the workspace.
+#: Points of the workspace at which the equations that are needed are found, beside its middle, and number of machines
+#: in which those that were left out are tested.
+_POINTS = 4
+#: Part of the workspace, about its middle, in which these points lie, and errors of the machines in parts of the
+#: robot's length.
+_SPREAD, _OFF = 0.5, 1e-2
+#: Largest residual of an equation of order 1 that follows from others.
+_CLOSED = 1e-9
+#: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
 _SEED = 0
 
@@ -40,166 +44,99 @@ class NotJudgedError(ValueError):
     """Error of a robot whose loops or limbs are singular where a search begins; the message is a clause."""
 
 
-class ScaledRows(NamedTuple):
-    """J as rows divided by their sizes, moments about the platform's origin in parts of a length.
-
-    The row of a leg times its length is a polynomial of the pose, and so nearer to a linear function than the unit row.
-
-    Attributes:
-        rows: (m, 6) rows of any size.
-        sizes: (m, 1) positive.
-    """
-
-    rows: SX
-    sizes: SX
-
-    @property
-    def jacobian(self) -> SX:
-        """J, (m, 6)."""
-        return self.rows / ca.repmat(self.sizes, 1, 6)
-
-
-@dataclass(frozen=True, eq=False)
-class PosedModel:
-    """A model as expressions of the coordinates: Substitution's numbers put in.
-
-    Attributes:
-        z: (n, 1) symbols.
-        free: indices of the pose's numbers.
-        size: (n,) of the coordinates.
-        closure: equations, of order 1.
-        every: all equations of loops, and signs that must be positive.
-        signs: (s, 1) numbers that are positive in home's assembly.
-        limbs: rows, members and actuators.
-        characteristic_length: by which couples are multiplied in J.
-        turned: the limbs with ``inverse * s R`` as the rotation.
-        inverse: (1, 1) symbol of ``1 / s``.
-        scale: (1, 1) ``s``.
-        symbols: those of the model.
-        given: expressions in their place, and those with ``inverse * s R`` as the rotation.
-    """
-
-    z: SX
-    free: tuple[int, ...]
-    size: FloatArray
-    closure: SX
-    every: SX
-    signs: SX
-    limbs: Limbs
-    characteristic_length: float
-    turned: Limbs
-    inverse: SX
-    scale: SX
-    symbols: list[SX]
-    given: tuple[list[SX], list[SX]]
-
-    def loops(self, equations: SX) -> Loops:
-        """Return some of the equations as functions of the coordinates."""
-        return Loops(self.z, equations, self.every, self.signs, self.size)
-
-    def scaled(self, length: float) -> ScaledRows:
-        """Return J with moments about the platform's origin divided by a length."""
-
-        def wrenches(limbs: Limbs) -> SX:
-            """Return rows of forces and couples, and 1 in a last column: the factor that makes them polynomials."""
-            rows = [
-                ca.horzcat(row.force.T, (row.moment - ca.cross(limbs.position, row.force)).T / length, 1)
-                for row in limbs.wrenches
-            ]
-            return ca.vertcat(SX(0, 7), *rows)
-
-        L, limbs = SX(self.characteristic_length), self.limbs
-        rows = ca.densify(self.polynomial(wrenches(limbs), wrenches(self.turned)))
-        factors = [L if row.kind is WrenchKind.COUPLE else SX(1) for row in limbs.wrenches]
-        sizes = [rows[i, 6] * ca.sqrt(row.square) / factors[i] for i, row in enumerate(limbs.wrenches)]
-        of_members = ca.horzcat(*homogenised(jacobian([], L, limbs.members), limbs.position, length))
-        ones = SX.ones(of_members.shape[0])
-        return ScaledRows(ca.vertcat(rows[:, :6], of_members), ca.vertcat(SX(0, 1), *sizes, ones))
-
-    def scaled_points(self, points: SX) -> tuple[SX, SX]:
-        """Return points (3 k, 1) in the symbols of the model as expressions of the coordinates, and these times s."""
-        function = ca.Function("points", self.symbols, [points])
-        plain, turned = (ca.horzcat(function.call(each)[0], SX.ones(points.shape[0])) for each in self.given)
-        rows = self.polynomial(plain, turned)
-        scaled = [rows[i, 0] * (self.scale if rows[i, 1].is_one() else 1) for i in range(rows.shape[0])]
-        return plain[:, 0], ca.vertcat(SX(0, 1), *scaled)
-
-    def polynomial(self, plain: SX, turned: SX) -> SX:
-        """Return a matrix whose rows that are linear in the rotation are multiplied by its scale, without a division.
-
-        Args:
-            plain: (m, c).
-            turned: the same with ``inverse * s R`` as the rotation.
-        """
-        slopes = ca.reshape(ca.jacobian(ca.densify(turned), self.inverse), *turned.shape)
-        constant = ca.substitute(turned, self.inverse, 0)
-        found = [
-            plain[i, :] if ca.depends_on(slopes[i, :], self.inverse) else constant[i, :] * self.scale + slopes[i, :]
-            for i in range(plain.shape[0])
-        ]
-        return ca.sparsify(ca.vertcat(SX(0, plain.shape[1]), *found))
-
-    def locked_rows(
-        self, columns: tuple[tuple[int, ...], ...], rows: tuple[tuple[int, ...], ...], length: float
-    ) -> RankMatrix:
-        """Return the matrix with locked actuators, rows that are linear in the rotation without a division.
-
-        Args:
-            columns: indices of the screws of each member that are kept.
-            rows: indices of the equations of the nested loops of each that are kept.
-            length: by which rotations are multiplied.
-        """
-        plain, turned = (locked_matrix(each.reduced(columns, rows, length)) for each in (self.limbs, self.turned))
-        return RankMatrix(self.polynomial(plain, turned), 0)
-
-
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A robot over a workspace.
+    """A robot over a workspace: the design, or every machine within a tolerance.
 
     Attributes:
         box: the poses.
-        z: (n,) symbols of the coordinates.
+        loops: k equations in the coordinates; errors are the last ones.
         free: indices of the pose's numbers, among the six of the box, that are the first coordinates.
-        size: (n,) by which coordinates are comparable: of the order of their ranges.
-        equations: (k, 1) that hold where the loops are closed.
-        independent, dependent: indices of the coordinates, ``n - k`` and k.
-        start: (n,) closed loops at the middle of the workspace, or near it.
+        independent, dependent: indices of the coordinates of the design, of which k are dependent.
+        start: (n,) closed loops of the design at the middle of the workspace, or near it.
         locked: rows and members with the actuators locked.
         unactuated: the same with free actuators; None for a robot without constraints.
-        scaled: J, moments divided by ``length``.
-        length: of the order of the robot's, length.
-        needed: indices of the equations among those of the model.
-        columns: indices of the screws of each member that are kept.
-        rows: indices of the equations of each member's nested loops that are kept.
+        scaled: J, moments divided by the length that is chosen.
+        chosen: what is kept of the model.
+        names: of the m joint centres whose errors are coordinates.
+        tolerance: largest size of each error, length.
+        design: the design alone, of all machines.
     """
 
     box: PoseBox
-    z: SX
+    loops: Loops
     free: tuple[int, ...]
-    size: FloatArray
-    equations: SX
     independent: tuple[int, ...]
     dependent: tuple[int, ...]
     start: FloatArray
     locked: RankMatrix
     unactuated: RankMatrix | None
     scaled: ScaledRows
-    length: float
-    needed: tuple[int, ...]
-    columns: tuple[tuple[int, ...], ...]
-    rows: tuple[tuple[int, ...], ...]
+    chosen: Chosen
+    names: tuple[str, ...] = ()
+    tolerance: float = 0.0
+    design: Problem | None = field(default=None, repr=False)
 
     @property
-    def loops(self) -> Loops:
-        """Equations as functions of the coordinates."""
-        return Loops(self.z, self.equations, self.equations, SX(0, 1), self.size)
+    def problem(self) -> Problem:
+        """The design alone."""
+        return self.design or self
+
+    @property
+    def length(self) -> float:
+        """A length of the order of the robot's."""
+        return self.chosen.length
+
+    @property
+    def z(self) -> SX:
+        """Symbols (n, 1) of the coordinates."""
+        return self.loops.z
+
+    @property
+    def size(self) -> FloatArray:
+        """Sizes (n,) by which coordinates are comparable: of the order of their ranges."""
+        return self.loops.size
+
+    @property
+    def equations(self) -> SX:
+        """Equations (k, 1) that hold where the loops are closed."""
+        return self.loops.equations
+
+    @property
+    def of_errors(self) -> list[int]:
+        """Indices of the errors among the coordinates."""
+        return list(range(len(self.start) - 3 * len(self.names), len(self.start)))
+
+    @property
+    def errors(self) -> SX:
+        """Symbols (3 m, 1) of the errors."""
+        return self.z[self.of_errors]
 
     def pose_of(self, z: FloatArray) -> FloatArray:
         """Return the six coordinates of the pose (..., 6) at points (..., n)."""
         y = np.broadcast_to(0.5 * self.box.lower + 0.5 * self.box.upper, (*z.shape[:-1], 6)).copy()
         y[..., list(self.free)] = z[..., : len(self.free)]
         return y
+
+    def exact(self, z: FloatArray) -> FloatArray:
+        """Return the coordinates (..., n) of the design at points of the design alone."""
+        return np.concatenate([z, np.zeros((*z.shape[:-1], len(self.of_errors)))], axis=-1)
+
+    def errors_of(self, z: FloatArray) -> CentreErrors:
+        """Return the errors of the machine at a point (n,)."""
+        own = z[self.of_errors].reshape(-1, 3)
+        return CentreErrors(self.names, frozen_array(own, own.shape))
+
+    def within(self, z: FloatArray) -> FloatArray:
+        """Return points (..., n) with the pose moved into the workspace, and the errors into the tolerance."""
+        z = z.copy()
+        y = self.box.clipped(self.pose_of(z).reshape(-1, 6)).reshape(*z.shape[:-1], 6)
+        z[..., : len(self.free)] = y[..., list(self.free)]
+        errors = z[..., self.of_errors].reshape(*z.shape[:-1], len(self.names), 3)
+        sizes, most = np.linalg.norm(errors, axis=-1, keepdims=True), INSIDE * self.tolerance
+        inside = errors * np.minimum(1.0, most / np.maximum(sizes, max(most, np.finfo(float).tiny)))
+        z[..., self.of_errors] = inside.reshape(*z.shape[:-1], len(self.of_errors))
+        return z
 
 
 def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
@@ -214,135 +151,96 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         NotJudgedError: no closed loops are found in the middle of the workspace, or they leave a joint free.
     """
     posed = posed_model(case, model, box)
-    count, loops = len(posed.free), posed.loops(posed.closure)
-    middle = np.concatenate([(0.5 * (box.lower + box.upper))[list(posed.free)], np.zeros(posed.z.numel() - count)])
+    loops, count = posed.loops, len(posed.free)
+    middle = np.concatenate([(0.5 * (box.lower + box.upper))[list(posed.free)], np.zeros(len(loops.size) - count)])
     start = closed_from_home(loops, middle, count)
     if start is None:
         raise NotJudgedError("the loops are not found closed, in the assembly of home, in the middle of the workspace")
     needed = _needed(loops, start, count)
-    equations = posed.closure[needed] if needed else SX(0, 1)
-    counted = posed.loops(equations)
-    dependent = _dependent(counted, start, count)
+    loops = loops.some(needed)
+    dependent = _dependent(loops, start, count)
     # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
     middle[list(dependent)] = start[list(dependent)]
-    moved = counted.all_closed(middle[:, None], list(dependent))[:, 0]
-    start = moved if counted.is_closed(moved) else start
-
-    def at_start(expression: SX) -> FloatArray:
-        """Return the values of a matrix of expressions."""
-        return np.asarray(ca.Function("start", [posed.z], [ca.densify(expression)])(start).full())
-
-    length = _length(posed.limbs, at_start) or float(np.linalg.norm(model.home)) or case.characteristic_length
-    # Screws that span the others where they are independent. Those that loops hold still are rounding alone.
-    columns = tuple(
-        tuple(range(each.rank))
-        if each.rank == each.screws.shape[1]
-        else _independent(
-            at_start(scaled_twists(each.screws, each.centre, SX(length), each.size)).T,
-            each.rank,
-            f"the passive joints of limb {each.label}",
-        )
-        for each in posed.limbs.members
-    )
-    rows = tuple(
-        _independent(at_start(each), path.loop_rank, f"the nested loops of limb {path.member}")
-        for each, path in zip(posed.limbs.loops, model.nested, strict=True)
-    )
+    moved = loops.all_closed(middle[:, None], list(dependent))[:, 0]
+    start = moved if loops.is_closed(moved) else start
+    chosen = _chosen(posed, model, start, needed, case.characteristic_length)
+    posed = posed.reduced(chosen)
     return Problem(
         box=box,
-        z=posed.z,
+        loops=posed.loops,
         free=posed.free,
-        size=posed.size,
-        equations=equations,
-        independent=tuple(k for k in range(posed.z.numel()) if k not in dependent),
+        independent=tuple(k for k in range(len(start)) if k not in dependent),
         dependent=dependent,
         start=frozen_array(start, start.shape),
-        locked=posed.locked_rows(columns, rows, length),
-        unactuated=_unactuated(model, posed.limbs.reduced(columns, rows, length), at_start),
-        scaled=posed.scaled(length),
-        length=length,
-        needed=tuple(needed),
-        columns=columns,
-        rows=rows,
+        locked=posed.locked,
+        unactuated=_unactuated(model, posed, start),
+        scaled=posed.scaled,
+        chosen=chosen,
     )
 
 
-def posed_model(case: Case, model: Model, box: PoseBox, *, z: SX | None = None, errors: SX | None = None) -> PosedModel:
-    """Return a model as expressions of the coordinates.
+def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) -> Problem:
+    """Return all machines within a tolerance on joint centres.
 
     Args:
         case: with fixed dimensions.
-        model: its robot; its parameters may be followed by errors of joint centres.
-        box: the poses.
-        z: (n, 1) symbols of the coordinates; new ones if left out.
-        errors: (3 m, 1) symbols in the place of the errors.
+        built: its robot with errors.
+        design: its robot over a workspace.
+        tolerance: largest error of each joint centre, length.
+
+    Raises:
+        NotJudgedError: the machines do not have the freedoms that the design has over the workspace.
     """
-    free = box.free
-    y = [SX(float(each)) for each in 0.5 * box.lower + 0.5 * box.upper]
-    own = [SX.sym(f"y{k}") for k in free] if z is None else ca.vertsplit(z)[: len(free)]
-    for k, symbol in zip(free, own, strict=True):
-        y[k] = symbol
-    unknowns = [SX.sym(item.name) for item in model.unknowns] if z is None else ca.vertsplit(z)[len(free) :]
-    errors = SX(0, 1) if errors is None else errors
-    position, turn = ca.vertcat(*y[:3]), ca.vertcat(*y[3:])
-    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    numbers = ca.vertcat(SX(0, 1), *values, errors)
-    given = Substitution(numbers, ca.vertcat(SX(0, 1), *unknowns), rotation_of(box, turn), position)
-    every = (*model.closure, *model.loops)
-    outputs = [
-        *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *[each.loops[:, each.passive] for each in model.nested],
-        *[each.value for each in model.signs],
-        *[each.expression for each in every],
-    ]
-    symbols = Substitution.identity(model).all
-    function = ca.Function("model", symbols, outputs)
-
-    def limbs_of(following: Iterator[SX]) -> Limbs:
-        """Return the limbs from the first outputs."""
-        rows = [
-            replace(row, force=next(following), moment=next(following), square=next(following))
-            for row in model.wrenches
-        ]
-        members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-        driven = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
-        loops = [next(following) for _ in model.nested]
-        return Limbs(rows, members, driven, loops, position, 1.0)
-
-    following = iter(function.call(given.all))
-    limbs = limbs_of(following)
-    polynomial, scale = polynomial_rotation(box, turn)
-    inverse = SX.sym("inverse")
-    turned = replace(given, rotation=inverse * polynomial)
-    signs = ca.vertcat(SX(0, 1), *[next(following) for _ in model.signs])
-    sizes = sizes_at(
-        model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), SX.ones(len(every) + len(model.unknowns))
+    errors = ca.vertcat(SX(0, 1), *[SX.sym(f"e{k}", 3) for k in range(len(built.names))])
+    whole = posed_model(case, built.model, design.box, design.z, errors)
+    posed, free = whole.reduced(design.chosen), design.unactuated
+    loops, size = posed.loops, np.concatenate([design.size, np.full(errors.numel(), tolerance)])
+    family = replace(
+        design,
+        loops=Loops(ca.vertcat(design.z, errors), loops.equations, loops.every, loops.signs, size),
+        start=np.concatenate([design.start, np.zeros(errors.numel())]),
+        locked=posed.locked,
+        unactuated=None if free is None else RankMatrix(free_matrix(posed.limbs), free.nullity),
+        scaled=posed.scaled,
+        names=built.names,
+        tolerance=tolerance,
+        design=design,
     )
-    scaled = [next(following) / sizes[k] for k in range(len(every))]
-    ranges = (0.5 * (box.upper - box.lower))[list(free)]
-    return PosedModel(
-        z=ca.vertcat(SX(0, 1), *[y[k] for k in free], *unknowns),
-        free=free,
-        size=np.concatenate([ranges, np.array(ca.DM(sizes[len(every) :, :])).ravel()]),
-        closure=ca.vertcat(SX(0, 1), *scaled[: len(model.closure)]),
-        every=ca.vertcat(SX(0, 1), *scaled),
-        signs=signs,
-        limbs=limbs,
-        characteristic_length=case.characteristic_length,
-        turned=limbs_of(iter(function.call(turned.all))),
-        inverse=inverse,
-        scale=scale,
-        symbols=symbols,
-        given=(given.all, turned.all),
-    )
+    _check_freedoms(family, whole.limbs)
+    return family
 
 
-def _needed(loops: Loops, start: FloatArray, count: int) -> list[int]:
+def _check_freedoms(family: Problem, limbs: Limbs) -> None:
+    """Refuse machines in which equations or screws that were left out do not follow from the others.
+
+    Raises:
+        NotJudgedError: they do not follow at random errors.
+    """
+    loops, own, errors = family.loops, list(family.independent), family.of_errors
+    members = [each for each in limbs.members if each.rank < each.screws.shape[1]]
+    columns = [scaled_twists(each.screws, each.centre, SX(family.length), each.size) for each in members]
+    function = ca.Function("every", [family.z], [ca.densify(each) for each in (loops.every, *columns)])
+    rng = np.random.default_rng(_SEED)
+    for _ in range(_POINTS):
+        # At home every machine closes, whatever its errors.
+        z = family.start.copy()
+        z[own] += _SPREAD * family.size[own] * rng.uniform(-1, 1, len(own))
+        z[errors] = _OFF * family.length * rng.uniform(-1, 1, len(errors))
+        found = loops.closed(z, list(family.dependent))
+        if found is None:
+            raise NotJudgedError("the loops do not close with errors of joint centres in the middle of the workspace")
+        every, *screws = (np.array(each) for each in function.call([ca.DM(found)]))
+        if float(np.abs(every).max(initial=0.0)) > _CLOSED:
+            fault = "with errors of joint centres the robot does not have the poses of the workspace exactly"
+            raise NotJudgedError(f"{fault}: state ranges for the numbers of the pose that it has no choice of")
+        if any(_rank_of(values) != member.rank for member, values in zip(members, screws, strict=True)):
+            raise NotJudgedError("errors of joint centres take freedoms from the robot: its limbs change")
+
+
+def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     """Return the indices of the equations that do not follow from others in the workspace."""
     if not loops.count:
-        return []
+        return ()
     rng = np.random.default_rng(_SEED)
     slopes = [loops.slopes(start[:, None])[0] * loops.size]
     for _ in range(_POINTS):
@@ -354,8 +252,8 @@ def _needed(loops: Loops, start: FloatArray, count: int) -> list[int]:
         if found is not None and loops.is_closed(found):
             slopes.append(loops.slopes(found[:, None])[0] * loops.size)
     if not any(np.abs(each).max() > _ZERO for each in slopes):
-        return []
-    return sorted(independent_rows(slopes))
+        return ()
+    return tuple(sorted(independent_rows(slopes)))
 
 
 def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
@@ -364,8 +262,7 @@ def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     Raises:
         NotJudgedError: the equations leave an unknown free.
     """
-    n, k = len(start), loops.count
-    unknowns = list(range(count, n))
+    unknowns, k = list(range(count, len(start))), loops.count
     if k < len(unknowns):
         raise NotJudgedError("the loops leave a passive joint free")
     if not k:
@@ -380,6 +277,28 @@ def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     return (*_independent(left.T, k - len(unknowns), "the loops"), *unknowns)
 
 
+def _chosen(posed: PosedModel, model: Model, start: FloatArray, needed: tuple[int, ...], otherwise: float) -> Chosen:
+    """Return what is kept with some equations: screws that span the others where they are independent, and a length.
+
+    Screws that loops hold still are rounding alone.
+
+    Raises:
+        NotJudgedError: the screws or the nested loops of a limb are singular at the start.
+    """
+    length = _length(posed, start) or float(np.linalg.norm(model.home)) or otherwise
+    columns, rows = [], []
+    for each in posed.limbs.members:
+        kept = tuple(range(each.rank))
+        if each.rank < each.screws.shape[1]:
+            values = posed.values(scaled_twists(each.screws, each.centre, SX(length), each.size), start)
+            kept = _independent(values.T, each.rank, f"the passive joints of limb {each.label}")
+        columns.append(kept)
+    for equations, path in zip(posed.limbs.loops, model.nested, strict=True):
+        values = posed.values(equations, start)
+        rows.append(_independent(values, path.loop_rank, f"the nested loops of limb {path.member}"))
+    return Chosen(needed, columns, rows, length)
+
+
 def _independent(values: FloatArray, rank: int, what: str) -> tuple[int, ...]:
     """Return the indices of as many rows of a matrix as have its rank.
 
@@ -392,28 +311,43 @@ def _independent(values: FloatArray, rank: int, what: str) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def _length(limbs: Limbs, at_start: Callable[[SX], FloatArray]) -> float:
+def _length(posed: PosedModel, start: FloatArray) -> float:
     """Return the median arm of rows and screws about the platform's origin; 0 where they have none."""
-    p = limbs.position
-    pairs = [(ca.norm_2(r.moment - ca.cross(p, r.force)), ca.norm_2(r.force)) for r in limbs.wrenches]
-    for member in limbs.members:
-        for j in range(member.screws.shape[1]):
-            omega, v = member.screws[:3, j], member.screws[3:, j]
-            pairs.append((ca.norm_2(v + ca.cross(omega, p)), ca.norm_2(omega)))
-    values = at_start(ca.horzcat(*[ca.vertcat(*each) for each in pairs]))
+    lines = [(row.force, row.moment) for row in posed.limbs.wrenches]
+    lines += [
+        (each.screws[:3, j], each.screws[3:, j]) for each in posed.limbs.members for j in range(each.screws.shape[1])
+    ]
+    pairs = [
+        ca.vertcat(ca.norm_2(moment - ca.cross(posed.limbs.position, along)), ca.norm_2(along))
+        for along, moment in lines
+    ]
+    values = posed.values(ca.horzcat(SX(2, 0), *pairs), start)
     arms = [a / b for a, b in values.T if a > _ZERO and b > _ZERO]
     return float(np.median(arms)) if arms else 0.0
 
 
-def _unactuated(model: Model, limbs: Limbs, at_start: Callable[[SX], FloatArray]) -> RankMatrix | None:
+def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatrix | None:
     """Return rows and members with free actuators; None for a robot without constraints."""
-    if (model.generic is not None and model.generic.constraints == 0) or (not limbs.actuators and model.members):
+    generic, limbs = model.generic, posed.limbs
+    if (generic is not None and generic.constraints == 0) or (not limbs.actuators and model.members):
         return None
     matrix = free_matrix(limbs)
     if not matrix.numel():
         return None
-    values = np.linalg.svd(at_start(matrix), compute_uv=False)
-    freedoms, idle = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0])), 0
-    if model.generic is not None:
-        freedoms, idle = 6 - model.generic.constraints, model.generic.idle
+    freedoms, idle = matrix.shape[1] - _rank_of(posed.values(matrix, start)), 0
+    if generic is not None:
+        freedoms, idle = 6 - generic.constraints, generic.idle
     return RankMatrix(matrix, freedoms + idle) if 0 < freedoms < 6 else None
+
+
+def _rank_of(values: FloatArray) -> int:
+    """Return the rank of a matrix of numbers."""
+    sizes = np.linalg.svd(values, compute_uv=False)
+    return int(np.count_nonzero(sizes > _ZERO * sizes[0]))
+
+
+def steepest(slopes: FloatArray, tolerance: float) -> FloatArray:
+    """Return errors (..., 3) as large as a tolerance along derivatives by them; none along derivatives of zero."""
+    sizes = np.linalg.norm(slopes, axis=-1, keepdims=True)
+    # A sum with zero has no negative zero.
+    return np.asarray(INSIDE * tolerance * slopes / np.maximum(sizes, np.finfo(float).tiny) + 0.0)

@@ -1,8 +1,8 @@
 """Reach and limits over the boxes of a slice: each kept, or violated, at every pose of a box, or open.
 
-Reach and limits on expressions are decided by the ranges of :mod:`..numbers.loop_limits`, those on the clearance of
-legs by its bounds from below and from above. A limit on singular values is proved to be
-kept by its bound; it counts as violated where it is so at the corners and at the middle of the box, which is no proof.
+Reach and limits on expressions are decided by their ranges, those on the clearance of legs by its bounds from below and
+from above. A limit on singular values is proved to be kept by its bound; it counts as violated where it is so at the
+corners and at the middle of the box, which is no proof.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import casadi as ca
 import numpy as np
+from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import Dimension, FloatArray
@@ -20,15 +22,20 @@ from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
-from ...boxes.rows import some
+from ...enclosure.forms import Encloser
+from ...enclosure.tape import compile_tape
+from ...statement.claims import Claim
 from ...statement.machine import joint_centres
-from ..numbers.bound_search import OverPoses
+from ...statement.tolerance import BuiltModel, machine_layout
+from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
+from ..numbers.expressions import ranges
 from ..numbers.extremes import ON_LIMIT
-from ..numbers.loop_limits import LimitValues
+from ..numbers.jacobian_numbers import SingularValues
 from ..numbers.searched import Subject, questions
-from ..ranks.krawczyk import Relation
+from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
+from ..robot.pose_box import pose_coordinates
 from ..robot.posed_robot import Problem
 
 #: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
@@ -78,38 +85,60 @@ class SliceLimits:
     """
 
     def __init__(self, case: Case, closed: ClosedForm, problem: Problem) -> None:
-        self._problem, self._values = problem, LimitValues(case, closed, problem)
-        self._reaches = len(closed.reaches)
+        self._problem, self._reaches = problem, len(closed.reaches)
         exact = replace(case, joint_centre_tolerance=None)
+        uncovered = self._take(exact, closed)
         subject = Subject(exact, closed.model, problem.box, joint_centres(exact), design=problem)
         limits: dict[str, SliceLimit] = {}
-        for claim in self._values.claims:
+        for claim in self._claims:
             limit = claim.reading.from_value(claim.limit or 0.0)
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
-        uncovered = dict.fromkeys(self._values.uncovered)
-        self._others: list[_Apart | _Sampled] = []
-        for question in (each for limit in case.limits for each in questions(subject, limit)):
-            key, value, is_apart = question.key, question.limit or 0.0, question.places is not None
-            try:
-                number = question.number()
-                over = None if problem.dependent else OverPoses(number, problem)
-            except UncoveredError:
-                over = None
-            if over is None:
-                uncovered[key] = None
+        self._others: list[_Other] = []
+        for claim, make in (each for limit in case.limits for each in questions(subject, limit)):
+            number, value = make(), claim.limit or 0.0
+            if problem.dependent or not _is_covered(number):
+                uncovered[claim.key] = None
                 continue
-            limits[key] = SliceLimit(key, value, question.dimension, is_enclosed=is_apart)
-            least = value if question.sense is Sense.MIN else -value
-            if isinstance(number, Clearance):
-                self._others.append(_Apart(key, number, over, least))
-            else:
-                self._others.append(_Sampled(key, over, least))
-        places = {key: k for k, key in enumerate(limits)}
-        self._places = [places[each.key] for each in (*self._values.claims, *self._others)]
+            is_enclosed = isinstance(number, Clearance)
+            limits[claim.key] = SliceLimit(claim.key, value, claim.reading.dimension, is_enclosed=is_enclosed)
+            self._others.append(_Other(claim.key, number, value if claim.sense is Sense.MIN else -value))
+        keys = [*(each.key for each in self._claims), *(each.key for each in self._others)]
+        self._places = [list(limits).index(key) for key in keys]
         #: Keys of limits that are not decided on boxes.
         self.uncovered = tuple(uncovered)
         #: The limits, one for each key.
         self.limits = tuple(limits.values())
+
+    def _take(self, case: Case, closed: ClosedForm) -> dict[str, None]:
+        """Take the reach of limbs and the limits on expressions; return keys of those without bounds.
+
+        The numbers are those of the claims times their signs, so that all limits are largest values.
+        """
+        problem, uncovered = self._problem, dict[str, None]()
+        self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
+        built, at = BuiltModel(closed.model, (), closed.reaches), pose_coordinates(problem.box)
+        symbols = machine_layout(case, built, 0.0, at)
+        reaches, claims = symbols.claims((), with_objective=False)
+        self._claims: list[Claim] = []
+        numbers, limits = [], []
+        for claim in (each for each in claims if each.limit is not None):
+            sign, limit = 1.0 if claim.sense is Sense.MAX else -1.0, claim.limit or 0.0
+            number = sign * symbols.of(claim.expression, SX(0, 1), problem.z)
+            try:
+                compile_tape(ca.Function("number", [problem.z], [number]))
+            except UncoveredError:
+                uncovered[claim.key] = None
+                continue
+            self._claims.append(claim)
+            numbers.append(number)
+            limits.append(sign * limit + ON_LIMIT * abs(limit))
+        self._limit = np.array(limits)
+        whole = ca.vertcat(SX(0, 1), *numbers)
+        reach = [symbols.of(each.expression, SX(0, 1), problem.z) for each in reaches]
+        # A last entry that is not used, for a robot without any.
+        self._encloser = Encloser(problem.z, ca.vertcat(SX(0, 1), problem.equations, *reach, whole, problem.z[0]))
+        self._function = ca.Function("numbers", [problem.z], [ca.densify(whole)])
+        return uncovered
 
     @property
     def unknown(self) -> NDArray[np.int8]:
@@ -124,25 +153,24 @@ class SliceLimits:
             relation: of the dependent coordinates, to which it is set.
             known: (B, K) states over larger boxes.
         """
-        states, enclosed = known.copy(), self._reaches + len(self._values.claims)
+        states, enclosed, k = known.copy(), self._reaches + len(self._claims), len(self._of.dependent)
         is_open = states == LimitState.OPEN
         rows = np.flatnonzero(is_open[:, :enclosed].any(axis=1) | bool(self._problem.dependent))
         if rows.size:
-            found = self._values.enclosed(some(boxes, rows))
-            for whole, part in zip(relation, found.relation, strict=True):
+            forms = self._encloser(boxes.lower[rows].T, boxes.upper[rows].T)
+            own, r = relation_of(forms.part(slice(0, k)), self._of), self._reaches
+            for whole, part in zip(relation, own, strict=True):
                 whole[rows] = part
-            limit = self._values.limit
-            kept = np.hstack([found.reach.lower >= 0, found.numbers.upper <= limit])
-            violated = np.hstack([found.reach.upper < 0, found.numbers.lower > limit])
+            lower, upper = ranges(with_relation(forms.part(slice(k, -1)), own, self._of))
+            kept = np.hstack([lower[:, :r] >= 0, upper[:, r:] <= self._limit])
+            violated = np.hstack([upper[:, :r] < 0, lower[:, r:] > self._limit])
             states[rows, :enclosed] = np.where(
                 is_open[rows, :enclosed], _states_of(kept, violated), states[rows, :enclosed]
             )
-        for k, claim in enumerate(self._others, enclosed):
-            rows = np.flatnonzero(is_open[:, k])
+        for j, claim in enumerate(self._others, enclosed):
+            rows = np.flatnonzero(is_open[:, j])
             if rows.size:
-                states[rows, k] = claim.states(
-                    *(self._problem.pose_of(each[rows]) for each in (boxes.lower, boxes.upper))
-                )
+                states[rows, j] = claim.states(boxes.lower[rows], boxes.upper[rows])
         return states
 
     def reached(self, states: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -158,9 +186,10 @@ class SliceLimits:
 
     def violated(self, z: FloatArray) -> NDArray[np.bool_]:
         """Return whether each limit is violated at points (P, n) with closed loops: (M, P); not where it is NaN."""
-        found, y = np.zeros((len(self.limits), len(z)), dtype=np.bool_), self._problem.pose_of(z)
+        found = np.zeros((len(self.limits), len(z)), dtype=np.bool_)
         with np.errstate(all="ignore"):
-            claims = [*(self._values.values(z) > self._values.limit[:, None]), *(e.violated(y) for e in self._others)]
+            numbers = self._function(z.T).full().reshape(len(self._claims), len(z))
+            claims = [*(numbers > self._limit[:, None]), *(each.violated(z) for each in self._others)]
         for place, claim in zip(self._places, claims, strict=True):
             found[place] |= claim
         return found
@@ -171,31 +200,29 @@ def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[
     return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
 
 
-class _Apart:
-    """The clearance of a pair of legs."""
-
-    def __init__(self, key: str, pair: Clearance, over: OverPoses, limit: float) -> None:
-        self.key, self._pair, self._over, self._limit = key, pair, over, limit - ON_LIMIT * abs(limit)
-
-    def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
-        """Return the states (B,) over boxes (B, 6)."""
-        kept = self._over.bounds(lower, upper).lower >= self._limit
-        return _states_of(kept, self._pair.most(self._over.forms(lower, upper)) < self._limit)
-
-    def violated(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return whether it is violated at points (P, 6): (P,)."""
-        return np.asarray(self._over.values(points) < self._limit)
+def _is_covered(number: Number) -> bool:
+    """Return whether a number has no operation without a rule."""
+    try:
+        _ = number.examiner
+    except UncoveredError:
+        return False
+    return True
 
 
-class _Sampled:
-    """A function that is bounded from below only; violated where it is so at the corners and the middle of a box."""
+class _Other:
+    """A limit on a number with bounds of its own, and no dependent coordinates."""
 
-    def __init__(self, key: str, oracle: OverPoses, limit: float) -> None:
-        self.key, self._oracle, self._limit = key, oracle, limit - ON_LIMIT * abs(limit)
+    def __init__(self, key: str, number: SingularValues | Clearance, limit: float) -> None:
+        self.key, self._number, self._limit = key, number, limit - ON_LIMIT * abs(limit)
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
-        """Return the states (B,) over boxes (B, 6)."""
-        kept = self._oracle.bounds(lower, upper).lower >= self._limit
+        """Return the states (B,) over boxes (B, n).
+
+        A number that is bounded from below only is violated where it is so at the corners and the middle of a box.
+        """
+        kept = self._number.bounds(lower, upper)[:, 0] >= self._limit
+        if isinstance(self._number, Clearance):
+            return _states_of(kept, self._number.most(lower, upper) < self._limit)
         free = np.flatnonzero((upper > lower).any(axis=0))
         violated = self.violated(0.5 * lower + 0.5 * upper)
         for sides in itertools.product((False, True), repeat=len(free)):
@@ -206,8 +233,8 @@ class _Sampled:
         return _states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return whether it is violated at points (P, 6): (P,)."""
-        return np.asarray(self._oracle.values(points) < self._limit)
+        """Return whether it is violated at points (P, n): (P,)."""
+        return np.asarray(self._number.values(points)[:, 0] < self._limit)
 
 
 class FirstViolated:

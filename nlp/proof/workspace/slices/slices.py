@@ -22,13 +22,10 @@ from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind
 from ....errors import CaseError, UncoveredError
-from ...boxes.rows import Boxes, bisected, joined, some
-from ...boxes.search import Order, Search, Verdicts
+from ...boxes.search import Boxes, Order, Search, Verdicts, bisected, joined, some
 from ...statement.machine import workspace_of_case
-from ..ranks.covering import Followed, LoopRule, loop_boxes_of, one_assembly
-from ..ranks.entry_change import is_polynomial
-from ..ranks.loop_boxes import Examiner, LoopBoxes
-from ..ranks.rank_rule import RankTest
+from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
+from ..ranks.rank_rule import RankTest, is_polynomial
 from ..robot.pose_box import PoseBox, pose_box, scaled
 from ..robot.posed_robot import NotJudgedError, build_problem
 from ..scale import largest_factor

@@ -15,8 +15,9 @@ import math
 import numpy as np
 
 from .....models import FloatArray
-from ...statement.machine import INSIDE, LEGS, CentreErrors, JointErrors, Legs
+from ...statement.machine import LEGS, CentreErrors, JointErrors, Legs
 from ..robot.pose_box import PoseBox, PoseNumbers
+from ..robot.posed_robot import steepest
 
 #: Part of itself by which the bound moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
@@ -35,11 +36,7 @@ def spans(legs: Legs, pose: PoseNumbers) -> FloatArray:
 
 def along(legs: Legs, rotation: FloatArray, base: FloatArray, platform: FloatArray) -> JointErrors:
     """Return errors as large as the tolerance along vectors (6, 3) in the world frame, none for a vector of zero."""
-    base, platform = (
-        legs.tolerance * INSIDE * each / np.maximum(np.linalg.norm(each, axis=1, keepdims=True), np.finfo(float).tiny)
-        for each in (base, platform)
-    )
-    return JointErrors(base, platform @ rotation)
+    return JointErrors(steepest(base, legs.tolerance), steepest(platform @ rotation, legs.tolerance))
 
 
 def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
@@ -95,10 +92,7 @@ def worst_rows(
         across = (q - n * (q * n).sum(axis=2, keepdims=True)) / l
         base -= share * across
         platform += share * (across + np.cross(n, moment) / length)
-    base, platform = (
-        legs.tolerance * INSIDE * each / np.maximum(np.linalg.norm(each, axis=2, keepdims=True), np.finfo(float).tiny)
-        for each in (base, platform)
-    )
+    base, platform = (steepest(each, legs.tolerance) for each in (base, platform))
     moved = arm + platform
     d = points[:, None, :3] + moved - legs.base - base
     return np.concatenate([d, np.cross(moved, d)], axis=2), base, np.einsum("kji,klj->kli", turn, platform)

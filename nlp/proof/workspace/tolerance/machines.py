@@ -1,4 +1,4 @@
-"""All claims about every machine within a tolerance of joint centres, for any robot.
+"""Claims about every machine within a tolerance of joint centres, for any robot.
 
 With the derivatives g_j by the error of centre j, a number g of a machine within the tolerance t is at most
 
@@ -12,26 +12,26 @@ follow from others, or a number has kinks, boxes of poses are searched for all m
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray, Model
 from .....models.joints import RobotError
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
-from ....case.limits.constraint import Reading
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
+from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
-from ...statement.machine import INSIDE, CentreErrors
+from ...statement.machine import CentreErrors, has_straight_legs
 from ...statement.tolerance import (
     BuiltModel,
     MachineLayout,
@@ -41,58 +41,138 @@ from ...statement.tolerance import (
     machine_layout,
     second_order_name,
 )
-from ..numbers.bound_search import Minimum
-from ..numbers.extremes import CLOSE, Extreme, prove_extreme, slack_of
+from ..numbers.bound_search import Minimum, smallest_values
+from ..numbers.expressions import Expressions
+from ..numbers.extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
 from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
-from ..robot.posed_robot import NotJudgedError, build_problem
-from ..robot.tolerance_model import ToleranceModel, family_of
-from ..verdict import Outcome
-from .machine_number import smallest_of_machines
+from ..robot.posed_robot import NotJudgedError, Problem, build_problem, family_of
+from .leg_errors import of_legs
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
-    from ..proof_record import PaperRecord
+    from ..proof_writer import PaperRecord
 
-#: Reason for numbers of a robot that does not have all poses.
-_OUT_OF_REACH = "not every machine within the tolerance is proved to reach every pose"
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
 #: Poses from whose first-order changes the size is taken beside which terms of second order are small.
-_POSES = 32
-_SEED = 0
-
-
-class Proving(NamedTuple):
-    """How claims are proved: gap, threads, a function of the progress, and the record for a proof on paper."""
-
-    gap: float
-    jobs: int | None
-    progress: Callable[[str, int, int], None] | None = None
-    paper: PaperRecord | None = None
+_POSES, _SEED = 32, 0
 
 
 class Machines:
-    """Every machine within a tolerance.
+    """Every machine within a tolerance; the design alone without one.
 
     Args:
         case: with fixed dimensions.
-        model: its robot, without unknowns in closed form.
+        closed: its robot without unknowns in closed form.
+        box: the poses.
+
+    Attributes:
         built: the robot with errors of its joint centres.
         family: the machines over the workspace.
+        symbols: the machines as symbols of one pose and of errors.
+
+    Raises:
+        NotJudgedError: the machines are not known, or do not have the freedoms of the design.
     """
 
-    def __init__(self, case: Case, model: Model, built: BuiltModel, family: ToleranceModel) -> None:
-        self.case, self.model, self.built, self.family = case, model, built, family
-        self._at = pose_coordinates(family.problem.box)
-        self.symbols: MachineLayout = machine_layout(case, built, family.tolerance, self._at)
+    def __init__(self, case: Case, closed: ClosedForm, box: PoseBox) -> None:
+        self._case, self._model, self._at = case, closed.model, pose_coordinates(box)
+        tolerance = case.joint_centre_tolerance or 0.0
+        try:
+            self.built = built_model(case.model) if tolerance else BuiltModel(closed.model, (), closed.reaches)
+        except RobotError as error:
+            raise NotJudgedError(str(error)) from None
+        self.family: Problem = family_of(case, self.built, build_problem(case, closed.model, box), tolerance)
+        self.symbols: MachineLayout = machine_layout(case, self.built, tolerance, self._at)
         self._rests: dict[tuple[str, str], float] = {}
 
     @cached_property
-    def design(self) -> Layout:
+    def _design(self) -> Layout:
         """The design as symbols of the pose."""
-        return design_layout(self.case, self.model, self._at)
+        return design_layout(self._case, self._model, self._at)
 
-    def rest(self, claim: Claim, number: SX, single: _Machine) -> float:
+    def extreme(
+        self, claim: Claim, *, gap: float = GAP, jobs: int | None = None, paper: PaperRecord | None = None
+    ) -> Extreme:
+        """Prove the smallest or the largest value of a number over all machines and poses.
+
+        Args:
+            claim: the number, in the symbols of machines.
+            gap: allowed distance of the bound from the best value known, as a part of it.
+            jobs: threads.
+            paper: records the search for a proof.
+        """
+        if is_requested():
+            return extreme_of(claim, Minimum(reason=why_stopped()))
+        number, found = self.number(claim), None
+        try:
+            if not self.family.problem.dependent and is_smooth(number):
+                found = self._by_first_order(claim, number, gap, jobs, paper)
+            found = found or next(self._by_search([claim], gap))
+        except UncoveredError as error:
+            return extreme_of(claim, Minimum(reason=str(error)))
+        if found.centres is None or not has_straight_legs(self._case.model):
+            return found
+        return replace(found, errors=of_legs(found.centres), centres=None)
+
+    def followed(self, claims: Sequence[Claim], *, gap: float) -> Iterator[Extreme]:
+        """Yield the extremes of those limits that have rules, by one search in which bounds within limits are enough.
+
+        Args:
+            claims: the limits, in the symbols of machines.
+            gap: allowed distance of the bound from a value beyond its limit, as a part of it.
+        """
+        covered = [claim for claim in claims if self._is_covered(claim)]
+        if covered:
+            with suppress(UncoveredError):  # an equation of loops
+                yield from self._by_search(covered, gap, is_enough=True)
+
+    def _is_covered(self, claim: Claim) -> bool:
+        """Return whether a number has no operation without a rule."""
+        try:
+            compile_tape(ca.Function("number", [self.family.z], [self.number(claim)]))
+        except UncoveredError:
+            return False
+        return True
+
+    def number(self, claim: Claim) -> SX:
+        """Return a number in the coordinates of machines, times -1 where the largest value is meant."""
+        return -_sign(claim) * self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
+
+    def _by_first_order(
+        self, claim: Claim, number: SX, gap: float, jobs: int | None, paper: PaperRecord | None
+    ) -> Extreme | None:
+        """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
+
+        Raises:
+            UncoveredError: the expression holds an operation without a rule.
+        """
+        family, symbols, design, sign = self.family, self.symbols, self._design, _sign(claim)
+        whole, machine = claim.expression, None
+        if any(ca.which_depends(number, family.errors, 1, True)):
+            values = Expressions(family, number)
+            rest = self._rest(claim, number, values)
+            if not math.isfinite(rest):
+                return None
+            gradient = ca.densify(ca.gradient(whole, symbols.errors))
+            sizes = enumerate(symbols.near_zero(whole, design).tolist())
+            change = sum((ca.norm_2(ca.vertcat(gradient[3 * j : 3 * j + 3], size)) for j, size in sizes), SX(0))
+            whole += sign * (family.tolerance * change * _OUTWARDS + rest)
+            machine = partial(self._worst, values, sign)
+            if paper is not None:
+                paper.rests[second_order_name(claim.name), claim.sense.value] = rest
+        pose = design.table.variables_vector
+        own = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
+        return prove_extreme(design, own, gap=gap, jobs=jobs, machine=machine, paper=paper)
+
+    def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[CentreErrors, float]:
+        """Return the errors that are worst at a pose to first order, and the number with them."""
+        problem = self.family.problem
+        z = self.family.exact(problem.box.coordinates(pose)[list(problem.free)])[None]
+        z = values.worst(z, values.slopes(z, np.zeros(1, dtype=np.intp)))
+        return self.family.errors_of(z[0]), -sign * float(values.values(z)[0, 0])
+
+    def _rest(self, claim: Claim, number: SX, values: Expressions) -> float:
         """Return a bound of the terms of second order of a claim's number, the same for both senses; or infinite.
 
         Raises:
@@ -101,235 +181,33 @@ class Machines:
         family, key = self.family, (claim.name, claim.key.rpartition(".")[0])
         if key not in self._rests:
             poses = family.problem.box.random(_POSES, np.random.default_rng(_SEED))[:, list(family.problem.free)]
-            first = max((single.first_order_change(z) for z in poses), default=0.0)
+            z = np.array([family.exact(each) for each in poses])
+            slopes = values.slopes(z, np.zeros(_POSES, dtype=np.intp))[:, poses.shape[1] :].reshape(_POSES, -1, 3)
+            first = family.tolerance * float(np.nan_to_num(np.linalg.norm(slopes, axis=2)).sum(axis=1).max())
             self._rests[key] = second_order_change(family, number, first)
         return self._rests[key]
 
-    def number(self, expression: SX) -> SX:
-        """Return an expression of the symbols of machines in the coordinates of their family."""
-        return self.symbols.of(expression, self.family.errors, self.family.problem.z)
+    def _by_search(self, claims: Sequence[Claim], gap: float, *, is_enough: bool = False) -> Iterator[Extreme]:
+        """Yield the extremes of numbers by one search of boxes of poses for all machines.
+
+        Args:
+            claims: the numbers, in the symbols of machines.
+            gap: as a part of a number.
+            is_enough: whether bounds within limits are enough whatever the gap is.
+
+        Raises:
+            UncoveredError: an expression holds an operation without a rule.
+        """
+        problem = self.family.problem
+        goals = [goal_of(claim, part=gap, is_enough=is_enough) for claim in claims]
+        every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals)
+        for claim, found in zip(claims, every, strict=True):
+            is_known = math.isfinite(found.value)
+            pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
+            centres = self.family.errors_of(found.at) if is_known and self.family.names else None
+            yield extreme_of(claim, found, pose, centres=centres)
 
 
-def machines_of(case: Case, model: Model, box: PoseBox) -> Machines:
-    """Return every machine within the tolerance of a case.
-
-    Args:
-        case: with fixed dimensions and a tolerance.
-        model: its robot, without unknowns in closed form.
-        box: the poses.
-
-    Raises:
-        NotJudgedError: the machines are not known, or do not have the freedoms of the design.
-    """
-    try:
-        built = built_model(case.model)
-    except RobotError as error:
-        raise NotJudgedError(str(error)) from None
-    problem = build_problem(case, model, box)
-    return Machines(case, model, built, family_of(case, built, problem, case.joint_centre_tolerance or 0.0))
-
-
-def machine_extremes(
-    machines: Machines,
-    quantities: Sequence[str],
-    proving: Proving,
-    *,
-    with_objective: bool,
-    only: Sequence[str] | None = None,
-) -> Iterator[Extreme]:
-    """Yield the extremes over all machines: of the reach of limbs, limits, lengths of legs, measures and tasks.
-
-    Args:
-        machines: the machines.
-        quantities: names of measures.
-        proving: how they are proved.
-        with_objective: whether F of each task is bounded.
-        only: names of the numbers that are meant; None for all.
-
-    Raises:
-        InputError: the robot has no measure of a name.
-    """
-    reaches, claims = machines.symbols.claims(quantities, with_objective=with_objective)
-    if only is not None:
-        reaches, claims = ([each for each in some if each.name in only] for some in (reaches, claims))
-    reached = True
-    for done, claim in enumerate([*reaches, *claims]):
-        if proving.progress is not None:
-            proving.progress(claim.name, done, len(reaches) + len(claims))
-        if done >= len(reaches) and not reached:
-            yield not_bounded(claim, _OUT_OF_REACH)
-            continue
-        found = machine_extreme(machines, claim, proving)
-        reached = reached and (done >= len(reaches) or found.outcome is Outcome.PROVED)
-        yield found
-
-
-def shown_extremes(
-    case: Case, closed: ClosedForm, box: PoseBox, quantities: Sequence[str], proving: Proving, *, with_objective: bool
-) -> Iterator[Extreme]:
-    """Yield the extremes of numbers without a limit of a design with loops, in the assembly of home.
-
-    Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is singular.
-    The design is searched as the only machine within a tolerance of nothing. None is yielded of a robot without loops,
-    or one whose loops cannot be followed.
-
-    Args:
-        case: with fixed dimensions.
-        closed: its robot without unknowns in closed form.
-        box: the poses.
-        quantities: names of measures.
-        proving: how they are proved.
-        with_objective: whether F of each task is bounded.
-
-    Raises:
-        InputError: the robot has no measure of a name.
-    """
-    if not closed.model.unknowns:
-        return
-    built = BuiltModel(closed.model, (), closed.reaches)
-    try:
-        family = family_of(case, built, build_problem(case, closed.model, box), 0.0)
-    except NotJudgedError:
-        return
-    machines = Machines(case, closed.model, built, family)
-    for claim in machines.symbols.claims(quantities, with_objective=with_objective)[1]:
-        if claim.limit is None:
-            yield machine_extreme(machines, claim, proving)
-
-
-def not_bounded(claim: Claim, reason: str) -> Extreme:
-    """Return the extreme of a claim of which nothing is proved."""
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    limit = None if claim.limit is None else claim.reading.from_value(claim.limit)
-    nothing = (sign * math.inf, math.nan, None, Outcome.OPEN, 0, 0.0, reason)
-    return Extreme(claim.name, claim.sense, claim.reading.dimension, claim.key, limit, *nothing)
-
-
-def machine_extreme(machines: Machines, claim: Claim, proving: Proving, *, again: bool = False) -> Extreme:
-    """Return the extreme of one number over all machines.
-
-    Args:
-        machines: the machines.
-        claim: the number, in their symbols.
-        proving: how it is proved.
-        again: whether the record takes the place of an earlier one of the same number.
-    """
-    if is_requested():
-        return not_bounded(claim, why_stopped())
-    number = machines.number(claim.expression)
-    try:
-        if not machines.family.problem.dependent and is_smooth(number):
-            found = _by_first_order(machines, claim, number, proving, again=again)
-            if found is not None:
-                return found
-        return _by_search(machines, claim, number, proving)
-    except UncoveredError as error:
-        return not_bounded(claim, str(error))
-
-
-def _by_first_order(machines: Machines, claim: Claim, number: SX, proving: Proving, *, again: bool) -> Extreme | None:
-    """Return the extreme of a number and its change as an expression of the pose; None where it is not bounded.
-
-    Raises:
-        UncoveredError: the expression holds an operation without a rule.
-    """
-    family, pose = machines.family, machines.design.table.variables_vector
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    machine, whole, symbols = None, claim.expression, machines.symbols
-    if any(ca.which_depends(number, family.errors, 1, True)):
-        single = _Machine(family, number, claim.reading, sign)
-        rest = machines.rest(claim, number, single)
-        if not math.isfinite(rest):
-            return None
-        gradient = ca.densify(ca.gradient(whole, symbols.errors))
-        sizes = enumerate(symbols.near_zero(whole, machines.design).tolist())
-        change = sum((ca.norm_2(ca.vertcat(gradient[3 * j : 3 * j + 3], size)) for j, size in sizes), SX(0))
-        whole, machine = whole + sign * (family.tolerance * change * _OUTWARDS + rest), single.worst
-        if proving.paper is not None:
-            proving.paper.rests[second_order_name(claim.name), claim.sense.value] = rest
-    own = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
-    return prove_extreme(
-        machines.design, own, gap=proving.gap, jobs=proving.jobs, machine=machine, paper=proving.paper, again=again
-    )
-
-
-class _Machine:
-    """A number of single machines.
-
-    Args:
-        family: the machines, none of whose coordinates follows from others.
-        number: (1, 1) in their coordinates, smooth.
-        reading: how it reads.
-        sign: 1 where the largest value is meant, -1 where the smallest one is.
-    """
-
-    def __init__(self, family: ToleranceModel, number: SX, reading: Reading, sign: float) -> None:
-        self._family, self._reading, self._sign = family, reading, sign
-        slopes = ca.densify(ca.gradient(number, family.errors))
-        self._function = ca.Function("number", [family.coordinates], [number, slopes])
-
-    def first_order_change(self, z: FloatArray) -> float:
-        """Return the first-order change at a pose (n,), of derivatives that are defined."""
-        slopes = self._slopes(z)
-        return self._family.tolerance * float(np.nan_to_num(np.linalg.norm(slopes, axis=1)).sum())
-
-    def worst(self, pose: PoseNumbers) -> tuple[CentreErrors, float]:
-        """Return the errors that are worst at a pose to first order, and the number, as people read it, with them."""
-        family = self._family
-        z = family.problem.box.coordinates(pose)[list(family.problem.free)]
-        slopes = self._slopes(z)
-        sizes = np.linalg.norm(slopes, axis=1, keepdims=True)
-        unit = np.divide(slopes, sizes, out=np.zeros_like(slopes), where=sizes > 0)
-        whole = np.concatenate([z, (self._sign * INSIDE * family.tolerance * unit).ravel()])
-        return family.errors_of(whole), self._reading.from_value(float(self._function(whole)[0]))
-
-    def _slopes(self, z: FloatArray) -> FloatArray:
-        """Return the derivatives (m, 3) by the errors of the design at a pose (n,)."""
-        return np.array(self._function(self._family.exact(z))[1].full().reshape(-1, 3))
-
-
-def _by_search(machines: Machines, claim: Claim, number: SX, proving: Proving) -> Extreme:
-    """Return the extreme of a number by a search of boxes of poses for all machines.
-
-    Raises:
-        UncoveredError: the expression holds an operation without a rule.
-    """
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
-    slack = 0.0 if claim.limit is None else slack_of(claim.limit)
-    limit = None if claim.limit is None else -sign * claim.limit
-    found = smallest_of_machines(machines.family, -sign * number, gap=proving.gap, limit=limit, slack=slack)
-    return _of_minimum(machines.family, claim, found, slack)
-
-
-def _of_minimum(family: ToleranceModel, claim: Claim, found: Minimum, slack: float) -> Extreme:
-    """Return the extreme of a claim from the smallest value of its number, or of the negative of it."""
-    sign, read = 1.0 if claim.sense is Sense.MAX else -1.0, claim.reading.from_value
-    is_bounded = math.isfinite(found.bound)
-    outcome, reason = (Outcome.OPEN if found.reason or not is_bounded else Outcome.PROVED), found.reason
-    if claim.limit is not None:
-        least = -sign * claim.limit
-        outcome = Outcome.OPEN
-        if found.value < least - slack:
-            outcome = Outcome.REFUTED
-        elif is_bounded and found.bound >= least - slack:
-            outcome = Outcome.PROVED
-    pose, centres = None, None
-    if math.isfinite(found.value):
-        problem = family.problem
-        pose = problem.box.pose(problem.pose_of(found.at))
-        centres = family.errors_of(found.at) if family.names else None
-    return Extreme(
-        name=claim.name,
-        sense=claim.sense,
-        dimension=claim.reading.dimension,
-        key=claim.key,
-        limit=None if claim.limit is None else read(claim.limit),
-        bound=read(-sign * found.bound) if is_bounded else sign * math.inf,
-        reached=math.nan if pose is None else read(-sign * found.value),
-        pose=pose,
-        outcome=outcome,
-        boxes=found.boxes,
-        seconds=found.seconds,
-        reason="" if outcome is not Outcome.OPEN else reason or CLOSE,
-        centres=centres,
-    )
+def _sign(claim: Claim) -> float:
+    """Return 1 where the largest value is meant, -1 where the smallest one is."""
+    return 1.0 if claim.sense is Sense.MAX else -1.0

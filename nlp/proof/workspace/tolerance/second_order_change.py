@@ -20,12 +20,10 @@ from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
-from ...boxes.rows import WHOLE, Boxes
-from ...boxes.search import Order, Rule, Search, Verdicts
+from ...boxes.search import WHOLE, Boxes, Order, Rule, Search, Verdicts, some
 from ...enclosure.forms import Encloser
-from ..ranks.covering import in_workspace, whole_workspace
-from ..ranks.loop_boxes import LoopBoxes
-from ..robot.tolerance_model import ToleranceModel
+from ..ranks.loop_boxes import LoopBoxes, contracted_boxes, whole_workspace
+from ..robot.posed_robot import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +36,7 @@ _SHARE, _NEAR = 0.02, 1.2
 _OUTWARDS = 1.02
 
 
-def second_order_change(family: ToleranceModel, expression: SX, first: float) -> float:
+def second_order_change(family: Problem, expression: SX, first: float) -> float:
     """Return a bound of the change of an expression beyond first order; infinite where none is found.
 
     Args:
@@ -51,7 +49,7 @@ def second_order_change(family: ToleranceModel, expression: SX, first: float) ->
     """
     H = ca.hessian(expression, family.errors)[0]
     groups = _groups(H, len(family.names))
-    return sum((_of_centres(family, H, each, first / len(groups)) for each in groups), 0.0)
+    return sum((_change(_ChangeRule(family, H, each), _SHARE * first / len(groups)) for each in groups), 0.0)
 
 
 def _groups(H: SX, count: int) -> list[list[int]]:
@@ -64,74 +62,66 @@ def _groups(H: SX, count: int) -> list[list[int]]:
     return [np.flatnonzero(group == each).tolist() for each in sorted(own)]
 
 
-def _of_centres(family: ToleranceModel, H: SX, centres: list[int], first: float) -> float:
-    """Return the bound for errors of some centres, whose second derivatives depend on no other errors."""
-    problem = family.problem
-    places = [3 * j + k for j in centres for k in range(3)]
-    own = ca.tril(H[places, places])
-    blocks = _Blocks(own, len(centres))
-    encloser = Encloser(
-        ca.vertcat(problem.z, family.errors[places]), ca.vertcat(*[own.nz[k] for k in range(own.nnz())])
-    )
-    rule, whole = _ChangeRule(family, encloser, blocks, len(places)), whole_workspace(problem)
-    width = (whole.upper - whole.lower)[0]
-    root = Boxes(whole.lower, whole.upper, np.array([math.inf]), np.array([WHOLE]), np.zeros(1))
-    search = Search(rule, root, whole=width, least=(0.0, 0.0), order=Order.LARGEST)
+def _change(rule: _ChangeRule, enough: float) -> float:
+    """Return a bound of the change of a rule, which is good enough at a size."""
+    lower, upper = rule.whole.lower, rule.whole.upper
+    root = Boxes(lower, upper, np.array([math.inf]), np.array([WHOLE]), np.zeros(1))
+    search = Search(rule, root, whole=(upper - lower)[0], least=(0.0, 0.0), order=Order.LARGEST)
     while search.is_open and search.boxes < _MOST:
         worst = search.state.waiting[-1][2]
         k = int(np.argmax(worst.bound))
-        if worst.bound[k] <= max(_SHARE * first, _NEAR * worst.more[k]):
+        if worst.bound[k] <= max(enough, _NEAR * worst.more[k]):
             break
         search.step(-math.inf)
     return max(search.bound, 0.0)
 
 
 class _ChangeRule(Rule[FloatArray]):
-    """Rule of the change of second order; boxes carry its value at their middles."""
+    """Rule of the change by errors of some centres; boxes carry its value at their middles.
+
+    Args:
+        family: the machines.
+        H: (3 m, 3 m) second derivatives by all errors.
+        centres: the k centres, whose second derivatives depend on no other errors.
+
+    Attributes:
+        whole: the workspace.
+    """
 
     block = _BLOCK
 
-    def __init__(self, family: ToleranceModel, encloser: Encloser, blocks: _Blocks, errors: int) -> None:
-        self._family, self._encloser, self._blocks, self._errors = family, encloser, blocks, errors
-        whole = whole_workspace(family.problem)
-        widths = whole.upper - whole.lower
-        self._whole = np.where(widths > 0, widths, np.inf)
+    def __init__(self, family: Problem, H: SX, centres: list[int]) -> None:
+        self._problem, self._tolerance, self.whole = family.problem, family.tolerance, whole_workspace(family.problem)
+        places = [3 * j + k for j in centres for k in range(3)]
+        lower, self._count = ca.tril(H[places, places]), len(centres)
+        self._encloser = Encloser(
+            ca.vertcat(self._problem.z, family.errors[places]), ca.vertcat(*[lower.nz[k] for k in range(lower.nnz())])
+        )
+        rows, columns = (np.array(each, dtype=int) for each in lower.sparsity().get_triplet())
+        self._block: NDArray[np.int64] = rows // 3 * self._count + columns // 3
+        # An entry below the diagonal of a block on the diagonal stands for two of this block.
+        self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
 
     def examine(self, boxes: Boxes[FloatArray]) -> Verdicts[FloatArray]:
         """Return bounds of boxes."""
         known = np.ones(len(boxes.split), dtype=bool)
-        now = in_workspace(self._family.problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
-        errors = np.full((len(now.lower), self._errors), self._family.tolerance)
+        now, kept, _ = contracted_boxes(self._problem, LoopBoxes(boxes.lower, boxes.upper, boxes.lower, known))
+        now = some(now, kept)
+        errors = np.full((len(now.lower), 3 * self._count), self._tolerance)
         forms = self._encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
-        factor = 0.5 * self._family.tolerance**2 * _OUTWARDS
         with np.errstate(all="ignore"):
-            found = factor * self._blocks.sums(np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r)
-        middles = np.nan_to_num(factor * self._blocks.sums(np.abs(forms.c)))
-        split = first_largest((now.upper - now.lower) / self._whole)
-        bound = np.where(np.isfinite(found), found, np.inf)
+            found = self._changes(np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r)
+        width = (self.whole.upper - self.whole.lower)[0]
+        split = first_largest((now.upper - now.lower) / np.where(width > 0, width, np.inf))
+        bound, middles = np.where(np.isfinite(found), found, np.inf), np.nan_to_num(self._changes(np.abs(forms.c)))
         return Verdicts(Boxes(now.lower, now.upper, bound, split, middles), -math.inf, len(split))
 
-
-class _Blocks:
-    """Blocks of centres of a symmetric matrix.
-
-    Args:
-        lower: (3 m, 3 m) its entries in and below the diagonal.
-        count: number m of centres.
-    """
-
-    def __init__(self, lower: SX, count: int) -> None:
-        rows, columns = (np.array(each, dtype=int) for each in lower.sparsity().get_triplet())
-        self._block: NDArray[np.int64] = rows // 3 * count + columns // 3
-        # An entry below the diagonal of a block on the diagonal stands for two of this block.
-        self._times = np.where((rows != columns) & (rows // 3 == columns // 3), 2.0, 1.0)
-        self._count = count
-
-    def sums(self, sizes: FloatArray) -> FloatArray:
-        """Return the sums (B,) of the norms of all blocks from sizes (B, R) of the entries."""
+    def _changes(self, sizes: FloatArray) -> FloatArray:
+        """Return the changes (B,) from sizes (B, R) of the entries: sums of the norms of all blocks."""
         total = np.zeros((len(sizes), self._count**2))
         for k, block in enumerate(self._block):
             total[:, block] += self._times[k] * sizes[:, k] ** 2
         norms = np.sqrt(total).reshape(-1, self._count, self._count)
-        diagonal = np.trace(norms, axis1=1, axis2=2)
-        return np.asarray(2 * norms.sum(axis=(1, 2)) - diagonal)
+        # The blocks above the diagonal are those below it.
+        norm = 2 * norms.sum(axis=(1, 2)) - np.trace(norms, axis1=1, axis2=2)
+        return np.asarray(0.5 * self._tolerance**2 * _OUTWARDS * norm)

@@ -1,0 +1,311 @@
+"""Claims about numbers that are no single expression: terms of second order, and those of six straight legs.
+
+Of six straight legs, with A their rows, F the diagonal matrix of the sizes of their forces, and J = F^-1 A with unit
+rows, the columns of ``P = A^-1 F`` are the platform's motions for unit changes of the legs' lengths. With C near the
+inverse of A at the centre of a box, ``P_0 = C F_0`` and ``B >= |I - C A|``,
+
+    P - P_0 = C (F - A P_0) + (C A)^-1 (I - C A) C (F - A P_0).
+
+The first part is affine in the coordinates but for a rest, the second at most ``(I - B)^-1 B |C (F - A P_0)|``. Sizes
+of affine matrices and vectors are convex: the corners of the box decide.
+
+* The smallest singular value of J is at least t where ``|P| <= 1 / t``, and the largest at most t where ``|J| <= t``.
+  The condition number is at most k where they are t and k t for any t.
+* Errors of legs d move the platform by ``P d`` to first order.
+* Two legs, as segments between their joints, are at least ``n.(x - y) / |n|`` apart, for any vector n and the least of
+  it over their ends x and y.
+
+With a tolerance on joint centres every singular value changes by at most a number, so that the smallest is claimed to
+be larger by it, and the largest to be smaller by it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from .....models import FloatArray
+from ....case.pose import Free
+from ....errors import UncoveredError
+from ...statement.machine import Legs
+from ...statement.tolerance import is_smooth
+from ..polynomials import UNIT
+from .forms import PRODUCT, UP, AffineMatrix, FormArithmetic, inverses
+from .motion_matrix import PosedRobot
+from .pose_boxes import Attempt
+from .statement import Machines
+
+#: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
+_WRONG = 1e-6
+#: Part by which the solution of a system is enlarged, so that it is a bound: its rounding is far below.
+_ENLARGED = 1e-6
+#: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
+_ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32].T
+#: Rows and columns of the entries of matrices (6, 6) and (3, 4).
+_DENSE, _ENDS = (np.indices(shape, dtype=np.intp).reshape(2, -1) for shape in ((6, 6), (3, 4)))
+#: Part of the trace that is taken off before Cholesky's factorisation: many times the bound of its rounding for
+#: matrices (6, 6), which is 8 roundings. A factorisation that ends proves the matrix positive definite (S. M. Rump,
+#: *Verification of positive definiteness*, BIT 46 (2006)).
+_CHOLESKY = 1e-13
+#: Steps in the search of the part of second order of errors, and of the nearest points of two legs.
+_STEPS, _NEAREST = 200, 12
+
+
+class SecondOrderClaim:
+    """The claim that the terms of second order of a number (1, 1) in the symbols of machines are at most a bound.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    def __init__(self, machines: Machines, expression: SX, bound: float) -> None:
+        symbols = machines.symbols
+        self.free = [k for k, each in enumerate(machines.root.values) if isinstance(each, Free)]
+        self._bound, self._tolerance = bound, symbols.tolerance
+        pose, errors = SX.sym("pose", len(self.free)), SX.sym("errors", symbols.errors.numel())
+        number = symbols.of(expression, errors, pose)
+        if not is_smooth(number):
+            raise UncoveredError("a number whose derivatives jump")
+        second = ca.hessian(number, errors)[0]
+        rows, columns = (np.array(each, dtype=int) for each in second.sparsity().get_triplet())
+        # Errors that second derivatives do not depend on are no variables of theirs.
+        entries = ca.vertcat(SX(0, 1), second.nz[:])
+        own = [k for k in range(errors.numel()) if ca.depends_on(entries, errors[k])]
+        _, self._block = np.unique(rows // 3 * errors.numel() + columns // 3, return_inverse=True)
+        self._errors, self._entries = len(own), FormArithmetic(ca.vertcat(pose, errors[own]), entries)
+
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6)."""
+        errors = np.full((len(lower), self._errors), self._tolerance)
+        values = self._entries(np.hstack([lower[:, self.free], -errors]), np.hstack([upper[:, self.free], errors]))
+        squares = np.zeros((self._block.max(initial=-1) + 1, len(lower)))
+        np.add.at(squares, self._block, np.abs(values.ends()).max(axis=0) ** 2)
+        whole = 0.5 * self._tolerance**2 * np.sqrt(squares).sum(axis=0) * UP
+        return Attempt(np.asarray(whole <= self._bound), np.zeros((len(lower), len(self.free))))
+
+
+@np.errstate(all="ignore")
+def are_positive(matrices: FloatArray) -> NDArray[np.bool_]:
+    """Return whether symmetric matrices (..., n, n) are positive definite; their lower triangles are read."""
+    n, good = matrices.shape[-1], np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
+    M = matrices - _CHOLESKY * np.abs(np.trace(matrices, axis1=-2, axis2=-1))[..., None, None] * np.eye(n)
+    for k in range(n):
+        pivot = M[..., k, k]
+        good = np.asarray(good & (pivot > 0))
+        column = M[..., k + 1 :, k] / np.sqrt(np.where(good, pivot, 1.0))[..., None]
+        M[..., k + 1 :, k + 1 :] -= column[..., :, None] * column[..., None, :]
+    return good
+
+
+def _at_corners(matrices: AffineMatrix, part: slice = slice(None)) -> FloatArray:
+    """Return the affine parts of some rows at the corners of the boxes, (B, rows, corners, 6)."""
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=matrices.A.shape[1])))
+    moved = matrices.A[:, :, part].transpose(0, 2, 3, 1) @ corners.T
+    return np.asarray((matrices.M[:, part, :, None] + moved).transpose(0, 1, 3, 2))
+
+
+def _size_at_centre(matrices: AffineMatrix) -> FloatArray:
+    """Return the spectral norms (B,) at the centres: computed numbers, 0 where they are not known."""
+    return np.asarray(np.linalg.norm(np.where(np.isfinite(matrices.M), matrices.M, 0.0), 2, axis=(1, 2)))
+
+
+def _size_is_at_most(matrices: AffineMatrix, most: FloatArray) -> NDArray[np.bool_]:
+    """Return whether the spectral norm is shown to be at most numbers (B,)."""
+    room = most * (1 - 8 * UNIT) - np.sqrt((matrices.rest**2).sum(axis=(1, 2))) * UP
+    corners = _at_corners(matrices).transpose(0, 2, 1, 3)
+    square = corners @ corners.transpose(0, 1, 3, 2)
+    # The product rounds by a part of the square of the Frobenius norm.
+    free = (room * room * (1 - 8 * UNIT))[:, None] - PRODUCT * np.trace(square, axis1=2, axis2=3)
+    return np.asarray((room > 0) & are_positive(free[..., None, None] * np.eye(6) - square).all(axis=1))
+
+
+class LegInverse:
+    """The inverse P of J of six straight legs over boxes of poses.
+
+    A length divides moments, and multiplies rotations; ``is_unit`` says whether J itself is meant too.
+    """
+
+    def __init__(self, robot: PosedRobot, length: float, *, is_unit: bool = False) -> None:
+        self.free = robot.free
+        A = ca.vertcat(*[ca.vertcat(row.force, row.moment / length).T for row in robot.rows])
+        sizes = ca.vertcat(*[ca.norm_2(A[k, :3]) for k in range(6)])
+        unit = A / ca.repmat(sizes, 1, 6) if is_unit else SX(0, 6)
+        self._is_unit, self._forms = is_unit, FormArithmetic(robot.z, ca.vertcat(sizes, ca.vec(A.T), ca.vec(unit.T)))
+
+    def inverse(
+        self, lower: FloatArray, upper: FloatArray
+    ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
+        """Return P over boxes (B, 6), where it is known, shares (B, n) of coordinates in its rest, and J or A."""
+        values, leg = self._forms(lower[:, self.free], upper[:, self.free]), np.arange(6)
+        sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(_DENSE, (6, 6))
+        C = inverses(matrix.M)
+        holds, bound, shares = matrix.contracted(C)
+        P = C * sizes.c[:, None, :]
+        # F - A P_0.
+        gap = AffineMatrix(-(matrix.M @ P), -(matrix.A @ P[:, None]), matrix.rest @ np.abs(P))
+        gap.M[:, leg, leg] += sizes.c
+        gap.A[:, :, leg, leg] += sizes.a.transpose(0, 2, 1)
+        gap.E[:, leg, leg] += sizes.r
+        T = C[:, None] @ gap.A
+        rest = (np.abs(C @ gap.M) + np.abs(C) @ gap.rest) * UP
+        Q = (rest + np.abs(T).sum(axis=1)) * UP
+        known = holds & np.isfinite(Q).all(axis=(1, 2))
+        bound, Q = (np.where(known[:, None, None], each, 0.0) for each in (bound, Q))
+        right = bound @ Q * UP
+        X = np.linalg.solve(np.eye(6) - bound, right) * (1 + _ENLARGED) + _ENLARGED * right
+        # (I - B) X >= B Q with a spectral radius below 1: X is a bound.
+        known = known & (X >= 0).all(axis=(1, 2)) & ((bound @ X) * UP + right <= X).all(axis=(1, 2))
+        J = values.forms(slice(42, None)).matrix(_DENSE, (6, 6)) if self._is_unit else matrix
+        return AffineMatrix(P, T, (rest + X) * UP), np.asarray(known), shares, J
+
+
+class SingularClaim(LegInverse):
+    """The claim that the smallest singular value of J is at least a bound, or its condition number at most.
+
+    A length divides moments. In the machines that are meant singular values change by at most ``change``.
+    """
+
+    def __init__(
+        self, robot: PosedRobot, length: float, bound: float, *, is_condition: bool, change: float = 0.0
+    ) -> None:
+        super().__init__(robot, length, is_unit=is_condition)
+        self._bound, self._change, self._is_condition = bound, change, is_condition
+
+    @np.errstate(all="ignore")
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6), from the sizes of P, and for the condition number those of J."""
+        inverse, known, shares, J = self.inverse(lower, upper)
+        low, high = 1 / _size_at_centre(inverse), _size_at_centre(J)
+        shares = np.abs(inverse.A).sum(axis=(2, 3)) + shares * inverse.E.sum(axis=(1, 2))[:, None]
+        if self._is_condition:
+            # The smallest singular value changes more: most of the room between the two is left to it.
+            least = (high + self._change) / self._bound
+            t = least * np.sqrt(np.sqrt((low - self._change) / least))
+            flat = _size_is_at_most(J, (t * self._bound * (1 - 4 * UNIT) - self._change) * (1 - 4 * UNIT))
+            shares += np.where(flat, 0.0, 1.0)[:, None] * np.abs(J.A).sum(axis=(2, 3))
+            known, is_wrong = known & flat, known & (high > low * self._bound * (1 + _WRONG))
+        else:
+            t = np.full(len(low), self._bound)
+            is_wrong = known & (low < self._bound * (1 - _WRONG))
+        holds = known & _size_is_at_most(inverse, (1 - 8 * UNIT) / (t + self._change))
+        return Attempt(np.asarray(holds), shares, np.asarray(is_wrong))
+
+
+class ErrorClaim(LegInverse):
+    """The claim that errors of legs of at most 1 move the platform, to first order, by at most a number.
+
+    It is about the rotation, or about the position of the platform's origin.
+    """
+
+    def __init__(self, robot: PosedRobot, most: float, *, is_rotation: bool) -> None:
+        super().__init__(robot, robot.length)
+        self._most = most * robot.length * (1 - 2 * UNIT) if is_rotation else most
+        self._part = slice(3, 6) if is_rotation else slice(0, 3)
+
+    @np.errstate(all="ignore")
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6), at all corners of the boxes and of the errors."""
+        inverse, known, shares, _ = self.inverse(lower, upper)
+        corners = np.ascontiguousarray(_at_corners(inverse, self._part))
+        moves = (corners.reshape(-1, 6) @ _ERRORS).reshape(len(corners), 3, -1)
+        worst = np.sqrt((moves * moves).sum(axis=1).max(axis=1))
+        sums, sizes = inverse.E[:, self._part].sum(axis=2), np.abs(inverse.A[:, :, self._part]).sum(axis=(2, 3))
+        terms = np.abs(inverse.M[:, self._part]).sum(axis=(1, 2)) + sizes.sum(axis=1)
+        worst = (worst + np.sqrt((sums * sums).sum(axis=1)) + 64 * UNIT * terms) * UP
+        at_centre = np.linalg.norm(inverse.M[:, self._part] @ _ERRORS, axis=1).max(axis=1)
+        is_wrong = known & (at_centre > self._most * (1 + _WRONG))
+        return Attempt(known & (worst <= self._most), sizes + shares * sums.sum(axis=1)[:, None], is_wrong)
+
+
+def whole_errors(position: float, rotation: float, eps: float, shortest: float, reach: float) -> tuple[float, float]:
+    """Return bounds of the whole errors of a pose, position and rotation; infinite where none is found.
+
+    With errors of second order r in the lengths, ``p = P (eps + r)`` and ``w = Q (eps + r)``, r must be at least
+    ``((p + a w)^2 / (l - p - a w) + a w^2) / 2``. It is found by iteration in fractions.
+
+    Args:
+        position: P, error of the position to first order for errors of legs of 1.
+        rotation: Q, that of the rotation.
+        eps: largest error of a leg, length.
+        shortest: l, a length below which no leg is.
+        reach: a, the largest distance of a joint from the platform's origin.
+    """
+    P, Q, error, leg, arm = map(Fraction, (position, rotation, eps, shortest, reach))
+    r = 0.0
+    for _ in range(_STEPS):
+        p, w = P * (error + Fraction(r)), Q * (error + Fraction(r))
+        along = p + arm * w
+        if along >= leg:
+            break
+        needed = (along**2 / (leg - along) + arm * w**2) / 2
+        if needed <= r:
+            return float(p) * (1 + 8 * UNIT), float(w) * (1 + 8 * UNIT)
+        if needed > leg:
+            break
+        r = float(needed) * (1 + _ENLARGED)
+    return math.inf, math.inf
+
+
+def change_of_jacobian(joints: Legs, tolerance: float, length: float, shortest: float) -> float:
+    """Return a bound of the Frobenius norm of the change of J, by which every singular value changes at most.
+
+    Within a tolerance t the unit force of a leg changes by at most ``h = 2 t / l``, with l the shortest length of a leg
+    of any machine, and its moment by ``|a| h + t``. A length divides moments. The bound is infinite where errors may
+    take up a whole leg.
+    """
+    if not shortest > 0:
+        return math.inf
+    turned = 2 * tolerance / shortest * UP
+    moments = (np.linalg.norm(joints.platform, axis=1) * UP * turned + tolerance) / length * UP
+    return float(np.sqrt((turned * turned + moments * moments).sum()) * UP)
+
+
+class ClearanceClaim:
+    """The claim that two legs, with these indices, are at least a distance apart."""
+
+    def __init__(self, robot: PosedRobot, pair: Sequence[int], least: float) -> None:
+        self.free, self._least = robot.free, least
+        (foot, arm), (other_foot, other_arm) = (robot.legs[k] for k in pair)
+        self._feet = np.array(ca.DM(foot - other_foot)).ravel()
+        # Differences of the ends of the two legs, times the scale: from foot to tip, tip to foot, and tip to tip.
+        spans = robot.scale * (robot.position - foot), robot.scale * (robot.position - other_foot)
+        ends = -spans[0] - other_arm, spans[1] + arm, arm - other_arm
+        self._forms = FormArithmetic(robot.z, ca.vertcat(*[ca.vertcat(end, robot.scale) for end in ends]))
+
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6)."""
+        matrix = self._forms(lower[:, self.free], upper[:, self.free]).forms().matrix(_ENDS, (3, 4))
+        gaps = matrix.M[:, :, :3] / matrix.M[:, :, 3:]
+        n = _between(self._feet, gaps[:, 0], gaps[:, 1])
+        size = np.sqrt((n * n).sum(axis=1))
+        needed = max(self._least, 0.0) * size * UP
+        along = (n * self._feet).sum(axis=1)
+        holds = along - needed >= PRODUCT * (np.abs(n) @ np.abs(self._feet) + needed)
+        factors = np.column_stack([n, -needed])[:, :, None]
+        slopes, rest = np.abs(matrix.A @ factors[:, None])[..., 0], (matrix.rest @ np.abs(factors))[..., 0]
+        fine = (matrix.M @ factors)[..., 0] >= (slopes.sum(axis=1) + rest) * UP
+        shares = np.where(fine[:, None], 0.0, slopes).sum(axis=2)
+        # The distance is at most that of two points of the legs.
+        return Attempt(holds & fine.all(axis=1), shares, np.asarray(size < self._least * (1 - _WRONG)))
+
+
+def _between(feet: FloatArray, foot_to_tip: FloatArray, tip_to_foot: FloatArray) -> FloatArray:
+    """Return vectors (B, 3) from the nearest point of the second leg to that of the first, from those of their ends.
+
+    Any vector is allowed, and a good one shows larger boxes: Newton's step for both, then one after the other.
+    """
+    d, e = tip_to_foot - feet, feet - foot_to_tip
+    dd, ee, de, dg, eg = ((x * y).sum(axis=1) for x, y in ((d, d), (e, e), (d, e), (d, feet), (e, feet)))
+    with np.errstate(all="ignore"):
+        s = np.clip(np.nan_to_num((de * eg - ee * dg) / (dd * ee - de * de), nan=0.5), 0.0, 1.0)
+        for _ in range(_NEAREST):
+            t = np.clip(np.nan_to_num((de * s + eg) / ee), 0.0, 1.0)
+            s = np.clip(np.nan_to_num((de * t - dg) / dd), 0.0, 1.0)
+    return np.asarray(feet + s[:, None] * d - t[:, None] * e)

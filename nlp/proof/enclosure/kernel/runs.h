@@ -1,0 +1,77 @@
+/* Runs of a tape over many boxes, LANES at once; first_order.py and second_order.py. */
+#ifndef RUNS_H
+#define RUNS_H
+
+#include <Python.h>
+#include "forms.h"
+
+/* A tape and memory in which it runs over LANES boxes: registers and results, the boxes, and the terms of an operation. */
+typedef struct {
+    const Tape *tape;
+    int n, order;
+    Store work, out;
+    Lane *box[4], *terms; /* centre, radius, lower and upper ends; terms */
+} Run;
+
+/* Lays a run over memory. */
+static Run prepare(const Tape *tape, int n, int order, Room *room)
+{
+    size_t terms = terms_of_order(n, order), stride = sizeof(Value) / sizeof(double) + terms * LANES;
+    Run x = {.tape = tape, .n = n, .order = order};
+    x.work = (Store){carve(room, (size_t)tape->registers * stride), stride};
+    x.out = (Store){carve(room, (size_t)tape->outputs * stride), stride};
+    for (int i = 0; i < 4; i++)
+        x.box[i] = (Lane *)carve(room, (size_t)n * LANES);
+    x.terms = (Lane *)carve(room, terms * LANES);
+    return x;
+}
+
+/* Runs a tape over LANES of B boxes with these ends, of numbers list[start], list[start + 1], ... or, without a list, from
+ * number start on; the last one before finish again where there are fewer. */
+static void run_block(const Run *x, const double *lower, const double *upper, Py_ssize_t B, const Py_ssize_t *list,
+                      Py_ssize_t start, Py_ssize_t finish)
+{
+    EACH
+    {
+        Py_ssize_t place = start + l < finish ? start + l : finish - 1, at = list ? list[place] : place;
+        for (int i = 0; i < x->n; i++, at += B) {
+            double lo = lower[at], hi = upper[at], middle = 0.5 * lo + 0.5 * hi;
+            middle = smaller(larger(middle, lo), hi);
+            double half = larger(hi - middle, middle - lo);
+            x->box[LOWER][i][l] = lo, x->box[UPPER][i][l] = hi, x->box[CENTRE][i][l] = middle;
+            half = half > 0 ? half * (1 + ULP) + TINY : 0.0;
+            x->box[RADIUS][i][l] = larger(-lo, hi) < LARGEST ? half : INFINITY;
+        }
+    }
+    (x->order > 1 ? run2 : run1)(x->tape, x->n, x->work, x->out, x->box, x->terms);
+}
+
+typedef struct {
+    const double *lower, *upper;         /* (n, B) */
+    double *c, *p, *q, *s, *lo, *hi, *a; /* (R, B), a: (R, n, B), or (R, n + n (n + 1) / 2, B) for forms of second order */
+    Py_ssize_t B;
+    int order;
+} Enclosed;
+
+/* Writes the forms and ranges of a tape's results; without memory, what is needed of it is counted only. */
+static void enclose_all(const Tape *tape, int n, const Enclosed *found, Room *room)
+{
+    Py_ssize_t B = found->B;
+    Run run = prepare(tape, n, found->order, room);
+    size_t terms = terms_of_order(n, found->order);
+    for (Py_ssize_t start = 0; room->at && start < B; start += LANES) {
+        run_block(&run, found->lower, found->upper, B, NULL, start, B);
+        size_t bytes = (size_t)(B - start < LANES ? B - start : LANES) * sizeof(double);
+        for (int k = 0; k < tape->outputs; k++) {
+            const Value *v = value_of(run.out, k);
+            const double *from[] = {v->c, v->p, v->q, v->s, v->lo, v->hi};
+            double *to[] = {found->c, found->p, found->q, found->s, found->lo, found->hi};
+            for (size_t part = 0; part < COUNT(to); part++)
+                memcpy(to[part] + k * B + start, from[part], bytes);
+            for (size_t i = 0; i < terms; i++)
+                memcpy(found->a + ((size_t)k * terms + i) * (size_t)B + start, terms_of(v)[i], bytes);
+        }
+    }
+}
+
+#endif

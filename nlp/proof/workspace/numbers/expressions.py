@@ -1,0 +1,114 @@
+"""Smallest values of expressions over all machines within a tolerance, or of the design alone, at every pose.
+
+Over a box of poses, and for all machines, an expression has a form ``g + a e_I + b e_D + d e_E + [-r, r]``. With the
+dependent coordinates replaced by their relation, no machine at a pose of the box has a smaller value than
+
+    (g + b off) - sum |a - b T| - sum_j |(d - b E)_j| - (r + |b| rho),
+
+where the errors of joint centre j count as one vector. Boxes of poses are bisected; errors never are. Values are those
+of machines whose errors are along the gradient, at the corner of a box. Loops are followed in the assembly of home;
+conditions of a program hold in others too.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from .....models import FloatArray
+from ...enclosure.forms import Forms
+from ..ranks.krawczyk import ROUNDING, by_centres, inverses
+from ..ranks.loop_boxes import LoopBoxes
+from ..robot.posed_robot import Problem, steepest
+from .bound_search import Bounds, Number
+
+#: Slope, as a part of the largest at a point, that is rounding error.
+_FLAT = 1e-9
+
+
+def ranges(forms: Forms, errors: int = 0) -> tuple[FloatArray, FloatArray]:
+    """Return lower and upper bounds (B, R) of expressions, infinite where nothing is known.
+
+    Args:
+        forms: of the expressions.
+        errors: number of the last terms, which are errors of joint centres.
+    """
+    c, a, r = forms
+    t = a.shape[2] - errors
+    with np.errstate(all="ignore"):
+        whole = np.abs(a[:, :, :t]).sum(axis=2) + by_centres(a[:, :, t:]) + r
+        half = whole + 2 * ROUNDING * (np.abs(c) + whole)
+        known = np.isfinite(c - half) & np.isfinite(c + half)
+        return np.where(known, c - half, -np.inf), np.where(known, c + half, np.inf)
+
+
+class Expressions(Number):
+    """Expressions of machines.
+
+    Args:
+        problem: the design, or all machines that are meant.
+        expressions: (K, 1) in its coordinates.
+    """
+
+    def __init__(self, problem: Problem, expressions: SX) -> None:
+        super().__init__(problem, expressions, expressions.numel())
+        slopes = ca.densify(ca.jacobian(expressions, problem.z))
+        self._values = ca.Function("values", [problem.z], [ca.densify(expressions)])
+        self._slopes = ca.Function("slopes", [problem.z], [slopes])
+
+    def over(self, forms: Forms, count: int) -> Bounds:
+        """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
+        # Each coordinate has a part of the rest, so that one with little slope is divided once the others are narrow.
+        shares = np.abs(forms.a[:, :, :count]) + forms.r[:, :, None] / max(count, 1)
+        return Bounds(ranges(forms, len(self.problem.of_errors))[0], shares)
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return the values (P, K) at closed points (P, n)."""
+        return np.asarray(self._values(z.T).full().reshape(self.count, len(z)).T)
+
+    def slopes(self, z: FloatArray, which: NDArray[np.intp]) -> FloatArray:
+        """Return derivatives (P, n) of an expression each at points; those by dependent coordinates are 0."""
+        found: FloatArray = self._slopes(z.T).full().reshape(self.count, len(z), -1)[which, np.arange(len(z))]
+        D, size = list(self.problem.dependent), self.problem.size
+        if D:
+            whole = self.problem.loops.slopes(z.T) * size
+            found = found * size
+            found -= (found[:, None, D] @ inverses(whole[:, :, D]) @ whole)[:, 0]
+            found = found / size
+            found[:, D] = 0.0
+        return found
+
+    def near(self, boxes: LoopBoxes, which: NDArray[np.intp]) -> FloatArray:
+        """Return points (2, P, n) with errors along the gradient, at the middle of boxes and at a corner."""
+        z = self.closed(boxes.centre)
+        slopes = self.slopes(z, which)
+        z = self.worst(z, slopes)
+        moved = self._at_corner(z, slopes, boxes)
+        return np.stack([self.closed(each) for each in (z, moved)])
+
+    def worst(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return the machines (P, n) with the smallest values to first order, from derivatives of the design."""
+        parts = slopes[:, self.problem.of_errors].reshape(len(z), -1, 3)
+        sizes = np.linalg.norm(parts, axis=2, keepdims=True)
+        z = z.copy()
+        errors = steepest(np.where(sizes > _FLAT * _sizes(sizes), -parts, 0.0), self.problem.tolerance)
+        z[:, self.problem.of_errors] = errors.reshape(len(z), -1)
+        return z
+
+    def _at_corner(self, z: FloatArray, slopes: FloatArray, boxes: LoopBoxes) -> FloatArray:
+        """Return points with the pose in the corner of a box that the derivatives point to."""
+        own, free = list(self.problem.independent), list(self.problem.free)
+        z = z.copy()
+        change = slopes[:, own] * (boxes.upper - boxes.lower)[:, own]
+        # A slope that is rounding error points to the upper end.
+        z[:, own] = np.where(change > _FLAT * _sizes(change), boxes.lower[:, own], boxes.upper[:, own])
+        of_pose = [j for j in own if j < len(free)]
+        z[:, of_pose] = self.problem.box.clipped(self.problem.pose_of(z))[:, free][:, of_pose]
+        return z
+
+
+def _sizes(values: FloatArray) -> FloatArray:
+    """Return the largest size of the values at each of P points, with the shape (P, 1, ...)."""
+    return np.asarray(np.nan_to_num(np.abs(values)).max(axis=tuple(range(1, values.ndim)), keepdims=True, initial=0.0))

@@ -1,0 +1,286 @@
+"""Numbers of J over boxes of poses, from its left inverses: singular values, and the worst error of the pose.
+
+J has rows A divided by sizes l, which :class:`.ScaledRows` chooses so that A is nearly a polynomial of the coordinates.
+Let C be a pseudo-inverse of A at the middle of a box, where l is 1. Then ``(C A)^-1 C diag(l)`` is a left inverse of J,
+and with ``C A = I + E`` and ``|E| <= B``, entry by entry,
+
+    (I + E)^-1 C = C - E C + ...,    where the terms of higher order are at most  B^2 (I - B)^-1 |C|.
+
+What is of first order in the coordinates is kept as it is, so that a convex number is largest at a corner of the box.
+
+The smallest singular value of J is at least 1 over the norm of any left inverse. The norm ``(tr (P P')^n)^(1/2n)`` is
+convex in P, not below the largest singular value and close to it. The largest singular value of J itself is bounded
+likewise. The Frobenius norm of a rest bounds what it adds.
+
+Errors of joint centres count as further terms of the rows. Those of six straight legs, up to t, change J by a matrix
+whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg of any
+machine, the unit force of a leg changes by at most ``h = 2 t / l``, and its moment about the platform's origin by
+``|a| h + t``.
+
+Lengths of six legs that are off by d move the platform, to first order, by ``J^-1 d``. For ``|d_i| <= 1`` the largest
+size of its position, or of its rotation, is met where every ``d_i`` is 1 or -1.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from .....models import FloatArray
+from ...enclosure.forms import Forms
+from ...statement.machine import LEGS, JointErrors, Legs
+from ..ranks.krawczyk import by_centres, inverses
+from ..robot.posed_robot import Problem
+from ..tolerance.leg_errors import change_of_rows, worst_rows
+from .bound_search import Bounds, Number
+
+#: Part of its size by which a computed number may be off: rounding of products and of LAPACK.
+ROUNDING = 1e-10
+#: Part of C below which a singular value of the middle matrix is zero.
+_ZERO = 1e-14
+#: Part by which a computed bound of an inverse is made larger, so that it surely is one.
+_ROOM = 1e-6
+#: Squarings in the norm of an inverse: its n is 2 to this power. Two equal singular values make it 2 % too large.
+_SQUARINGS = 4
+#: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
+_ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=LEGS)))[: 2 ** (LEGS - 1)].T
+
+
+class _Rows(NamedTuple):
+    """Rows A and sizes l of J over B boxes, scaled so that the middle of each size is 1.
+
+    Attributes:
+        A: (B, m, 6) middles.
+        terms: (B, t, m, 6) coefficients of ``|e| <= 1``: f coordinates, then products of two, then errors of centres.
+        rest: (B, m, 6).
+        bend, slack: (B, t, m) coefficients, and (B, m) rests, of sizes.
+        coordinates, errors: number f of coordinates, and number of the terms that are errors.
+    """
+
+    A: FloatArray
+    terms: FloatArray
+    rest: FloatArray
+    bend: FloatArray
+    slack: FloatArray
+    coordinates: int
+    errors: int
+
+    def spread(self, linear: FloatArray) -> FloatArray:
+        """Return the largest sizes (B, ...) of linear parts (B, t, ...); the errors of a centre are a vector."""
+        t = linear.shape[1] - self.errors
+        return np.asarray(np.abs(linear[:, :t]).sum(axis=1) + by_centres(np.moveaxis(linear[:, t:], 1, -1)))
+
+
+class _RowsNumber(Number):
+    """A number of J.
+
+    Args:
+        problem: the design, or all machines that are meant.
+        length: by which moments about the platform's origin are divided.
+    """
+
+    def __init__(self, problem: Problem, length: float) -> None:
+        scaled = problem.scaled
+        super().__init__(problem, ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes))
+        self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
+        self._jacobian = ca.Function("J", [problem.z], [ca.densify(scaled.jacobian)])
+
+    def jacobian(self, z: FloatArray) -> FloatArray:
+        """Return J (P, m, 6) at points (P, n)."""
+        flat = self._jacobian(z.T).full()
+        return np.asarray(flat.reshape(len(flat), len(z), 6).transpose(1, 0, 2) * self._scale)
+
+    def rows(self, forms: Forms, count: int) -> _Rows:
+        """Return the rows over boxes from forms of them, column by column, and of their sizes."""
+        B, entries, t = forms.a.shape
+        m = entries // 7
+        (c, a, r), sizes = forms, forms.c[:, 6 * m :]
+        with np.errstate(all="ignore"):
+            unit = 1 / np.where(sizes > 0, sizes, np.nan)
+            A = c[:, : 6 * m].reshape(B, 6, m).transpose(0, 2, 1) * self._scale * unit[:, :, None]
+            terms = a[:, : 6 * m].reshape(B, 6, m, t).transpose(0, 3, 2, 1) * self._scale * unit[:, None, :, None]
+            rest = r[:, : 6 * m].reshape(B, 6, m).transpose(0, 2, 1) * self._scale * unit[:, :, None]
+            bend, slack = a[:, 6 * m :].transpose(0, 2, 1) * unit[:, None], r[:, 6 * m :] * unit
+        slack = slack * (1 + ROUNDING) + ROUNDING
+        return _Rows(A, terms, rest * (1 + ROUNDING), bend, slack, count, len(self.problem.of_errors))
+
+
+class SingularValues(_RowsNumber):
+    """Smallest singular value of J, or minus its condition number.
+
+    With legs, bounds are those of all machines within their tolerance, and values those of the machine that is worst to
+    first order at each point.
+
+    Args:
+        problem: the design, or all machines that are meant, whose errors count entry by entry.
+        length: by which moments about the platform's origin are divided.
+        is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
+        legs: joint centres of six straight legs with the tolerance that is meant; None for another robot.
+        shortest: no leg of any machine is shorter over the workspace; used with a tolerance of legs alone.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        length: float,
+        *,
+        is_condition: bool,
+        legs: Legs | None = None,
+        shortest: float = 0.0,
+    ) -> None:
+        super().__init__(problem, length)
+        self._length, self._is_condition = length, is_condition
+        self._legs = legs if legs is not None and legs.tolerance else None
+        self._change = 0.0 if self._legs is None else change_of_rows(self._legs, length, shortest)
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return the values (P, 1) at points (P, n)."""
+        if self._legs is not None:
+            y = self.problem.pose_of(z)
+            J = worst_rows(self._legs, self.problem.box, y, self._length, self._is_condition)[0]
+            with np.errstate(all="ignore"):
+                J = J / np.linalg.norm(J[:, :, :3], axis=2, keepdims=True) / [1, 1, 1, *[self._length] * 3]
+        else:
+            J = self.jacobian(z)
+        known = np.asarray(np.isfinite(J).all(axis=(1, 2)))
+        values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
+        with np.errstate(all="ignore"):
+            found = -values[:, 0] / values[:, -1] if self._is_condition else values[:, -1]
+        return np.where(known, found, np.nan)[:, None]
+
+    def worst(self, y: FloatArray) -> JointErrors | None:
+        """Return the errors of the legs that are worst at a pose (6,) to first order; None for the design."""
+        if self._legs is None:
+            return None
+        _, base, platform = worst_rows(self._legs, self.problem.box, y[None], self._length, self._is_condition)
+        return JointErrors(base[0], platform[0])
+
+    def over(self, forms: Forms, count: int) -> Bounds:
+        """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
+        rows = self.rows(forms, count)
+        fixed, linear, rest, shares = _left_inverses(rows)
+        with np.errstate(all="ignore"):
+            norm = _schatten(_at_corners(fixed, linear)) + _frobenius(rest)
+            found = least = np.maximum(1 / norm - self._change, 0.0) if self._change else 1 / norm
+            if self._is_condition:
+                largest = _largest(rows) + self._change
+                found = -largest / least if self._change else -largest * norm
+        floor = -np.inf if self._is_condition else 0.0
+        return Bounds(np.where(np.isfinite(found), found, floor)[:, None], shares)
+
+
+class WorstError(_RowsNumber):
+    """Minus the largest error of the pose to first order, for unit errors of legs: its smallest value is the worst.
+
+    Args:
+        problem: six straight legs.
+        is_rotation: whether the rotation is meant, and not the position of the platform's origin.
+    """
+
+    def __init__(self, problem: Problem, *, is_rotation: bool) -> None:
+        super().__init__(problem, 1.0)
+        self._part = slice(3, 6) if is_rotation else slice(0, 3)
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return minus the error (P, 1) at points (P, n)."""
+        return np.asarray(-self._sizes(z).max(axis=1, keepdims=True))
+
+    def worst(self, z: FloatArray) -> FloatArray:
+        """Return the signs (6,) of the errors of legs that are worst at a point (n,)."""
+        return np.asarray(_ERRORS[:, int(np.argmax(self._sizes(z[None])))])
+
+    def _sizes(self, z: FloatArray) -> FloatArray:
+        """Return the errors (P, 32) for all signs of the errors of legs."""
+        return np.asarray(np.linalg.norm(inverses(self.jacobian(z))[:, self._part] @ _ERRORS, axis=1))
+
+    def over(self, forms: Forms, count: int) -> Bounds:
+        """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
+        fixed, linear, rest, shares = _left_inverses(self.rows(forms, count))
+        with np.errstate(all="ignore"):
+            corners = _at_corners(fixed[:, self._part], linear[:, :, self._part])
+            worst = np.linalg.norm(corners @ _ERRORS, axis=2).max(axis=(1, 2))
+            worst += np.linalg.norm(rest[:, self._part].sum(axis=2), axis=1)
+        return Bounds(np.where(np.isfinite(worst), -worst * (1 + ROUNDING), -np.inf)[:, None], shares)
+
+
+def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return left inverses ``fixed + linear.e + [-rest, rest]`` of J over B boxes, with ``|e_i| <= 1``.
+
+    Returns:
+        (B, 6, m) fixed: position, then rotation times a length, for unit values of the rows; (B, f, 6, m) linear: for
+        each coordinate the change over half of the box; (B, 6, m) rest, infinite where no bound is known; (B, 1, f)
+        shares of coordinates in the width.
+    """
+    known = np.asarray(np.isfinite(rows.A).all(axis=(1, 2)) & np.isfinite(rows.terms).all(axis=(1, 2, 3)))
+    A = np.where(known[:, None, None], rows.A, np.eye(rows.A.shape[1], 6))
+    f, eye = rows.coordinates, np.eye(6)
+    with np.errstate(all="ignore"):
+        C = np.linalg.pinv(A, rcond=_ZERO)
+        size = np.abs(C)
+        slopes = C[:, None] @ np.where(known[:, None, None, None], rows.terms, 0.0)
+        far = size @ rows.rest + np.abs(C @ A - eye) + ROUNDING * (size @ np.abs(A))
+        first = rows.spread(slopes)
+        E = first + far
+        known &= np.isfinite(E).all(axis=(1, 2))
+        E = np.where(known[:, None, None], E, 0.0)
+        # |(I + E)^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.
+        X = _solutions(eye - E, size) * (1 + _ROOM)
+        known &= (X >= 0).all(axis=(1, 2)) & (size <= X - E @ X).all(axis=(1, 2))
+        # Rows are divided by 1 + d with |d| <= spread of the sizes.
+        change = C[:, None] * rows.bend[:, :, None] - slopes @ C[:, None]
+        d = rows.spread(rows.bend) + rows.slack
+        rest = rows.spread(change[:, f:]) + size * rows.slack[:, None]
+        rest += (far @ size + E @ E @ X) * (1 + d)[:, None] + first @ size * d[:, None]
+        rest += ROUNDING * (size + rows.spread(change))
+    rest = np.where(known[:, None, None] & np.isfinite(rest), rest, np.inf)
+    shares = (slopes[:, :f] ** 2).sum(axis=(2, 3))[:, None]
+    return C, change[:, :f], rest, shares
+
+
+def _solutions(matrices: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solutions of systems (B, 6, 6) with right sides (B, 6, m); -1 for singular ones."""
+    good = np.abs(np.linalg.det(matrices)) > 0
+    found: FloatArray = np.full_like(right, -1.0)
+    found[good] = np.linalg.solve(matrices[good], right[good])
+    return found
+
+
+def _at_corners(fixed: FloatArray, linear: FloatArray) -> FloatArray:
+    """Return matrices (B, 2^f, r, m) at the corners of boxes, from the middles and linear parts (B, f, r, m)."""
+    f = linear.shape[1]
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=f))).reshape(2**f, f)
+    return np.asarray(fixed[:, None] + np.einsum("sf,bfij->bsij", signs, linear))
+
+
+def _schatten(matrices: FloatArray) -> FloatArray:
+    """Return the largest norm (B,) of matrices (B, S, 6, m): convex, and not below the largest singular value."""
+    square = matrices @ matrices.transpose(0, 1, 3, 2)
+    trace = np.trace(square, axis1=2, axis2=3)
+    power = square / trace[:, :, None, None]
+    for _ in range(_SQUARINGS):
+        power = power @ power
+    norm = np.sqrt(trace) * np.trace(power, axis1=2, axis2=3) ** (0.5 / 2**_SQUARINGS)
+    return np.asarray(norm.max(axis=1) * (1 + ROUNDING))
+
+
+def _largest(rows: _Rows) -> FloatArray:
+    """Return an upper bound (B,) of the largest singular value of J."""
+    d = rows.spread(rows.bend) + rows.slack
+    # 1 / (1 + e) = 1 - e + e^2 / (1 + e) for the deviation e of a size from 1.
+    room = np.where(d < 1, 1 - d, np.nan)
+    linear = rows.terms - rows.A[:, None] * rows.bend[..., None]
+    rest = rows.rest / room[..., None] + (rows.spread(rows.terms) * (d / room)[..., None])
+    rest += np.abs(rows.A) * (rows.slack + d * d / room)[..., None]
+    rest += rows.spread(linear[:, rows.coordinates :])
+    corners = _at_corners(rows.A, linear[:, : rows.coordinates])
+    known = np.asarray(np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2)))
+    values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
+    return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)
+
+
+def _frobenius(r: FloatArray) -> FloatArray:
+    """Return the Frobenius norms (B,) of matrices (B, r, c), not below their exact values."""
+    return np.asarray(np.sqrt((r * r).sum(axis=(1, 2))) * (1 + ROUNDING))

@@ -1,0 +1,398 @@
+"""Claims at poses of a workspace as constraints of a program, for any robot and any machine within a tolerance.
+
+At such a pose those numbers that the robot can choose are fixed. Unknowns in closed form are put in. The other
+unknowns, and the numbers of the pose that the robot has no choice of, are further variables of the program, with the
+loop equations at this pose as constraints.
+
+Out of a limb's reach the closed forms are continued, so that a search may pass through it: the reach is a claim, and so
+a constraint, of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Dimension, FloatArray, Model, RobotInstance, Substitution, frozen_vector, instantiate
+from ...models.instance import homogenised
+from ...models.joints.closedform import Reach, closed_form
+from ...models.rows import independent_rows
+from ..case.case import Case
+from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
+from ..case.limits.joints import JointAngle
+from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ..program.nlp import Nlp
+from ..program.places import Scalar
+from ..proof.statement.machine import workspace_of_case
+from ..proof.statement.tolerance import BuiltModel, built_model
+from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of
+from ..proof.workspace.robot.posed_robot import NotJudgedError, Problem, build_problem
+
+#: Part of a limit by which it is tighter in the constraints: several gaps of the proofs fit between.
+TIGHTER = 1e-3
+#: Start of the name of a claim that a limb reaches every pose; smallest squared sine or cosine of a limb's reach: of a
+#: number between 0 and 1 the limit 0 is tighter by as much.
+REACH, _REACH = "reach limb ", TIGHTER
+#: Part of the determinant of J in the middle of the workspace that is demanded at a singular pose.
+_DETERMINANT = 1e-2
+#: The same of J'J, from the stated pose: J'J has no sign that tells the far side of a singular pose, so that the
+#: singular pose moves by little: of each further one more is demanded, up to a largest part.
+_SQUARED, _MORE, _MOST = 1e-4, 4.0, 1e-2
+#: Steps from the middle of the workspace to a pose, along which closed loops are followed.
+_WAY = 16
+#: Half ranges by which a number of the pose that the robot has no choice of may leave its range in a search.
+_BEYOND = 0.5
+#: Steps of Newton's method for the further variables, and largest residual of closed loops.
+_STEPS, _CLOSED = 12, 1e-9
+#: Part of its size by which two constraints may differ that count as the same; and the distance of designs, in half
+#: ranges, at which they are compared.
+_ALIKE, _NEARBY = 3e-4, 0.05
+_SEED = 0
+
+
+class BindingPose(NamedTuple):
+    """A pose at which a claim, by its name, is a constraint.
+
+    Attributes:
+        name: of the claim.
+        pose: the pose; of a stroke that of the shortest length.
+        longest: pose of the longest length of a stroke; else None.
+        errors: (m, 3) of the joint centres of the machine that is meant; None for the exact one.
+    """
+
+    name: str
+    pose: PoseNumbers
+    longest: PoseNumbers | None = None
+    errors: FloatArray | None = None
+
+    @property
+    def poses(self) -> tuple[PoseNumbers, ...]:
+        """The pose, or both poses of a stroke."""
+        return (self.pose,) if self.longest is None else (self.pose, self.longest)
+
+    def is_same(self, other: BindingPose) -> bool:
+        """Return whether another one has the same claim, poses and machine, to the last bit."""
+        one, two = (
+            [*(part for pose in each.poses for part in (pose.position, pose.rotation)), each.errors]
+            for each in (self, other)
+        )
+        is_same = (
+            a is b or (a is not None and b is not None and np.array_equal(a, b)) for a, b in zip(one, two, strict=False)
+        )
+        return self.name == other.name and len(one) == len(two) and all(is_same)
+
+
+@dataclass(frozen=True, eq=False)
+class _ClosedPose:
+    """A robot at a pose, with m further variables of a program that close its loops.
+
+    Attributes:
+        model: the robot; its unknowns have no closed form.
+        robot: at the pose.
+        reaches: edges of the reach of its limbs at the pose.
+        variables, symbols: the further variables, (m, 1).
+        lower, upper, start: (m,) their bounds, and values at which the loops of the design are closed.
+        equations: m loop equations.
+    """
+
+    model: Model
+    robot: RobotInstance
+    reaches: tuple[Reach, ...]
+    variables: tuple[Scalar, ...]
+    symbols: SX
+    lower: FloatArray
+    upper: FloatArray
+    start: FloatArray
+    equations: tuple[BoundedConstraint, ...] = ()
+
+
+class _PosedClaim(NamedTuple):
+    """A claim as constraints of a program, with the robot at its poses."""
+
+    poses: tuple[_ClosedPose, ...]
+    constraints: tuple[BoundedConstraint, ...]
+
+
+class PoseConstraints:
+    """Claims at poses, as constraints of the program of a case.
+
+    Args:
+        nlp: the program without them.
+        case: the case, with a workspace.
+    """
+
+    def __init__(self, nlp: Nlp, case: Case) -> None:
+        if case.workspace is None:
+            raise TypeError("a case with limits over its workspace has a workspace")
+        self._nlp, self._case, self._box = nlp, case, pose_box(case.workspace)
+        self._closed = closed_form(case.model, extended=True)
+        names = [item.name for item in case.model.unknowns]
+        own = nlp.program.places.unknowns[0] if names else ()
+        self._unknowns = [own[names.index(item.name)] for item in self._closed.model.unknowns]
+        self._claims: list[_PosedClaim] = []
+        self._singular = 0
+
+    @property
+    def program(self) -> Nlp:
+        """The program with the claims as constraints."""
+        nlp, program = self._nlp, self._nlp.program
+        poses = [pose for claim in self._claims for pose in claim.poses]
+        count = sum(len(each.variables) for each in poses)
+        wider = replace(
+            program,
+            variables=(*program.variables, *(item for each in poses for item in each.variables)),
+            x=ca.vertcat(program.x, *[each.symbols for each in poses]),
+            places=replace(program.places, further=tuple(range(nlp.n, nlp.n + count))),
+        )
+        wide = replace(
+            nlp,
+            program=wider,
+            lower=frozen_vector([*nlp.lower, *(value for each in poses for value in each.lower)]),
+            upper=frozen_vector([*nlp.upper, *(value for each in poses for value in each.upper)]),
+            start=frozen_vector([*nlp.start, *(value for each in poses for value in each.start)]),
+        )
+        equations = [item for each in poses for item in each.equations]
+        return wide.with_constraints([*equations, *(item for each in self._claims for item in each.constraints)])
+
+    def added(self, design: Case, fresh: Sequence[BindingPose], x: FloatArray) -> list[BindingPose]:
+        """Add further claims as constraints, and return those that are added.
+
+        Constraints that only repeat another, at the images of a pose in a symmetric robot, are left out: with both a
+        program would have no unique multipliers. Two are the same where they differ by less than they are tighter than
+        their limits, at a design and at designs around it.
+
+        Args:
+            design: that refutes the claims.
+            fresh: the claims.
+            x: (n,) the design, and more that does not count.
+        """
+        # Where a limb does not reach a pose, J and the limits are not defined nearby: the reach comes first.
+        first = [each for each in fresh if each.name.startswith(REACH)]
+        problem = _problem(design) if fresh else None
+        if problem is None:
+            return []
+        kept, known = list[BindingPose](), list[tuple[str, FloatArray]]()
+        points = self._points_around(x[: self._nlp.n])
+        for each in first or fresh:
+            claim = self._claim(each, problem, points[0])
+            if claim is None:
+                continue
+            values = self._values(claim, points)
+            # Limits of one size on joints of different limbs repeat each other too.
+            key = repr([(item.lower, item.upper) for item in claim.constraints])
+            if not any(key == one and _are_alike(values, other) for one, other in known):
+                known.append((key, values))
+                kept.append(each)
+                self._claims.append(claim)
+        return kept
+
+    def _points_around(self, x: FloatArray) -> list[FloatArray]:
+        """Return a design (n,), and designs around it."""
+        nlp, rng = self._nlp, np.random.default_rng(_SEED)
+        steps = (_NEARBY * nlp.scale * rng.normal(size=nlp.n) for _ in range(3))
+        return [x, *(np.clip(x + step, nlp.lower, nlp.upper) for step in steps)]
+
+    def _values(self, claim: _PosedClaim, points: Sequence[FloatArray]) -> FloatArray:
+        """Return the numbers of a claim's constraints, with loops closed, at designs (n,)."""
+        program, arguments = self._nlp.program, self._nlp.arguments
+        symbols = ca.vertcat(SX(0, 1), *[each.symbols for each in claim.poses])
+        equations, values = (
+            ca.vertcat(SX(0, 1), *[item.constraint.expression for item in items])
+            for items in ([item for each in claim.poses for item in each.equations], claim.constraints)
+        )
+        outputs = [ca.densify(each) for each in (equations, ca.jacobian(equations, symbols), values)]
+        function, found = ca.Function("claim", [program.x, program.p, symbols], outputs), list[FloatArray]()
+        for x in points:
+            w = np.concatenate([each.start for each in claim.poses])
+            for _ in range(_STEPS):
+                residual, slopes, numbers = (each.full() for each in function(x, arguments, w))
+                if not len(w) or not np.isfinite(slopes).all() or np.abs(residual).max() <= _CLOSED:
+                    break
+                w -= np.linalg.lstsq(slopes, residual.ravel(), rcond=None)[0]
+            found.append(numbers.ravel())
+        return np.array(found)
+
+    def _claim(self, binding: BindingPose, problem: Problem, x: FloatArray) -> _PosedClaim | None:
+        """Return a claim as constraints; None where it has none, or the loops of the design (n,) do not close there."""
+        where = f" workspace pose {len(self._claims) + 1}"
+        poses = []
+        for pose in binding.poses:
+            closed = self._closed_pose(pose, binding.errors, problem, x, where)
+            if closed is None:
+                return None
+            poses.append(closed)
+        found = tuple(self._constraints(binding, poses, x, where))
+        return _PosedClaim(tuple(poses), found) if found else None
+
+    def _closed_pose(
+        self, pose: PoseNumbers, errors: FloatArray | None, problem: Problem, x: FloatArray, where: str
+    ) -> _ClosedPose | None:
+        """Return a machine at a pose; None where the loops of the design (n,) do not close there."""
+        nlp, count, y = self._nlp, len(problem.free), self._box.coordinates(pose)
+        start = _closed_at(problem, y)
+        if start is None:
+            return None
+        dependent = [j for j in problem.dependent if j < count]
+        places = [problem.free[j] for j in dependent]
+        model, reaches = self._closed.model, self._closed.reaches
+        parameters, reference = nlp.program.robot.parameters, nlp.program.robot.reference
+        if errors is not None:
+            model, reaches = self._built.model, self._built.reaches
+            parameters = ca.vertcat(parameters, SX(errors.ravel().tolist()))
+            reference = (*reference, *np.zeros(errors.size).tolist()) if reference else ()
+        names = [*(f"number {j + 1} of the pose" for j in places), *(item.name for item in model.unknowns)]
+        symbols, coordinates = SX.sym("w", len(names)), SX(y)
+        for j, place in enumerate(places):
+            coordinates[place] = symbols[j]
+        lower, upper = self._box.lower[places], self._box.upper[places]
+        room, unknowns = _BEYOND * (upper - lower), symbols[len(places) :]
+        given = Substitution(parameters, unknowns, rotation_of(self._box, coordinates[3:]), coordinates[:3], reference)
+        robot = self._robot(model, given)
+        values = [each.value for each in reaches]
+        shown = ca.Function("reach", Substitution.identity(model).all, values).call(given.all) if values else []
+        closed = _ClosedPose(
+            model=model,
+            robot=robot,
+            reaches=tuple(Reach(each.limb, value) for each, value in zip(reaches, shown, strict=True)),
+            variables=tuple(Scalar(f"{name}{where}", Dimension.NUMBER) for name in names),
+            symbols=symbols,
+            lower=np.concatenate([lower - room, nlp.lower[self._unknowns]]),
+            upper=np.concatenate([upper + room, nlp.upper[self._unknowns]]),
+            start=start[[*dependent, *range(count, len(start))]],
+        )
+        equations = self._equations(closed, x, where)
+        return replace(closed, equations=equations) if len(equations) == len(names) else None
+
+    @cached_property
+    def _built(self) -> BuiltModel:
+        return built_model(self._case.model, extended=True)
+
+    def _robot(self, model: Model, given: Substitution) -> RobotInstance:
+        """Return a robot with the tasks of the case."""
+        twists = [SX(np.asarray(task.twist, dtype=np.float64).tolist()) for task in self._case.tasks]
+        return instantiate(model, given, SX(self._case.characteristic_length), twists)
+
+    def _equations(self, closed: _ClosedPose, x: FloatArray, where: str) -> tuple[BoundedConstraint, ...]:
+        """Return the loop equations that determine the further variables: those that follow from them are left out."""
+        if not closed.variables:
+            return ()
+        program, closure = self._nlp.program, closed.robot.closure
+        slopes = ca.Function("slopes", [program.x, program.p, closed.symbols], [ca.jacobian(closure, closed.symbols)])
+        values = slopes(x, self._nlp.arguments, closed.start).full() * (closed.upper - closed.lower)
+        return tuple(
+            BoundedConstraint(Constraint(f"{closed.model.closure[k].name}{where}", closure[k], NUMBER), 0.0, 0.0)
+            for k in sorted(independent_rows([values]))
+        )
+
+    def _constraints(
+        self, binding: BindingPose, poses: Sequence[_ClosedPose], x: FloatArray, where: str
+    ) -> Iterator[BoundedConstraint]:
+        """Yield the constraints of a claim, with limits that are a little tighter."""
+        closed, name = poses[0], f"{binding.name}{where}"
+        if binding.name == "regular":
+            yield self._regular(closed.robot, name)
+            return
+        reaches = [each.value for each in closed.reaches if binding.name == f"{REACH}{each.limb}"]
+        if reaches:
+            program = self._nlp.program
+            numbers = ca.Function("reach", [program.x, program.p], [ca.vertcat(*reaches)])
+            # Both rods of a parallelogram reach equally far: one of two equal constraints is enough.
+            farthest = int(np.argmin(numbers(x, self._nlp.arguments).full()))
+            yield BoundedConstraint(Constraint(name, reaches[farthest], NUMBER), _REACH, math.inf)
+            return
+        items = self._of_stroke(binding.name, poses) if binding.longest is not None else self._at_pose(closed, where)
+        yield from (_tightened(item, name) for item in items if item.constraint.name in (binding.name, name))
+
+    def _regular(self, robot: RobotInstance, name: str) -> BoundedConstraint:
+        """Return the constraint that J keeps its rank: a determinant of its six rows also keeps its sign."""
+        length = self._case.characteristic_length
+        model = self._closed.model
+        if robot.jacobian.shape[0] == robot.jacobian.shape[1] and not (model.unknowns or model.members):
+            middle = self._box.pose(0.5 * (self._box.lower + self._box.upper))
+            position, rotation = SX(middle.position.tolist()), SX(middle.rotation.tolist())
+            design = Substitution(self._nlp.program.robot.parameters, SX(0, 1), rotation, position)
+            ratio = ca.det(_rows(robot, length)) / ca.det(_rows(self._robot(model, design), length))
+            return BoundedConstraint(Constraint(name, ratio, NUMBER), _DETERMINANT, math.inf)
+        one, other = (_rows(each, length) for each in (robot, self._nlp.program.robot))
+        least = min(_SQUARED * _MORE**self._singular, _MOST)
+        self._singular += 1
+        ratio = ca.det(one.T @ one) / ca.det(other.T @ other)
+        return BoundedConstraint(Constraint(name, ratio, NUMBER), least, math.inf)
+
+    def _at_pose(self, closed: _ClosedPose, where: str) -> Iterator[BoundedConstraint]:
+        """Yield the constraints of the case's limits on a machine at a pose, and on its joint centres."""
+        robot, design, names = closed.robot, self._nlp.program.robot.legs, tuple(task.name for task in self._case.tasks)
+        plates = [
+            Plate(plate, tuple(PlateJoint(leg.name, getattr(leg, plate)) for leg in robot.legs))
+            for plate in ("base", "platform")
+        ]
+        # Joints are mounted as in the design.
+        legs = tuple(replace(one, span=other.span) for one, other in zip(design, robot.legs, strict=True))
+        for limit in self._case.limits:
+            posed = replace(robot, legs=legs) if isinstance(limit, JointAngle) else robot
+            yield from limit.at_pose(PosedRobot(closed.model, posed, names, where))
+            if robot.legs:
+                yield from (item for plate in plates for item in limit.on_plate(plate))
+            if limit.needs_legs:
+                yield from limit.of_design(Design(self._case.as_limited, (robot,), {}))
+
+    def _of_stroke(self, name: str, poses: Sequence[_ClosedPose]) -> Iterator[BoundedConstraint]:
+        """Yield the constraints of a claim about a leg at the poses of its shortest and of its longest length."""
+        both = Design(self._case.as_limited, tuple(each.robot for each in poses), {})
+        for limit in self._case.limits:
+            for leg, family in zip(poses[0].robot.legs, limit.on_pairs(both), strict=False):
+                for item in family.pair(0, 1):
+                    if name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
+                        yield BoundedConstraint(replace(item.constraint, name=name), item.lower, item.upper)
+
+
+def _rows(robot: RobotInstance, length: float) -> SX:
+    """Return J (m, 6) with moments about the platform's origin, divided by a length."""
+    return ca.horzcat(*homogenised(robot.jacobian, robot.position, length))
+
+
+def _are_alike(one: FloatArray, other: FloatArray) -> bool:
+    """Return whether numbers (designs, constraints) are the same but for a small part of their size."""
+    return one.shape == other.shape and bool(np.abs(one - other).max() <= _ALIKE * np.abs(other).max(initial=0.0))
+
+
+def _problem(design: Case) -> Problem | None:
+    """Return a design over its workspace; None where its loops are not closed in the middle."""
+    try:
+        return build_problem(design, closed_form(design.model).model, pose_box(workspace_of_case(design)))
+    except NotJudgedError:
+        return None
+
+
+def _closed_at(problem: Problem, y: FloatArray) -> FloatArray | None:
+    """Return closed loops (n,) at a pose with coordinates (6,), followed from the middle; None where they end."""
+    independent, dependent = list(problem.independent), list(problem.dependent)
+    z = problem.start.copy()
+    target = z.copy()
+    target[: len(problem.free)] = y[list(problem.free)]
+    if not dependent:
+        return target
+    loops = problem.loops
+    begin = z[independent]
+    for part in np.linspace(0, 1, _WAY + 1)[1:]:
+        z[independent] = begin + part * (target[independent] - begin)
+        z = loops.all_closed(z[:, None], dependent)[:, 0]
+        if not np.isfinite(z).all():
+            return None
+    return z
+
+
+def _tightened(item: BoundedConstraint, name: str) -> BoundedConstraint:
+    """Return a constraint with tighter bounds and a name; its number is that of its expression."""
+    lower = item.lower + TIGHTER * abs(item.lower) if math.isfinite(item.lower) else item.lower
+    upper = item.upper - TIGHTER * abs(item.upper) if math.isfinite(item.upper) else item.upper
+    # A measure is evaluated at the stated pose, and this is another.
+    stated = (item.lower, item.upper)
+    return BoundedConstraint(replace(item.constraint, name=name, measure=None, stated=stated), lower, upper)

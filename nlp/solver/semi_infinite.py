@@ -1,0 +1,178 @@
+"""A design that is regular and keeps its limits over a continuous workspace, by exchange of poses.
+
+A limit over a workspace is one constraint for each of its poses. A program with a few of them is solved, its design is
+judged over the whole workspace (:mod:`screwsynth.nlp.proof.workspace`), and the poses that refute a claim become
+constraints, each of the one claim that it refutes, until the proof holds.
+
+In these constraints every limit is a little tighter than in the case: a design that lies exactly on a limit at the
+worst of the poses known is beyond it at some pose nearby, and only poses without end would end the exchange.
+
+Source: J. W. Blankenship, J. E. Falk, *Infinitely constrained optimization problems*, J. Optim. Theory Appl. 19 (1976).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import FloatArray
+from ...models.joints.closedform import closed_form
+from ..case.case import Case
+from ..case.task import Sense
+from ..errors import CaseError
+from ..interruption import is_requested, one_call
+from ..program.formulation import formulate
+from ..program.nlp import Nlp
+from ..proof.enclosure.engine import kernel
+from ..proof.statement.machine import CentreErrors, JointErrors, workspace_of_case
+from ..proof.statement.posed_layout import reach_claims
+from ..proof.workspace.judge import Judgement, judge_workspace
+from ..proof.workspace.numbers.extremes import prove_extreme
+from ..proof.workspace.ranks.ranks import not_judged
+from ..proof.workspace.robot.pose_box import pose_box
+from ..proof.workspace.verdict import Outcome
+from .multistart import ProgramSolution
+from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
+
+#: Gap of the proofs: several of them fit between a limit of the constraints and that of the case.
+_GAP = 2e-4
+#: Reason for ranks that are not judged.
+_UNREACHED = "a limb does not reach every pose, so that J is not judged"
+#: Largest number of exchanges.
+MOST_EXCHANGES = 40
+
+#: Solves a program, from points that come before those that the search samples.
+SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
+#: Called after each exchange with the number of exchanges, F, and the number of claims that are not proved.
+ExchangeProgress = Callable[[int, float, int], None]
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceProof:
+    """The proof of a design over its workspace.
+
+    Attributes:
+        judgement: of the design.
+        poses: poses of the constraints, in the order in which they were found.
+        history: F, and the number of claims that were not proved, of each design in turn.
+        first: the design that keeps the limits at the stated pose alone: its judgement.
+        tighter: part of themselves by which the limits of the constraints are tighter than those of the case.
+    """
+
+    judgement: Judgement
+    poses: tuple[BindingPose, ...]
+    history: tuple[tuple[float, int], ...]
+    first: Judgement
+    tighter: float = TIGHTER
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether the design is regular and keeps its limits at every pose."""
+        return not _faults(self.judgement)
+
+
+class Exchanged(NamedTuple):
+    """The last program's solution, and the judgement of its design; None where the program has no answer."""
+
+    own: ProgramSolution
+    proof: WorkspaceProof | None
+
+
+@one_call
+def solve_over_workspace(case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None) -> Exchanged:
+    """Return the solution of a case whose limits hold over its workspace, and the proof.
+
+    Args:
+        case: a case with one task and one stated pose.
+        solve_one: solves a program.
+        progress: called after each exchange.
+
+    Raises:
+        CaseError: the case has several tasks or poses.
+        InputError: the C kernel was not built.
+    """
+    if len(case.tasks) > 1 or case.pose_count > 1:
+        raise CaseError("limits.over", "needs a case with one task and one stated pose", "workspace", case.source)
+    kernel()  # before any solve where it is missing
+    nlp = formulate(case)
+    constraints, binding, history = PoseConstraints(nlp, case), list[BindingPose](), list[tuple[float, int]]()
+    first: Judgement | None = None
+    found = solve_one(nlp, ())
+    while found.status.is_answer:
+        design = design_of(case, nlp, found.x)
+        judged = _judged(design)
+        first = judged if first is None else first
+        faults = _faults(judged)
+        history.append((found.F, len(faults)))
+        if progress is not None:
+            progress(len(history), found.F, len(faults))
+        fresh = [each for each in faults if each is not None and not any(map(each.is_same, binding))]
+        fresh = constraints.added(design, fresh, found.x)
+        if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
+            return Exchanged(found, WorkspaceProof(judged, tuple(binding), tuple(history), first))
+        binding += fresh
+        nlp = constraints.program
+        found = solve_one(nlp, [np.concatenate([found.x, nlp.start[len(found.x) :]])])
+    return Exchanged(found, None)
+
+
+def _judged(case: Case) -> Judgement:
+    """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone."""
+    closed, workspace = closed_form(case.model), workspace_of_case(case)
+    if closed.reaches:
+        layout, claims = reach_claims(case, closed, workspace)
+        found = tuple(prove_extreme(layout, claim, gap=_GAP, jobs=1) for claim in claims)
+        if any(each.outcome is not Outcome.PROVED for each in found):
+            return Judgement(case, workspace, not_judged(pose_box(workspace), _UNREACHED), found)
+    return judge_workspace(case, gap=_GAP, jobs=1, with_objective=False)
+
+
+def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
+    """Return a case with the dimensions of a point (n,) of its program, all fixed."""
+    values = nlp.program.kernels.robot_state(x, nlp.arguments).parameters.ravel().tolist()
+    parameters, begin = {}, 0
+    for item in case.model.parameters:
+        count = len(item.components)
+        parts = values[begin : begin + count]
+        parameters[item.name] = parts[0] if count == 1 else parts
+        begin += count
+    return replace(case, parameters=parameters)
+
+
+def _faults(judged: Judgement) -> list[BindingPose | None]:
+    """Return a pose for each claim that is not proved; None for one that is open without a pose."""
+    faults: list[BindingPose | None] = []
+    regular = judged.regularity
+    if regular.outcome is not Outcome.PROVED:
+        faults.append(
+            None
+            if regular.y is None
+            else BindingPose("regular", regular.box.pose(regular.y), None, _errors(regular.errors, regular.centres))
+        )
+    if judged.constraints is not None and judged.constraints.outcome is not Outcome.PROVED:
+        faults.append(None)
+    by_name = {(each.name, each.sense): each for each in judged.extremes}
+    for each in judged.extremes:
+        if not each.fails:
+            continue
+        if each.pose is None:
+            faults.append(None)
+        elif each.key.startswith("actuator."):
+            limb = each.name.partition(" limb ")[2]
+            short, long = (by_name[f"leg_length limb {limb}", sense].pose for sense in (Sense.MIN, Sense.MAX))
+            faults.append(
+                None if short is None else BindingPose(each.name, short, long, _errors(each.errors, each.centres))
+            )
+        else:
+            faults.append(BindingPose(each.name, each.pose, None, _errors(each.errors, each.centres)))
+    return faults
+
+
+def _errors(legs: JointErrors | None, centres: CentreErrors | None) -> FloatArray | None:
+    """Return the errors (m, 3) of the joint centres of a machine; None for the exact one."""
+    if legs is not None:
+        return legs.of_centres(()).vectors
+    return None if centres is None else centres.vectors
