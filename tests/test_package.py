@@ -229,7 +229,7 @@ def test_the_gallery_of_the_documentation_is_up_to_date() -> None:
 def test_the_case_file_of_the_documentation_is_valid() -> None:
     text = (ROOT / "docs" / "case-files.md").read_text(encoding="utf-8")
     (written,) = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
-    case = screwsynth.nlp.case_from(written, "shown")
+    case = screwsynth.nlp.case_from_tables(tomllib.loads(written), name="shown", source="case-files.md")
     assert case.tasks[0].name == "drive the screw"
 
 

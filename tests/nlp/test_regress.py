@@ -192,7 +192,7 @@ def test_junit_escapes_what_a_case_says(tmp_path: Path) -> None:
 def test_a_quantity_that_is_no_number_of_the_result_is_a_fault_of_the_case(tmp_path: Path, cli: Run) -> None:
     code, _, err = cli(
         "check",
-        edited(
+        changed(
             tmp_path,
             "paper-4.3-axis-x",
             ('quantity = "parameters.x4"\nvalue = 21.1\n', 'quantity = "parameters.x9"\nvalue = 21.1\n'),

@@ -503,7 +503,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "gap"), [("hexapod-linuxcnc", "0.1"), ("hexapod-workspace", "0.2")])
+@pytest.mark.parametrize(("name", "gap"), [("hexapod-linuxcnc", "0.02"), ("hexapod-workspace", "0.05")])
 def test_shipped_workspaces_of_machines_as_they_are_built_are_accepted(
     cli: Run, tmp_path: Path, name: str, gap: str
 ) -> None:
