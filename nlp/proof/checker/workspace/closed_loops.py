@@ -83,6 +83,7 @@ class LoopPoints:
         z, others = z.copy(), [k for k in range(z.shape[1]) if k not in moving]
         to = z[:, others] if to is None else to
         first, way = self.at(z)[0], to - z[:, others]
+        size = np.abs(first).max(axis=1, initial=0.0)
         for k in range(1, steps + 1):
             left = 1 - k / steps
             z[:, others] = to - left * way
@@ -92,6 +93,9 @@ class LoopPoints:
                 if not np.nanmax(np.abs(g), initial=0.0) > 1e-3 * _CLOSED:
                     break
                 z[:, moving] -= self._size[moving] * (inverses(J[:, :, moving], zero) @ g[:, :, None])[:, :, 0]
+            # Beyond a fold there are no left sides that fall: steps from there may end in any assembly.
+            off = np.abs(self.at(z)[0] - left * first).max(axis=1, initial=0.0)
+            z[(size > _CLOSED) & ~(off <= size / steps)] = np.nan
         z[~(np.abs(self.at(z)[0]).max(axis=1, initial=0.0) <= _CLOSED)] = np.nan
         return z
 

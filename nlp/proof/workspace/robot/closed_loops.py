@@ -125,11 +125,17 @@ def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | Non
         pose: number of the pose's coordinates. They move only where the unknowns alone do not close the loops.
     """
     unknowns, every, first = list(range(pose, len(z))), list(range(len(z))), loops.values(z[:, None])[0]
+    off = max(np.abs(first).max(initial=0.0) / _WAY, _CLOSED)
     for moving in (unknowns, every):
         found: FloatArray | None = z
-        for share in np.repeat(np.linspace(1, 0, _WAY + 1)[1:], 2):
-            found = None if found is None else loops.moved(found, moving, share * first)
-        found = None if found is None else loops.closed(found, moving)
-        if found is not None and loops.is_closed(found):
-            return found
+        for share in np.linspace(1, 0, _WAY + 1)[1:]:
+            for _ in range(2):
+                found = None if found is None else loops.moved(found, moving, share * first)
+            # Beyond a fold there are no left sides that fall: steps from there may end in any assembly.
+            if found is None or not np.abs(loops.values(found[:, None])[0] - share * first).max(initial=0.0) <= off:
+                break
+        else:
+            found = None if found is None else loops.closed(found, moving)
+            if found is not None and loops.is_closed(found):
+                return found
     return None
