@@ -70,7 +70,7 @@ from .evidence.state import RobotState as RobotState
 from .evidence.state import evaluate as evaluate
 from .evidence.tolerance import ToleranceLoss as ToleranceLoss
 from .evidence.tolerance import tolerance_loss as tolerance_loss
-from .exchange.export import export_robot as export_robot
+from .formats.export import export_robot as export_robot
 from .front.data import front_result as front_result
 from .front.front import Front as Front
 from .front.front import FrontPoint as FrontPoint

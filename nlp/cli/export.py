@@ -36,8 +36,8 @@ def export(
     """
     from ..case.reader import read_case
     from ..errors import one_line
-    from ..exchange.export import check_pose, check_same_robot, files_at, fixed_point, is_assembled
-    from ..exchange.writing.folder import check_formats
+    from ..formats.export import check_pose, check_same_robot, files_at, fixed_point, is_assembled
+    from ..formats.writing.folder import check_formats
     from ..output.files import check_folder, check_outputs, write_folder
     from .progress import solve_with_progress
 

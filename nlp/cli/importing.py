@@ -68,11 +68,11 @@ def import_(
     The robot file has the model's numbers; its joints have the model's names. FILE stands before --actuated and --free.
     """
     from ..errors import InputError, one_line
-    from ..exchange.reading.importing import Request, import_robot
-    from ..exchange.reading.reduction import Ends
-    from ..exchange.reading.robotfile import BEGINNING, robot_file
-    from ..exchange.reading.symmetry import offers_of
-    from ..exchange.reading.words import offer_lines, summary_lines
+    from ..formats.reading.importing import Request, import_robot
+    from ..formats.reading.reduction import Ends
+    from ..formats.reading.robotfile import BEGINNING, robot_file
+    from ..formats.reading.symmetry import offers_of
+    from ..formats.reading.words import offer_lines, summary_lines
     from ..output.files import check_origin, check_outputs, write_text
     from ..output.terminal import show
     from ..results.text import Line, Tone

@@ -37,13 +37,13 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import loops_are_closed
-from screwsynth.nlp.exchange.reading.importing import Request, import_robot
-from screwsynth.nlp.exchange.reading.reduction import Ends
-from screwsynth.nlp.exchange.solved.mechanism_of import Exported, mechanism_of
-from screwsynth.nlp.exchange.writing.folder import exported_files
-from screwsynth.nlp.exchange.writing.mjcf import mjcf_text
-from screwsynth.nlp.exchange.writing.numbers import quaternion, roll_pitch_yaw
-from screwsynth.nlp.exchange.writing.urdf import urdf_of
+from screwsynth.nlp.formats.reading.importing import Request, import_robot
+from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
+from screwsynth.nlp.formats.writing.folder import exported_files
+from screwsynth.nlp.formats.writing.mjcf import mjcf_text
+from screwsynth.nlp.formats.writing.numbers import quaternion, roll_pitch_yaw
+from screwsynth.nlp.formats.writing.urdf import urdf_of
 
 ROBOTS = (*gallery_names(), "stewart-gough", "hexapod", "three-upu")
 #: One of each kind of limb and of closing, for tests that build the robot again.

@@ -52,7 +52,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
         assert (status, said) == (2, ""), words
         assert fault in wrong
         assert wrong.count("\n") == 1
-    monkeypatch.setattr("screwsynth.nlp.exchange.writing.dxf.find_spec", lambda _: None)
+    monkeypatch.setattr("screwsynth.nlp.formats.writing.dxf.find_spec", lambda _: None)
     status, _, wrong = cli("export", case, "--format", "all", "--out", str(out))
     assert status == 2
     assert "ezdxf, which is not installed: pip install 'screwsynth[robots]'" in wrong

@@ -18,15 +18,15 @@ from screwsynth.models import Substitution, jacobian
 from screwsynth.models.joints import RobotError, robot
 from screwsynth.models.mechanism import mechanism_of, wrenches_of
 from screwsynth.nlp import InputError, load_case
-from screwsynth.nlp.exchange.reading.blocks import between
-from screwsynth.nlp.exchange.reading.checking import check_text
-from screwsynth.nlp.exchange.reading.filetext import robot_file_text
-from screwsynth.nlp.exchange.reading.frames import Frame, rotation_from_roll_pitch_yaw
-from screwsynth.nlp.exchange.reading.importing import Imported, Request, import_robot
-from screwsynth.nlp.exchange.reading.newton import close, gap_of
-from screwsynth.nlp.exchange.reading.reduction import Ends
-from screwsynth.nlp.exchange.reading.urdf import read_urdf
-from screwsynth.nlp.exchange.reading.xmltext import read_xml
+from screwsynth.nlp.formats.reading.blocks import between
+from screwsynth.nlp.formats.reading.checking import check_text
+from screwsynth.nlp.formats.reading.filetext import robot_file_text
+from screwsynth.nlp.formats.reading.frames import Frame, rotation_from_roll_pitch_yaw
+from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
+from screwsynth.nlp.formats.reading.newton import close, gap_of
+from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.reading.urdf import read_urdf
+from screwsynth.nlp.formats.reading.xmltext import read_xml
 
 STEWARTS = tuple(f"stewart_{k}" for k in range(1, 7))
 

@@ -22,11 +22,11 @@ from screwsynth.models.mechanism import (
     wrenches_of,
 )
 from screwsynth.nlp import InputError
-from screwsynth.nlp.exchange.reading.checking import check_text
-from screwsynth.nlp.exchange.reading.filetext import robot_file_text
-from screwsynth.nlp.exchange.reading.importing import Request, import_robot
-from screwsynth.nlp.exchange.reading.reduction import Ends
-from screwsynth.nlp.exchange.reading.snapping import near_misses, snapped
+from screwsynth.nlp.formats.reading.checking import check_text
+from screwsynth.nlp.formats.reading.filetext import robot_file_text
+from screwsynth.nlp.formats.reading.importing import Request, import_robot
+from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.reading.snapping import near_misses, snapped
 
 E = np.eye(3)
 

@@ -14,13 +14,13 @@ from builders import Array
 
 from screwsynth.models.mechanism import wrenches_of
 from screwsynth.nlp import InputError
-from screwsynth.nlp.exchange.reading.description import Description
-from screwsynth.nlp.exchange.reading.frames import Frame, rotation_vector
-from screwsynth.nlp.exchange.reading.importing import Request, import_robot
-from screwsynth.nlp.exchange.reading.mjcf import read_mjcf
-from screwsynth.nlp.exchange.reading.newton import close, gap_of, gap_of_coupling
-from screwsynth.nlp.exchange.reading.reduction import Ends
-from screwsynth.nlp.exchange.reading.xmltext import read_xml
+from screwsynth.nlp.formats.reading.description import Description
+from screwsynth.nlp.formats.reading.frames import Frame, rotation_vector
+from screwsynth.nlp.formats.reading.importing import Request, import_robot
+from screwsynth.nlp.formats.reading.mjcf import read_mjcf
+from screwsynth.nlp.formats.reading.newton import close, gap_of, gap_of_coupling
+from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.reading.xmltext import read_xml
 
 mujoco = pytest.importorskip("mujoco")
 
