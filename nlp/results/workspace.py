@@ -68,7 +68,7 @@ class RegularData(JsonObject):
         outcome: ``proved``; ``refuted``, with a singular pose; ``open``, with the middle of the widest box that is
             left.
         pose: that pose; absent where the claim is proved.
-        between: two poses at which the determinant of the rows has opposite signs, without rounding; absent where the
+        between: two poses at which the determinant of the rows is proved to have opposite signs; absent where the
             claim is not refuted so.
         boxes: number of boxes examined.
         open: number of boxes left.
