@@ -124,6 +124,8 @@ def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | Non
         z: (n,) coordinates of the pose, then zeros.
         pose: number of the pose's coordinates. They move only where the unknowns alone do not close the loops.
     """
+    if not loops.count:
+        return z if loops.is_closed(z) else None
     unknowns, every, first = list(range(pose, len(z))), list(range(len(z))), loops.values(z[:, None])[0]
     off = max(np.abs(first).max(initial=0.0) / _WAY, _CLOSED)
     for moving in (unknowns, every):
