@@ -13,7 +13,7 @@ from screwsynth.nlp.proof.checker.bisection import show
 from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.tree import Node
-from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
+from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly, LoopPoints
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim
@@ -92,6 +92,14 @@ def sign_of(block: np.ndarray) -> int:
     """The sign of the determinant of a matrix (2, 2), in fractions."""
     a, b, c, d = (Fraction(float(each)) for each in block.ravel())
     return (a * d > b * c) - (a * d < b * c)
+
+
+def test_no_points_are_closed() -> None:
+    """A block of pairs of boxes may have been tied already, every one."""
+    case = load_case("hexapod-linuxcnc")
+    robot = PosedRobot(case, case.model, pose_root(workspace_of_case(case)))
+    points = LoopPoints(robot, robot.z[:2])
+    assert points.closed(np.zeros((0, 6)), [0, 1], to=np.zeros((0, 4)), steps=2).shape == (0, 6)
 
 
 @pytest.mark.parametrize("size", [2.0**-40, 1.0, 2.0**40])

@@ -59,6 +59,8 @@ class LoopPoints:
 
     def at(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return left sides (B, k) and their derivatives (B, k, n) at points (B, n), for coordinates of size 1."""
+        if not len(z):  # a function of no points is evaluated at one
+            return np.zeros((0, self._count)), np.zeros((0, self._count, z.shape[1]))
         g, J = (each.full() for each in self._function(z.T))
         return g.T, np.asarray(J.reshape(self._count, *z.shape).transpose(1, 0, 2) * self._size)
 
