@@ -21,6 +21,11 @@ class Sense(enum.Enum):
     MAX = "max"
     MIN = "min"
 
+    @property
+    def sign(self) -> float:
+        """1 of a maximum and -1 of a minimum: this times the number is maximised."""
+        return 1.0 if self is Sense.MAX else -1.0
+
 
 @dataclass(frozen=True, eq=False)
 class Task:

@@ -164,7 +164,7 @@ class Nlp(Whole):
     @property
     def sign(self) -> float:
         """Factor that turns the objective into one to be minimised: -1 for a maximum, 1 for a minimum."""
-        return -1.0 if self.sense is Sense.MAX else 1.0
+        return -self.sense.sign
 
     def stated_limit(self, j: int) -> float:
         """Return the bound of side j as the case states it, in the units of its expression."""

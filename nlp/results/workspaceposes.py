@@ -161,7 +161,7 @@ def _beyond(each: ExtremeData) -> float:
     """Return how far a number is beyond its limit, as a part of the limit; negative where it is kept."""
     if each.limit is None or each.reached is None:
         return float("-inf")
-    sign = 1.0 if each.sense is Sense.MAX else -1.0
+    sign = each.sense.sign
     return sign * (each.reached - each.limit) / (abs(each.limit) or 1.0)
 
 

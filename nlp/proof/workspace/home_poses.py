@@ -118,7 +118,7 @@ class Homes:
         value = float(function(x, self._nlp.arguments))
         reached = claim.reading.from_value(value)
         if is_limit and claim.limit is not None:
-            sign = 1.0 if each.sense is Sense.MAX else -1.0
+            sign = each.sense.sign
             if sign * (value - claim.limit) > slack_of(claim.limit):
                 return replace(each, reached=reached, outcome=Outcome.REFUTED, reason="")
             return replace(opened, reached=reached)

@@ -81,7 +81,7 @@ class PaperRecord:
     def program(self, claim: Claim, found: Certificate, tree: TreeRecord) -> None:
         """Record a search of a number, if it has a bound, open boxes being leaves, that keeps the number's limit."""
         is_bounded = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE)
-        sign = 1.0 if claim.sense is Sense.MAX else -1.0
+        sign = claim.sense.sign
         most = math.inf if claim.limit is None else sign * claim.limit + slack_of(claim.limit)
         if is_bounded and math.isfinite(found.bound) and sign * found.bound <= most:
             self._keep(claim, found.nlp, -found.nlp.sign * found.bound, tree.tree(with_open=True))
@@ -234,7 +234,7 @@ class _Writer:
         if each.kind == "error":
             bound = self._record.firsts[each.name] * (1 + _OUTWARDS)
         else:
-            sign = 1.0 if found.sense is Sense.MAX else -1.0
+            sign = found.sense.sign
             # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
             limit = found.bound + sign * _OUTWARDS * abs(found.bound) if each.limit is None else each.limit
             bound = sign * max(sign * limit, sign * found.bound)

@@ -118,7 +118,7 @@ class Machines:
     def number(self, claim: Claim, rest: float) -> SX:
         """Return a bound (1, 1) of a number over all machines in the symbols of the design, from the rest's bound."""
         errors, pose = self.symbols.errors, self.design.table.variables_vector
-        slopes, sign = ca.densify(ca.gradient(claim.expression, errors)), 1.0 if claim.sense is Sense.MAX else -1.0
+        slopes, sign = ca.densify(ca.gradient(claim.expression, errors)), claim.sense.sign
         squares = [ca.sumsqr(slopes[k : k + 3]) for k in range(0, errors.numel(), 3)]
         small = self.symbols.near_zero(claim.expression, self.design).tolist()
         first = sum((ca.sqrt(each + size**2) for each, size in zip(squares, small, strict=True)), SX(0))

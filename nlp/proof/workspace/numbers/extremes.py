@@ -106,7 +106,7 @@ def extreme_of(
         errors: of the machine that reaches it, as for :class:`Extreme`.
         centres: likewise.
     """
-    sign, read, limit = (1.0 if claim.sense is Sense.MAX else -1.0), claim.reading.from_value, claim.limit
+    sign, read, limit = claim.sense.sign, claim.reading.from_value, claim.limit
     is_bounded, is_reached, reason = math.isfinite(found.bound), math.isfinite(found.value), found.reason
     bound = read(-sign * found.bound) if is_bounded else sign * math.inf
     outcome = Outcome.PROVED if is_bounded and not reason else Outcome.OPEN
@@ -167,7 +167,7 @@ def prove_extreme(
         machine: returns the machine that is worst at a pose, for a claim about every machine within a tolerance.
         paper: records the search for a proof.
     """
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
+    sign = claim.sense.sign
     if is_requested():
         return extreme_of(claim, Minimum(reason=why_stopped()))
     nlp = extreme_program(layout, claim.expression, claim.sense)
@@ -199,7 +199,7 @@ def _search(
         UncoveredError: the expression holds an operation without a rule.
     """
     # A program of a claim has one function, and its search is that of certify with or without a record.
-    sign, writer = 1.0 if claim.sense is Sense.MAX else -1.0, None if paper is None else TreeRecord()
+    sign, writer = claim.sense.sign, None if paper is None else TreeRecord()
     found = certify_program(nlp, gap=gap, jobs=jobs, recorder=writer)
     boxes, seconds = found.boxes, found.seconds
     while (finer := _finer_gap(nlp, claim, found)) is not None and not is_requested():
@@ -225,7 +225,7 @@ def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
     """Return the gap that decides a claim's limit; None where it is decided, or the search did not end by itself."""
     if claim.limit is None or found.status is not CertificateStatus.PROVED:
         return None
-    sign = 1.0 if claim.sense is Sense.MAX else -1.0
+    sign = claim.sense.sign
     slack = slack_of(claim.limit)
     room = sign * (claim.limit - found.incumbent) + slack / 2
     if not (room > 0 and sign * (found.bound - claim.limit) > slack):

@@ -92,7 +92,7 @@ class _Combined(NamedTuple):
     @property
     def sign(self) -> float:
         """1 for a largest value, -1 for a smallest one."""
-        return 1.0 if self.claim.sense is Sense.MAX else -1.0
+        return self.claim.sense.sign
 
     def refined(self, ends: list[Extreme]) -> tuple[list[Extreme], Extreme]:
         """Return the two lengths as fine as the limit needs, and the extreme of the number."""
@@ -173,6 +173,6 @@ class _Combined(NamedTuple):
 
 def _better(one: Extreme, finer: Extreme) -> Extreme:
     """Return a length that was proved more finely, with the boxes and seconds of both proofs."""
-    sign = 1.0 if one.sense is Sense.MAX else -1.0
+    sign = one.sense.sign
     best = finer if sign * finer.bound <= sign * one.bound else replace(finer, bound=one.bound)
     return replace(best, boxes=one.boxes + finer.boxes, seconds=one.seconds + finer.seconds, outcome=one.outcome)

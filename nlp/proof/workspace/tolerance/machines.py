@@ -137,7 +137,7 @@ class Machines:
 
     def number(self, claim: Claim) -> SX:
         """Return a number in the coordinates of machines, times -1 where the largest value is meant."""
-        return -_sign(claim) * self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
+        return -claim.sense.sign * self.symbols.of(claim.expression, self.family.errors, self.family.problem.z)
 
     def _by_first_order(
         self, claim: Claim, number: SX, gap: float, jobs: int | None, paper: PaperRecord | None
@@ -147,7 +147,7 @@ class Machines:
         Raises:
             UncoveredError: the expression holds an operation without a rule.
         """
-        family, symbols, design, sign = self.family, self.symbols, self._design, _sign(claim)
+        family, symbols, design, sign = self.family, self.symbols, self._design, claim.sense.sign
         whole, machine = claim.expression, None
         if any(ca.which_depends(number, family.errors, 1, True)):
             values = Expressions(family, number)
@@ -206,8 +206,3 @@ class Machines:
             pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
             centres = self.family.errors_of(found.at) if is_known and self.family.names else None
             yield extreme_of(claim, found, pose, centres=centres)
-
-
-def _sign(claim: Claim) -> float:
-    """Return 1 where the largest value is meant, -1 where the smallest one is."""
-    return 1.0 if claim.sense is Sense.MAX else -1.0
