@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.task import Sense
+from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.verdict import Outcome
 from ..units import Units
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
@@ -13,7 +14,8 @@ from .parts import HeadData, VersionsData
 from .point import head_data, versions
 
 if TYPE_CHECKING:
-    from ..proof.statement.machine import CentreErrors, JointErrors
+    from ..case.case import Case
+    from ..proof.statement.machine import JointErrors
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.numbers.extremes import Extreme
     from ..proof.workspace.robot.pose_box import PoseNumbers
@@ -228,8 +230,8 @@ def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
         tighter=proof.tighter,
         designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
         poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
-        regular=_regular_data(judged.regularity, units),
-        extremes=tuple(_extreme_data(each, units) for each in judged.extremes),
+        regular=_regular_data(judged.regularity, judged.case),
+        extremes=tuple(_extreme_data(each, judged.case) for each in judged.extremes),
     )
 
 
@@ -245,9 +247,9 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
         parameters=parameters,
         joint_centre=case.joint_centre_tolerance,
         proved=judged.is_proved,
-        regular=_regular_data(judged.regularity, case.units),
-        constraints=None if judged.constraints is None else _regular_data(judged.constraints, case.units),
-        extremes=tuple(_extreme_data(each, case.units) for each in judged.extremes),
+        regular=_regular_data(judged.regularity, case),
+        constraints=None if judged.constraints is None else _regular_data(judged.constraints, case),
+        extremes=tuple(_extreme_data(each, case) for each in judged.extremes),
         scale=scale,
         versions=versions(),
     )
@@ -267,14 +269,14 @@ def _fixed(value: object) -> float:
     return value
 
 
-def _regular_data(found: "RankVerdict", units: Units) -> RegularData:
+def _regular_data(found: "RankVerdict", case: "Case") -> RegularData:
     """Return the verdict on regularity."""
     sides = None
     if found.sides is not None:
-        sides = tuple(pose_data(found.box.pose(y), units) for y in found.sides)
+        sides = tuple(pose_data(found.box.pose(y), case.units) for y in found.sides)
     return RegularData(
         outcome=found.outcome,
-        pose=None if found.pose is None else pose_data(found.pose, units),
+        pose=None if found.pose is None else pose_data(found.pose, case.units),
         between=sides,
         boxes=found.boxes,
         open=found.open,
@@ -282,24 +284,24 @@ def _regular_data(found: "RankVerdict", units: Units) -> RegularData:
         seconds=found.seconds,
         engine=found.engine,
         reason=found.reason or None,
-        machine=_machine_data(found.errors, found.centres),
+        machine=_machine_data(found.errors, case),
     )
 
 
-def _machine_data(errors: "JointErrors | None", centres: "CentreErrors | None") -> MachineData | None:
+def _machine_data(errors: "JointErrors | None", case: "Case") -> MachineData | None:
     """Return the errors of a machine; None for the exact one. Lengths are in the case's unit already."""
-    if centres is not None:
-        joints = zip(centres.names, centres.vectors, strict=True)
-        data = tuple(CentreData(joint=name, error=vector(error)) for name, error in joints)
-        return MachineData(base=None, platform=None, centres=data)
     if errors is None:
         return None
-    base, platform = (tuple(vector(part) for part in each) for each in errors)
-    return MachineData(base=base, platform=platform, centres=None)
+    each = tuple(map(vector, errors.vectors))
+    if has_straight_legs(case.model):
+        return MachineData(base=each[::2], platform=each[1::2], centres=None)
+    centres = tuple(CentreData(joint=name, error=error) for name, error in zip(errors.names, each, strict=True))
+    return MachineData(base=None, platform=None, centres=centres)
 
 
-def _extreme_data(each: "Extreme", units: Units) -> ExtremeData:
+def _extreme_data(each: "Extreme", case: "Case") -> ExtremeData:
     """Return an extreme in a case's units."""
+    units = case.units
 
     def shown(value: float) -> float | None:
         return units.shown(value, each.dimension) if math.isfinite(value) else finite_or_none(value)
@@ -317,5 +319,5 @@ def _extreme_data(each: "Extreme", units: Units) -> ExtremeData:
         boxes=each.boxes,
         seconds=each.seconds,
         reason=each.reason or None,
-        machine=_machine_data(each.errors, each.centres),
+        machine=_machine_data(each.errors, case),
     )

@@ -27,7 +27,7 @@ from ..interruption import is_requested, one_call
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
-from ..proof.statement.machine import CentreErrors, JointErrors, workspace_of_case
+from ..proof.statement.machine import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import Judgement, judge_workspace
 from ..proof.workspace.numbers.extremes import prove_extreme
@@ -150,7 +150,7 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
         faults.append(
             None
             if regular.y is None
-            else BindingPose("regular", regular.box.pose(regular.y), None, _errors(regular.errors, regular.centres))
+            else BindingPose("regular", regular.box.pose(regular.y), None, _errors(regular.errors))
         )
     if judged.constraints is not None and judged.constraints.outcome is not Outcome.PROVED:
         faults.append(None)
@@ -163,16 +163,12 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
         elif each.key.startswith("actuator."):
             limb = each.name.partition(" limb ")[2]
             short, long = (by_name[f"leg_length limb {limb}", sense].pose for sense in (Sense.MIN, Sense.MAX))
-            faults.append(
-                None if short is None else BindingPose(each.name, short, long, _errors(each.errors, each.centres))
-            )
+            faults.append(None if short is None else BindingPose(each.name, short, long, _errors(each.errors)))
         else:
-            faults.append(BindingPose(each.name, each.pose, None, _errors(each.errors, each.centres)))
+            faults.append(BindingPose(each.name, each.pose, None, _errors(each.errors)))
     return faults
 
 
-def _errors(legs: JointErrors | None, centres: CentreErrors | None) -> FloatArray | None:
+def _errors(found: JointErrors | None) -> FloatArray | None:
     """Return the errors (m, 3) of the joint centres of a machine; None for the exact one."""
-    if legs is not None:
-        return legs.of_centres(()).vectors
-    return None if centres is None else centres.vectors
+    return None if found is None else found.vectors

@@ -447,11 +447,11 @@ def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
     (found,) = (each for each in judged.extremes if each.key)
     assert judged.is_regular
     assert found.outcome is Outcome.REFUTED
-    assert found.centres is not None
+    assert found.errors is not None
     assert found.pose is not None
-    errors = found.centres.vectors
+    errors = found.errors.vectors
     assert np.linalg.norm(errors, axis=1).max() <= 1e-3
-    assert found.centres.names == ("1:1", "1:3", "2:1", "2:3", "3:1", "3:3")
+    assert found.errors.names == ("1:1", "1:3", "2:1", "2:3", "3:1", "3:3")
     y = pose_box(workspace_of_case(case)).coordinates(found.pose)
     y[3:] = 2 * np.arctan(y[3:])
     value = robot.values(y[None], errors[None])[0, 0]
@@ -496,13 +496,13 @@ def test_a_machine_far_off_is_singular() -> None:
     judged = judge_workspace(case, with_limits=False, paper=record)
     found = judged.regularity
     assert found.outcome is Outcome.REFUTED
-    assert found.centres is not None
+    assert found.errors is not None
     assert found.y is not None
-    assert np.linalg.norm(found.centres.vectors, axis=1).max() <= 0.2
+    assert np.linalg.norm(found.errors.vectors, axis=1).max() <= 0.2
     (checked,) = check_workspace_proof(paper_of(judged, record, text + place + TURN), case).claims
     assert checked.is_refuted
     # Six straight legs with these errors: the determinant of their unit rows vanishes.
-    pose, e = found.box.pose(found.y), found.centres.vectors
+    pose, e = found.box.pose(found.y), found.errors.vectors
     rows = []
     for i in range(6):
         side, turn = (-1.0 if i < 3 else 1.0), np.array([(i % 3) * 2 * math.pi / 3])

@@ -203,7 +203,7 @@ def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
         problem.locked,
         most_boxes=4000,
         look=SingularSearch(
-            problem, problem.locked, lambda at: homes.is_singular(at.y, at.centres, constraints=False)
+            problem, problem.locked, lambda at: homes.is_singular(at.y, at.errors, constraints=False)
         ).look,
     )
     assert found.outcome is Outcome.REFUTED

@@ -32,27 +32,16 @@ class Legs(NamedTuple):
     platform: FloatArray
     tolerance: float = 0.0
 
+    def spans(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return the vectors (k, 3) from the base joints to the platform joints at a pose, in the world frame."""
+        return np.asarray(position + self.platform @ rotation.T - self.base)
+
 
 class JointErrors(NamedTuple):
-    """Errors of the joint centres of one machine, (k, 3) each: base in the world frame, platform in its own, length."""
-
-    base: FloatArray
-    platform: FloatArray
-
-    def applied(self, legs: Legs) -> Legs:
-        """Return the exact legs of the machine with these errors."""
-        return Legs(legs.base + self.base, legs.platform + self.platform)
-
-    def of_centres(self, names: tuple[str, ...]) -> CentreErrors:
-        """Return the errors by the names of the centres: base, then platform, leg by leg."""
-        return CentreErrors(names, np.stack([self.base, self.platform], axis=1).reshape(-1, 3))
-
-
-class CentreErrors(NamedTuple):
-    """Errors of the joint centres of one machine of a robot that is not six straight legs.
+    """Errors of the joint centres of one machine.
 
     Attributes:
-        names: of the m joint centres.
+        names: of the m joint centres; of straight legs that on the base, then that on the platform, leg by leg.
         vectors: (m, 3) in the world frame at home, length; of platform joints of legs in the platform's frame.
     """
 

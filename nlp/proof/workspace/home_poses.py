@@ -25,7 +25,7 @@ from ...evidence.state import evaluate
 from ...program.layout import Layout
 from ...program.nlp import Nlp
 from ..statement.claims import REACH, Claim, claims_of
-from ..statement.machine import CentreErrors
+from ..statement.machine import JointErrors
 from ..statement.posed_layout import extreme_program
 from ..statement.tolerance import coordinate_layout
 from .numbers.extremes import Extreme, slack_of
@@ -77,17 +77,17 @@ class Homes:
             found[each.name, each.sense] = each, value
         return found
 
-    def is_singular(self, y: FloatArray, centres: CentreErrors | None, *, constraints: bool) -> bool:
+    def is_singular(self, y: FloatArray, errors: JointErrors | None, *, constraints: bool) -> bool:
         """Return whether J, or the constraint wrenches alone, lose their rank at a pose (6,), as ``evaluate`` shows it.
 
         Args:
             y: coordinates of the pose.
-            centres: errors of the joint centres of another machine than the design.
+            errors: of the joint centres of another machine than the design.
             constraints: whether the constraint wrenches are meant.
         """
         if not self.case.model.unknowns:
             return True
-        x = self._closed(y, centres)
+        x = self._closed(y, errors)
         if x is None:
             return False
         # Where nested loops lose their rank, the actuators' motions have no value, and say nothing of constraints.
@@ -106,7 +106,7 @@ class Homes:
         """Return an extreme with its value in home's assembly, and open where only another one refutes it."""
         if not self.case.model.unknowns or each.pose is None or each.key == REACH:
             return each
-        x = self._closed(self.box.coordinates(each.pose), each.centres)
+        x = self._closed(self.box.coordinates(each.pose), each.errors)
         is_limit = each.limit is not None
         wrong, reason = (Outcome.REFUTED, _ELSEWHERE) if is_limit else (Outcome.PROVED, _WIDER)
         opened = replace(each, outcome=Outcome.OPEN, reason=reason) if each.outcome is wrong else each
@@ -125,14 +125,14 @@ class Homes:
         is_other = abs(reached - each.reached) > _SAME * max(abs(each.reached), 1e-6)
         return replace(opened if is_other else each, reached=reached)
 
-    def _closed(self, y: FloatArray, centres: CentreErrors | None) -> FloatArray | None:
+    def _closed(self, y: FloatArray, errors: JointErrors | None) -> FloatArray | None:
         """Return the point of the program with closed loops at a pose (6,) of a machine; None without one."""
         nlp = self._nlp
         x, inner = nlp.start.copy(), set(nlp.program.places.inner)
         given = y[list(self.box.free)]
         if self.machines is not None:
             family = self.machines.family
-            errors = np.zeros(family.errors.numel()) if centres is None else centres.vectors.ravel()
-            given = np.concatenate([errors, given])
+            own = np.zeros(family.errors.numel()) if errors is None else errors.vectors.ravel()
+            given = np.concatenate([own, given])
         x[[k for k in range(nlp.n) if k not in inner]] = given
         return closed_in_place(nlp, x)

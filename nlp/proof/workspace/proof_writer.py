@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....models import FloatArray
-from ...case.task import Sense
 from ..boxes.tree import TreeRecord
 from ..certificate.certificate import CertificateStatus
 from ..checker.premises import fingerprint
@@ -199,10 +198,9 @@ class _Writer:
         if machines is None or found.reason:
             raise ProofError(f"{_words(found)}; a computed pose has no proof")
         # The determinant has the other sign for the largest errors in these directions too, and is farther from 0.
-        centres = found.centres if found.errors is None else found.errors.of_centres(machines.symbols.built.names)
-        if centres is None:
+        if found.errors is None:
             raise ProofError(_words(found))
-        errors = centres.vectors.copy()
+        errors = found.errors.vectors.copy()
         errors *= INSIDE * machines.symbols.tolerance / np.linalg.norm(errors, axis=1).max()
         sides = [np.concatenate([y, each.ravel()]) for each in (np.zeros_like(errors), errors)]
         return ProofClaim(name, "", "singular", sides=tuple(tuple(side.tolist()) for side in sides))

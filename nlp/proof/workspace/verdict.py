@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 
 from ....models import FloatArray
-from ..statement.machine import CentreErrors, JointErrors
+from ..statement.machine import JointErrors
 from .robot.pose_box import PoseBox, PoseNumbers
 
 
@@ -37,7 +37,6 @@ class RankVerdict:
         reason: for stopping before every box was closed; else empty.
         errors: of the joint centres of the machine that is singular at ``y``, where that is not the exact machine; else
             None.
-        centres: the same for a robot that is not six straight legs.
     """
 
     outcome: Outcome
@@ -51,7 +50,6 @@ class RankVerdict:
     seconds: float
     reason: str
     errors: JointErrors | None = None
-    centres: CentreErrors | None = None
 
     @property
     def pose(self) -> PoseNumbers | None:

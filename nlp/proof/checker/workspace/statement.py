@@ -19,7 +19,6 @@ from ....case.limits.clearance import LegClearance
 from ....case.limits.constraint import LENGTH, NUMBER, Reading
 from ....case.limits.legs import Actuator
 from ....case.limits.singular_values import ConditionNumber, SmallestSingularValue
-from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....program.layout import Layout
 from ...statement.claims import CONSTRAINTS, REGULAR, SPECTRAL, Claim, asked_name, asked_spectra, claims_of

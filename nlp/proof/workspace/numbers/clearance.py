@@ -17,10 +17,9 @@ import numpy as np
 
 from .....models import FloatArray, Model
 from ...enclosure.forms import Forms
-from ...statement.machine import JointErrors, Legs
+from ...statement.machine import Legs
 from ..robot.posed_model import PosedModel
-from ..robot.posed_robot import Problem
-from ..tolerance.leg_errors import along
+from ..robot.posed_robot import Problem, steepest
 from .bound_search import Bounds, Number
 
 #: Part of the sum of the sizes of all terms by which a bound is moved outwards: rounding.
@@ -63,17 +62,17 @@ class Clearance(Number):
         """Return the vectors (P, 3) from the nearest point of the second leg to that of the first."""
         return _between(self._ends(z.T).full().T)
 
-    def worst(self, y: FloatArray) -> JointErrors | None:
-        """Return the errors with which the legs are nearest to each other at a pose (6,); None for the design."""
+    def worst(self, y: FloatArray) -> FloatArray | None:
+        """Return the errors (m, 3) with which the legs are nearest at a pose (6,); None for the design."""
         if self._legs is None:
             return None
         between = self.between(y[None, list(self.problem.free)])
-        moved = np.zeros_like(self._legs.base)
-        moved[list(self._places)] = np.array([[-1.0], [1.0]]) * between
-        errors = along(self._legs, self.problem.box.pose(y).rotation, moved, moved)
+        signs = np.zeros(len(self._legs.base))
+        signs[list(self._places)] = -1.0, 1.0
+        both = np.concatenate([between, between @ self.problem.box.pose(y).rotation])
+        errors = steepest(signs[:, None, None] * both, self._legs.tolerance).reshape(-1, 3)
         # Legs that the whole errors would move through each other touch with a part of them.
-        part = min(1.0, float(np.linalg.norm(between)) / self._nearer)
-        return JointErrors(part * errors.base, part * errors.platform)
+        return min(1.0, float(np.linalg.norm(between)) / self._nearer) * errors
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""

@@ -22,7 +22,7 @@ from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
-from ...statement.machine import CentreErrors, JointErrors
+from ...statement.machine import JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ..proof_writer import PaperRecord
 
 #: Returns the errors of the machine that is worst at a pose, to first order, and the value of its expression.
-WorstMachine = Callable[[PoseNumbers], tuple[CentreErrors, float]]
+WorstMachine = Callable[[PoseNumbers], tuple[JointErrors, float]]
 #: Gap of a bound as a part of the value, where none is asked for.
 GAP = 1e-3
 #: Finest gap that is tried where a limit lies between a bound and the best value known: that of rounding.
@@ -65,7 +65,6 @@ class Extreme:
         seconds: wall time.
         reason: for an open outcome; else empty.
         errors: of the joint centres of the machine that reaches the value; None for the exact machine.
-        centres: the same for a robot that is not six straight legs.
     """
 
     name: str
@@ -81,7 +80,6 @@ class Extreme:
     seconds: float
     reason: str
     errors: JointErrors | None = None
-    centres: CentreErrors | None = None
 
     @property
     def fails(self) -> bool:
@@ -95,7 +93,6 @@ def extreme_of(
     pose: PoseNumbers | None = None,
     *,
     errors: JointErrors | None = None,
-    centres: CentreErrors | None = None,
 ) -> Extreme:
     """Return the extreme of a number from the smallest value of its expression, or of minus it for the largest one.
 
@@ -104,7 +101,6 @@ def extreme_of(
         found: without a reason where it is as good as asked for.
         pose: at which the value is reached.
         errors: of the machine that reaches it, as for :class:`Extreme`.
-        centres: likewise.
     """
     sign, read, limit = claim.sense.sign, claim.reading.from_value, claim.limit
     is_bounded, is_reached, reason = math.isfinite(found.bound), math.isfinite(found.value), found.reason
@@ -133,7 +129,6 @@ def extreme_of(
         seconds=found.seconds,
         reason=reason if outcome is Outcome.OPEN else "",
         errors=errors,
-        centres=centres,
     )
 
 
@@ -186,8 +181,8 @@ def prove_extreme(
     pose = None if x is None else _pose(nlp, x)
     if pose is None or machine is None:
         return extreme_of(claim, found, pose)
-    centres, value = machine(pose)
-    return extreme_of(claim, found._replace(value=-sign * value), pose, centres=centres)
+    errors, value = machine(pose)
+    return extreme_of(claim, found._replace(value=-sign * value), pose, errors=errors)
 
 
 def _search(

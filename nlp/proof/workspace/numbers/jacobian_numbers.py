@@ -31,7 +31,7 @@ import numpy as np
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
-from ...statement.machine import LEGS, JointErrors, Legs
+from ...statement.machine import LEGS, Legs
 from ..ranks.krawczyk import by_centres, inverses
 from ..robot.posed_robot import Problem
 from ..tolerance.leg_errors import change_of_rows, worst_rows
@@ -151,12 +151,12 @@ class SingularValues(_RowsNumber):
             found = -values[:, 0] / values[:, -1] if self._is_condition else values[:, -1]
         return np.where(known, found, np.nan)[:, None]
 
-    def worst(self, y: FloatArray) -> JointErrors | None:
-        """Return the errors of the legs that are worst at a pose (6,) to first order; None for the design."""
+    def worst(self, y: FloatArray) -> FloatArray | None:
+        """Return the errors (12, 3) that are worst at a pose (6,) to first order; None for the design."""
         if self._legs is None:
             return None
         _, base, platform = worst_rows(self._legs, self.problem.box, y[None], self._length, self._is_condition)
-        return JointErrors(base[0], platform[0])
+        return np.stack([base[0], platform[0]], axis=1).reshape(-1, 3)
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""

@@ -141,7 +141,7 @@ def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> Po
     """
     pose = box.pose(y)
     position, rotation = pose.position, pose.rotation
-    wanted = np.linalg.norm(position + legs.platform @ rotation.T - legs.base, axis=1) + errors
+    wanted = np.linalg.norm(legs.spans(position, rotation), axis=1) + errors
     for _ in range(_NEWTON):
         arm = legs.platform @ rotation.T
         span = position + arm - legs.base
@@ -155,7 +155,7 @@ def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> Po
         position = position + step[:3]
         if angle:
             rotation = np.array(ca.evalf(matrix_from_axis_angle(SX(step[3:] / angle), SX(angle)))) @ rotation
-    lengths = np.linalg.norm(position + legs.platform @ rotation.T - legs.base, axis=1)
+    lengths = np.linalg.norm(legs.spans(position, rotation), axis=1)
     if not np.abs(lengths - wanted).max() <= _CLOSED * wanted.max():
         return None
     turned = axis_angle_from_matrix(rotation @ pose.rotation.T).angle

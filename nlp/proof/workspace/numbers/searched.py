@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from casadi import SX
 
-from .....models import Model
+from .....models import FloatArray, Model
 from ....case.case import Case
 from ....case.limits.clearance import LegClearance
 from ....case.limits.constraint import LENGTH, NUMBER
@@ -20,7 +20,7 @@ from ....case.limits.singular_values import ConditionNumber, SmallestSingularVal
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ...statement.claims import Claim, asked_name, asked_spectra
-from ...statement.machine import CentreErrors, JointErrors, Legs, has_straight_legs
+from ...statement.machine import JointErrors, Legs, has_straight_legs
 from ..robot.pose_box import PoseBox
 from ..robot.posed_model import posed_model
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -67,11 +67,9 @@ class Subject:
     shortest: float = 0.0
     design: Problem | None = None
 
-    def shown(self, errors: JointErrors | None) -> tuple[JointErrors | None, CentreErrors | None]:
-        """Return errors of legs as those of an extreme: six straight legs are told by their legs, others by names."""
-        if errors is None or has_straight_legs(self.case.model):
-            return errors, None
-        return None, None if self.family is None else errors.of_centres(self.family.names)
+    def errors(self, vectors: FloatArray | None) -> JointErrors | None:
+        """Return errors (m, 3) of joint centres with their names; None for the design."""
+        return None if vectors is None or self.family is None else JointErrors(self.family.names, vectors)
 
     @cached_property
     def problem(self) -> Problem:
@@ -164,8 +162,7 @@ def _answer(subject: Subject, question: Question, gap: float, paper: PaperRecord
     if not math.isfinite(found.value):
         return extreme_of(claim, found)
     y = problem.pose_of(found.at)
-    errors, centres = subject.shown(number.worst(y))
-    return extreme_of(claim, found, subject.box.pose(y), errors=errors, centres=centres)
+    return extreme_of(claim, found, subject.box.pose(y), errors=subject.errors(number.worst(y)))
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:

@@ -18,7 +18,7 @@ from ...statement.claims import Claim
 from ...statement.machine import JointErrors, Legs
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
-from ..tolerance.leg_errors import along, spans
+from ..robot.posed_robot import steepest
 from ..verdict import Outcome
 from .bound_search import Minimum
 from .extremes import Extreme, extreme_of, slack_of
@@ -63,12 +63,11 @@ def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine) 
             if value is None:
                 continue
             claim = Claim(f"{key} limb {leg.name}", sense, SX(), LENGTH, key, value)
-            number = _Combined(claim, legs, i, np.array(factors), refine)
+            number = _Combined(subject, legs, claim, i, np.array(factors), refine)
             ends, extreme = number.refined([found[k] for k in own])
             for k, each in zip(own, ends, strict=True):
                 found[k] = each
-            errors, centres = subject.shown(extreme.errors)
-            added.append(replace(extreme, errors=errors, centres=centres))
+            added.append(extreme)
     return [*found, *added]
 
 
@@ -76,15 +75,17 @@ class _Combined(NamedTuple):
     """A number of a leg, its shortest and its longest length times factors.
 
     Attributes:
-        claim: the number, with its limit.
+        subject: the robot.
         legs: joint centres, with their tolerance.
+        claim: the number, with its limit.
         leg: index of the leg.
         factors: (2,).
         refine: proves a length more finely.
     """
 
-    claim: Claim
+    subject: Subject
     legs: Legs
+    claim: Claim
     leg: int
     factors: FloatArray
     refine: Refine
@@ -129,16 +130,20 @@ class _Combined(NamedTuple):
         if not self.legs.tolerance or len(poses) < len(ends):
             return float(self.factors @ [each.reached for each in ends]), None
         # The errors are along the change of the number, to first order.
-        base, platform = np.zeros_like(self.legs.base), np.zeros_like(self.legs.base)
         at, turned = self.directions(poses)
-        base[self.leg], platform[self.leg] = -self.sign * self.factors @ at, self.sign * self.factors @ turned
-        errors = along(self.legs, np.eye(3), base, platform)
-        machine = errors.applied(self.legs)
-        return float(self.factors @ [np.linalg.norm(spans(machine, pose)[self.leg]) for pose in poses]), errors
+        errors = np.zeros((2 * len(self.legs.base), 3))
+        slopes = self.sign * np.stack([-self.factors @ at, self.factors @ turned])
+        e, f = errors[2 * self.leg : 2 * self.leg + 2] = steepest(slopes, self.legs.tolerance)
+        moved = self._spans(poses) + [pose.rotation @ f - e for pose in poses]
+        return float(self.factors @ np.linalg.norm(moved, axis=1)), self.subject.errors(errors)
+
+    def _spans(self, poses: Sequence[PoseNumbers]) -> FloatArray:
+        """Return the vectors (K, 3) along the leg at poses, in the world frame."""
+        return np.array([self.legs.spans(pose.position, pose.rotation)[self.leg] for pose in poses])
 
     def directions(self, poses: Sequence[PoseNumbers]) -> tuple[FloatArray, FloatArray]:
         """Return the unit directions (K, 3) of the leg at poses, in the world frame and in that of the platform."""
-        d = np.array([spans(self.legs, pose)[self.leg] for pose in poses])
+        d = self._spans(poses)
         d /= np.linalg.norm(d, axis=1, keepdims=True)
         return d, np.array([n @ pose.rotation for n, pose in zip(d, poses, strict=True)])
 

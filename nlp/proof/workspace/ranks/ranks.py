@@ -14,12 +14,10 @@ from ....interruption import one_search
 from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
 from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
-from ...statement.machine import has_straight_legs
 from ..home_poses import Homes
 from ..robot.pose_box import PoseBox
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
-from ..tolerance.leg_errors import of_legs
 from ..verdict import Outcome, RankVerdict
 from .loop_boxes import APART, Examined, Examiner, Followed, LoopRule, coordinates_to_split
 from .rank_rule import RankTest
@@ -69,14 +67,12 @@ def prove_ranks(
                 continue
 
             def is_shown(at: Singular, *, constraints: bool = name == CONSTRAINTS) -> bool:
-                return homes.is_singular(at.y, at.centres, constraints=constraints)
+                return homes.is_singular(at.y, at.errors, constraints=constraints)
 
             recorder, search = None if paper is None else paper.own(name), SingularSearch(problem, matrix, is_shown)
             verdict = prove_rank(problem, matrix, progress=progress, recorder=recorder, look=search.look)
             if name == REGULAR and verdict.outcome is Outcome.OPEN and not problem.dependent:
                 verdict = _refuted(verdict, search.from_random())
-            if verdict.centres is not None and has_straight_legs(homes.case.model):
-                verdict = replace(verdict, errors=of_legs(verdict.centres), centres=None)
             found.append(verdict)
     except (UncoveredError, NotJudgedError) as error:
         return Ranks(not_judged(homes.box, str(error)), None)
@@ -87,7 +83,7 @@ def _refuted(verdict: RankVerdict, at: Singular | None) -> RankVerdict:
     """Return a verdict that a singular pose refutes; the same without one."""
     if at is None:
         return verdict
-    return replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, sides=at.sides, centres=at.centres)
+    return replace(verdict, outcome=Outcome.REFUTED, y=at.y, reason=at.reason, sides=at.sides, errors=at.errors)
 
 
 def not_judged(box: PoseBox, reason: str) -> RankVerdict:

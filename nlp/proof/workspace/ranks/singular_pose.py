@@ -30,7 +30,7 @@ import numpy as np
 from .....models import FloatArray, frozen_array
 from .....models.arrays import first_largest
 from ...enclosure.forms import Encloser
-from ...statement.machine import CentreErrors
+from ...statement.machine import JointErrors
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem, steepest
 from .krawczyk import are_contractions, inverses
@@ -87,13 +87,13 @@ class Singular(NamedTuple):
         y: (6,) its coordinates.
         reason: how it is known, where that is no proof; else empty.
         sides: (2, 6) two poses at which the determinant is proved to have opposite signs; None without them.
-        centres: errors of the joint centres of the machine that is singular; None for the design.
+        errors: of the joint centres of the machine that is singular; None for the design.
     """
 
     y: FloatArray
     reason: str = ""
     sides: FloatArray | None = None
-    centres: CentreErrors | None = None
+    errors: JointErrors | None = None
 
 
 class SingularPose:
@@ -443,9 +443,9 @@ class SingularSearch:
         """Return the singular pose at a point (n,), between two others (2, 6), if it is one in home's assembly."""
         if z is None:
             return None
-        centres = self._problem.errors_of(z)
+        errors = self._problem.errors_of(z)
         y = frozen_array(self._problem.pose_of(z), (6,))
-        found = Singular(y, reason, sides, centres if centres.vectors.any() else None)
+        found = Singular(y, reason, sides, errors if errors.vectors.any() else None)
         return found if self._is_shown(found) else None
 
     @property

@@ -21,7 +21,7 @@ from .....models import FloatArray, Model, frozen_array
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
-from ...statement.machine import INSIDE, CentreErrors
+from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .closed_loops import Loops, closed_from_home
 from .pose_box import PoseBox
@@ -122,10 +122,10 @@ class Problem:
         """Return the coordinates (..., n) of the design at points of the design alone."""
         return np.concatenate([z, np.zeros((*z.shape[:-1], len(self.of_errors)))], axis=-1)
 
-    def errors_of(self, z: FloatArray) -> CentreErrors:
+    def errors_of(self, z: FloatArray) -> JointErrors:
         """Return the errors of the machine at a point (n,)."""
         own = z[self.of_errors].reshape(-1, 3)
-        return CentreErrors(self.names, frozen_array(own, own.shape))
+        return JointErrors(self.names, frozen_array(own, own.shape))
 
     def within(self, z: FloatArray) -> FloatArray:
         """Return points (..., n) with the pose moved into the workspace, and the errors into the tolerance."""

@@ -1,4 +1,4 @@
-"""Errors of the joint centres of six straight legs: worst machines of strokes and clearances, and the change of J.
+"""Errors of the joint centres of six straight legs: the change of J, and the worst machines of its singular values.
 
 With ``s = u . J v`` a singular value of J, u and v its vectors, the row of a leg with unit force n and moment
 ``R a x n`` about the platform's origin, divided by L, changes s by
@@ -15,28 +15,12 @@ import math
 import numpy as np
 
 from .....models import FloatArray
-from ...statement.machine import LEGS, CentreErrors, JointErrors, Legs
-from ..robot.pose_box import PoseBox, PoseNumbers
+from ...statement.machine import Legs
+from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import steepest
 
 #: Part of itself by which the bound moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
-
-
-def of_legs(errors: CentreErrors) -> JointErrors:
-    """Return the errors of a machine as those of its legs: of their joints on the base, and on the platform."""
-    each = errors.vectors.reshape(LEGS, 2, 3)
-    return JointErrors(each[:, 0], each[:, 1])
-
-
-def spans(legs: Legs, pose: PoseNumbers) -> FloatArray:
-    """Return the vectors (6, 3) from the base joints to the platform joints at a pose, in the world frame."""
-    return np.asarray(pose.position + legs.platform @ pose.rotation.T - legs.base)
-
-
-def along(legs: Legs, rotation: FloatArray, base: FloatArray, platform: FloatArray) -> JointErrors:
-    """Return errors as large as the tolerance along vectors (6, 3) in the world frame, none for a vector of zero."""
-    return JointErrors(steepest(base, legs.tolerance), steepest(platform @ rotation, legs.tolerance))
 
 
 def change_of_rows(legs: Legs, length: float, shortest: float) -> float:

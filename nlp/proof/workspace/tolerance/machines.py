@@ -25,13 +25,12 @@ from casadi import SX
 from .....models.joints import RobotError
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
-from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
 from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
-from ...statement.machine import CentreErrors, has_straight_legs
+from ...statement.machine import JointErrors
 from ...statement.tolerance import (
     BuiltModel,
     MachineLayout,
@@ -46,7 +45,6 @@ from ..numbers.expressions import Expressions
 from ..numbers.extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
 from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem, family_of
-from .leg_errors import of_legs
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
@@ -108,12 +106,9 @@ class Machines:
         try:
             if not self.family.problem.dependent and is_smooth(number):
                 found = self._by_first_order(claim, number, gap, jobs, paper)
-            found = found or next(self._by_search([claim], gap))
+            return found or next(self._by_search([claim], gap))
         except UncoveredError as error:
             return extreme_of(claim, Minimum(reason=str(error)))
-        if found.centres is None or not has_straight_legs(self._case.model):
-            return found
-        return replace(found, errors=of_legs(found.centres), centres=None)
 
     def followed(self, claims: Sequence[Claim], *, gap: float) -> Iterator[Extreme]:
         """Yield the extremes of those limits that have rules, by one search in which bounds within limits are enough.
@@ -165,7 +160,7 @@ class Machines:
         own = replace(claim, expression=symbols.of(whole, SX.zeros(symbols.errors.numel()), pose))
         return prove_extreme(design, own, gap=gap, jobs=jobs, machine=machine, paper=paper)
 
-    def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[CentreErrors, float]:
+    def _worst(self, values: Expressions, sign: float, pose: PoseNumbers) -> tuple[JointErrors, float]:
         """Return the errors that are worst at a pose to first order, and the number with them."""
         problem = self.family.problem
         z = self.family.exact(problem.box.coordinates(pose)[list(problem.free)])[None]
@@ -204,5 +199,5 @@ class Machines:
         for claim, found in zip(claims, every, strict=True):
             is_known = math.isfinite(found.value)
             pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
-            centres = self.family.errors_of(found.at) if is_known and self.family.names else None
-            yield extreme_of(claim, found, pose, centres=centres)
+            errors = self.family.errors_of(found.at) if is_known and self.family.names else None
+            yield extreme_of(claim, found, pose, errors=errors)
