@@ -9,6 +9,7 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Minimum, N
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 
 #: A robot of any six straight legs.
 HEXAPOD = hexapod()
@@ -51,7 +52,8 @@ def case_of_legs(robot: Legs) -> Case:
 
 def subject_of(robot: Legs, box: PoseBox, shortest: float = 0.0) -> Subject:
     """Six legs over a box."""
-    return Subject(case_of_legs(robot), HEXAPOD, box, robot, shortest=shortest)
+    case = case_of_legs(robot)
+    return Subject(case, HEXAPOD, build_problem(case, HEXAPOD, box), shortest=shortest)
 
 
 def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> Clearance:

@@ -204,7 +204,8 @@ def planar() -> Case:
 
 def loops() -> Claim:
     case = planar()
-    alone = Machines(case, closed_form(case.model), pose_box(workspace_of_case(case)))
+    closed = closed_form(case.model)
+    alone = Machines(case, closed, build_problem(case, closed.model, pose_box(workspace_of_case(case))))
     claims = [each for each in alone.symbols.claims(())[1] if each.key.endswith("max")]
     found = smallest_values(
         Expressions(alone.family, ca.vertcat(*map(alone.number, claims))),
@@ -222,7 +223,8 @@ def loops() -> Claim:
 @cache
 def family() -> Problem:
     case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
-    return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case))).family
+    closed = closed_form(case.model)
+    return Machines(case, closed, build_problem(case, closed.model, pose_box(workspace_of_case(case)))).family
 
 
 def machines() -> Claim:

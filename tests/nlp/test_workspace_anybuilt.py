@@ -39,6 +39,7 @@ from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.tolerance import machines as tolerance
 from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -82,7 +83,8 @@ def case_of(name: str) -> Case:
 
 
 def machines(case: Case) -> Machines:
-    return Machines(case, closed_form(case.model), pose_box(workspace_of_case(case)))
+    closed = closed_form(case.model)
+    return Machines(case, closed, build_problem(case, closed.model, pose_box(workspace_of_case(case))))
 
 
 @dataclass(frozen=True)

@@ -215,12 +215,13 @@ def test_ranks_are_refuted_by_what_is_shown_alone(monkeypatch: pytest.MonkeyPatc
     case = planar(0.13426, 19.47242, 3)
     assert case.workspace is not None
     homes = Homes(case, pose_box(case.workspace), (), None)
-    found = prove_ranks(closed_form(case.model).model, homes)
+    problem = build_problem(case, closed_form(case.model).model, pose_box(case.workspace))
+    found = prove_ranks(problem, homes)
     judged = Judgement(case, case.workspace, found.regular, (), found.constraints)
     assert check_shown(case, judged) == 1
     monkeypatch.setattr(Homes, "is_singular", lambda *_, **__: False)
     with within(0.2):
-        assert prove_ranks(closed_form(case.model).model, homes).regular.outcome is Outcome.OPEN
+        assert prove_ranks(problem, homes).regular.outcome is Outcome.OPEN
 
 
 @pytest.mark.parametrize(

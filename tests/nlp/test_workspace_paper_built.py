@@ -29,12 +29,13 @@ from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClai
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import Machines
-from screwsynth.nlp.proof.statement.machine import Legs, joint_centres, workspace_of_case
+from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
 from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Run = Callable[..., tuple[int, str, str]]
@@ -497,7 +498,7 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
         assert "could not be shown" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
-    subject = Subject(case, case.model, pose_box(judged.workspace), joint_centres(case))
+    subject = Subject(case, case.model, build_problem(case, case.model, pose_box(judged.workspace)))
     for extreme in searched_extremes(replace(subject, case=replace(case, limits=Limits())), ASKED[1:], gap=0.1):
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 

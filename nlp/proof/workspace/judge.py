@@ -14,7 +14,7 @@ from ...case.workspace import Workspace
 from ...interruption import is_requested, one_call, within
 from ..enclosure.engine import kernel
 from ..statement.claims import SPECTRAL, Claim, claims_of
-from ..statement.machine import check_leg_error, has_straight_legs, joint_centres, workspace_of_case
+from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
@@ -25,7 +25,7 @@ from .numbers.searched import Subject, searched_extremes
 from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import pose_box
-from .robot.posed_robot import NotJudgedError
+from .robot.posed_robot import NotJudgedError, Problem, build_problem
 from .tolerance.machines import Machines
 from .verdict import Outcome, RankVerdict
 
@@ -133,11 +133,11 @@ def judge_workspace(
     workspace = own if workspace is None else workspace
     with within(time_limit, _PART):
         numbers = _Numbers(case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
-        homes = Homes(case, numbers.box, numbers.names, numbers.machines)
+        homes, meant = Homes(case, numbers.box, numbers.names, numbers.machines), numbers.meant
         ranks = (
-            Ranks(not_judged(numbers.box, numbers.unknown), None)
-            if numbers.unknown
-            else prove_ranks(numbers.closed.model, homes, progress=rank_progress, paper=paper)
+            Ranks(not_judged(numbers.box, numbers.reason), None)
+            if meant is None
+            else prove_ranks(meant, homes, progress=rank_progress, paper=paper)
         )
         judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
         if not with_limits or (until_fault and not judged.is_regular):
@@ -160,7 +160,8 @@ class _Numbers:
         closed: the robot without unknowns in closed form.
         names: measures that are numbers of the robot.
         machines: every machine within the tolerance; None where the design is judged, or none.
-        unknown: reason why the machines that are meant are not judged; else empty.
+        meant: the design, or these machines, over the workspace; None where they are not judged.
+        reason: why they are not; else empty.
         found: the extremes so far. Lengths that a stroke needs more finely take the place of those before.
     """
 
@@ -178,12 +179,15 @@ class _Numbers:
         self.box, self.closed = pose_box(self.workspace), closed_form(self.case.model)
         self.names = [name for name in self.quantities if name not in SPECTRAL]
         self.machines: Machines | None = None
-        self.unknown = ""
-        if self.case.joint_centre_tolerance:
-            try:
-                self.machines = Machines(self.case, self.closed, self.box)
-            except NotJudgedError as error:
-                self.unknown = str(error)
+        self.meant: Problem | None = None
+        self.reason = ""
+        try:
+            design = build_problem(self.case, self.closed.model, self.box)
+            if self.case.joint_centre_tolerance:
+                self.machines = Machines(self.case, self.closed, design)
+            self.meant = design if self.machines is None else self.machines.family
+        except NotJudgedError as error:
+            self.reason = str(error)
         self.found: list[Extreme] = []
         self._claims: Sequence[Claim] = ()
         self._prove: Callable[..., Extreme] = prove_extreme
@@ -199,15 +203,7 @@ class _Numbers:
         yield from self._of_design() if self.machines is None else self._of_machines(self.machines)
         lengths = [each for each in self.found if each.name.startswith("leg_length limb ") and each.sense is Sense.MIN]
         shortest = min((each.bound for each in lengths), default=0.0)
-        subject = Subject(
-            case=self.case,
-            model=self.closed.model,
-            box=self.box,
-            legs=joint_centres(self.case),
-            family=None if self.machines is None else self.machines.family,
-            unknown=self.unknown,
-            shortest=shortest,
-        )
+        subject = Subject(self.case, self.closed.model, self.meant, self.reason, shortest)
         count = len(self.found)
         whole = with_strokes(subject, self.found, self._finer)
         self.found, strokes = whole[:count], whole[count:]
@@ -237,19 +233,16 @@ class _Numbers:
         is_closed = closed.reaches and is_reached
         layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
         claims = claims_of(layout, self.names, with_objective=self.with_objective)
-        decided = [] if self.unknown or not closed.model.unknowns else self._in_home(is_reached=is_reached)
+        decided = self._in_home(self.meant, is_reached=is_reached) if self.meant and closed.model.unknowns else []
         yield from self._proved(claims, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper), decided)
 
-    def _in_home(self, *, is_reached: bool) -> Iterator[Extreme]:
+    def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Extreme]:
         """Yield the extremes of a design with loops that are decided in the assembly of home.
 
         Loop equations as conditions of a program hold in every assembly, and F has no bound where one of these is
         singular. The loops are followed here, and the design is the only machine within no tolerance.
         """
-        try:
-            alone = Machines(self.case, self.closed, self.box)
-        except NotJudgedError:
-            return
+        alone = Machines(self.case, self.closed, design)
         claims = alone.symbols.claims(self.names, with_objective=self.with_objective)[1]
         limited = alone.followed([claim for claim in claims if claim.limit is not None], gap=self.gap)
         yield from (each for each in limited if each.outcome is not Outcome.OPEN)
@@ -262,6 +255,8 @@ class _Numbers:
     ) -> Iterator[Extreme]:
         """Yield the extremes of claims; those that are decided are searched again for the paper alone."""
         self._claims, self._prove = claims, prove
+        # What is proved of the design says nothing of the machines that are meant.
+        uncovered = self.reason if self.case.joint_centre_tolerance else ""
         known = {(each.name, each.sense, each.key): each for each in decided}
         for done, claim in enumerate(claims):
             if self.progress is not None:
@@ -270,7 +265,7 @@ class _Numbers:
             is_limit = own is not None and own.limit is not None
             if own is None or (self.paper is not None and not (is_limit and own.outcome is not Outcome.PROVED)):
                 gap = _AS_NEEDED if is_limit else self.gap
-                again = prove(replace(claim, uncovered=self.unknown), gap=gap)
+                again = prove(replace(claim, uncovered=uncovered), gap=gap)
                 own = own or again
             yield own
 

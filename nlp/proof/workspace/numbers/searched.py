@@ -20,10 +20,9 @@ from ....case.limits.singular_values import ConditionNumber, SmallestSingularVal
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ...statement.claims import Claim, asked_name, asked_spectra
-from ...statement.machine import JointErrors, Legs, has_straight_legs
-from ..robot.pose_box import PoseBox
+from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
 from ..robot.posed_model import posed_model
-from ..robot.posed_robot import NotJudgedError, Problem, build_problem
+from ..robot.posed_robot import NotJudgedError, Problem
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
 from .extremes import Extreme, extreme_of, goal_of
@@ -50,46 +49,43 @@ class Subject:
     Attributes:
         case: with fixed dimensions.
         model: its robot, without unknowns that follow in closed form.
-        box: the poses.
-        legs: joint centres of straight legs, with the tolerance; None for a robot without any.
-        family: the machines within the tolerance; None for the design alone.
-        unknown: reason why the machines that are meant are not judged; else empty.
+        machines: the design, or all machines within its tolerance, over the workspace; None where they are not judged.
+        reason: why they are not; else empty.
         shortest: no leg of any machine is shorter over the workspace.
-        design: the design over the workspace, where it is known.
     """
 
     case: Case
     model: Model
-    box: PoseBox
-    legs: Legs | None
-    family: Problem | None = None
-    unknown: str = ""
+    machines: Problem | None
+    reason: str = ""
     shortest: float = 0.0
-    design: Problem | None = None
 
     def errors(self, vectors: FloatArray | None) -> JointErrors | None:
         """Return errors (m, 3) of joint centres with their names; None for the design."""
-        return None if vectors is None or self.family is None else JointErrors(self.family.names, vectors)
+        return None if vectors is None or self.machines is None else JointErrors(self.machines.names, vectors)
 
     @cached_property
+    def legs(self) -> Legs | None:
+        """Joint centres of straight legs, with the tolerance; None for a robot without any."""
+        return joint_centres(self.case)
+
+    @property
     def problem(self) -> Problem:
         """The design over the workspace.
 
         Raises:
-            NotJudgedError: its loops are not closed in the middle, or the machines that are meant are not judged.
+            NotJudgedError: the machines that are meant are not judged.
         """
-        if self.unknown:
-            raise NotJudgedError(self.unknown)
-        if self.design is not None:
-            return self.design
-        return build_problem(self.case, self.model, self.box) if self.family is None else self.family.problem
+        if self.machines is None:
+            raise NotJudgedError(self.reason)
+        return self.machines.problem
 
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
         """Return the smallest singular value of J, or minus its condition number."""
         # The change of J by errors of six straight legs has a bound of its own.
         has_legs, problem = has_straight_legs(self.case.model), self.problem
         return SingularValues(
-            problem if has_legs else self.family or problem,
+            problem if has_legs else self.machines or problem,
             length,
             is_condition=is_condition,
             legs=self.legs if has_legs else None,
@@ -98,7 +94,7 @@ class Subject:
 
     def clearance(self, places: tuple[int, int]) -> Clearance:
         """Return the distance of two legs."""
-        posed = posed_model(self.case, self.model, self.box, z=self.problem.z)
+        posed = posed_model(self.case, self.model, self.problem.box, z=self.problem.z)
         return Clearance(self.problem, posed, self.model, places, legs=self.legs)
 
 
@@ -162,7 +158,7 @@ def _answer(subject: Subject, question: Question, gap: float, paper: PaperRecord
     if not math.isfinite(found.value):
         return extreme_of(claim, found)
     y = problem.pose_of(found.at)
-    return extreme_of(claim, found, subject.box.pose(y), errors=subject.errors(number.worst(y)))
+    return extreme_of(claim, found, problem.box.pose(y), errors=subject.errors(number.worst(y)))
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:
@@ -171,7 +167,7 @@ def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float)
     A bound of the change of J is wider than its change in any one machine, and no smaller boxes make it less wide. The
     most at a few poses is taken.
     """
-    box, problem = subject.box, number.problem
+    problem, box = number.problem, number.problem.box
     allowed = gap * (abs(float(number.values(problem.start[None])[0, 0])) or 1.0)
     if not subject.case.joint_centre_tolerance or problem.dependent:
         return allowed

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .....models import Model, frozen_array
+from .....models import frozen_array
 from ....errors import UncoveredError
 from ....interruption import one_search
 from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
@@ -17,7 +17,7 @@ from ...statement.claims import CONSTRAINTS, REGULAR
 from ..home_poses import Homes
 from ..robot.pose_box import PoseBox
 from ..robot.posed_model import RankMatrix
-from ..robot.posed_robot import NotJudgedError, Problem, build_problem
+from ..robot.posed_robot import Problem
 from ..verdict import Outcome, RankVerdict
 from .loop_boxes import APART, Examined, Examiner, Followed, LoopRule, coordinates_to_split
 from .rank_rule import RankTest
@@ -45,7 +45,7 @@ class Ranks(NamedTuple):
 
 
 def prove_ranks(
-    model: Model,
+    problem: Problem,
     homes: Homes,
     *,
     progress: RankProgress | None = None,
@@ -54,14 +54,13 @@ def prove_ranks(
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
 
     Args:
-        model: the robot, without unknowns that follow in closed form.
-        homes: the case, its poses and the machines that are meant.
+        problem: the design, or all machines that are meant.
+        homes: the same at single poses.
         progress: called during them.
         paper: records the searches for a proof.
     """
     found = []
     try:
-        problem = build_problem(homes.case, model, homes.box) if homes.machines is None else homes.machines.family
         for name, matrix in ((REGULAR, problem.locked), (CONSTRAINTS, problem.unactuated)):
             if matrix is None:
                 continue
@@ -74,8 +73,8 @@ def prove_ranks(
             if name == REGULAR and verdict.outcome is Outcome.OPEN and not problem.dependent:
                 verdict = _refuted(verdict, search.from_random())
             found.append(verdict)
-    except (UncoveredError, NotJudgedError) as error:
-        return Ranks(not_judged(homes.box, str(error)), None)
+    except UncoveredError as error:
+        return Ranks(not_judged(problem.box, str(error)), None)
     return Ranks(found[0], found[1] if len(found) > 1 else None)
 
 

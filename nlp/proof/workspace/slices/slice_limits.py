@@ -24,7 +24,6 @@ from ....case.task import Sense
 from ....errors import UncoveredError
 from ...enclosure.forms import Encloser
 from ...statement.claims import Claim
-from ...statement.machine import joint_centres
 from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
@@ -34,6 +33,7 @@ from ..numbers.searched import Subject, questions
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import PoseBox
+from ..robot.posed_robot import build_problem
 from ..tolerance.machines import Machines
 
 #: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
@@ -90,8 +90,8 @@ class SliceLimits:
 
     def __init__(self, case: Case, closed: ClosedForm, box: PoseBox) -> None:
         case = replace(case, joint_centre_tolerance=None)
-        alone = Machines(case, closed, box)
-        self.problem = problem = alone.family.problem
+        self.problem = problem = build_problem(case, closed.model, box)
+        alone = Machines(case, closed, problem)
         reaches, claims = alone.symbols.claims((), with_objective=False)
         known = [claim for claim in claims if claim.limit is not None and alone.is_covered(claim)]
         uncovered = dict.fromkeys(each.key for each in claims if each.limit is not None and each not in known)
@@ -99,7 +99,7 @@ class SliceLimits:
         for claim in known:
             limit = claim.reading.from_value(claim.limit or 0.0)
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
-        subject = Subject(case, closed.model, box, joint_centres(case), design=problem)
+        subject = Subject(case, closed.model, problem)
         self._others: list[_Other] = []
         for claim, make in (each for limit in case.limits for each in questions(subject, limit)):
             number = make()

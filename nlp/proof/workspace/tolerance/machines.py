@@ -43,8 +43,8 @@ from ...statement.tolerance import (
 from ..numbers.bound_search import Minimum, smallest_values
 from ..numbers.expressions import Expressions
 from ..numbers.extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
-from ..robot.pose_box import PoseBox, PoseNumbers, pose_coordinates
-from ..robot.posed_robot import NotJudgedError, Problem, build_problem, family_of
+from ..robot.pose_box import PoseNumbers, pose_coordinates
+from ..robot.posed_robot import NotJudgedError, Problem, family_of
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Machines:
     Args:
         case: with fixed dimensions.
         closed: its robot without unknowns in closed form.
-        box: the poses.
+        design: this robot over the workspace.
 
     Attributes:
         built: the robot with errors of its joint centres.
@@ -73,14 +73,14 @@ class Machines:
         NotJudgedError: the machines are not known, or do not have the freedoms of the design.
     """
 
-    def __init__(self, case: Case, closed: ClosedForm, box: PoseBox) -> None:
-        self._case, self._model, self._at = case, closed.model, pose_coordinates(box)
+    def __init__(self, case: Case, closed: ClosedForm, design: Problem) -> None:
+        self._case, self._model, self._at = case, closed.model, pose_coordinates(design.box)
         tolerance = case.joint_centre_tolerance or 0.0
         try:
             self.built = built_model(case.model) if tolerance else BuiltModel(closed.model, (), closed.reaches)
         except RobotError as error:
             raise NotJudgedError(str(error)) from None
-        self.family: Problem = family_of(case, self.built, build_problem(case, closed.model, box), tolerance)
+        self.family: Problem = family_of(case, self.built, design, tolerance)
         self.symbols: MachineLayout = machine_layout(case, self.built, tolerance, self._at)
         self._rests: dict[tuple[str, str], float] = {}
 
