@@ -5,8 +5,9 @@ left of it, and ends by itself.
 
 A request ends the process, unless work has begun that has something to show: that work asks now and then whether it is
 requested to stop. It is the command line that listens, with :func:`listen`; a program that imports this package gets
-Python's own ``KeyboardInterrupt``. In a search it ends the search, which returns the state that its last complete step
-left; the searches that follow in the same call (:func:`one_call`) end at once. Elsewhere it ends the call.
+Python's own ``KeyboardInterrupt``. A search takes note of it instead, ends after the present step, and returns the
+state that its last complete step left; the searches that follow in the same call (:func:`one_call`) end at once.
+Elsewhere, and at a second interrupt in one step, it ends the call.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar, copy_context
 from functools import wraps
 from pathlib import Path
-from threading import Event, Lock
+from threading import Event, Lock, current_thread, main_thread
 from types import FrameType
 from typing import NamedTuple, ParamSpec, TypeVar
 
@@ -195,19 +196,33 @@ def reason_of(search: Callable[[], str]) -> str:
     complete. What it claims otherwise must hold in the middle of a step too: a step changes what is claimed by one
     assignment, its last.
     """
-    before = _in_search.get()
+    before, call = _in_search.get(), _call.get()
+    noted = Event() if call is None else call
+    # CasADi loses an exception that a signal raises in one of its functions.
+    listens = current_thread() is main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+    def note(number: int, frame: FrameType | None) -> None:
+        """Take note of an interrupt; a second one is Python's."""
+        if noted.is_set():
+            signal.default_int_handler(number, frame)
+        noted.set()
+
     try:
         _in_search.set(True)
-        return search()
+        _call.set(noted)
+        if listens:
+            signal.signal(signal.SIGINT, note)
+        return search() or (STOPPED if noted.is_set() else "")
     except KeyboardInterrupt:
-        call = _call.get()
-        if call is not None:
-            call.set()
+        noted.set()
         return STOPPED
     except _StoppedError:
         return why_stopped()
     finally:
+        if listens:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         _in_search.set(before)
+        _call.set(call)
 
 
 def stop_if_requested() -> None:
