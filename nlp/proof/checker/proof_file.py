@@ -30,7 +30,7 @@ import zlib
 from dataclasses import asdict, dataclass
 from typing import Final, Literal
 
-from ...case.pose import Free
+from ...case.pose import ends_of
 from ...case.workspace import Workspace
 from ...errors import InputError
 from ...system.strictjson import json_tree, object_of
@@ -152,10 +152,7 @@ class Proof:
 
 def workspace_numbers(workspace: Workspace) -> Poses:
     """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
-    position, angles = (
-        tuple((each.lower, each.upper) if isinstance(each, Free) else (each, each) for each in values)
-        for values in (workspace.position, workspace.turns.angles)
-    )
+    position, angles = (tuple(map(ends_of, values)) for values in (workspace.position, workspace.turns.angles))
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
 
 
