@@ -19,7 +19,7 @@ from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
-from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
+from screwsynth.nlp.proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
 
 sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("bench", "tests", "tests/models")]
 from limb_cases import poses  # noqa: E402 - the tests' cases
@@ -55,10 +55,10 @@ def measure(name: str, case: Case, gap: float, limit: float = 120.0) -> None:
     if found.status.value != "proved":
         print(f"{begin}  {found.status.value}: {found.reason}", flush=True)
         return
-    proof = Proof("", name, Statement(), fingerprint(nlp), -nlp.sign * found.bound, recorder.tree())
-    size = len(proof.as_text()) / 1000
+    claim = ProofClaim(OPTIMUM, "", "program", -nlp.sign * found.bound, fingerprint(nlp), recorder.tree())
+    size = len(Proof("", name, Statement(), (claim,)).as_text()) / 1000
     times.append(time.process_time())
-    checked = check_proof(proof, nlp)
+    checked = check_proof(claim, nlp)
     check = time.process_time() - times[-1]
     ratio = check / (times[2] - times[1])
     print(f"{begin} {found.boxes:9,} {times[2] - times[1]:7.2f} s {checked.leaves:8,} {size:7,.0f} kB "

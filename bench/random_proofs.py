@@ -105,7 +105,7 @@ def examine(seed: int, seconds: float) -> dict[str, object]:
     proof = proof_of(certified, text)
     began = time.process_time()
     try:
-        verified = check_proof(proof, program_of(case, proof.statement))
+        verified = check_proof(proof.claims[0], program_of(case, certified.statement))
         row |= {"outcome": "accepted", "leaves": verified.leaves, "pieces": verified.pieces}
     except ProofError as error:
         row |= {"outcome": "rejected", "message": str(error)}

@@ -47,6 +47,11 @@ class Free:
 Value: TypeAlias = float | Free
 
 
+def ends_of(value: Value) -> tuple[float, float]:
+    """Return the bounds of a number: the same twice for a fixed one."""
+    return (value.lower, value.upper) if isinstance(value, Free) else (float(value), float(value))
+
+
 def sizes_of_turn(angle: Value) -> tuple[float, float]:
     """Return the smallest and the largest size, radians, of a rotation about a free axis.
 
@@ -55,10 +60,9 @@ def sizes_of_turn(angle: Value) -> tuple[float, float]:
     Args:
         angle: the angle, radians.
     """
-    if not isinstance(angle, Free):
-        return abs(angle), abs(angle)
-    sizes = sorted((abs(angle.lower), abs(angle.upper)))
-    return (0.0 if angle.lower <= 0 <= angle.upper else sizes[0]), sizes[1]
+    lower, upper = ends_of(angle)
+    sizes = sorted((abs(lower), abs(upper)))
+    return (0.0 if lower <= 0 <= upper else sizes[0]), sizes[1]
 
 
 @dataclass(frozen=True, eq=False)

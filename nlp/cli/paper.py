@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.pose import Value
-    from ..proof.checker.proof_file import Unproved, WorkspaceProof
+    from ..proof.checker.proof_file import Proof, Unproved
     from ..proof.checker.workspace.check import CheckedClaim
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.proof_writer import PaperRecord
@@ -64,7 +64,7 @@ def write_paper(
     _echo_unproved(proof.unproved, err=True)
 
 
-def verify_paper(proof: WorkspaceProof, case: Case, leg_error: float) -> None:
+def verify_paper(proof: Proof, case: Case, leg_error: float) -> None:
     """Check the proof of a workspace and say what it proves.
 
     Raises:

@@ -11,7 +11,7 @@ from .options import AllAssemblies, LegError, ResultFile, SettingTexts, read_set
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from ..proof.checker.proof_file import Proof
+    from ..proof.checker.proof_file import ProofClaim, Statement
 
 
 def verify_proof(
@@ -37,13 +37,13 @@ def verify_proof(
     from .. import __version__
     from ..errors import InputError
     from ..output.files import read_text
-    from ..proof.checker.proof_file import Proof, read_proof
+    from ..proof.checker.proof_file import Statement, read_proof
     from .dimensions import read_machine
     from .paper import verify_paper
 
     options = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
     given = read_proof(read_text(proof), proof)
-    foreign = ("--leg-error",) if isinstance(given, Proof) else ("--above", "--all-assemblies")
+    foreign = ("--leg-error",) if isinstance(given.premises, Statement) else ("--above", "--all-assemblies")
     for name in foreign:
         if options[name]:
             raise InputError(f"{name}: means nothing for this proof, which another command wrote")
@@ -53,15 +53,15 @@ def verify_proof(
         raise InputError(f"{'--set' if settings else '--of'}: needs the CASE that it changes")
     else:
         loaded = _carried_case(given.case, given.name, proof)
-    if isinstance(given, Proof):
-        _verify(given, loaded, above, all_assemblies=all_assemblies)
+    if isinstance(given.premises, Statement):
+        _verify(given.premises, given.claims[0], loaded, above, all_assemblies=all_assemblies)
     else:
         verify_paper(given, loaded, leg_error)
     whose = "the case is the one that the proof carries; " if case is None else ""
     typer.echo(f"{whose}checked by screwsynth {__version__}")
 
 
-def _verify(proof: Proof, case: Case, above: float | None, *, all_assemblies: bool) -> None:
+def _verify(statement: Statement, claim: ProofClaim, case: Case, above: float | None, *, all_assemblies: bool) -> None:
     """Check the proof of a certificate and say what it proves.
 
     Raises:
@@ -73,14 +73,14 @@ def _verify(proof: Proof, case: Case, above: float | None, *, all_assemblies: bo
     from ..proof.checker.proof_file import ProofError
 
     try:
-        hold_statement(case, proof.statement, above=above, all_assemblies=all_assemblies)
-        checked = check_proof(proof, program_of(case, proof.statement))
+        hold_statement(case, statement, above=above, all_assemblies=all_assemblies)
+        checked = check_proof(claim, program_of(case, statement))
         if above is not None and not -checked.bound > above:
             raise ProofError(f"the proof shows {-checked.bound:.10g}, which is not above {above:.10g}")
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
-    typer.echo(f"holds: {one_line(claim_words(case, proof.statement, proof.bound))}")
+    typer.echo(f"holds: {one_line(claim_words(case, statement, claim.bound))}")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
 
 

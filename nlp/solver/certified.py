@@ -18,7 +18,7 @@ from ..proof.boxes.tree import TreeRecord
 from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_program
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses, has_modes, program_of
-from ..proof.checker.proof_file import Proof, Statement
+from ..proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
 from .answer import Answer
@@ -221,7 +221,8 @@ def proof_of(certified: Certified, text: str) -> Proof:
     nlp = certificate.nlp
     bound = None if certificate.status is CertificateStatus.INFEASIBLE else -nlp.sign * certificate.bound
     graph = fingerprint(program_of(nlp.case, certified.statement))
-    return Proof(text, nlp.case.name, certified.statement, graph, bound, certified.tree)
+    claim = ProofClaim(OPTIMUM, "", "program", bound, graph, certified.tree)
+    return Proof(text, nlp.case.name, certified.statement, (claim,))
 
 
 def _complete_tree(writer: TreeRecord | None, certificate: Certificate) -> bytes | None:

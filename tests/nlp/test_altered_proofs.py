@@ -24,7 +24,7 @@ from screwsynth.nlp import InputError, case_from_tables
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.checker import proof_file
 from screwsynth.nlp.proof.checker.premises import fingerprint, program_of
-from screwsynth.nlp.proof.checker.proof_file import ProofClaim, Statement, WorkspaceProof
+from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, Statement
 
 Run = Callable[..., tuple[int, str, str]]
 Place = tuple[str | int, ...]
@@ -510,7 +510,7 @@ def test_errors_of_legs_are_refused_for_a_robot_without_six_legs(cli: Run, folde
     case, proof = folder / "legless.toml", folder / "legless.json"
     case.write_text(CRANKS, encoding="utf-8")
     claim = ProofClaim("regular", "", "regular", tree=b"\x02")
-    proof.write_text(WorkspaceProof("", "legless", (), (), (), 0.01, (claim,), ()).as_text(), encoding="utf-8")
+    proof.write_text(Proof("", "legless", Premises((), (), (), 0.01), (claim,)).as_text(), encoding="utf-8")
     words = (str(proof), str(case)) if command == "verify-proof" else (str(case),)
     code, out, err = cli(command, *words, "--leg-error", "0.01")
     assert (code, out) == (2, "")

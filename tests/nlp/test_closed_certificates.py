@@ -119,7 +119,7 @@ def test_a_proof_without_unknowns_is_checked() -> None:
     assert found.certificate is not None
     assert found.certificate.status is CertificateStatus.PROVED
     assert found.certificate.boxes < 100
-    proof = proof_of(found, "")
+    (proof,) = proof_of(found, "").claims
     assert check_proof(proof, found.certificate.nlp).leaves > 1
 
 

@@ -22,7 +22,7 @@ from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
-from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
+from screwsynth.nlp.proof.checker.proof_file import ProofClaim
 from screwsynth.nlp.proof.enclosure.forms import QuadraticModel
 from screwsynth.nlp.proof.statement.limb_separation import separate
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
@@ -88,7 +88,7 @@ def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
     recorder = TreeRecord()
     found = certify_program(nlp, gap=1e-2, recorder=recorder)
     assert found.status is CertificateStatus.INFEASIBLE
-    proof = Proof("", "none", Statement(), fingerprint(nlp), None, recorder.tree())
+    proof = ProofClaim("none", "", "program", None, fingerprint(nlp), recorder.tree())
     assert check_proof(proof, nlp).bound == -math.inf
 
 

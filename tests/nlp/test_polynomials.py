@@ -155,8 +155,8 @@ def test_a_proof_whose_cuts_are_within_rounding_of_loop_equations_is_accepted() 
     task = Task(np.array([0.3, -0.5, 0.8, size, -0.4 * size, 0.6 * size]), "max")
     case = Case(model, parameters, list(model.home), [task], Rotation(), characteristic_length=0.7 * size)
     certified = certify(case, gap=1e-4, starts=4, with_proof=True)
-    proof = proof_of(certified, "")
-    nlp = program_of(case, proof.statement)
+    (proof,) = proof_of(certified, "").claims
+    nlp = program_of(case, certified.statement)
     assert check_proof(proof, nlp).bound == proof.bound
     assert proof.bound is not None
     with pytest.raises(ProofError, match="could not be shown"):

@@ -18,7 +18,7 @@ from screwsynth.nlp import Case, case_from_tables, load_case
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint, is_same_program, program_of
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofClaim, ProofError, Statement, read_proof
 from screwsynth.nlp.proof.checker.tree import Leaf, Node, TreeReader, read_claims
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 from screwsynth.nlp.solver.certified import certify, proof_of
@@ -33,10 +33,16 @@ def text() -> str:
 
 
 @pytest.fixture(scope="module")
-def proof(text: str) -> Proof:
+def written(text: str) -> Proof:
     """Axis held: four variables, no row, faces and contraction."""
     case = load_case(NAME)
     return proof_of(certify(case, gap=1e-4, starts=4, with_proof=True), text)
+
+
+@pytest.fixture(scope="module")
+def proof(written: Proof) -> ProofClaim:
+    """The only claim of the proof."""
+    return written.claims[0]
 
 
 def ball_case() -> Case:
@@ -49,22 +55,22 @@ def ball_case() -> Case:
 
 
 @pytest.fixture(scope="module")
-def ball() -> Proof:
+def ball() -> ProofClaim:
     case = ball_case()
-    return proof_of(certify(case, gap=1e-5, starts=4, with_proof=True), "")
+    return proof_of(certify(case, gap=1e-5, starts=4, with_proof=True), "").claims[0]
 
 
-def test_a_proof_holds_and_survives_writing_and_reading(proof: Proof) -> None:
-    again = read_proof(proof.as_text(), "again")
-    assert again == proof
-    nlp = program_of(load_case(NAME), proof.statement)
-    checked = check_proof(again, nlp)
+def test_a_proof_holds_and_survives_writing_and_reading(written: Proof) -> None:
+    again = read_proof(written.as_text(), "again")
+    assert again == written
+    assert isinstance(again.premises, Statement)
+    checked = check_proof(again.claims[0], program_of(load_case(NAME), again.premises))
     assert checked.leaves > 10
-    assert checked.bound == proof.bound
+    assert checked.bound == written.claims[0].bound
 
 
-def test_a_proof_with_rows_holds(ball: Proof) -> None:
-    nlp = program_of(ball_case(), ball.statement)
+def test_a_proof_with_rows_holds(ball: ProofClaim) -> None:
+    nlp = program_of(ball_case(), Statement())
     claims = read_claims(TreeReader(ball.tree), standard_form(nlp))
     assert {kind for kind, _ in claims} >= {Node.BOUNDED, Node.INFEASIBLE}
     check_proof(ball, nlp)
@@ -89,34 +95,34 @@ class Places(TreeReader):
                 self.places.append((start, self.at - start, 0.5 * (low + high)))
 
 
-def nodes(proof: Proof, case: Case) -> list[tuple[int, int, bool]]:
+def nodes(proof: ProofClaim, case: Case) -> list[tuple[int, int, bool]]:
     """Start and length of every closing reason in a tree, and whether the middle of its box is feasible."""
-    form = standard_form(program_of(case, proof.statement))
+    form = standard_form(program_of(case, Statement()))
     reader = Places(proof.tree)
     read_claims(reader, form)
     reader.finish()
     return [(start, length, is_feasible(form, middle)) for start, length, middle in reader.places]
 
 
-def rejected(proof: Proof, case: Case) -> str:
+def rejected(proof: ProofClaim, case: Case) -> str:
     with pytest.raises(ProofError) as caught:
-        check_proof(proof, program_of(case, proof.statement))
+        check_proof(proof, program_of(case, Statement()))
     return str(caught.value)
 
 
-def test_a_tree_without_one_of_its_leaves_is_rejected(proof: Proof) -> None:
+def test_a_tree_without_one_of_its_leaves_is_rejected(proof: ProofClaim) -> None:
     places = nodes(proof, load_case(NAME))
     for at, length, _ in (places[0], places[len(places) // 2], places[-1]):
         tree = proof.tree[:at] + proof.tree[at + length :]
         assert rejected(replace(proof, tree=tree), load_case(NAME))
 
 
-def test_a_tree_with_a_leaf_too_many_is_rejected(proof: Proof) -> None:
+def test_a_tree_with_a_leaf_too_many_is_rejected(proof: ProofClaim) -> None:
     message = rejected(replace(proof, tree=proof.tree + bytes([Node.BOUNDED])), load_case(NAME))
     assert "goes on" in message
 
 
-def test_an_altered_bound_is_rejected(proof: Proof, ball: Proof) -> None:
+def test_an_altered_bound_is_rejected(proof: ProofClaim, ball: ProofClaim) -> None:
     assert proof.bound is not None
     assert ball.bound is not None
     message = rejected(replace(proof, bound=proof.bound * (1 - 3e-4)), load_case(NAME))
@@ -124,16 +130,16 @@ def test_an_altered_bound_is_rejected(proof: Proof, ball: Proof) -> None:
     assert "bounded" in rejected(replace(ball, bound=ball.bound * (1 - 3e-4)), ball_case())
 
 
-def test_an_altered_cut_is_rejected(ball: Proof) -> None:
+def test_an_altered_cut_is_rejected(ball: ProofClaim) -> None:
     tree = bytearray(ball.tree)
     at = next(at for at, kind in enumerate(tree) if kind == Node.HALF)
     del tree[at : at + 2]
     assert rejected(replace(ball, tree=bytes(tree)), ball_case())
 
 
-def test_a_changed_reason_is_rejected(ball: Proof) -> None:
+def test_a_changed_reason_is_rejected(ball: ProofClaim) -> None:
     places = nodes(ball, ball_case())
-    row = len(standard_form(program_of(ball_case(), ball.statement)).functions)
+    row = len(standard_form(program_of(ball_case(), Statement())).functions)
     bounded = [at for at, _, feasible in places if ball.tree[at] == Node.BOUNDED and feasible]
     for at in (bounded[0], bounded[-1]):
         for kind, index in ((Node.INFEASIBLE, row), (Node.MONOTONE, 0)):
@@ -144,19 +150,19 @@ def test_a_changed_reason_is_rejected(ball: Proof) -> None:
 @pytest.mark.parametrize(
     "tree", [b"", b"\xff", bytes([Node.HALF]), bytes([Node.HALF, 200]), bytes([Node.INFEASIBLE, 9])]
 )
-def test_what_is_no_tree_is_rejected(proof: Proof, tree: bytes) -> None:
+def test_what_is_no_tree_is_rejected(proof: ProofClaim, tree: bytes) -> None:
     assert rejected(replace(proof, tree=tree), load_case(NAME))
 
 
-def test_a_face_that_is_not_the_cases_is_rejected(proof: Proof) -> None:
+def test_a_face_that_is_not_the_cases_is_rejected(proof: ProofClaim) -> None:
     tree = bytes([Node.HALF, 0, Node.FACE_UPPER, 0]) + proof.tree
     assert rejected(replace(proof, tree=tree + proof.tree), load_case(NAME))
 
 
-def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
+def test_a_proof_is_for_its_case_only(proof: ProofClaim) -> None:
     other = load_case(NAME, {"x1": 12.5})
     assert "other expressions" in rejected(proof, other)
-    assert fingerprint(program_of(load_case(NAME), proof.statement)) == proof.graph
+    assert fingerprint(program_of(load_case(NAME), Statement())) == proof.graph
 
 
 def test_the_command_line_writes_and_checks_proofs(cli: Run, tmp_path: Path) -> None:
@@ -180,9 +186,9 @@ def test_no_proof_is_written_of_a_search_that_ends_before(cli: Run, tmp_path: Pa
     assert not target.exists()
 
 
-def test_the_command_line_rejects_what_is_damaged_or_altered(cli: Run, tmp_path: Path, proof: Proof) -> None:
+def test_the_command_line_rejects_what_is_damaged_or_altered(cli: Run, tmp_path: Path, written: Proof) -> None:
     target = tmp_path / "proof.json"
-    content = json.loads(proof.as_text())
+    content = json.loads(written.as_text())
     claim = content["claims"][0]
     tree = zlib.decompress(base64.b64decode(claim["tree"]))
     claim["tree"] = base64.b64encode(zlib.compress(tree[:-1])).decode()
@@ -297,14 +303,14 @@ def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, meth
     assert out.count("proved:") == 3
 
 
-def test_a_fingerprint_forgives_rounding_and_nothing_else(proof: Proof) -> None:
-    nlp = program_of(load_case(NAME), proof.statement)
+def test_a_fingerprint_forgives_rounding_and_nothing_else(proof: ProofClaim) -> None:
+    nlp = program_of(load_case(NAME), Statement())
     rounded = replace(nlp, arguments=np.nextafter(nlp.arguments, np.inf), upper=np.nextafter(nlp.upper, 0.0))
     assert is_same_program(fingerprint(rounded), proof.graph)
     for other in (
         replace(nlp, upper=nlp.upper * (1 + 1e-5)),
-        program_of(load_case(NAME, {"x2": 8.0001}), proof.statement),
-        program_of(load_case("paper-4.1-rotation-axis-z"), proof.statement),
+        program_of(load_case(NAME, {"x2": 8.0001}), Statement()),
+        program_of(load_case("paper-4.1-rotation-axis-z"), Statement()),
     ):
         assert not is_same_program(fingerprint(other), proof.graph)
     for text in ("", "x y z", proof.graph + " 1", proof.graph[:-3] + "zzz"):
@@ -327,10 +333,10 @@ def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
         "task": [{"name": "t", "sense": "max", "axis": [1, 2, 3], "point": [1, 0, 2], "pitch": 1}],
     }
     case = case_from_tables(tables, name="two legs", source="two legs")
-    proof = proof_of(certify(case, gap=1e-3, starts=2, with_proof=True), "")
+    (proof,) = proof_of(certify(case, gap=1e-3, starts=2, with_proof=True), "").claims
     assert proof.tree[0] == Node.LIMBS
     assert proof.bound is not None
-    nlp = program_of(case, proof.statement)
+    nlp = program_of(case, Statement())
     assert check_proof(proof, nlp).bound == proof.bound
     assert "together" in rejected(replace(proof, bound=proof.bound * (1 - 1e-3)), case)
     (first,) = struct.unpack("<d", proof.tree[1:9])
@@ -356,8 +362,8 @@ def test_leg_clearance_is_covered_and_its_proof_holds() -> None:
     evidence = certified.solution.evidence
     assert evidence is not None
     assert any(side.name.startswith("leg_clearance") for side in evidence.active)
-    proof = proof_of(certified, "")
-    nlp = program_of(case, proof.statement)
+    (proof,) = proof_of(certified, "").claims
+    nlp = program_of(case, Statement())
     check_proof(proof, nlp)
     form = standard_form(nlp)
     x = form.lower[:, None] + np.random.default_rng(0).random((form.n, 3000)) * (form.upper - form.lower)[:, None]

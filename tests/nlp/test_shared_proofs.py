@@ -22,7 +22,7 @@ from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.polymodels import Tilts, forms_of, polynomial_sum
 from screwsynth.nlp.proof.checker.premises import fingerprint
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Statement
+from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError
 from screwsynth.nlp.proof.checker.tree import Node, SharedLeaves, leaf_bytes, read_shared
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
@@ -38,13 +38,13 @@ def near_home() -> Case:
     return Case(case.model, case.parameters, position, case.tasks, rotation=rotation)
 
 
-def proof_of(nlp: Nlp, gap: float, x: np.ndarray | None = None) -> Proof:
+def proof_of(nlp: Nlp, gap: float, x: np.ndarray | None = None) -> ProofClaim:
     """The proof that a search records, whatever it is worth."""
     recorder = TreeRecord()
     found = certify_program(nlp, x, gap=gap, jobs=1, recorder=recorder)
     assert found.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
     bound = None if found.status is CertificateStatus.INFEASIBLE else -nlp.sign * found.bound
-    return Proof("", "limbs", Statement(), fingerprint(nlp), bound, recorder.tree())
+    return ProofClaim("limbs", "", "program", bound, fingerprint(nlp), recorder.tree())
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +58,11 @@ def nlp(best: ProgramSolution) -> Nlp:
 
 
 @pytest.fixture(scope="module")
-def proof(best: ProgramSolution) -> Proof:
+def proof(best: ProgramSolution) -> ProofClaim:
     return proof_of(best.nlp, GAP, best.x)
 
 
-def middle_leaf(proof: Proof, nlp: Nlp) -> SharedLeaves:
+def middle_leaf(proof: ProofClaim, nlp: Nlp) -> SharedLeaves:
     """The leaf whose box is nearest to home's rotation, in which poses are feasible."""
     _, found = separated(nlp.case)
     assert found.common is not None
@@ -72,20 +72,20 @@ def middle_leaf(proof: Proof, nlp: Nlp) -> SharedLeaves:
     return SharedLeaves(*(each[..., away.argmin()] for each in leaves))
 
 
-def rejected(proof: Proof, nlp: Nlp) -> str:
+def rejected(proof: ProofClaim, nlp: Nlp) -> str:
     with pytest.raises(ProofError) as caught:
         check_proof(proof, nlp)
     return str(caught.value)
 
 
-def test_a_proof_by_limbs_that_share_variables_holds(proof: Proof, nlp: Nlp) -> None:
+def test_a_proof_by_limbs_that_share_variables_holds(proof: ProofClaim, nlp: Nlp) -> None:
     assert proof.tree[0] == Node.SHARED
     checked = check_proof(proof, nlp)
     assert checked.leaves > 1
     assert checked.bound == proof.bound
 
 
-def changed(proof: Proof, nlp: Nlp, change: Callable[[np.ndarray, np.ndarray, np.ndarray], object]) -> Proof:
+def changed(proof: ProofClaim, nlp: Nlp, change: Callable[[np.ndarray, np.ndarray, np.ndarray], object]) -> ProofClaim:
     """The proof with other numbers (K,), (K, m), (K, m, m) in one leaf, which ``change`` writes in place."""
     leaf = middle_leaf(proof, nlp)
     old = leaf_bytes(leaf.bounds, leaf.g, leaf.Q)
@@ -95,7 +95,7 @@ def changed(proof: Proof, nlp: Nlp, change: Callable[[np.ndarray, np.ndarray, np
     return replace(proof, tree=proof.tree.replace(old, leaf_bytes(bounds, g, Q)))
 
 
-def test_what_was_tampered_with_is_rejected(proof: Proof, nlp: Nlp) -> None:
+def test_what_was_tampered_with_is_rejected(proof: ProofClaim, nlp: Nlp) -> None:
     assert proof.bound is not None
     size = abs(proof.bound)
     for less in (2 * GAP, 0.7 * GAP):

@@ -20,7 +20,7 @@ from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
-from screwsynth.nlp.proof.checker.proof_file import Proof, Statement
+from screwsynth.nlp.proof.checker.proof_file import ProofClaim
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.machine import Legs
@@ -72,7 +72,7 @@ def test_parts_of_a_claim_by_limbs_add_up() -> None:
     found = certify_program(nlp, start, above=-2.1, recorder=recorder)
     assert found.status is CertificateStatus.PROVED
     assert -2.1 < found.bound <= -2
-    proof = Proof("", "none", Statement(), fingerprint(nlp), -found.bound, recorder.tree())
+    proof = ProofClaim("none", "", "program", -found.bound, fingerprint(nlp), recorder.tree())
     assert check_proof(proof, nlp).bound == -found.bound
 
 
@@ -95,7 +95,7 @@ def test_a_value_that_jumps_has_no_rule(jump: Callable[[SX], SX]) -> None:
     with pytest.raises(UncoveredError, match="the robot's expressions hold the"):
         certify_program(nlp, np.array([2.9, -1.0]))
     with pytest.raises(UncoveredError):
-        check_proof(Proof("", "none", Statement(), fingerprint(nlp), 0.0, bytes([Node.BOUNDED])), nlp)
+        check_proof(ProofClaim("none", "", "program", 0.0, fingerprint(nlp), bytes([Node.BOUNDED])), nlp)
 
 
 @pytest.mark.parametrize("place", ["examine", "branch"])

@@ -13,7 +13,7 @@ from builders import Run, case_from
 
 from screwsynth.nlp import InputError, certify, load_result
 from screwsynth.nlp.embedding.folder import read_manifest
-from screwsynth.nlp.proof.checker.proof_file import ProofClaim, Unproved, WorkspaceProof, read_proof
+from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, Unproved, read_proof
 from screwsynth.nlp.solver.certified import proof_of
 from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
 from screwsynth.nlp.system.strictjson import WrongValueError, json_tree, object_of, value_of
@@ -170,7 +170,8 @@ def readers(folder: Path, cli: Run) -> dict[str, tuple[bytes, Callable[[bytes], 
     claim = ProofClaim("F", "max", "program", 2.5, "graph", b"\x06", ((0.0, 1.0),))
     poses = (((0.0, 1.0),) * 3, "axis", ((0.0, 1.0),), (0.0, 0.0, 1.0))
     unproved = (Unproved("G", "min", "open"),)
-    paper = WorkspaceProof("text", "name", poses, ((0.0,) * 3,), ("q",), 0.1, (claim,), unproved, 0.2, (claim,))
+    premises = Premises(poses, ((0.0,) * 3,), ("q",), 0.1, 0.2)
+    paper = Proof("text", "name", premises, (claim,), (claim,), unproved)
 
     def read_file(content: bytes) -> object:
         file.write_bytes(content)

@@ -143,8 +143,8 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
     assert not again.certificate.nlp.in_home_mode
     assert not again.statement.in_home_mode
     # The proof is about home's mode alone, and fails for all modes.
-    proof = proof_of(own, DELTA)
-    assert proof.statement.in_home_mode
+    (proof,) = proof_of(own, DELTA).claims
+    assert own.statement.in_home_mode
     nlp = own.certificate.nlp
     assert check_proof(proof, nlp).leaves > 1
     with pytest.raises(ProofError, match="for other expressions or bounds"):

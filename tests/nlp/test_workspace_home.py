@@ -19,7 +19,7 @@ from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import RobotState
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.proof.checker.proof_file import ProofError, WorkspaceProof, read_proof
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
@@ -126,7 +126,7 @@ def verdicts(judged: Judgement) -> list[tuple[str, str, Outcome]]:
     return [*ranks, *((each.name, each.sense.value, each.outcome) for each in judged.extremes)]
 
 
-def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, WorkspaceProof]:
+def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, Proof]:
     record = PaperRecord()
     judged = judge_workspace(case, with_limits=with_limits, with_objective=False, jobs=1, paper=record)
     return judged, read_proof(paper_of(judged, record, "").as_text(), "again")

@@ -23,7 +23,7 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.checker.fractions import tangent_ends
-from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
+from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, read_proof
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace import check
 from screwsynth.nlp.proof.checker.workspace.forms import contraction
@@ -84,7 +84,7 @@ def judged() -> tuple[Judgement, PaperRecord]:
 
 
 @pytest.fixture(scope="module")
-def proof(judged: tuple[Judgement, PaperRecord]) -> WorkspaceProof:
+def proof(judged: tuple[Judgement, PaperRecord]) -> Proof:
     return paper_of(*judged, TEXT, quantities=["leg_length"], leg_error=LEG_ERROR)
 
 
@@ -106,13 +106,18 @@ def random_boxes(root: PoseRoot, count: int, width: float, rng: np.random.Genera
     return lower, upper
 
 
-def rejected(proof: WorkspaceProof, case: Case | None = None) -> str:
+def stated(proof: Proof) -> Premises:
+    assert isinstance(proof.premises, Premises)
+    return proof.premises
+
+
+def rejected(proof: Proof, case: Case | None = None) -> str:
     with pytest.raises(ProofError) as caught:
-        check.check_workspace_proof(proof, case_of() if case is None else case, leg_error=proof.leg_error)
+        check.check_workspace_proof(proof, case_of() if case is None else case, leg_error=stated(proof).leg_error)
     return str(caught.value)
 
 
-def changed(proof: WorkspaceProof, name: str, sense: str = "", **values: object) -> WorkspaceProof:
+def changed(proof: Proof, name: str, sense: str = "", **values: object) -> Proof:
     """The proof with other values in one of its claims."""
     assert any((each.name, each.sense) == (name, sense) for each in proof.claims)
     claims = [
@@ -122,18 +127,18 @@ def changed(proof: WorkspaceProof, name: str, sense: str = "", **values: object)
     return replace(proof, claims=tuple(claims))
 
 
-def alone(proof: WorkspaceProof, *names: str) -> WorkspaceProof:
+def alone(proof: Proof, *names: str) -> Proof:
     """The proof with these claims alone; it says of the others that they have none."""
     kept = tuple(each for each in proof.claims if each.name in names)
     others = (Unproved(each.name, each.sense, "left out") for each in proof.claims if each.name not in names)
     return replace(proof, claims=kept, unproved=(*proof.unproved, *others))
 
 
-def claim(proof: WorkspaceProof, name: str, sense: str = "") -> ProofClaim:
+def claim(proof: Proof, name: str, sense: str = "") -> ProofClaim:
     return next(each for each in proof.claims if (each.name, each.sense) == (name, sense))
 
 
-def test_a_proof_with_every_kind_of_claim_holds(proof: WorkspaceProof, judged: tuple[Judgement, PaperRecord]) -> None:
+def test_a_proof_with_every_kind_of_claim_holds(proof: Proof, judged: tuple[Judgement, PaperRecord]) -> None:
     assert not proof.unproved
     again = read_proof(proof.as_text(), "again")
     assert again == proof
@@ -164,14 +169,14 @@ def test_a_proof_with_every_kind_of_claim_holds(proof: WorkspaceProof, judged: t
         ("leg_clearance limbs 1- and 1+", "min", 9.0),
     ],
 )
-def test_another_bound_is_rejected(proof: WorkspaceProof, name: str, sense: str, factor: float) -> None:
+def test_another_bound_is_rejected(proof: Proof, name: str, sense: str, factor: float) -> None:
     bound = claim(proof, name, sense).bound
     assert bound is not None
     needed = (name, "rotation error") if name == "position error" else (name,)
     assert name in rejected(alone(changed(proof, name, sense, bound=bound * factor), *needed))
 
 
-def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: WorkspaceProof) -> None:
+def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: Proof) -> None:
     assert "does not keep" in rejected(changed(alone(proof, "condition_number"), "condition_number", "max", bound=9.0))
     tighter = case_of(TEXT.replace("max = 44", "max = 30"))
     proof = alone(proof, "leg_length limb 1-", "actuator.stroke_max limb 1-")
@@ -179,7 +184,7 @@ def test_a_bound_that_does_not_keep_the_limit_is_rejected(proof: WorkspaceProof)
     assert "does not keep" in rejected(proof, case_of(TEXT.replace("stroke_max = 30", "stroke_max = 2")))
 
 
-def test_other_trees_are_rejected(proof: WorkspaceProof) -> None:
+def test_other_trees_are_rejected(proof: Proof) -> None:
     proof = alone(proof, "regular", "position error", "rotation error")
     tree = node_bytes(Node.CUT, 0, value=0.0) + bytes([Node.BOUNDED] * 2)
     assert "ends" in rejected(changed(proof, "position error", "max", tree=tree[:-1]))
@@ -191,7 +196,7 @@ def test_other_trees_are_rejected(proof: WorkspaceProof) -> None:
     assert "outside of it" in rejected(changed(proof, "position error", "max", tree=shifted))
 
 
-def test_a_proof_is_for_its_case_only(proof: WorkspaceProof) -> None:
+def test_a_proof_is_for_its_case_only(proof: Proof) -> None:
     assert "another workspace" in rejected(proof, case_of(TEXT.replace("max = 9 }", "max = 9.5 }")))
     assert "other joint centres" in rejected(proof, case_of(TEXT.replace("11.543", "11.544")))
     assert "other expressions" in rejected(
@@ -205,7 +210,7 @@ def test_a_proof_is_for_its_case_only(proof: WorkspaceProof) -> None:
     assert "no reason" in rejected(
         changed(alone(proof, "condition_number"), "condition_number", "max", reason="lengths")
     )
-    assert "measure" in rejected(replace(proof, quantities=("none",)))
+    assert "measure" in rejected(replace(proof, premises=replace(stated(proof), quantities=("none",))))
 
 
 def test_a_leaf_across_a_singular_pose_is_rejected(robot: Legs) -> None:

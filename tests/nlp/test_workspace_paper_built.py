@@ -22,7 +22,7 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
-from screwsynth.nlp.proof.checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, read_proof
+from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, read_proof
 from screwsynth.nlp.proof.checker.workspace import check
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClaim, SingularClaim, change_of_jacobian
@@ -97,7 +97,7 @@ def case_of(text: str = TEXT) -> Case:
     return case_from_tables(tomllib.loads(text), name="machine", source="machine.toml")
 
 
-def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: Any) -> tuple[Judgement, WorkspaceProof]:  # noqa: ANN401
+def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: Any) -> tuple[Judgement, Proof]:  # noqa: ANN401
     record = PaperRecord()
     judged = judge_workspace(case_of(text), quantities=quantities, gap=0.02, jobs=1, paper=record, **options)
     leg_error = options.get("leg_error", 0.0)
@@ -105,26 +105,36 @@ def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: An
 
 
 @pytest.fixture(scope="module")
-def both() -> tuple[Judgement, WorkspaceProof]:
+def both() -> tuple[Judgement, Proof]:
     return written(leg_error=LEG_ERROR)
 
 
 @pytest.fixture(scope="module")
-def proof(both: tuple[Judgement, WorkspaceProof]) -> WorkspaceProof:
+def proof(both: tuple[Judgement, Proof]) -> Proof:
     return both[1]
 
 
-def rejected(proof: WorkspaceProof, text: str = TEXT) -> str:
+def stated(proof: Proof) -> Premises:
+    assert isinstance(proof.premises, Premises)
+    return proof.premises
+
+
+def stating(proof: Proof, **values: Any) -> Proof:  # noqa: ANN401
+    """The proof with other values in its premises."""
+    return replace(proof, premises=replace(stated(proof), **values))
+
+
+def rejected(proof: Proof, text: str = TEXT) -> str:
     with pytest.raises(ProofError) as caught:
-        check.check_workspace_proof(proof, case_of(text), leg_error=proof.leg_error)
+        check.check_workspace_proof(proof, case_of(text), leg_error=stated(proof).leg_error)
     return str(caught.value)
 
 
-def claim(proof: WorkspaceProof, name: str, sense: str = "") -> ProofClaim:
+def claim(proof: Proof, name: str, sense: str = "") -> ProofClaim:
     return next(each for each in (*proof.claims, *proof.lemmas) if (each.name, each.sense) == (name, sense))
 
 
-def changed(proof: WorkspaceProof, name: str, sense: str, **values: Any) -> WorkspaceProof:  # noqa: ANN401
+def changed(proof: Proof, name: str, sense: str, **values: Any) -> Proof:  # noqa: ANN401
     """The proof with other values in one of its claims, or lemmas."""
     old = claim(proof, name, sense)
     claims, lemmas = (
@@ -134,18 +144,18 @@ def changed(proof: WorkspaceProof, name: str, sense: str, **values: Any) -> Work
     return replace(proof, claims=claims, lemmas=lemmas)
 
 
-def alone(proof: WorkspaceProof, *names: str) -> WorkspaceProof:
+def alone(proof: Proof, *names: str) -> Proof:
     """The proof with these claims alone; it says of the others that they have none."""
     kept = tuple(each for each in proof.claims if each.name in names)
     others = (Unproved(each.name, each.sense, "left out") for each in proof.claims if each.name not in names)
     return replace(proof, claims=kept, unproved=(*proof.unproved, *others))
 
 
-def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, WorkspaceProof]) -> None:
+def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Proof]) -> None:
     judged, proof = both
     assert judged.is_proved
     assert not proof.unproved
-    assert proof.tolerance == TOLERANCE
+    assert stated(proof).joint_centre == TOLERANCE
     assert read_proof(proof.as_text(), "again") == proof
     # Of one leg, or of one pair of legs, and one stroke that takes lengths of one machine.
     strokes = [each.name for each in proof.claims if each.reason == "one machine"]
@@ -154,7 +164,7 @@ def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Wo
     # Singular values and errors of the pose rest on the shortest lengths of all legs.
     kept |= {f"leg_length limb {leg}" for leg in others}
     some = alone(proof, *kept, strokes[0], "leg_clearance limbs 1- and 2+", "joint_spacing base joints 1- and 1+")
-    checked = check.check_workspace_proof(some, case_of(), leg_error=some.leg_error)
+    checked = check.check_workspace_proof(some, case_of(), leg_error=stated(some).leg_error)
     assert len(checked.claims) == len(some.claims)
     # No machine that the search found is beyond a bound that the check shows, and the bounds are those of the search.
     extremes = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
@@ -175,9 +185,9 @@ def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Wo
     assert kinds == {*angles, *rates, *plates, "actuator.stroke_max", "actuator.dead_length"}
 
 
-def rejections(proof: WorkspaceProof, text: str = TEXT) -> Callable[..., str]:
+def rejections(proof: Proof, text: str = TEXT) -> Callable[..., str]:
     """The check of one claim after the other, with other values in it: a function that returns why it is rejected."""
-    checker = check._Checker(proof, case_of(text), proof.leg_error)
+    checker = check._Checker(proof, case_of(text), stated(proof).leg_error)
     expected = {each.key: each for each in checker.expected}
 
     def reject(name: str, sense: str, **values: Any) -> str:  # noqa: ANN401
@@ -188,7 +198,7 @@ def rejections(proof: WorkspaceProof, text: str = TEXT) -> Callable[..., str]:
     return reject
 
 
-def test_another_tolerance_is_rejected(proof: WorkspaceProof) -> None:
+def test_another_tolerance_is_rejected(proof: Proof) -> None:
     larger = TEXT.replace("joint_centre = 0.02", "joint_centre = 0.06")
     without = TEXT.replace("[tolerance]\njoint_centre = 0.02\n", "")
     for text in (larger, TEXT.replace("joint_centre = 0.02", "joint_centre = 0.01"), without):
@@ -196,13 +206,13 @@ def test_another_tolerance_is_rejected(proof: WorkspaceProof) -> None:
     # Another number in the file is no way around: bounds are those of the machines of the case.
     longest = claim(proof, "leg_length limb 2-", "max").bound
     assert longest is not None
-    reject = rejections(replace(proof, tolerance=0.06), larger)
+    reject = rejections(stating(proof, joint_centre=0.06), larger)
     names = ("leg_length limb 2-", "F", "rate_share limb 1-", "base_joint_angle limb 1-", "radius_ratio")
     for name in (*names, "actuator.stroke_max limb 2+"):
         assert "other expressions" in reject(name, "max")
     smaller = TEXT.replace("max = 60 }", f"max = {math.sqrt(longest) - 0.01} }}", 1)
     assert "does not keep" in rejections(proof, smaller)("leg_length limb 2-", "max")
-    reject = rejections(replace(proof, tolerance=0.0), without)
+    reject = rejections(stating(proof, joint_centre=0.0), without)
     assert "other expressions" in reject("F", "max")
     assert "about the exact machine" in reject("actuator.stroke_max limb 2+", "max")
 
@@ -220,7 +230,7 @@ def value_of(name: str, sense: str, number: float) -> float:
     return number if kind == "leg_clearance" else sign * number
 
 
-def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, WorkspaceProof]) -> None:
+def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, Proof]) -> None:
     """The search knows a machine within the tolerance that is beyond each of these bounds by a millionth."""
     judged, proof = both
     reject = rejections(proof)
@@ -238,7 +248,7 @@ def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, Work
         assert "could not be shown" in fault or "is wrong" in fault, name
 
 
-def test_other_lemmas_and_directions_are_rejected(proof: WorkspaceProof) -> None:
+def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     name, rest = "actuator.stroke_max limb 2+", claim(proof, second_order_name("F"), "max")
     assert rest.bound is not None
     smaller = replace(rest, bound=0.5 * rest.bound)
@@ -451,7 +461,7 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     judged, given = written(text, (), with_limits=False)
     assert judged.regularity.errors is not None
     (found,) = check.check_workspace_proof(
-        read_proof(given.as_text(), "again"), case_of(text), leg_error=given.leg_error
+        read_proof(given.as_text(), "again"), case_of(text), leg_error=stated(given).leg_error
     ).claims
     assert found.is_refuted
     assert found.by_machine
@@ -466,7 +476,7 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     ):
         assert fault in rejected(changed(given, "regular", "", sides=sides), text)
     smaller = text.replace("joint_centre = 0.8", "joint_centre = 0.1")
-    assert "more than the tolerance" in rejected(replace(given, tolerance=0.1), smaller)
+    assert "more than the tolerance" in rejected(stating(given, joint_centre=0.1), smaller)
 
 
 def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Path) -> None:
@@ -492,7 +502,9 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
     judged, given = written(text, ASKED[1:], with_objective=False)
     reject = rejections(given, text)
     for name, sense, extreme in zip(ASKED[1:], ("min", "max"), judged.extremes[-2:], strict=True):
-        checked = check.check_workspace_proof(alone(given, name), case_of(text), leg_error=given.leg_error).claims[0]
+        checked = check.check_workspace_proof(
+            alone(given, name), case_of(text), leg_error=stated(given).leg_error
+        ).claims[0]
         assert (checked.name, checked.sense) == (name, sense) == (extreme.name, extreme.sense.value)
         assert checked.bound == pytest.approx(extreme.bound, rel=1e-5)
         assert "could not be shown" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))

@@ -16,10 +16,11 @@ from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.proof_file import (
+    Premises,
+    Proof,
     ProofClaim,
     ProofError,
     Unproved,
-    WorkspaceProof,
     read_proof,
     workspace_numbers,
 )
@@ -59,18 +60,18 @@ def gallery_case(name: str, part: float, degrees: float, seed: int | None = None
     return Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])], workspace=workspace)
 
 
-def proof_of(case: Case, text: str = "", *, with_objective: bool = False) -> WorkspaceProof:
+def proof_of(case: Case, text: str = "", *, with_objective: bool = False) -> Proof:
     """The proof, without F, which takes longest."""
     record = PaperRecord()
     judged = judge_workspace(case, gap=0.1, with_objective=with_objective, paper=record)
     return read_proof(paper_of(judged, record, text).as_text(), "again")
 
 
-def claim(proof: WorkspaceProof, name: str) -> ProofClaim:
+def claim(proof: Proof, name: str) -> ProofClaim:
     return next(each for each in proof.claims if each.name == name)
 
 
-def changed(proof: WorkspaceProof, name: str, **values: object) -> WorkspaceProof:
+def changed(proof: Proof, name: str, **values: object) -> Proof:
     """The proof of one claim alone, tampered with."""
     own = replace(claim(proof, name), **values)  # type: ignore[arg-type]
     others = tuple(
@@ -79,7 +80,7 @@ def changed(proof: WorkspaceProof, name: str, **values: object) -> WorkspaceProo
     return replace(proof, claims=(own,), unproved=(*proof.unproved, *others))
 
 
-def rejected(proof: WorkspaceProof, case: Case) -> str:
+def rejected(proof: Proof, case: Case) -> str:
     with pytest.raises(ProofError) as caught:
         check_workspace_proof(proof, case)
     return str(caught.value)
@@ -95,12 +96,12 @@ def reachy_case(text: str) -> Case:
 
 
 @pytest.fixture(scope="module")
-def reachy() -> tuple[Case, WorkspaceProof]:
+def reachy() -> tuple[Case, Proof]:
     text = one_motor(reachy_text(0.45))
     return reachy_case(text), proof_of(reachy_case(text), text)
 
 
-def test_reachy_mini_is_on_paper(reachy: tuple[Case, WorkspaceProof]) -> None:
+def test_reachy_mini_is_on_paper(reachy: tuple[Case, Proof]) -> None:
     case, proof = reachy
     assert {(each.name, each.reason) for each in proof.unproved} == {("F", "it was not judged")}
     checked = check_workspace_proof(proof, case)
@@ -111,7 +112,7 @@ def test_reachy_mini_is_on_paper(reachy: tuple[Case, WorkspaceProof]) -> None:
     assert all(each.limit is not None and each.bound is not None for each in checked.claims[1:])
 
 
-def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, WorkspaceProof]) -> None:
+def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, Proof]) -> None:
     case, proof = reachy
     tree = claim(proof, "regular").tree
     assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
@@ -240,13 +241,15 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
 
 
 def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
-    reachy: tuple[Case, WorkspaceProof], monkeypatch: pytest.MonkeyPatch
+    reachy: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, proof = reachy
     case = reachy_case(one_motor(reachy_text(1.0)))
     assert case.workspace is not None
     monkeypatch.setattr(_PoseRule, "most_pieces", 100)
-    other = replace(changed(proof, "regular"), workspace=workspace_numbers(case.workspace))
+    assert isinstance(proof.premises, Premises)
+    other = changed(proof, "regular")
+    other = replace(other, premises=replace(proof.premises, workspace=workspace_numbers(case.workspace)))
     # All claims about limits are named, and none is proved.
     assert "could not be shown" in rejected(other, case)
 
@@ -279,7 +282,8 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     assert "not one of the workspace" in rejected(changed(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
     small = gallery_case("6-ups", 0.02, 5, 1)
     assert small.workspace is not None
-    other = replace(proof, workspace=workspace_numbers(small.workspace))
+    assert isinstance(proof.premises, Premises)
+    other = replace(proof, premises=replace(proof.premises, workspace=workspace_numbers(small.workspace)))
     assert "not one of the workspace" in rejected(other, small)
 
 

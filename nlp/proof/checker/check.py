@@ -22,7 +22,7 @@ from .bisection import show
 from .optimum import Claims, rule_of
 from .polymodels import Tilts
 from .premises import fingerprint, is_same_program
-from .proof_file import Proof, ProofError
+from .proof_file import ProofClaim, ProofError
 from .tree import FACES, Box, Node, SharedLeaves, TreeReader, read_claims, read_shared
 
 #: Rounding of sums of a few numbers, in parts of their sizes: many times the largest possible.
@@ -44,23 +44,23 @@ class VerifiedProof:
     bound: float
 
 
-def check_proof(proof: Proof, nlp: Nlp) -> VerifiedProof:
-    """Check a proof, by showing each of its claims again.
+def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
+    """Check the proof of a claim about a program, by showing each claim of its tree again.
 
     Args:
-        proof: the proof.
+        claim: the claim, with its tree.
         nlp: the program that it is about, built from the case.
 
     Raises:
         ProofError: the proof is for another program, its bytes are no tree, or a claim could not be shown.
     """
-    if not is_same_program(fingerprint(nlp), proof.graph):
+    if not is_same_program(fingerprint(nlp), claim.graph):
         raise ProofError("the proof is for other expressions or bounds than this case's")
     form = standard_form(nlp)
     refuse_jumps(form.expressions, form.x)
-    bound = -np.inf if proof.bound is None else proof.bound
+    bound = -np.inf if claim.bound is None else claim.bound
     kinds = {bytes([Node.LIMBS]): _of_limbs, bytes([Node.SHARED]): _of_shared_limbs}
-    leaves, every = kinds.get(proof.tree[:1], _of_tree)(proof.tree, form, bound)
+    leaves, every = kinds.get(claim.tree[:1], _of_tree)(claim.tree, form, bound)
     pieces = sum(show(rule_of(each), each.lower, each.upper) for each in every)
     return VerifiedProof(leaves, pieces, bound)
 

@@ -135,13 +135,11 @@ class BoundRule(FormRule):
         left = np.flatnonzero(~holds & defined)
         forms = forms.select(left)
         if J:
-            models = [polynomial_sum(forms, weights) for weights in weights_of(J, self._equation, forms)]
-            for model in models:
-                shown.keep(left, model.bound() <= bound[left], model.change())
+            model = polynomial_sum(forms, weights_of(J, self._equation, forms))
+            shown.keep(left, model.bound() <= bound[left], model.change())
             rest = np.flatnonzero(~shown.holds[left])
             left, forms = left[rest], forms.select(rest)
-            for model in models:
-                shown.cut(left, reaching_part(model.select(rest), bound[left], lower[:, left], upper[:, left]))
+            shown.cut(left, reaching_part(model.select(rest), bound[left], lower[:, left], upper[:, left]))
         self._use_conditions(shown, left, forms, lower, upper)
         if self._slopes.stops:
             self._collapse(shown, left, forms)

@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 _SUMS = 1e-13
 #: More than underflow can cost a sum.
 _TINY = 1e-290
-#: Weight, in the choice of the variable to bisect, of those at their ends on a whole box: it decides if no other does.
-_AT_END = 0.05
-#: Sweeps over all expressions of the two searches of weights.
-_SWEEPS, _EDGE_SWEEPS = 12, 3
+#: Weight of slopes beside curvatures in the choice of the variable to bisect.
+_SLOPE = 0.3
+#: Sweeps over all expressions in the search of weights.
+_SWEEPS = 3
 
 
 class Forms(NamedTuple):
@@ -107,15 +107,8 @@ class SumModel:
         return np.asarray(self.fixed + _largest(self.b, self.H, side) + _TINY)
 
     def change(self) -> FloatArray:
-        """Return how much (n, N) the bound can gain from halving each variable; the balls are of third order.
-
-        Where the sum rises or falls along a variable on the whole box, the bound is taken at its end already.
-        """
-        reach = self.reach
-        free = np.abs(self.b) <= reach
-        coupled = np.where(free[:, None] & free[None], np.abs(self.H), 0.0).sum(axis=0)
-        own = np.where(free, coupled + 0.3 * np.abs(self.b), 0.0)
-        return np.asarray(own + _AT_END * (reach + 0.3 * np.abs(self.b)) + 2 * self.balls)
+        """Return how much (n, N) the bound can gain from halving each variable; the balls are of third order."""
+        return np.asarray(self.reach + _SLOPE * np.abs(self.b) + 2 * self.balls)
 
 
 def polynomial_sum(forms: Forms, weights: FloatArray) -> SumModel:
@@ -193,14 +186,12 @@ def reaching_part(
         return np.where(none, np.inf, np.fmax(lower, low)), np.where(none, -np.inf, np.fmin(upper, high))
 
 
-def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> list[FloatArray]:
-    """Return choices of weights (R, N): of functions, not negative with sum 1; of inequalities, not positive.
+def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> FloatArray:
+    """Return weights (R, N): of functions, not negative with sum 1; of inequalities, not positive.
 
     Any weights give a bound, and these make it small. The bound of ``L = sum_r w_r v_r`` over a box is about
-    ``L(c) + sum_i r_i |dL/dx_i (c)|``. The weights are found in two steps: coordinate descent on the sum of squares of
-    the scaled gradient, and then on this bound itself, which also counts how far a condition is violated at the centre.
-    The first weights are better where the optimum lies in the box, the second ones for a box on the edge of the
-    feasible set.
+    ``L(c) + sum_i r_i |dL/dx_i (c)|``, which counts how far a condition is violated at the centre too. The weights are
+    found by coordinate descent: those of functions on the squares of the gradient, those of conditions on this bound.
 
     Args:
         functions: number of functions, which come before the conditions.
@@ -214,26 +205,15 @@ def weights_of(functions: int, is_equation: Sequence[bool], forms: Forms) -> lis
             # A condition that cannot bind gets no weight.
             usable[r] &= ~(forms.high[r] < 0)
     G, values = np.where(usable[:, None], G, 0.0), np.where(usable, values, 0.0)
-    weights = np.zeros_like(values)
+    weights, left = np.zeros_like(values), G[0].copy()
     weights[0] = 1.0
-    if len(G) == 1:
-        return [weights]
-    left = G[0].copy()
     bind = [r for r in range(functions, len(G)) if usable[r].any()]
-    sizes = np.einsum("rin,rin->rn", G, G)
     for _ in range(_SWEEPS):
         for r in range(1, functions):
             _move_towards(r, functions, weights, G, left)
         for r in bind:
-            step = np.einsum("in,in->n", G[r], left) / np.where(sizes[r] > 0, sizes[r], np.inf)
-            new = weights[r] - step if is_equation[r] else np.minimum(weights[r] - step, 0.0)
-            left += (new - weights[r]) * G[r]
-            weights[r] = new
-    edge = weights.copy()
-    for _ in range(_EDGE_SWEEPS):
-        for r in bind:
-            _minimise_bound(edge[r], G[r], values[r], left, is_equation[r])
-    return [weights, edge]
+            _minimise_bound(weights[r], G[r], values[r], left, is_equation[r])
+    return weights
 
 
 def _move_towards(r: int, functions: int, weights: FloatArray, G: FloatArray, left: FloatArray) -> None:

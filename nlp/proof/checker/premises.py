@@ -1,7 +1,7 @@
 """Program of a case that a proof bounds, its fingerprint, and the proven claim in words.
 
-The tasks, their weights and senses, poses, limits and dimensions are those of the case. A :class:`.proof.Statement`
-names one of the few programs that a case has.
+The tasks, their weights and senses, poses, limits and dimensions are those of the case. A
+:class:`.proof_file.Statement` names one of the few programs that a case has.
 """
 
 from __future__ import annotations

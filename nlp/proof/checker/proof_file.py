@@ -30,7 +30,7 @@ import zlib
 from dataclasses import asdict, dataclass
 from typing import Final, Literal
 
-from ...case.pose import Free
+from ...case.pose import ends_of
 from ...case.workspace import Workspace
 from ...errors import InputError
 from ...system.strictjson import json_tree, object_of
@@ -42,7 +42,9 @@ _EARLIER = ("screwsynth-workspace-proof",)
 #: Largest tree in bytes: the proofs of docs/certificate.md have a few million.
 _LARGEST_TREE = 2**28
 #: Name of the only claim of a proof about a program.
-_OPTIMUM = "optimum"
+OPTIMUM = "optimum"
+#: Poses of a workspace: ranges of the position, kind, ranges of the angles, axis.
+Poses = tuple[str | tuple[float | tuple[float, ...], ...], ...]
 
 
 class ProofError(InputError):
@@ -102,89 +104,56 @@ class Unproved:
 
 
 @dataclass(frozen=True)
-class Proof:
-    """A proof about a program of a case.
+class Premises:
+    """What a proof about a workspace says of its premises; everything else follows from the case.
 
     Attributes:
-        case: the case file's text.
-        name: the case's name.
-        statement: the program of the case that it is about.
-        graph: fingerprint of the program's expressions and bounds.
-        bound: upper bound of the maximised value (minus F for a minimum) over the feasible part of the root; None
-            where there is no feasible point.
-        tree: the nodes' bytes.
-    """
-
-    case: str
-    name: str
-    statement: Statement
-    graph: str
-    bound: float | None
-    tree: bytes
-
-    def as_text(self) -> str:
-        """Return the JSON text."""
-        claim = ProofClaim(_OPTIMUM, "", "program", self.bound, self.graph, self.tree)
-        return _text(
-            _File(_FORMAT, _VERSION, self.name, self.case, "program", self.statement, (_table_of(claim),), (), ())
-        )
-
-
-@dataclass(frozen=True)
-class WorkspaceProof:
-    """Proofs of claims about a workspace.
-
-    Attributes:
-        case: the case file's text.
-        name: the case's name.
         workspace: the poses, from :func:`workspace_numbers`.
         legs: (12, 3) joint centres of six straight legs, base before platform; empty for another robot.
         quantities: measures that were asked for.
         leg_error: largest error of a leg's length.
+        joint_centre: largest error of each joint centre in the machines that the claims are about; 0 for the exact one.
+    """
+
+    workspace: Poses
+    legs: tuple[tuple[float, ...], ...]
+    quantities: tuple[str, ...]
+    leg_error: float
+    joint_centre: float = 0.0
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Proofs of claims about a case.
+
+    Attributes:
+        case: the case file's text.
+        name: the case's name.
+        premises: the program of the case that the one claim is about, or what claims about a workspace rest on.
         claims: the claims that are proved.
-        unproved: the others.
-        tolerance: largest error of each joint centre in the machines that the claims are about; 0 for the exact one.
         lemmas: claims that others rest on.
+        unproved: claims without a proof.
     """
 
     case: str
     name: str
-    workspace: object
-    legs: tuple[tuple[float, ...], ...]
-    quantities: tuple[str, ...]
-    leg_error: float
+    premises: Statement | Premises
     claims: tuple[ProofClaim, ...]
-    unproved: tuple[Unproved, ...]
-    tolerance: float = 0.0
     lemmas: tuple[ProofClaim, ...] = ()
+    unproved: tuple[Unproved, ...] = ()
 
     def as_text(self) -> str:
         """Return the JSON text."""
-        premises = _Premises(self.workspace, self.legs, self.quantities, self.leg_error, self.tolerance)
+        about: Literal["program", "workspace"] = "program" if isinstance(self.premises, Statement) else "workspace"
         claims, lemmas = (tuple(map(_table_of, some)) for some in (self.claims, self.lemmas))
-        return _text(
-            _File(_FORMAT, _VERSION, self.name, self.case, "workspace", premises, claims, lemmas, self.unproved)
-        )
+        file = _File(_FORMAT, _VERSION, self.name, self.case, about, self.premises, claims, lemmas, self.unproved)
+        return json.dumps(asdict(file), indent=1, allow_nan=False) + "\n"
 
 
-def workspace_numbers(workspace: Workspace) -> object:
+def workspace_numbers(workspace: Workspace) -> Poses:
     """Return a workspace as texts and numbers: ranges of the position, kind, ranges of the angles, axis."""
-    position, angles = (
-        tuple((each.lower, each.upper) if isinstance(each, Free) else (each, each) for each in values)
-        for values in (workspace.position, workspace.turns.angles)
-    )
+    position, angles = (tuple(map(ends_of, values)) for values in (workspace.position, workspace.turns.angles))
     return position, workspace.turns.kind.value, angles, tuple(workspace.turns.axis)
-
-
-@dataclass(frozen=True)
-class _Premises:
-    """What a proof about a workspace says of its premises, as its file has it."""
-
-    workspace: object
-    legs: tuple[tuple[float, ...], ...]
-    quantities: tuple[str, ...]
-    leg_error: float
-    joint_centre: float
 
 
 @dataclass(frozen=True)
@@ -216,18 +185,13 @@ class _File:
     not_on_paper: tuple[Unproved, ...]
 
 
-def _text(file: _File) -> str:
-    """Return the JSON text of a proof."""
-    return json.dumps(asdict(file), indent=1, allow_nan=False) + "\n"
-
-
 def _table_of(claim: ProofClaim) -> _ClaimTable:
     """Return a claim with its tree packed."""
     text = base64.b64encode(zlib.compress(claim.tree, 9)).decode("ascii")
     return _ClaimTable(**{**vars(claim), "tree": text}, digest=hashlib.sha256(claim.tree).hexdigest())
 
 
-def read_proof(text: str, source: str) -> Proof | WorkspaceProof:
+def read_proof(text: str, source: str) -> Proof:
     """Read a proof from its JSON text.
 
     Args:
@@ -244,34 +208,16 @@ def read_proof(text: str, source: str) -> Proof | WorkspaceProof:
         ):
             raise ProofError(f"{source}: is no proof of this version, {_VERSION}: write it again")
         found = object_of(_File, table)
-        if found.about == "program":
-            statement = object_of(Statement, found.premises, "premises")
-            if len(found.claims) != 1 or found.claims[0].reason != "program" or found.lemmas or found.not_on_paper:
-                raise ValueError("a proof about a program has one claim")
-        else:
-            premises = object_of(_Premises, found.premises, "premises")
+        is_program = found.about == "program"
+        kind: type[Statement] | type[Premises] = Statement if is_program else Premises
+        premises = object_of(kind, found.premises, "premises")
+        reasons = [each.reason for each in found.claims]
+        if is_program and (reasons != ["program"] or found.lemmas or found.not_on_paper):
+            raise ValueError("a proof about a program has one claim")
     except ValueError as error:
         raise ProofError(f"{source}: is no proof as certify and workspace write it: {error}") from None
     claims, lemmas = (tuple(_claim_of(each, source) for each in some) for some in (found.claims, found.lemmas))
-    if found.about == "program":
-        return Proof(found.case, found.name, statement, claims[0].graph, claims[0].bound, claims[0].tree)
-    return WorkspaceProof(
-        case=found.case,
-        name=found.name,
-        workspace=_tuples(premises.workspace),
-        legs=premises.legs,
-        quantities=premises.quantities,
-        leg_error=premises.leg_error,
-        claims=claims,
-        unproved=found.not_on_paper,
-        tolerance=premises.joint_centre,
-        lemmas=lemmas,
-    )
-
-
-def _tuples(value: object) -> object:
-    """Return lists within lists as tuples."""
-    return tuple(_tuples(each) for each in value) if isinstance(value, list) else value
+    return Proof(found.case, found.name, premises, claims, lemmas, found.not_on_paper)
 
 
 def _claim_of(table: _ClaimTable, source: str) -> ProofClaim:

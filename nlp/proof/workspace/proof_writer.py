@@ -13,7 +13,7 @@ from ....models import FloatArray
 from ..boxes.tree import TreeRecord
 from ..certificate.certificate import CertificateStatus
 from ..checker.premises import fingerprint
-from ..checker.proof_file import ProofClaim, ProofError, Unproved, WorkspaceProof, workspace_numbers
+from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_numbers
 from ..checker.tree import Node
 from ..checker.workspace.statement import ERRORS, ExpectedClaim, expected_claims, legs_numbers, robot_claims
 from ..statement.claims import REACH, REGULAR, one_machine_name
@@ -95,7 +95,7 @@ class PaperRecord:
 
 def paper_of(
     judged: Judgement, record: PaperRecord, text: str, *, quantities: Sequence[str] = (), leg_error: float = 0.0
-) -> WorkspaceProof:
+) -> Proof:
     """Return the proof of what is proved, or refuted by two poses, and the claims that have none.
 
     Args:
@@ -106,32 +106,29 @@ def paper_of(
         leg_error: largest error of a leg's length.
     """
     writer = _Writer(judged, record)
-    claims = expected_claims(judged.case, writer.robot, quantities, leg_error)
+    expected = expected_claims(judged.case, writer.robot, quantities, leg_error)
     unproved = []
-    for each in claims:
+    for each in expected:
         try:
             writer.proved[each.key] = writer.proof(each)
         except ProofError as error:
             unproved.append(Unproved(*each.key, str(error)))
-    known = {each.key for each in claims}
+    known = {each.key for each in expected}
     unproved += [Unproved(*key, _NO_RULES) for key in writer.extremes if key not in known]
     # The whole errors follow from those of first order together, and from the lengths of legs.
     missing = [each for each in ERRORS if (each, "max") not in writer.proved]
     for other in ERRORS if len(missing) == 1 else ():
         if writer.proved.pop((other, "max"), None):
             unproved.append(Unproved(other, "max", f"the {missing[0]} has no proof"))
-    return WorkspaceProof(
-        case=text,
-        name=judged.case.name,
+    premises = Premises(
         workspace=workspace_numbers(judged.workspace),
         legs=legs_numbers(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
-        claims=tuple(writer.proved.values()),
-        unproved=tuple(unproved),
-        tolerance=judged.case.joint_centre_tolerance or 0.0,
-        lemmas=tuple(writer.lemmas()),
+        joint_centre=judged.case.joint_centre_tolerance or 0.0,
     )
+    claims, lemmas = tuple(writer.proved.values()), tuple(writer.lemmas())
+    return Proof(text, judged.case.name, premises, claims, lemmas, tuple(unproved))
 
 
 class _Writer:

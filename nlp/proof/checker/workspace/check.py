@@ -26,7 +26,7 @@ from ...statement.machine import Legs, check_leg_error, workspace_of_case
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
 from ..check import check_proof
-from ..proof_file import Proof, ProofClaim, ProofError, Statement, WorkspaceProof
+from ..proof_file import Premises, Proof, ProofClaim, ProofError
 from ..tree import Node
 from .motion_matrix import PosedRobot
 from .number_claims import ClearanceClaim, ErrorClaim, SecondOrderClaim, SingularClaim, change_of_jacobian, whole_errors
@@ -81,7 +81,7 @@ class VerifiedWorkspace:
     pieces: int
 
 
-def check_workspace_proof(proof: WorkspaceProof, case: Case, *, leg_error: float = 0.0) -> VerifiedWorkspace:
+def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -> VerifiedWorkspace:
     """Check a proof of a workspace, by showing each of its claims again.
 
     Args:
@@ -118,10 +118,12 @@ def check_workspace_proof(proof: WorkspaceProof, case: Case, *, leg_error: float
 class _Checker:
     """A check of claims one after the other; later ones use the bounds of earlier ones."""
 
-    def __init__(self, proof: WorkspaceProof, case: Case, leg_error: float) -> None:
-        workspace = workspace_of_case(case)
+    def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
+        workspace, premises = workspace_of_case(case), proof.premises
+        if not isinstance(premises, Premises):
+            raise ProofError("the proof is not about a workspace")
         self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
-        hold_premises(case, workspace, robot.legs, leg_error, proof)
+        hold_premises(case, workspace, robot.legs, leg_error, premises)
         self._case, self._root, self._tolerance = case, pose_root(workspace), case.joint_centre_tolerance or 0.0
         self._firsts = {
             each.name: each.bound for each in proof.claims if each.name in ERRORS and each.bound is not None
@@ -131,7 +133,7 @@ class _Checker:
         self._bounds: dict[tuple[str, str], float] = {}
         self.leaves = self.pieces = 0
         try:
-            self.expected = expected_claims(case, robot, proof.quantities, leg_error)
+            self.expected = expected_claims(case, robot, premises.quantities, leg_error)
         except InputError as error:
             raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
 
@@ -188,7 +190,8 @@ class _Checker:
     def _program(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout) -> float:
         """Return the bound of an expression in the symbols of a layout that a tree of ``certify`` proves."""
         nlp = extreme_program(layout, expression, sense)
-        checked = check_proof(Proof("", given.name, Statement(), given.graph, _stated(given), given.tree), nlp)
+        _stated(given)
+        checked = check_proof(given, nlp)
         self.leaves += checked.leaves
         self.pieces += checked.pieces
         return -nlp.sign * checked.bound

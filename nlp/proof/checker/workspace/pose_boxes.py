@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .....models import FloatArray
-from ....case.pose import Free, Value
+from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ..bisection import Shown, show
 from ..fractions import tangent_ends
@@ -75,19 +75,19 @@ class PoseRoot:
 def pose_root(workspace: Workspace) -> PoseRoot:
     """Return the box of coordinates of a workspace."""
     turns = workspace.turns
-    spans = [_ends(each) for each in workspace.position]
+    spans = [ends_of(each) for each in workspace.position]
     outer = [(Fraction(low), Fraction(high)) for low, high in spans]
     inner = list(outer)
     ball, inner_ball = math.inf, None
     if turns.kind is TurnKind.ANY_AXIS:
-        largest = max(map(abs, _ends(turns.angles[0])))
+        largest = max(map(abs, ends_of(turns.angles[0])))
         least, most = tangent_ends(largest)
         spans += [(-largest, largest)] * 3
         outer += [(-most, most)] * 3
         inner += [(-most, most)] * 3
         ball, inner_ball = _up(most * most), least * least
     else:
-        for low, high in map(_ends, turns.angles):
+        for low, high in map(ends_of, turns.angles):
             (below, start), (end, above) = tangent_ends(low), tangent_ends(high)
             wide = below - _AXIS * abs(below), above + _AXIS * abs(above)
             spans.append((low, high))
@@ -103,11 +103,6 @@ def pose_root(workspace: Workspace) -> PoseRoot:
     )
     axis = np.array(turns.axis, dtype=float)
     return PoseRoot(turns.kind, axis, tuple(values), lower, upper, tuple(inner + flat), ball, inner_ball)
-
-
-def _ends(value: Value) -> tuple[float, float]:
-    """Return the ends of a number: the same twice for a fixed one."""
-    return (value.lower, value.upper) if isinstance(value, Free) else (float(value), float(value))
 
 
 def _down(value: Fraction) -> float:

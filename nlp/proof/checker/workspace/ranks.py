@@ -145,22 +145,14 @@ class RankClaim:
             every = zip(*(vars(each).values() for each in self._shown), strict=True)
             self._assembly.refuse_apart(Enclosed(*map(np.concatenate, every)))
 
-    @property
-    def is_square(self) -> bool:
-        """Whether the matrix is J itself, with rows that are neither normalised nor zero, over poses without loops."""
-        return self._shape == (6, 6) and not self._freedoms and not self._assembly.dependent
-
-    def values_at(self, y: FloatArray) -> FloatArray:
-        """Return the matrices (K, m, c) at poses (K, 6) without loops: computed numbers."""
-        return self._matrices(self._closed(y, y)).M
-
     def show_sign_change(self, root: PoseRoot, sides: Sequence[Sequence[float]]) -> None:
         """Show that the determinant has opposite signs at two points (6 + e,): a pose, and errors of joint centres.
 
         The entries have values along the whole way between them, and poses and errors are convex in their coordinates:
         the determinant changes continuously, and is 0 at a point.
         """
-        if not self.is_square:
+        # The matrix is J itself, with rows that are neither normalised nor zero, over poses without loops.
+        if self._shape != (6, 6) or self._freedoms or self._assembly.dependent:
             raise ProofError("a singular pose has a proof for robots with six rows, without loops, alone")
         points = [np.array(each, dtype=float) for each in sides]
         if len(points) != 2 or any(y.shape != (COORDINATES + self._errors,) for y in points):

@@ -26,7 +26,7 @@ from ...statement.machine import Legs, legs_of
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
 from ..premises import exact
-from ..proof_file import ProofError, WorkspaceProof, workspace_numbers
+from ..proof_file import Premises, ProofError, workspace_numbers
 from .motion_matrix import turned_rotation
 from .pose_boxes import PoseRoot, pose_root
 
@@ -244,16 +244,16 @@ def legs_numbers(legs: Legs | None) -> tuple[tuple[float, ...], ...]:
     return () if legs is None else tuple(map(tuple, [*legs.base.tolist(), *legs.platform.tolist()]))
 
 
-def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, proof: WorkspaceProof) -> None:
+def hold_premises(case: Case, workspace: Workspace, legs: Legs | None, leg_error: float, given: Premises) -> None:
     """Refuse a proof whose file names other premises than those of the case; the check does without the file's."""
-    if workspace_numbers(workspace) != proof.workspace:
+    if workspace_numbers(workspace) != given.workspace:
         raise ProofError("the proof is for another workspace than this case's")
-    if proof.leg_error != leg_error:
-        stated = f"the proof is for legs that are off by at most {exact(proof.leg_error)} {case.units.length}"
+    if given.leg_error != leg_error:
+        stated = f"the proof is for legs that are off by at most {exact(given.leg_error)} {case.units.length}"
         raise ProofError(f"{stated}, and not {exact(leg_error)}: see --leg-error")
-    numbers, given = legs_numbers(legs), proof.legs
-    same = list(map(len, numbers)) == list(map(len, given))
-    if not same or not np.allclose(given, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
+    numbers = legs_numbers(legs)
+    same = list(map(len, numbers)) == list(map(len, given.legs))
+    if not same or not np.allclose(given.legs, numbers, rtol=0.0, atol=_SAME * np.abs(numbers).max(initial=0.0)):
         raise ProofError("the proof is for other joint centres than this case's")
-    if (case.joint_centre_tolerance or 0.0) != proof.tolerance:
+    if (case.joint_centre_tolerance or 0.0) != given.joint_centre:
         raise ProofError("the proof is for machines within another tolerance on joint centres than this case's")

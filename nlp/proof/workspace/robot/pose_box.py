@@ -21,7 +21,7 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
-from ....case.pose import Free, Value
+from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ...statement.tolerance import PoseCoordinates
 
@@ -157,14 +157,14 @@ class PoseBox:
 
 def pose_box(workspace: Workspace) -> PoseBox:
     """Return the box of coordinates of a workspace."""
-    ends = [_ends(value) for value in workspace.position]
+    ends = [ends_of(value) for value in workspace.position]
     turns, ball = workspace.turns, math.inf
     if turns.kind is TurnKind.ANY_AXIS:
-        radius = _tangent(max(abs(end) for end in _ends(turns.angles[0])), 1.0)
+        radius = _tangent(max(abs(end) for end in ends_of(turns.angles[0])), 1.0)
         ball = radius * radius * (1 + _TANGENT)
         ends += [(-radius, radius)] * 3
     else:
-        angles = [_ends(value) for value in turns.angles]
+        angles = [ends_of(value) for value in turns.angles]
         ends += [
             (_tangent(low, -1.0), _tangent(high, 1.0)) if low < high else (math.tan(low / 2),) * 2
             for low, high in angles
@@ -203,11 +203,6 @@ def _scaled(value: Value, factor: float, about_zero: bool = False) -> Value:
         return value
     centre = 0.0 if about_zero else (value.lower + value.upper) / 2
     return Free(centre + factor * (value.lower - centre), centre + factor * (value.upper - centre))
-
-
-def _ends(value: Value) -> tuple[float, float]:
-    """Return the ends of a number: the same twice for a fixed one."""
-    return (value.lower, value.upper) if isinstance(value, Free) else (value, value)
 
 
 def _tangent(angle: float, outwards: float) -> float:
