@@ -8,12 +8,12 @@ import pytest
 from limb_cases import machine, poses, separated
 from numpy_engine import squared_quotients as quotients
 from numpy_engine.bounding import NumpyEngine
+from numpy_engine.intervals import midpoints
 from numpy_engine.limb_models import NumpyLimbEngine
 from numpy_engine.quadratic_models import GradientModel
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.proof.boxes.engine import Engine, search_tape
-from screwsynth.nlp.proof.enclosure.forms import midpoints
 from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows
 from screwsynth.nlp.proof.statement.limb_separation import terms_of
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form

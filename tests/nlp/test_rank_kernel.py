@@ -1,4 +1,4 @@
-"""The rank of matrices without loops, from forms of second order in the C kernel: boxes, bounds, planted faults.
+"""The rank of matrices from forms of their entries in the C kernel: boxes, bounds, planted faults.
 
 A copy of the kernel keeps C, the middle of the matrix and the bound B of the last box, so that ``|I - C M(y)| <= B``
 can be held against the matrix at points of the box, computed by CasADi.
@@ -25,11 +25,14 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.proof.enclosure.forms import Encloser, Forms
 from screwsynth.nlp.proof.statement.tolerance import built_model
+from screwsynth.nlp.proof.workspace.ranks import rank_rule
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
-from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
+from screwsynth.nlp.proof.workspace.ranks.rank_rule import EntryChange, RankTest
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
+from screwsynth.nlp.proof.workspace.robot.posed_model import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
@@ -95,18 +98,38 @@ def test_the_kernel_agrees_with_the_reference_box_by_box(tolerance: float) -> No
     assert 0.1 < theirs.is_regular.mean() < 0.9
 
 
+def test_a_matrix_may_have_many_columns() -> None:
+    x = ca.SX.sym("x", 1)
+    test = RankTest(RankMatrix(x * ca.SX.eye(100), 0), x, np.ones(1))
+    forms = Encloser(x, test.entries)(np.array([[0.5, -0.5]]), np.array([[1.5, 1.5]]))
+    assert test.examine(forms, 1, 0).is_regular.tolist() == [True, False]
+
+
+def test_the_errors_of_a_centre_are_a_vector_of_unit_length() -> None:
+    x = ca.SX.sym("x", 1)
+    test = RankTest(RankMatrix(x, 0), x, np.ones(1))
+    # The sums of two vectors' lengths are 0.99 and 1.01; those of their parts would be 1.3 and more.
+    parts = np.array([[0.5], [0.52]]) / math.sqrt(3)
+    a = np.hstack([np.repeat(parts, 3, axis=1), 0 * parts, 0.49 + 0 * parts, 0 * parts])[:, None]
+    found = test.examine(Forms(np.ones((2, 1)), a, np.zeros((2, 1))), 0, 6)
+    assert found.is_regular.tolist() == [True, False]
+
+
 #: One wrong rule each: the text of the kernel, and what stands in its place.
 FAULTS = {
     "no fault": ("", ""),
-    "pairs are dropped": ("a < n + n; a++", "a < n; a++"),
-    "terms of first order are dropped": ("for (int a = 0, t = 0;", "for (int a = n, t = n;"),
-    "the half of a square is its own middle": ("b == a - n ? 0.5 : 1.0", "b == a - n ? 0.0 : 1.0"),
-    "a square moves about 0": ("EACH middle[l] += 0.5 * term[l], size", "EACH size"),
+    "products are dropped": ("t < T; t++", "t < found->coordinates; t++"),
+    "terms of first order are dropped": ("for (int t = 0; t < T;", "for (int t = found->coordinates; t < T;"),
     "|C| times the rest is omitted": ("fabs(by[l]) * (rest[l] + ", "fabs(by[l]) * (0 * rest[l] + "),
-    "errors of joint centres change nothing": ("scale * found->change[", "0 * found->change["),
-    "the rest has a fifth of its width": ("double half = 0.5 * (v->q[l]", "double half = 0.1 * (v->q[l]"),
+    "the rest has a fifth of its width": ("rest[l] *= scale", "rest[l] *= 0.2 * scale"),
     "the spectral radius may be above 1": ("if (most < 1 - PRODUCTS)", "if (most < 3)"),
 }  # fmt: skip
+#: Wrong forms: by how much the term of a square moves the middle, and its factor. The last are those of machines alone.
+FORMS = {
+    "the half of a square is its own middle": (0.0, 0.0),
+    "a square moves about 0": (-1.0, 1.0),
+    "errors of joint centres change nothing": None,
+}
 
 
 class Copy:
@@ -116,7 +139,7 @@ class Copy:
         shutil.copytree(FOLDER, folder / "copy", ignore=shutil.ignore_patterns("*.so", "*.py", "__pycache__"))
         header = folder / "copy" / "kernel" / "rank.h"
         text = header.read_text(encoding="utf-8")
-        keep = "            for (int i = 0; i < n; i++)\n                found->shares"
+        keep = "            found->sign["
         for before, after in ((keep, f"            if (!l) keep_parts(m, parts);\n{keep}"), (old, new)):
             assert not before or text.count(before) == 1, before
             text = text.replace(before, after) if before else text
@@ -150,8 +173,6 @@ def is_found(copy: Copy, meant: Problem) -> bool:
     """Whether ``I - C M(y)`` is beyond the kernel's bound at a point, or a box counts with too large a bound."""
     rng, problem = np.random.default_rng(1), meant.problem
     examiner = Examiner(meant, RankTest(meant.locked, meant.z, meant.start))
-    assert examiner.second is not None
-    examiner.second.module = copy.module
     M = ca.Function("M", [meant.z], [ca.densify(meant.locked.matrix)])
     n, columns = len(problem.start), meant.locked.matrix.shape[1]
     values = M(meant.start).full()
@@ -187,9 +208,24 @@ def attacked() -> tuple[list[Problem], Problem]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_planted_fault_is_found(fault: str, tmp_path: Path) -> None:
-    copy = Copy(tmp_path, *FAULTS[fault])
+@pytest.mark.parametrize("fault", [*FAULTS, *FORMS])
+def test_a_planted_fault_is_found(fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    copy = Copy(tmp_path, *FAULTS.get(fault, ("", "")))
+    monkeypatch.setattr(rank_rule, "kernel", lambda: copy.module)
+    wrong, second = FORMS.get(fault), Encloser.second
+    if wrong is not None:
+
+        def moved(self: Encloser, lower: FloatArray, upper: FloatArray) -> Forms:
+            c, a, r = second(self, lower, upper)
+            n = len(lower)
+            squares = n + np.cumsum([0, *range(n, 1, -1)])
+            c = c + wrong[0] * a[:, :, squares].sum(axis=2)
+            a[:, :, squares] *= wrong[1]
+            return Forms(c, a, r)
+
+        monkeypatch.setattr(Encloser, "second", moved)
+    elif fault in FORMS:
+        monkeypatch.setattr(EntryChange, "over", lambda *_: np.zeros((1, 1)))
     problems, machines = attacked()
     found = any(is_found(copy, problem) for problem in problems) or is_found(copy, machines)
     assert found == (fault != "no fault")

@@ -13,7 +13,7 @@ from hexapods import bounds_of, smallest, values_of
 from numpy_engine import first_order
 from typer.testing import CliRunner
 
-from screwsynth.models import FloatArray, Substitution
+from screwsynth.models import Substitution
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
@@ -126,16 +126,16 @@ def test_boxes_are_not_divided_before_the_widths_of_joints_settle(
 
 
 def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
-    matrices = rank.RankTest.matrices
+    examine = rank.RankTest.examine
 
-    def without(self: rank.RankTest, forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray]:
-        M0, M, R = matrices(self, forms)
-        return M0, np.zeros_like(M), np.where(np.isfinite(R), 0.0, R)
+    def without(self: rank.RankTest, forms: Forms, f: int, errors: int) -> rank.Tested:
+        rest = np.where(np.isfinite(forms.r), 0.0, forms.r)
+        return examine(self, Forms(forms.c, np.zeros_like(forms.a), rest), f, errors)
 
     monkeypatch.setattr(loop_boxes, "MOST_VARIABLES", 0)  # forms of first order, as robots with loops have them
     problem = problem_of("6-ups", 0.5, 80)
     assert not wrong_boxes(problem, problem.locked, 1.0, 1)[1]
-    monkeypatch.setattr(rank.RankTest, "matrices", without)
+    monkeypatch.setattr(rank.RankTest, "examine", without)
     assert wrong_boxes(problem, problem.locked, 1.0, 1)[1]
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from casadi import SX
 from numpy_engine.bounding import NumpyEngine
+from numpy_engine.intervals import midpoints
 from numpy_engine.limb_models import NumpyLimbEngine
 from numpy_engine.second_order import enclose_second, monomials
 
@@ -15,7 +16,7 @@ from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.proof.boxes.engine import Engine, Verdict
 from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.polynomials import middles, places
-from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of, midpoints
+from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of
 from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 

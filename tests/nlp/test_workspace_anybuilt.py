@@ -364,8 +364,9 @@ def test_no_box_is_regular_for_all_machines_in_which_one_is_not(monkeypatch: pyt
     # Without the part of the errors boxes are said to be regular in which a machine is not.
     examine = rank.RankTest.examine
 
-    def without(self: rank.RankTest, forms: Forms, f: int) -> rank.Tested:
-        return examine(self, Forms(forms.c, forms.a[:, :, :f], np.zeros_like(forms.r)), f)
+    def without(self: rank.RankTest, forms: Forms, f: int, errors: int) -> rank.Tested:
+        known = forms.a.shape[2] - errors
+        return examine(self, Forms(forms.c, forms.a[:, :, :known], np.zeros_like(forms.r)), f, 0)
 
     monkeypatch.setattr(rank.RankTest, "examine", without)
     assert wrong_boxes("6-ups", 0.4)[1]

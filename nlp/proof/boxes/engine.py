@@ -136,6 +136,7 @@ class LimbModels:
         stops_up, stops_down: (m, B) whether a condition may stop a point from moving along a shared variable.
         high: (B,) upper bound of the function.
         value: (B,) lower bound of the function at the centre; -inf where a condition may be violated there.
+        centre: (n, B).
     """
 
     is_possible: NDArray[np.bool_]
@@ -150,6 +151,7 @@ class LimbModels:
     stops_down: NDArray[np.bool_]
     high: FloatArray
     value: FloatArray
+    centre: FloatArray
 
 
 class Engine:
@@ -261,6 +263,7 @@ class Engine:
             stops_down=sides[:, 3] > 0,
             high=found.bound,
             value=found.value,
+            centre=found.centre,
         )
 
 

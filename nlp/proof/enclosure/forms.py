@@ -14,7 +14,6 @@ overflows, is *poisoned*: its ``s`` and its ends are infinite, and so are those 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
 from typing import NamedTuple
 
 import casadi as ca
@@ -29,24 +28,6 @@ from .tape import Tape, compile_tape
 ULP = 2.0**-51
 #: More than underflow can cost an operation. Additions are exact there.
 TINY = 1e-300
-#: A value of this size or more is poisoned, so that no square and no product of two overflows, and no inverse of a
-#: square underflows.
-LARGEST = 1e150
-
-
-class Midpoints(NamedTuple):
-    """Centres and radii of boxes, (n, B) each; ``centre +- radius`` holds the box in spite of rounding."""
-
-    centre: FloatArray
-    radius: FloatArray
-
-
-def midpoints(lower: FloatArray, upper: FloatArray) -> Midpoints:
-    """Return the centres and radii of boxes with ends (n, B)."""
-    centre = np.clip(0.5 * lower + 0.5 * upper, lower, upper)
-    radius = np.maximum(upper - centre, centre - lower)
-    radius = np.where(radius > 0, radius * (1 + ULP) + TINY, 0.0)
-    return Midpoints(centre, np.where(np.maximum(-lower, upper) < LARGEST, radius, np.inf))
 
 
 @dataclass(eq=False)
@@ -70,23 +51,20 @@ class Enclosures:
     hi: FloatArray
 
 
-def enclose(
-    tape: Tape, lower: FloatArray, upper: FloatArray, module: ModuleType | None = None, order: int = 1
-) -> Enclosures:
+def enclose(tape: Tape, lower: FloatArray, upper: FloatArray, order: int = 1) -> Enclosures:
     """Return enclosures of a tape's results over boxes.
 
     Args:
         tape: the instructions.
         lower: (n, B) lower ends of the boxes.
         upper: (n, B) upper ends of the boxes.
-        module: the C kernel, where it is known already.
         order: of the forms; with 2, ``a`` has coefficients of pairs of variables too, and ``[p, q]`` what is left.
     """
     n, count = lower.shape
     c, p, q, s, lo, hi = (np.empty((tape.outputs, count)) for _ in range(6))
     a = np.empty((tape.outputs, n if order == 1 else n * (n + 3) // 2, count))
     ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-    (module or kernel()).enclose(n, tape.head, (*ends, c, p, q, s, lo, hi, a), count, order)
+    kernel().enclose(n, tape.head, (*ends, c, p, q, s, lo, hi, a), count, order)
     return Enclosures(c, a, p, q, s, lo, hi)
 
 
@@ -122,21 +100,25 @@ class Encloser:
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
-        InputError: the C kernel was not built.
     """
 
     def __init__(self, z: SX, expressions: SX) -> None:
-        self.module = kernel()
         self.tape: Tape = compile_tape(ca.Function("entries", [z], [ca.densify(expressions)]))
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms over boxes with ends (n, B)."""
-        return forms_of(enclose(self.tape, lower, upper, self.module))
+        return forms_of(enclose(self.tape, lower, upper))
 
     def second(self, lower: FloatArray, upper: FloatArray) -> Forms:
-        """Return the forms of second order over boxes with ends (n, B): ``e_i e_j``, i <= j, follow row by row."""
-        found = forms_of(enclose(self.tape, lower, upper, self.module, 2))
-        return halve_squares(found, len(lower))
+        """Return the forms of second order over boxes with ends (n, B): ``e_i e_j``, i <= j, follow row by row.
+
+        Each ``e_i^2`` is ``1/2 + 1/2 e`` with e in [-1, 1].
+        """
+        c, a, r = forms_of(enclose(self.tape, lower, upper, 2))
+        n = len(lower)
+        squares = n + np.cumsum([0, *range(n, 1, -1)])
+        a[:, :, squares] *= 0.5
+        return Forms(c + a[:, :, squares].sum(axis=2), a, r)
 
 
 def forms_of(found: Enclosures) -> Forms:
@@ -144,14 +126,6 @@ def forms_of(found: Enclosures) -> Forms:
     middle, half = 0.5 * (found.p + found.q), 0.5 * (found.q - found.p)
     rest = half + found.s + 4 * ULP * (half + np.abs(found.c) + np.abs(middle))
     return Forms((found.c + middle).T, found.a.transpose(2, 0, 1), rest.T)
-
-
-def halve_squares(forms: Forms, n: int) -> Forms:
-    """Return forms of second order in n coordinates with 1/2 + 1/2 e for each ``e_i^2``: e in [-1, 1]."""
-    squares = n + np.cumsum([0, *range(n, 1, -1)])
-    a = forms.a.copy()
-    a[:, :, squares] *= 0.5
-    return Forms(forms.c + a[:, :, squares].sum(axis=2), a, forms.r)
 
 
 class Ends(NamedTuple):

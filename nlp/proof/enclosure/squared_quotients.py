@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ..statement.limb_separation import terms_of
+from ..statement.limb_separation import factored_terms, terms_of
 
 if TYPE_CHECKING:
     from ..statement.standard_form import StandardForm
@@ -86,18 +86,7 @@ def tangent_rows(form: StandardForm) -> Rows | None:
 
 def as_quotient(term: SX, function: int) -> Quotient | None:
     """Return a term as a squared quotient; None for another one."""
-    factor = 1.0
-    while True:
-        if term.is_op(ca.OP_NEG):
-            term, factor = term.dep(0), -factor
-        elif term.is_op(ca.OP_TWICE):
-            term, factor = term.dep(0), 2 * factor
-        elif term.is_op(ca.OP_MUL) and term.dep(0).is_constant():
-            term, factor = term.dep(1), factor * float(term.dep(0))
-        elif term.is_op(ca.OP_MUL) and term.dep(1).is_constant():
-            term, factor = term.dep(0), factor * float(term.dep(1))
-        else:
-            break
+    term, factor = factored_terms(term)[0]
     if not (term.is_op(ca.OP_DIV) and term.dep(0).is_op(ca.OP_SQ)) or term.dep(1).is_constant() or factor == 0:
         return None
     N, D = term.dep(0).dep(0), term.dep(1)

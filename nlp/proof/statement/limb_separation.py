@@ -126,12 +126,17 @@ def _connected(own: frozenset[int], links: Sequence[frozenset[int]]) -> list[fro
 
 def terms_of(expression: SX) -> list[SX]:
     """Return the terms of a sum (1, 1), constant factors multiplied in."""
-    terms: list[SX] = []
+    return [each if factor == 1 else factor * each for each, factor in factored_terms(expression)]
+
+
+def factored_terms(expression: SX) -> list[tuple[SX, float]]:
+    """Return the terms of a sum (1, 1), each with its constant factor."""
+    terms: list[tuple[SX, float]] = []
     waiting = [(expression, 1.0)]
     while waiting:
         each, factor = waiting.pop()
         if len(terms) + len(waiting) > _MOST_TERMS:
-            return [expression]
+            return [(expression, 1.0)]
         if each.is_op(ca.OP_ADD):
             waiting += [(each.dep(1), factor), (each.dep(0), factor)]
         elif each.is_op(ca.OP_SUB):
@@ -145,5 +150,5 @@ def terms_of(expression: SX) -> list[SX]:
         elif each.is_op(ca.OP_MUL) and each.dep(1).is_constant():
             waiting.append((each.dep(0), factor * float(each.dep(1))))
         else:
-            terms.append(each if factor == 1 else factor * each)
+            terms.append((each, factor))
     return terms

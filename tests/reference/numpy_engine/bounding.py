@@ -23,13 +23,12 @@ from screwsynth.nlp.proof.boxes.engine import (
     value_tape,
     without_conditions,
 )
-from screwsynth.nlp.proof.enclosure.forms import Midpoints, midpoints
 from screwsynth.nlp.proof.enclosure.squared_quotients import search_rows, tangent_rows
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
 from .first_order import enclose
 from .first_pass import LINEAR, Cuts, FirstPass, first_pass
-from .intervals import ULP
+from .intervals import ULP, Midpoints, midpoints
 from .quadratic_models import GradientModel, QuadraticModel, gradient_model, multipliers
 from .squared_quotients import with_quotients
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from screwsynth.nlp.proof.enclosure.forms import Enclosures, midpoints
+from screwsynth.nlp.proof.enclosure.forms import Enclosures
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
-from .intervals import LARGEST, TINY, ULP, interval_product, widen
+from .intervals import LARGEST, TINY, ULP, interval_product, midpoints, widen
 from .univariate import RULES
 
 if TYPE_CHECKING:

@@ -42,3 +42,18 @@ def interval_product(lo: FloatArray, hi: FloatArray, other_lo: FloatArray, other
     least, most = widen(least, most, TINY)
     # Two factors that are not negative have no negative product, however far down it was rounded.
     return Interval(np.where((lo >= 0) & (other_lo >= 0), np.maximum(least, 0.0), least), most)
+
+
+class Midpoints(NamedTuple):
+    """Centres and radii of boxes, (n, B) each; ``centre +- radius`` holds the box in spite of rounding."""
+
+    centre: FloatArray
+    radius: FloatArray
+
+
+def midpoints(lower: FloatArray, upper: FloatArray) -> Midpoints:
+    """Return the centres and radii of boxes with ends (n, B)."""
+    centre = np.clip(0.5 * lower + 0.5 * upper, lower, upper)
+    radius = np.maximum(upper - centre, centre - lower)
+    radius = np.where(radius > 0, radius * (1 + ULP) + TINY, 0.0)
+    return Midpoints(centre, np.where(np.maximum(-lower, upper) < LARGEST, radius, np.inf))

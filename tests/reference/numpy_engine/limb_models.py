@@ -10,9 +10,9 @@ import numpy as np
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp.proof.boxes.engine import LimbModels, Verdict
-from screwsynth.nlp.proof.enclosure.forms import midpoints
 
 from .bounding import NumpyEngine
+from .intervals import midpoints
 
 
 class NumpyLimbEngine:
@@ -62,4 +62,5 @@ class NumpyLimbEngine:
             stops_down=(stops & (is_equation | ~(g_lo > 0))).any(axis=0),
             high=np.where(defined, high[:J].min(axis=0), np.inf),
             value=np.where(holds, (middle[:J] - error[:J]).min(axis=0), -np.inf),
+            centre=box.centre,
         )

@@ -20,10 +20,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from screwsynth.nlp.proof.enclosure.forms import midpoints
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
-from .intervals import LARGEST, TINY, ULP, Interval, interval_product, widen
+from .intervals import LARGEST, TINY, ULP, Interval, interval_product, midpoints, widen
 from .univariate import RULES, Rule
 
 if TYPE_CHECKING:

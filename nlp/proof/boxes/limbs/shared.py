@@ -18,7 +18,7 @@ import numpy as np
 
 from .....models.arrays import first_largest
 from ...checker.tree import Node, leaf_bytes, node_bytes
-from ...enclosure.forms import ULP, midpoints
+from ...enclosure.forms import TINY, ULP
 from ..engine import Engine, LimbModels, Threads
 from ..optimum import LEAST_WIDTHS
 from ..search import SMALL, WHOLE, Boxes, Order, Rule, Search, Verdicts, some
@@ -362,7 +362,8 @@ def cut_own(limb: LimbBound, sums: FloatArray, threshold: float) -> LeftOwn:
     level = np.fmax(np.where(np.isfinite(level), level, -np.inf), limb.reached)
     keep = (limb.bounds > -np.inf) & ~(limb.bounds < level[own.of])
     ends = L.ends_reaching(level[own.of])
-    centre, radius = midpoints(own.lower, own.upper)
+    centre = found.centre[m:]
+    radius = np.maximum(own.upper - centre, centre - own.lower) * (1 + ULP) + TINY
     margin = (np.abs(centre) + radius) * (4 * ULP)
     low = centre + radius * ends.low[m:] - margin
     high = centre + radius * ends.high[m:] + margin

@@ -1,32 +1,38 @@
-/* The rank of a matrix over boxes, from forms of second order of its entries; workspace/ranks/rank_rule.py. */
+/* The rank of a matrix over boxes, from forms of its entries; workspace/ranks/rank_rule.py. */
 #ifndef RANK_H
 #define RANK_H
 
-#include "runs.h"
+#include <Python.h>
+#include "values.h"
 
-/* Part of the sum of the sizes of all terms by which a computed sum of products may be off: fewer than 400 roundings. */
+/* Part of the sum of the sizes of all terms by which a computed sum of products may be off: fewer than 400 roundings, those
+ * of the middles among them. */
 #define PRODUCTS 1e-13
 #define RANK_POWERS 12
 #define NORM_POWERS 6
+#define MOST_COLUMNS 1024
 
 typedef struct {
     int rows, columns, nullity, entries;
-    const int *at;          /* (entries, 2) row and column of each result of the tape */
+    const int *at;          /* (entries, 2) row and column of each entry */
     const double *scale;    /* (entries) powers of two */
     const double *constant; /* (rows, columns) what is the same everywhere */
 } Matrix;
 
+/* Forms of the entries: middle + terms e + [-rest, rest]. The coordinates come first, the errors of joint centres last:
+ * three of each, which are a vector of at most unit length. */
 typedef struct {
-    const double *lower, *upper; /* (n, B) */
-    const double *change;        /* (entries, B) by how much entries may be off, or NULL */
-    int *regular, *sign;         /* (B), (B) of the determinant of a square matrix, else 0 */
-    double *shares, *smallest;   /* (n, B), (B) */
+    int terms, coordinates, errors;
+    const double *middle, *a, *rest; /* (entries, B), a: (entries, terms, B) */
+    int *regular, *sign;             /* (B), (B) of the determinant of a square matrix, else 0 */
+    double *shares, *smallest;       /* (coordinates, B), (B) */
     Py_ssize_t B;
 } Ranks;
 
 /* Parts of LANES boxes, and of one of them: A has the middle and, below it, a basis of its null space. */
 typedef struct {
-    Lane *C, *bound, *linear, *row, *middle, *rest, *size;
+    Lane *C, *bound, *linear, *row, *squares, *middle, *rest, *size, *terms;
+    int *is_term; /* (entries, terms) whether a term differs from 0 in one of the boxes */
     double *A, *inverse, *work, *B, *v, *w;
 } RankParts;
 
@@ -64,7 +70,7 @@ static double reflect(double *M, int rows, int columns, int k, double *diagonal)
  * space with the longest row first. */
 static void null_space(const double *A, int rows, int columns, int nullity, double *basis, double *M)
 {
-    double diagonal, factors[64];
+    double diagonal, factors[MOST_COLUMNS];
     int rank = columns - nullity;
     for (int i = 0; i < rows; i++)
         for (int j = 0; j < columns; j++)
@@ -176,50 +182,39 @@ static int is_contracting(const double *B, int c, double *v, double *w)
     return 0;
 }
 
-static RankParts lay_parts(const Matrix *m, int n, Room *room)
+static RankParts lay_parts(const Matrix *m, const Ranks *found, Room *room)
 {
-    size_t rows = (size_t)(m->rows + m->nullity), c = (size_t)m->columns, E = (size_t)m->entries;
+    size_t rows = (size_t)(m->rows + m->nullity), c = (size_t)m->columns, E = (size_t)m->entries, T = (size_t)found->terms;
     RankParts x;
     x.C = (Lane *)carve(room, rows * c * LANES), x.bound = (Lane *)carve(room, c * c * LANES);
-    x.linear = (Lane *)carve(room, (size_t)n * c * c * LANES), x.row = (Lane *)carve(room, c * LANES);
+    x.linear = (Lane *)carve(room, (size_t)found->coordinates * c * c * LANES);
+    x.row = (Lane *)carve(room, c * LANES), x.squares = (Lane *)carve(room, c * LANES);
     x.middle = (Lane *)carve(room, E * LANES), x.rest = (Lane *)carve(room, E * LANES);
-    x.size = (Lane *)carve(room, E * LANES);
+    x.size = (Lane *)carve(room, E * LANES), x.terms = (Lane *)carve(room, E * T * LANES);
+    x.is_term = (int *)carve(room, E * T);
     x.A = carve(room, rows * c), x.inverse = carve(room, rows * c), x.work = carve(room, rows * c + 2 * (rows + c));
     x.B = carve(room, c * c), x.v = carve(room, rows + c), x.w = carve(room, rows + c);
     return x;
 }
 
-/* Middles of the entries, the sizes of what moves about them, and what is left; the square of a coordinate is a half,
- * plus or minus as much. */
-static void middles_of(const Matrix *m, int n, Store out, const Ranks *found, Py_ssize_t start, RankParts x)
+/* Reads the scaled forms of boxes from number start on, and the sizes of what moves about their middles. */
+WIDE static void read_forms(const Matrix *m, const Ranks *found, Py_ssize_t start, RankParts x)
 {
-    for (int e = 0; e < m->entries; e++) {
-        const Value *v = value_of(out, e);
-        const Lane *terms = terms_of(v);
-        double scale = m->scale[e];
-        double *middle = x.middle[e], *size = x.size[e], *rest = x.rest[e];
-        EACH middle[l] = v->c[l] + 0.5 * (v->p[l] + v->q[l]), size[l] = 0;
-        EACH_OF(i, 0, v->terms.linear)
-        {
-            EACH size[l] += fabs(terms[i][l]);
-            EACH_OF(j, i, v->terms.pairs[i])
-            {
-                const double *term = terms[row_of(n, i) + j];
-                if (i == j)
-                    EACH middle[l] += 0.5 * term[l], size[l] += 0.5 * fabs(term[l]);
-                else
-                    EACH size[l] += fabs(term[l]);
-            }
+    Py_ssize_t B = found->B;
+    size_t bytes = (size_t)(B - start < LANES ? B - start : LANES) * sizeof(double);
+    for (int e = 0, at = 0; e < m->entries; e++) {
+        double scale = m->scale[e], *middle = x.middle[e], *rest = x.rest[e], *size = x.size[e];
+        memcpy(middle, found->middle + e * B + start, bytes), memcpy(rest, found->rest + e * B + start, bytes);
+        EACH middle[l] *= scale, rest[l] *= scale, size[l] = 0;
+        for (int t = 0; t < found->terms; t++, at++) {
+            double *term = x.terms[at];
+            int some = 0;
+            memcpy(term, found->a + at * B + start, bytes);
+            EACH some |= term[l] != 0;
+            EACH some |= term[l] != 0;
+            EACH term[l] *= scale, size[l] += fabs(term[l]);
+            x.is_term[at] = some;
         }
-        /* The middle is a sum of n + 2 terms, the half width of two. */
-        EACH
-        {
-            double half = 0.5 * (v->q[l] - v->p[l]);
-            double rounding = (n + 6) * ULP * (fabs(v->c[l]) + half + size[l] + fabs(middle[l]));
-            rest[l] = scale * (half + v->s[l] + rounding) * (1 + 4 * ULP), middle[l] *= scale, size[l] *= scale;
-        }
-        for (int l = 0; found->change && l < LANES && start + l < found->B; l++)
-            rest[l] = (rest[l] + scale * found->change[e * found->B + start + l]) * (1 + 4 * ULP);
     }
 }
 
@@ -231,7 +226,7 @@ static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
     memcpy(x.A, m->constant, (size_t)(m->rows * c) * sizeof(double));
     for (int e = 0; e < m->entries; e++) {
         x.A[m->at[2 * e] * c + m->at[2 * e + 1]] += x.middle[e][l];
-        known &= x.rest[e][l] < INFINITY;
+        known &= x.rest[e][l] < INFINITY && x.size[e][l] < INFINITY && fabs(x.middle[e][l]) < INFINITY;
     }
     *smallest = known ? 0 : INFINITY;
     if (known && m->nullity)
@@ -258,10 +253,10 @@ static int invert_lane(const Matrix *m, int l, RankParts x, double *smallest)
     return good;
 }
 
-/* Adds the parts of |I - C M| that move with the coordinates, and what is left. */
-WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
+/* Adds the parts of |I - C M| that move with the coordinates and the errors, and what is left. */
+WIDE static void add_moving(const Matrix *m, const Ranks *found, RankParts x)
 {
-    int rows = m->rows + m->nullity, c = m->columns;
+    int rows = m->rows + m->nullity, c = m->columns, T = found->terms, first = T - found->errors;
     for (int i = 0; i < c; i++) {
         Lane *bound = x.bound + i * c;
         const Lane *C = (const Lane *)(x.C + i * rows);
@@ -270,30 +265,33 @@ WIDE static void add_moving(const Matrix *m, int n, Store out, RankParts x)
             const double *by = C[m->at[2 * e]];
             EACH to[l] += fabs(by[l]) * (rest[l] + PRODUCTS * size[l]);
         }
-        for (int a = 0, t = 0; a < n + n; a++)
-            for (int b = a < n ? n - 1 : a - n; b < n; b++, t++) {
-                /* First the terms of first order, then the pairs, row by row; the scales of a column are one number. */
-                double part = a >= n && b == a - n ? 0.5 : 1.0;
-                memset(x.row, 0, (size_t)c * sizeof(Lane));
-                for (int e = 0; e < m->entries; e++) {
-                    const Value *v = value_of(out, e);
-                    if (!((a < n ? v->terms.linear >> a : v->terms.pairs[a - n] >> b) & 1))
-                        continue;
-                    const double *term = terms_of(v)[t], *by = C[m->at[2 * e]];
-                    double *to = x.row[m->at[2 * e + 1]], scale = part * m->scale[e];
-                    EACH to[l] += by[l] * (term[l] * scale);
-                }
-                for (int j = 0; j < c; j++)
-                    EACH bound[j][l] += fabs(x.row[j][l]);
-                if (a < n)
-                    for (int j = 0; j < c; j++)
-                        EACH x.linear[(t * c + i) * c + j][l] = fabs(x.row[j][l]);
+        for (int t = 0; t < T; t++) {
+            memset(x.row, 0, (size_t)c * sizeof(Lane));
+            for (int e = 0; e < m->entries; e++) {
+                if (!x.is_term[e * T + t])
+                    continue;
+                const double *term = x.terms[e * T + t], *by = C[m->at[2 * e]];
+                double *to = x.row[m->at[2 * e + 1]];
+                EACH to[l] += by[l] * term[l];
             }
+            for (int j = 0; j < c; j++) {
+                double *row = x.row[j], *squares = x.squares[j];
+                int part = t < first ? -1 : (t - first) % 3; /* of an error */
+                if (part < 0)
+                    EACH bound[j][l] += fabs(row[l]);
+                else
+                    EACH squares[l] = (part ? squares[l] : TINY) + row[l] * row[l];
+                if (part == 2)
+                    EACH bound[j][l] += sqrt(squares[l]);
+                if (t < found->coordinates)
+                    EACH x.linear[(t * c + i) * c + j][l] = fabs(row[l]);
+            }
+        }
     }
 }
 
-/* Whether the matrix surely has full rank in the box of lane l, and the shares of the coordinates in the bound. */
-static int judge_lane(const Matrix *m, int n, int l, RankParts x, double *shares)
+/* Whether the matrix surely has full rank in the box of lane l; if not, the shares of the coordinates in the bound. */
+static int judge_lane(const Matrix *m, const Ranks *found, int l, RankParts x, double *shares)
 {
     int c = m->columns;
     for (int k = 0; k < c * c; k++) {
@@ -302,33 +300,28 @@ static int judge_lane(const Matrix *m, int n, int l, RankParts x, double *shares
             return 0;
     }
     int good = is_contracting(x.B, c, x.v, x.w);
-    for (int t = 0; t < n && !good; t++) {
+    for (int t = 0; t < found->coordinates && !good; t++, shares += found->B) {
         double sum = 0;
         for (int i = 0; i < c; i++)
             for (int j = 0; j < c; j++)
                 sum += x.linear[(t * c + i) * c + j][l] * x.v[j] / x.v[i];
-        shares[t] = isfinite(sum) ? sum : 0;
+        *shares = isfinite(sum) ? sum : 0;
     }
     return good;
 }
 
-/* Judges boxes; without memory, what they need of it is counted only. */
-static void rank_all(const Tape *tape, const Matrix *m, int n, Ranks *found, Room *room)
+/* Judges boxes, whose shares are 0 at first; without memory, what they need of it is counted only. */
+static void rank_all(const Matrix *m, Ranks *found, Room *room)
 {
-    Run run = prepare(tape, n, 2, room);
-    RankParts parts = lay_parts(m, n, room);
+    RankParts parts = lay_parts(m, found, room);
     for (Py_ssize_t start = 0; room->at && start < found->B; start += LANES) {
-        run_block(&run, found->lower, found->upper, found->B, NULL, start, found->B);
-        middles_of(m, n, run.out, found, start, parts);
+        read_forms(m, found, start, parts);
         int ready[LANES] = {0};
         EACH if (start + l < found->B) ready[l] = invert_lane(m, l, parts, found->smallest + start + l);
-        add_moving(m, n, run.out, parts);
+        add_moving(m, found, parts);
         for (int l = 0; l < LANES && start + l < found->B; l++) {
-            double shares[64] = {0};
-            found->regular[start + l] = ready[l] && judge_lane(m, n, l, parts, shares);
+            found->regular[start + l] = ready[l] && judge_lane(m, found, l, parts, found->shares + start + l);
             found->sign[start + l] = m->rows == m->columns && !m->nullity ? ready[l] : 0;
-            for (int i = 0; i < n; i++)
-                found->shares[i * found->B + start + l] = shares[i];
         }
     }
 }

@@ -15,23 +15,18 @@ form with parameters is in A. Neumaier, *Interval Methods for Systems of Equatio
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 #: Part of the sum of the sizes of all terms by which a computed product may be off: products here have fewer than 400
 #: terms, each with a rounding of 2^-53.
 ROUNDING = 1e-13
 #: More than underflow can take from a sum of squares.
 _TINY = 1e-300
-#: Steps of the power method for a vector that proves a contraction.
-_POWERS = 12
 
 
 class Coordinates(NamedTuple):
@@ -108,30 +103,6 @@ def with_relation(forms: Forms, relation: Relation, of: Coordinates) -> Forms:
         rest = forms.r + (size @ relation.rho[:, :, None])[:, :, 0]
         terms = np.abs(forms.c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
         return Forms(middle, slopes, rest * (1 + ROUNDING) + ROUNDING * terms)
-
-
-def are_contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Return which nonnegative matrices (B, c, c) surely have a spectral radius below 1, and positive vectors (B, c).
-
-    ``B v < v`` for a positive v proves it (Collatz and Wielandt).
-    """
-    v = np.ones(B.shape[:2])
-    proved = np.zeros(len(B), dtype=bool)
-    active = np.asarray(np.isfinite(B).all(axis=(1, 2)))
-    for _ in range(_POWERS):
-        rows = np.flatnonzero(active)
-        if not rows.size:
-            break
-        w = (B[rows] @ v[rows, :, None])[:, :, 0]
-        ratio = w / v[rows]
-        done = ratio.max(axis=1) < 1 - ROUNDING
-        proved[rows[done]] = True
-        active[rows[done | (ratio.min(axis=1) >= 1)]] = False
-        going = active[rows]
-        # A little of the vector before keeps every component positive.
-        scale = np.maximum(w[going].max(axis=1, keepdims=True), 1e-300)
-        v[rows[going]] = w[going] / scale + 1e-9 * v[rows[going]]
-    return proved, v
 
 
 def inverses(matrices: FloatArray) -> FloatArray:

@@ -21,11 +21,11 @@ from .....models.arrays import first_largest
 from ...boxes.engine import MOST_VARIABLES
 from ...boxes.search import Boxes, Rule, bisected, joined, some
 from ...enclosure.forms import Encloser, Forms
+from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from .krawczyk import (
     Coordinates,
     Relation,
-    are_contractions,
     by_centres,
     inverses,
     no_relation,
@@ -110,8 +110,15 @@ class Test(Protocol):
     def unknown(self, count: int, f: int) -> Tested:
         """Return the results for boxes of which nothing is known."""
 
-    def examine(self, forms: Forms, f: int) -> Tested:
-        """Return the results for boxes from forms of the entries in f independent coordinates, then errors."""
+    def examine(self, forms: Forms, f: int, errors: int) -> Tested:
+        """Return the results for boxes.
+
+        Args:
+            forms: of the entries.
+            f: number of the first terms, which are the independent coordinates.
+            errors: number of the last terms, which are errors of joint centres; those between are products of two
+                coordinates.
+        """
 
 
 class Examiner:
@@ -134,13 +141,11 @@ class Examiner:
         self.problem, self.loops, self._test = problem, problem.loops, test
         self.of = Coordinates(list(problem.independent), list(problem.dependent), problem.of_errors)
         self.second: Encloser | None = None
-        self._rank: RankTest | None = None
         self._change: EntryChange | None = None
         is_short = not problem.dependent and len(problem.independent) <= MOST_VARIABLES
         # With errors, forms of second order are those of the polynomials of a matrix alone.
         is_rank = isinstance(test, RankTest)
         if is_short and (not problem.names or (is_rank and is_polynomial(test.entries, problem.z))):
-            self._rank = test if isinstance(test, RankTest) else None
             self._change = EntryChange(problem, test.entries) if problem.names else None
             exact = test.entries if self._change is None else self._change.exact
             self.second = Encloser(problem.problem.z, exact)
@@ -148,13 +153,20 @@ class Examiner:
             _ = self._encloser  # refuses an operation without a rule at once
 
     @cached_property
+    def _single(self) -> RankTest:
+        """The test of the loop equations' derivatives: where it is passed, no pose has two closed points in a box."""
+        problem, D = self.problem, self.of.dependent
+        # Powers of two, so that scaling rounds nothing.
+        sizes = ca.diag(ca.DM(2.0 ** np.round(np.log2(problem.size[D]))))
+        slopes = ca.jacobian(problem.equations, problem.z)[:, D] @ sizes
+        return RankTest(RankMatrix(slopes, 0), problem.z, problem.start)
+
+    @cached_property
     def _encloser(self) -> Encloser:
-        """Forms of first order of the equations, their derivatives by dependent coordinates, and the entries."""
-        problem = self.problem
-        slopes = [ca.jacobian(problem.equations, problem.z)[:, k] for k in self.of.dependent]
-        own = ca.densify(ca.vertcat(SX(0, 1), *slopes))
+        """Forms of first order of the equations, of their derivatives by dependent coordinates, and of the entries."""
         # A last entry that is not used, for a matrix that is constant.
-        return Encloser(problem.z, ca.vertcat(problem.equations, own, self._test.entries, problem.z[0]))
+        entries = self.problem.equations, self._single.entries, self._test.entries, self.problem.z[0]
+        return Encloser(self.problem.z, ca.vertcat(*entries))
 
     def examine(self, boxes: LoopBoxes) -> Examined:
         """Examine boxes."""
@@ -162,10 +174,11 @@ class Examiner:
         relation = no_relation(B, self.of)
         if self.second is not None and B:
             ends = boxes.lower.T[:f], boxes.upper.T[:f]
-            if self._rank is None:
-                return Examined(boxes, relation, *self._test.examine(self.second.second(*ends), f))
-            change = None if self._change is None else self._change.over(*ends)
-            return Examined(boxes, relation, *self._rank.examine_second(self.second, *ends, change))
+            forms = self.second.second(*ends)
+            if self._change is not None:
+                forms = forms._replace(r=forms.r + self._change.over(*ends).T)
+            return Examined(boxes, relation, *self._test.examine(forms, f, 0))
+        slopes = slice(k, k + self._single.entries.numel())
         lower, upper, near, known = some(boxes, np.arange(B))
         tested = self._test.unknown(B, f)
         columns: tuple[NDArray[Any], ...] = (*relation, *tested)
@@ -180,14 +193,14 @@ class Examiner:
             forms = self._encloser(lower[rows].T, upper[rows].T)
             own = relation_of(forms.part(slice(0, k)), self.of)
             if attempt:
-                good = self._is_single(forms, own, lower[rows], upper[rows])
+                good = (own.reach < 1).all(axis=1) & self._single.examine(forms.part(slopes), 0, 0).is_regular
                 known[rows[good]] = True
                 self._widen(rows[~good], own.reach[~good], lower, upper)
                 rows, forms, own = rows[good], some(forms, good), some(own, good)
             if not rows.size:
                 continue
-            entries = with_relation(forms.part(slice(k + k * k, -1)), own, self.of)
-            found = self._test.examine(entries, f)
+            entries = with_relation(forms.part(slice(slopes.stop, -1)), own, self.of)
+            found = self._test.examine(entries, f, len(self.of.errors))
             for whole, part in zip(columns, (*own, *found), strict=True):
                 whole[rows] = part
         for j in self.of.dependent:
@@ -231,21 +244,6 @@ class Examiner:
         low, high = lower[rows][:, D], upper[rows][:, D]
         half = 0.5 * (high - low) / self.problem.size[D]
         self._set_widths(rows, 0.5 * (low + high), half * np.maximum(_AGAIN * reach, 0.5), lower, upper)
-
-    def _is_single(self, forms: Forms, relation: Relation, lower: FloatArray, upper: FloatArray) -> NDArray[np.bool_]:
-        """Return whether each pose of a box surely has one closed point between the ends, and only one."""
-        k = len(self.of.dependent)
-        stays = (relation.reach < 1).all(axis=1)
-        c, a, r = forms.part(slice(k, k + k * k))
-        half = 0.5 * (upper - lower)[:, self.of.dependent]
-        # Columns of the derivatives by dependent coordinates, one after the other.
-        G = c.reshape(-1, k, k).transpose(0, 2, 1) * half[:, None, :]
-        spread = (np.abs(a).sum(axis=2) + r).reshape(-1, k, k).transpose(0, 2, 1) * half[:, None, :]
-        Y = inverses(G)
-        with np.errstate(all="ignore"):
-            B = np.abs(Y @ G - np.eye(k)) + np.abs(Y) @ (spread * (1 + 1e-12) + 1e-12 * np.abs(G))
-        is_regular, _ = are_contractions(np.where(np.isfinite(B), B, np.inf))
-        return np.asarray(stays & is_regular)
 
     def tied(self, one: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
         """Return whether neighbours have the same closed point somewhere on their common face.

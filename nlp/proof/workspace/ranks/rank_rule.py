@@ -1,7 +1,8 @@
 """The test of a sparse matrix over boxes: whether it has full column rank at every closed point.
 
 With forms of the entries, in which the dependent coordinates are replaced by their relation to the independent ones,
-``M = M0 + sum_v M_v e_v + [-R, R]``. For any matrix C, here a pseudo-inverse of M0,
+``M = M0 + sum_v M_v e_v + [-R, R]``; in forms of second order products of two coordinates are further terms. For any
+matrix C, here a left inverse of M0,
 
     |I - C M| <= |I - C M0| + sum_v |C M_v| + |C| R  entry by entry;
 
@@ -26,10 +27,10 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray
+from ...enclosure.engine import kernel
 from ...enclosure.forms import Encloser, Forms
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
-from .krawczyk import ROUNDING, are_contractions, by_centres
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -74,99 +75,40 @@ class RankTest:
     """
 
     def __init__(self, matrix: RankMatrix, z: SX, start: FloatArray) -> None:
-        self.nullity, whole = matrix.nullity, matrix.matrix
+        whole = matrix.matrix
         values = ca.Function("start", [z], [ca.densify(whole)])(start).full()
-        self.sign = int(self._signs(values[None])[0])
+        is_square = whole.shape[0] == whole.shape[1] and not matrix.nullity
+        self.sign = int(np.linalg.slogdet(values)[0]) if is_square else 0
         sizes = np.linalg.norm(values, axis=1)
         # A power of two, so that scaling rounds nothing.
         scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
-        self._constant = np.zeros(whole.shape)
+        constant = np.zeros(whole.shape)
         places, entries = [], []
         for k, place in enumerate(zip(*whole.sparsity().get_triplet(), strict=True)):
             entry = whole.nz[k]
             if entry.is_constant():
-                self._constant[place] = float(entry)
+                constant[place] = float(entry)
             else:
                 places.append(place)
                 entries.append(entry)
         self.entries: SX = ca.vertcat(SX(0, 1), *entries)
-        self._constant *= scale[:, None]
         at = np.array(places, dtype=np.int32).reshape(-1, 2)
-        self._at, self._scale = tuple(at.T), np.ascontiguousarray(scale[at[:, 0]])
-        self._head = (*whole.shape, matrix.nullity, (at, self._scale, self._constant))
-
-    def examine_second(
-        self, encloser: Encloser, lower: FloatArray, upper: FloatArray, change: FloatArray | None = None
-    ) -> Tested:
-        """Return the verdict on boxes from forms of second order of the entries.
-
-        Args:
-            encloser: of the entries.
-            lower: (n, B) lower ends of the coordinates.
-            upper: (n, B) upper ends.
-            change: (E, B) by how much the entries may be off in other machines; None for the design alone.
-        """
-        n, count = lower.shape
-        regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
-        shares, smallest = np.empty((n, count)), np.empty(count)
-        ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-        found = (*ends, regular, shares, smallest, signs, change)
-        encloser.module.rank(n, encloser.tape.head, self._head, found, count)
-        return Tested(regular.astype(bool), shares.T, smallest, signs)
+        parts = at, np.ascontiguousarray(scale[at[:, 0]]), constant * scale[:, None]
+        self._head = (*whole.shape, matrix.nullity, len(places), parts)
 
     def unknown(self, count: int, f: int) -> Tested:
         """Return the results for boxes of which nothing is known."""
         nothing = np.zeros(count, dtype=np.int32)
         return Tested(nothing.astype(bool), np.zeros((count, f)), np.full(count, np.inf), nothing)
 
-    def examine(self, forms: Forms, f: int) -> Tested:
-        """Return the verdict on boxes from forms of first order of the entries, whose first f terms are no errors."""
-        M0, M, R = self.matrices(forms)
-        columns = M0.shape[2]
-        _, values, right = np.linalg.svd(M0, full_matrices=True)
-        rank = columns - self.nullity
-        signs = self._signs(M0)
-        if self.nullity:
-            extra = right[:, rank:]
-            M0 = np.concatenate([M0, extra], axis=1)
-            M = np.concatenate([M, np.zeros((*M.shape[:2], *extra.shape[1:]))], axis=2)
-            R = np.concatenate([R, np.zeros_like(extra)], axis=1)
-        with np.errstate(all="ignore"):
-            smallest = (
-                np.nan_to_num(values[:, rank - 1] / values[:, 0]) if values.shape[1] >= rank else np.zeros(len(M0))
-            )
-            C = np.linalg.pinv(M0, rcond=1e-14)
-            size = np.abs(C)
-            products = C[:, None] @ M
-            linear = np.abs(products[:, :f])
-            B = np.abs(C @ M0 - np.eye(columns)) + linear.sum(axis=1) + size @ R
-            B += by_centres(products[:, f:].transpose(0, 2, 3, 1))
-            # Products of fewer than 400 terms, and a sum.
-            B += ROUNDING * (size @ (np.abs(M0) + np.abs(M).sum(axis=1)))
-            is_regular, v = are_contractions(np.where(np.isfinite(B), B, np.inf) * (1 + ROUNDING))
-            shares = (linear * v[:, None, None, :] / v[:, None, :, None]).sum(axis=(2, 3))
-        return Tested(is_regular, np.nan_to_num(shares), smallest, signs)
-
-    def matrices(self, forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return middles (B, m, c), linear parts (B, t, m, c), and rests from forms of the entries with t terms.
-
-        Where one is not finite, the rest is infinite, and the others are 0.
-        """
-        (middle, slope, rest), (rows, columns) = forms, self._at
-        M0 = np.broadcast_to(self._constant, (len(middle), *self._constant.shape)).copy()
-        R, M = np.zeros_like(M0), np.zeros((len(middle), slope.shape[2], *self._constant.shape))
-        M0[:, rows, columns] += middle * self._scale
-        R[:, rows, columns] = rest * self._scale
-        M[:, :, rows, columns] = (slope * self._scale[:, None]).transpose(0, 2, 1)
-        known = np.asarray(np.isfinite(M0).all(axis=(1, 2)) & np.isfinite(R).all(axis=(1, 2)))
-        known &= np.isfinite(M).all(axis=(1, 2, 3))
-        M0[~known], M[~known], R[~known] = 0.0, 0.0, np.inf
-        return M0, M, R
-
-    def _signs(self, matrices: FloatArray) -> NDArray[np.int32]:
-        """Return the signs (B,) of the determinants of square matrices (B, m, c); 0 for others."""
-        is_square = matrices.shape[1] == matrices.shape[2] and not self.nullity
-        return (np.linalg.slogdet(matrices)[0] if is_square else np.zeros(len(matrices))).astype(np.int32)
+    def examine(self, forms: Forms, f: int, errors: int) -> Tested:
+        """Return the verdict on boxes from forms of the entries, as of :class:`~.loop_boxes.Test`."""
+        count, terms = len(forms.c), forms.a.shape[2]
+        regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
+        shares, smallest = np.zeros((f, count)), np.empty(count)
+        given = [np.ascontiguousarray(each) for each in (forms.c.T, forms.a.transpose(1, 2, 0), forms.r.T)]
+        kernel().rank(self._head, (terms, f, errors), (*given, regular, shares, smallest, signs), count)
+        return Tested(regular.astype(bool), shares.T, smallest, signs)
 
 
 def is_polynomial(entries: SX, coordinates: SX) -> bool:
@@ -219,7 +161,7 @@ class EntryChange:
         np.add.at(squares, self._of_sum, sizes * sizes)
         found = np.repeat(self._bend[:, None], lower.shape[1], axis=1)
         np.add.at(found, self._sums, self._tolerance * np.sqrt(squares))
-        return np.ascontiguousarray(found * _OUTWARDS)
+        return np.asarray(found * _OUTWARDS)
 
 
 def _slopes(expressions: SX, errors: SX) -> tuple[SX, NDArray[np.int64], NDArray[np.int64]]:

@@ -7,8 +7,8 @@ divided by a length, has a singular value of at most 1e-10 of the largest.
 
 The workspace is convex in its coordinates: where the determinant of six rows is positive at one pose, negative at
 another, and the rows have values along the segment between the two, a pose of it is singular. With C near the inverse
-of the rows at a pose, the sign of their determinant is that of det C where ``|I - C M|`` has a spectral radius below 1.
-det C is computed in whole numbers.
+of the rows at a pose, the sign of their determinant is that of det C where no row of ``|I - C M|`` has a sum of 1 or
+more. det C is computed in whole numbers.
 
 Of all machines within a tolerance on joint centres, one may be singular although the design is not. The smallest
 singular value is made smaller by errors of the centres, each along its derivative: the method of Frank and Wolfe [1],
@@ -33,9 +33,8 @@ from ...enclosure.forms import Encloser
 from ...statement.machine import JointErrors
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem, steepest
-from .krawczyk import are_contractions, inverses
+from .krawczyk import ROUNDING, inverses
 from .loop_boxes import Examined
-from .rank_rule import RankTest
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -218,12 +217,8 @@ class DeterminantSigns:
         self._values = ca.Function("rows", [problem.z], [ca.densify(matrix.matrix)])
 
     @cached_property
-    def _test(self) -> RankTest:
-        return RankTest(self._matrix, self._problem.z, self._problem.start)
-
-    @cached_property
     def _encloser(self) -> Encloser:
-        return Encloser(self._problem.z, self._test.entries)
+        return Encloser(self._problem.z, ca.vec(self._matrix.matrix.T))
 
     def computed(self, points: FloatArray) -> FloatArray:
         """Return the determinants (K,) of unit rows at points (K, n): computed numbers, 0 where rows have no value."""
@@ -234,12 +229,12 @@ class DeterminantSigns:
 
     def proved(self, z: FloatArray) -> int:
         """Return the sign at a point (n,); 0 where it is not proved."""
-        M, _, R = self._test.matrices(self._encloser(z[:, None], z[:, None]))
+        forms = self._encloser(z[:, None], z[:, None])
+        M, R = (each.reshape(1, 6, 6) for each in (forms.c, forms.r))
         C = inverses(M)
         with np.errstate(all="ignore"):
             bound = np.abs(C @ M - np.eye(6)) + np.abs(C) @ (R + _PRODUCT * np.abs(M))
-        is_known, _ = are_contractions(np.where(np.isfinite(bound), bound, np.inf))
-        return _sign_of_determinant(C[0]) if is_known[0] else 0
+        return _sign_of_determinant(C[0]) if bound.sum(axis=2).max() < 1 - ROUNDING else 0
 
     def change(self, one: FloatArray, other: FloatArray) -> FloatArray | None:
         """Return a point (n,) next to where the sign changes between two points; it has the sign of the other one.
