@@ -67,8 +67,8 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
         paper: records the searches for a proof.
     """
     legs, shortest = subject.legs, subject.shortest
-    eps = leg_error + 2 * (0.0 if legs is None else legs.tolerance)
-    if legs is None or not eps > 0:
+    eps = leg_error + 2 * legs.tolerance
+    if not eps > 0:
         return
     problem = subject.problem
     searches: list[tuple[WorstError, Minimum]] = []

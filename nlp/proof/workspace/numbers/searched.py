@@ -22,7 +22,6 @@ from ....errors import UncoveredError
 from ...statement.claims import Claim, asked_name, asked_spectra
 from ...statement.machine import CentreErrors, JointErrors, Legs, has_straight_legs
 from ..robot.pose_box import PoseBox
-from ..robot.posed_model import posed_model
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
@@ -51,7 +50,7 @@ class Subject:
         case: with fixed dimensions.
         model: its robot, without unknowns that follow in closed form.
         box: the poses.
-        legs: joint centres of straight legs, with the tolerance; None for a robot without any.
+        legs: joint centres of straight legs, with the tolerance.
         family: the machines within the tolerance; None for the design alone.
         unknown: reason why the machines that are meant are not judged; else empty.
         shortest: no leg of any machine is shorter over the workspace.
@@ -61,7 +60,7 @@ class Subject:
     case: Case
     model: Model
     box: PoseBox
-    legs: Legs | None
+    legs: Legs
     family: Problem | None = None
     unknown: str = ""
     shortest: float = 0.0
@@ -100,8 +99,7 @@ class Subject:
 
     def clearance(self, places: tuple[int, int]) -> Clearance:
         """Return the distance of two legs."""
-        posed = posed_model(self.case, self.model, self.box, z=self.problem.z)
-        return Clearance(self.problem, posed, self.model, places, legs=self.legs)
+        return Clearance(self.problem, self.legs, places)
 
 
 def searched_extremes(

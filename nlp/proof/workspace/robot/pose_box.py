@@ -73,6 +73,12 @@ class PoseBox:
         """Indices of the coordinates that vary."""
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
 
+    def symbols(self, z: SX) -> SX:
+        """Return the six coordinates (6, 1), of which those that vary are the first symbols of z (n, 1)."""
+        y = SX((0.5 * self.lower + 0.5 * self.upper).tolist())
+        y[list(self.free)] = z[: len(self.free)]
+        return y
+
     @cached_property
     def _inner(self) -> tuple[FloatArray, FloatArray, float]:
         """Ends, and the largest squared size of a Cayley vector, of poses that are surely those of the workspace.

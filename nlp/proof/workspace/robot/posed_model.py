@@ -187,8 +187,6 @@ class PosedModel:
         turned: the limbs with ``inverse * s R`` as the rotation.
         inverse: symbol that stands for ``1 / s``.
         scale: ``s``, a polynomial.
-        symbols: of the model: parameters, unknowns, rotation, position.
-        given: what is put in their place, plain and turned.
     """
 
     loops: Loops
@@ -198,8 +196,6 @@ class PosedModel:
     turned: Limbs
     inverse: SX
     scale: SX
-    symbols: list[SX]
-    given: tuple[list[SX], list[SX]]
 
     @property
     def z(self) -> SX:
@@ -237,14 +233,6 @@ class PosedModel:
         ones = SX.ones(of_members.shape[0])
         return ScaledRows(ca.vertcat(rows[:, :6], of_members), ca.vertcat(SX(0, 1), *sizes, ones))
 
-    def scaled_points(self, points: SX) -> tuple[SX, SX]:
-        """Return points (3 k, 1) in the symbols of the model as expressions of the coordinates, and these times s."""
-        function = ca.Function("points", self.symbols, [points])
-        plain, turned = (ca.horzcat(function.call(each)[0], SX.ones(points.shape[0])) for each in self.given)
-        rows = self.polynomial(plain, turned)
-        scaled = [rows[i, 0] * (self.scale if rows[i, 1].is_one() else 1) for i in range(rows.shape[0])]
-        return plain[:, 0], ca.vertcat(SX(0, 1), *scaled)
-
     def polynomial(self, plain: SX, turned: SX) -> SX:
         """Return a matrix whose rows that are linear in the rotation are multiplied by its scale, without a division.
 
@@ -274,8 +262,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
     free, errors = box.free, SX(0, 1) if errors is None else errors
     if z is None:
         z = ca.vertcat(SX(0, 1), *[SX.sym(f"y{k}") for k in free], *[SX.sym(item.name) for item in model.unknowns])
-    y = SX((0.5 * box.lower + 0.5 * box.upper).tolist())
-    y[list(free)] = z[: len(free)]
+    y = box.symbols(z)
     position, turn = y[:3], y[3:]
     values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
     numbers = ca.vertcat(SX(0, 1), *values, errors)
@@ -289,8 +276,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
-    symbols = Substitution.identity(model).all
-    function = ca.Function("model", symbols, outputs)
+    function = ca.Function("model", Substitution.identity(model).all, outputs)
 
     def limbs_of(following: Iterator[SX]) -> Limbs:
         """Return the limbs from the first outputs."""
@@ -321,6 +307,4 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
         turned=limbs_of(iter(function.call(turned.all))),
         inverse=inverse,
         scale=scale,
-        symbols=symbols,
-        given=(given.all, turned.all),
     )
