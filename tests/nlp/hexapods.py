@@ -5,10 +5,12 @@ import numpy as np
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Task
 from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Minimum, Number, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem, family_of
 
 #: A robot of any six straight legs.
 HEXAPOD = hexapod()
@@ -51,7 +53,11 @@ def case_of_legs(robot: Legs) -> Case:
 
 def subject_of(robot: Legs, box: PoseBox, shortest: float = 0.0) -> Subject:
     """Six legs over a box."""
-    return Subject(case_of_legs(robot), HEXAPOD, box, robot, shortest=shortest)
+    case, family = case_of_legs(robot), None
+    if robot.tolerance:
+        design = build_problem(case, HEXAPOD, box)
+        family = family_of(case, built_model(HEXAPOD), design, robot.tolerance)
+    return Subject(case, HEXAPOD, box, robot, family, shortest=shortest)
 
 
 def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> Clearance:

@@ -24,17 +24,19 @@ size of its position, or of its rotation, is met where every ``d_i`` is 1 or -1.
 from __future__ import annotations
 
 import itertools
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
-from ...statement.machine import LEGS, JointErrors, Legs
+from ...statement.machine import LEGS, JointErrors
 from ..ranks.krawczyk import by_centres, inverses
 from ..robot.posed_robot import Problem
-from ..tolerance.leg_errors import change_of_rows, worst_rows
+from ..tolerance.leg_errors import of_legs
 from .bound_search import Bounds, Number
 
 #: Part of its size by which a computed number may be off: rounding of products and of LAPACK.
@@ -80,16 +82,17 @@ class _RowsNumber(Number):
     Args:
         problem: the design, or all machines that are meant.
         length: by which moments about the platform's origin are divided.
+        machines: those of which values are; of the problem if left out.
     """
 
-    def __init__(self, problem: Problem, length: float) -> None:
-        scaled = problem.scaled
+    def __init__(self, problem: Problem, length: float, machines: Problem | None = None) -> None:
+        scaled, of = problem.scaled, machines or problem
         super().__init__(problem, ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes))
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
-        self._jacobian = ca.Function("J", [problem.z], [ca.densify(scaled.jacobian)])
+        self._jacobian = ca.Function("J", [of.z], [ca.densify(of.scaled.jacobian)])
 
     def jacobian(self, z: FloatArray) -> FloatArray:
-        """Return J (P, m, 6) at points (P, n)."""
+        """Return J (P, m, 6) at points (P, n) of the machines."""
         flat = self._jacobian(z.T).full()
         return np.asarray(flat.reshape(len(flat), len(z), 6).transpose(1, 0, 2) * self._scale)
 
@@ -111,15 +114,15 @@ class _RowsNumber(Number):
 class SingularValues(_RowsNumber):
     """Smallest singular value of J, or minus its condition number.
 
-    With legs, bounds are those of all machines within their tolerance, and values those of the machine that is worst to
-    first order at each point.
+    With machines, values are those of the one that is worst to first order at each point: with u and v the vectors of a
+    singular value, it is ``u . J v``, whose derivatives by the errors are those of the entries of J alone.
 
     Args:
         problem: the design, or all machines that are meant, whose errors count entry by entry.
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
-        legs: joint centres of six straight legs with the tolerance that is meant; None for another robot.
-        shortest: no leg of any machine is shorter over the workspace; used with a tolerance of legs alone.
+        machines: all that are meant, where the problem is the design alone.
+        change: by which every singular value of theirs differs from the design's at most.
     """
 
     def __init__(
@@ -128,23 +131,33 @@ class SingularValues(_RowsNumber):
         length: float,
         *,
         is_condition: bool,
-        legs: Legs | None = None,
-        shortest: float = 0.0,
+        machines: Problem | None = None,
+        change: float = 0.0,
     ) -> None:
-        super().__init__(problem, length)
-        self._length, self._is_condition = length, is_condition
-        self._legs = legs if legs is not None and legs.tolerance else None
-        self._change = 0.0 if self._legs is None else change_of_rows(self._legs, length, shortest)
+        super().__init__(problem, length, machines)
+        self._is_condition, self._change, self._machines = is_condition, change, machines
+
+    @cached_property
+    def _slopes(self) -> ca.Function:
+        """The derivatives of u . J v by the errors of machines."""
+        of = self._machines or self.problem
+        J = of.scaled.jacobian * ca.repmat(SX(self._scale.tolist()).T, of.scaled.rows.shape[0], 1)
+        u, v = SX.sym("u", J.shape[0]), SX.sym("v", J.shape[1])
+        return ca.Function("slopes", [of.z, u, v], [ca.densify(ca.gradient(ca.dot(u, J @ v), of.errors))])
+
+    def _worst(self, machines: Problem, z: FloatArray) -> FloatArray:
+        """Return the machines that are worst to first order at points (P, n) of the design."""
+        z = machines.exact(z)
+        u, s, v = np.linalg.svd(np.nan_to_num(self.jacobian(z)))
+        slopes = np.zeros((len(z), len(machines.of_errors)))
+        # The logarithm of the condition number falls with that of the smallest one, and grows with that of the largest.
+        for k, weight in ((5, -1.0), (0, 1.0)) if self._is_condition else ((5, -1.0),):
+            slopes += weight / s[:, k, None] * self._slopes(z.T, u[:, :, k].T, v[:, k].T).full().T
+        return machines.with_errors(z, slopes)
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (P, 1) at points (P, n)."""
-        if self._legs is not None:
-            y = self.problem.pose_of(z)
-            J = worst_rows(self._legs, self.problem.box, y, self._length, self._is_condition)[0]
-            with np.errstate(all="ignore"):
-                J = J / np.linalg.norm(J[:, :, :3], axis=2, keepdims=True) / [1, 1, 1, *[self._length] * 3]
-        else:
-            J = self.jacobian(z)
+        J = self.jacobian(z if self._machines is None else self._worst(self._machines, z))
         known = np.asarray(np.isfinite(J).all(axis=(1, 2)))
         values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
         with np.errstate(all="ignore"):
@@ -153,10 +166,9 @@ class SingularValues(_RowsNumber):
 
     def worst(self, y: FloatArray) -> JointErrors | None:
         """Return the errors of the legs that are worst at a pose (6,) to first order; None for the design."""
-        if self._legs is None:
+        if self._machines is None:
             return None
-        _, base, platform = worst_rows(self._legs, self.problem.box, y[None], self._length, self._is_condition)
-        return JointErrors(base[0], platform[0])
+        return of_legs(self._machines.errors_of(self._worst(self._machines, y[None, list(self.problem.free)])[0]))
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""

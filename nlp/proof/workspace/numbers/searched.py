@@ -23,6 +23,7 @@ from ...statement.claims import Claim, asked_name, asked_spectra
 from ...statement.machine import CentreErrors, JointErrors, Legs, has_straight_legs
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import NotJudgedError, Problem, build_problem
+from ..tolerance.leg_errors import change_of_rows
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
 from .extremes import Extreme, extreme_of, goal_of
@@ -87,15 +88,12 @@ class Subject:
 
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
         """Return the smallest singular value of J, or minus its condition number."""
+        family, problem = self.family, self.problem
+        if not (self.legs.tolerance and has_straight_legs(self.case.model)):
+            return SingularValues(family or problem, length, is_condition=is_condition)
         # The change of J by errors of six straight legs has a bound of its own.
-        has_legs, problem = has_straight_legs(self.case.model), self.problem
-        return SingularValues(
-            problem if has_legs else self.family or problem,
-            length,
-            is_condition=is_condition,
-            legs=self.legs if has_legs else None,
-            shortest=self.shortest,
-        )
+        change = change_of_rows(self.legs, length, self.shortest)
+        return SingularValues(problem, length, is_condition=is_condition, machines=family, change=change)
 
     def clearance(self, places: tuple[int, int]) -> Clearance:
         """Return the distance of two legs."""

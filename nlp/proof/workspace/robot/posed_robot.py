@@ -127,6 +127,12 @@ class Problem:
         own = z[self.of_errors].reshape(-1, 3)
         return CentreErrors(self.names, frozen_array(own, own.shape))
 
+    def with_errors(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return points (P, n) with errors as large as the tolerance along derivatives (P, 3 m)."""
+        z = z.copy()
+        z[:, self.of_errors] = steepest(slopes.reshape(len(z), -1, 3), self.tolerance).reshape(len(z), -1)
+        return z
+
     def within(self, z: FloatArray) -> FloatArray:
         """Return points (..., n) with the pose moved into the workspace, and the errors into the tolerance."""
         z = z.copy()
