@@ -244,7 +244,11 @@ def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
             single[j, i], single[i, j] = 2 * turn[k], -2 * turn[k]
             turned, scale = single @ turned, one * scale
         return turned, scale
-    r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
+    return cayley_rotation(turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist()))
+
+
+def cayley_rotation(r: SX) -> tuple[SX, SX]:
+    """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a Cayley vector (3, 1)."""
     square = ca.sumsqr(r)
     return (1 - square) * SX.eye(3) + 2 * (r @ r.T) + 2 * ca.skew(r), 1 + square
 
