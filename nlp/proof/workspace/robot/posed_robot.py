@@ -25,7 +25,7 @@ from ...statement.machine import INSIDE, CentreErrors
 from ...statement.tolerance import BuiltModel
 from .closed_loops import Loops, closed_from_home
 from .pose_box import PoseBox
-from .posed_model import Chosen, Limbs, PosedModel, RankMatrix, ScaledRows, free_matrix, posed_model
+from .posed_model import Chosen, PosedModel, RankMatrix, ScaledRows, posed_model
 
 #: Points of the workspace at which the equations that are needed are found, beside its middle, and number of machines
 #: in which those that were left out are tested.
@@ -206,26 +206,26 @@ def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) 
         loops=Loops(ca.vertcat(design.z, errors), loops.equations, loops.every, loops.signs, size),
         start=np.concatenate([design.start, np.zeros(errors.numel())]),
         locked=posed.locked,
-        unactuated=None if free is None else RankMatrix(free_matrix(posed.limbs), free.nullity),
+        unactuated=None if free is None else RankMatrix(posed.unlocked, free.nullity),
         scaled=posed.scaled,
         names=built.names,
         tolerance=tolerance,
         design=design,
     )
     if built.names:
-        _check_freedoms(family, whole.limbs)
+        _check_freedoms(family, whole)
     return family
 
 
-def _check_freedoms(family: Problem, limbs: Limbs) -> None:
+def _check_freedoms(family: Problem, whole: PosedModel) -> None:
     """Refuse machines in which equations or screws that were left out do not follow from the others.
 
     Raises:
         NotJudgedError: they do not follow at random errors.
     """
     loops, own, errors = family.loops, list(family.independent), family.of_errors
-    members = [each for each in limbs.members if each.rank < each.screws.shape[1]]
-    columns = [scaled_twists(each.screws, each.centre, SX(family.length), each.size) for each in members]
+    members = [each for each in whole.limbs.members if each.rank < each.screws.shape[1]]
+    columns = [whole.plain(scaled_twists(each.screws, each.centre, SX(family.length), each.size)) for each in members]
     function = ca.Function("every", [family.z], [ca.densify(each) for each in (loops.every, *columns)])
     rng = np.random.default_rng(_SEED)
     for _ in range(_POINTS):
@@ -338,7 +338,7 @@ def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatri
     generic, limbs = model.generic, posed.limbs
     if (generic is not None and generic.constraints == 0) or (not limbs.actuators and model.members):
         return None
-    matrix = free_matrix(limbs)
+    matrix = posed.unlocked
     if not matrix.numel():
         return None
     freedoms, idle = matrix.shape[1] - _rank_of(posed.values(matrix, start)), 0
