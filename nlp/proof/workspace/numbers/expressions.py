@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
-from ..ranks.krawczyk import ROUNDING, by_centres, inverses
+from ..ranks.krawczyk import ROUNDING, by_centres
 from ..ranks.loop_boxes import LoopBoxes
+from ..robot.closed_loops import inverses
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 

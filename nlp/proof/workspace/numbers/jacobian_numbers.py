@@ -34,7 +34,8 @@ from casadi import SX
 from .....models import FloatArray
 from ...enclosure.forms import Forms
 from ...statement.machine import LEGS, JointErrors
-from ..ranks.krawczyk import by_centres, inverses
+from ..ranks.krawczyk import by_centres
+from ..robot.closed_loops import inverses
 from ..robot.posed_robot import Problem
 from ..tolerance.leg_errors import of_legs
 from .bound_search import Bounds, Number
@@ -239,7 +240,7 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
         known &= np.isfinite(E).all(axis=(1, 2))
         E = np.where(known[:, None, None], E, 0.0)
         # |(I + E)^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.
-        X = _solutions(eye - E, size) * (1 + _ROOM)
+        X = inverses(eye - E) @ size * (1 + _ROOM)
         known &= (X >= 0).all(axis=(1, 2)) & (size <= X - E @ X).all(axis=(1, 2))
         # Rows are divided by 1 + d with |d| <= spread of the sizes.
         change = C[:, None] * rows.bend[:, :, None] - slopes @ C[:, None]
@@ -250,14 +251,6 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
     rest = np.where(known[:, None, None] & np.isfinite(rest), rest, np.inf)
     shares = (slopes[:, :f] ** 2).sum(axis=(2, 3))[:, None]
     return C, change[:, :f], rest, shares
-
-
-def _solutions(matrices: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the solutions of systems (B, 6, 6) with right sides (B, 6, m); -1 for singular ones."""
-    good = np.abs(np.linalg.det(matrices)) > 0
-    found: FloatArray = np.full_like(right, -1.0)
-    found[good] = np.linalg.solve(matrices[good], right[good])
-    return found
 
 
 def _at_corners(fixed: FloatArray, linear: FloatArray) -> FloatArray:

@@ -21,6 +21,7 @@ import numpy as np
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
+from ..robot.closed_loops import inverses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -132,12 +133,3 @@ def are_contractions(B: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
         scale = np.maximum(w[going].max(axis=1, keepdims=True), 1e-300)
         v[rows[going]] = w[going] / scale + 1e-9 * v[rows[going]]
     return proved, v
-
-
-def inverses(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices (B, k, k); NaN for singular ones."""
-    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
-    found: FloatArray = np.full_like(matrices, np.nan)
-    found[good] = np.linalg.inv(matrices[good])
-    return found

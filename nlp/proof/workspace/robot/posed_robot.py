@@ -23,7 +23,7 @@ from .....models.rows import independent_rows
 from ....case.case import Case
 from ...statement.machine import INSIDE, CentreErrors
 from ...statement.tolerance import BuiltModel
-from .closed_loops import Loops, closed_from_home
+from .closed_loops import DEPENDENT, Loops, closed_from_home
 from .pose_box import PoseBox
 from .posed_model import Chosen, PosedModel, RankMatrix, ScaledRows, posed_model
 
@@ -167,7 +167,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     dependent = _dependent(loops, start, count)
     # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
     middle[list(dependent)] = start[list(dependent)]
-    moved = loops.all_closed(middle[:, None], list(dependent))[:, 0]
+    moved = loops.all_closed(middle[:, None], dependent)[:, 0]
     start = moved if loops.is_closed(moved) else start
     chosen = _chosen(posed, model, start, needed, case.characteristic_length)
     posed = posed.reduced(chosen)
@@ -233,8 +233,8 @@ def _check_freedoms(family: Problem, whole: PosedModel) -> None:
         z = family.start.copy()
         z[own] += _SPREAD * family.size[own] * rng.uniform(-1, 1, len(own))
         z[errors] = _OFF * family.length * rng.uniform(-1, 1, len(errors))
-        found = loops.closed(z, list(family.dependent))
-        if found is None:
+        found = loops.all_closed(z[:, None], family.dependent)[:, 0]
+        if not np.isfinite(found).all():
             raise NotJudgedError("the loops do not close with errors of joint centres in the middle of the workspace")
         every, *screws = (np.array(each) for each in function.call([ca.DM(found)]))
         if float(np.abs(every).max(initial=0.0)) > _CLOSED:
@@ -251,13 +251,11 @@ def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     rng = np.random.default_rng(_SEED)
     slopes = [loops.slopes(start[:, None])[0] * loops.size]
     for _ in range(_POINTS):
-        z = start.copy()
-        z[:count] += _SPREAD * loops.size[:count] * rng.uniform(-1, 1, count)
-        found = loops.closed(z, list(range(count, len(z)))) if len(z) > count else z
-        if found is None or not loops.is_closed(found):
-            found = loops.closed(z, list(range(len(z))))
-        if found is not None and loops.is_closed(found):
-            slopes.append(loops.slopes(found[:, None])[0] * loops.size)
+        z = start[:, None].copy()
+        z[:count, 0] += _SPREAD * loops.size[:count] * rng.uniform(-1, 1, count)
+        every = (loops.all_closed(z, range(begin, len(z)), zero=DEPENDENT) for begin in (count, 0))
+        found = next((each for each in every if loops.is_closed(each[:, 0])), None)
+        slopes += [] if found is None else [loops.slopes(found)[0] * loops.size]
     if not any(np.abs(each).max() > _ZERO for each in slopes):
         return ()
     return tuple(sorted(independent_rows(slopes)))
