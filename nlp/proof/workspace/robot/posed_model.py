@@ -32,6 +32,7 @@ from casadi import SX
 
 from .....models import Actuator, FloatArray, Member, Model, Substitution, Wrench, WrenchKind, jacobian, rate_relations
 from .....models.instance import homogenised, sizes_at
+from .....models.member import scaled_twists
 from ....case.case import Case
 from ....case.pose import Free
 from .closed_loops import Loops
@@ -92,11 +93,7 @@ class Limbs:
 
     def twists(self, screws: SX) -> SX:
         """Return twists (6, k), angular velocity, then velocity at the world's origin, as ``(v, length omega)``."""
-        found = [
-            ca.vertcat(screws[3:, j] + ca.cross(screws[:3, j], self.position), self.length * screws[:3, j])
-            for j in range(screws.shape[1])
-        ]
-        return ca.horzcat(SX(6, 0), *found)
+        return scaled_twists(screws, self.position, SX(self.length), 6)
 
 
 def locked_matrix(limbs: Limbs) -> SX:
