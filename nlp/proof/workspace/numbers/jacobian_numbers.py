@@ -10,7 +10,7 @@ What is of first order in the coordinates is kept as it is, so that a convex num
 
 The smallest singular value of J is at least 1 over the norm of any left inverse. The norm ``(tr (P P')^n)^(1/2n)`` is
 convex in P, not below the largest singular value and close to it. The largest singular value of J itself is bounded
-likewise. The Frobenius norm of a rest bounds what it adds.
+likewise, from forms of its own entries. The Frobenius norm of a rest bounds what it adds.
 
 Errors of joint centres count as further terms of the rows. Those of six straight legs, up to t, change J by a matrix
 whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg of any
@@ -98,10 +98,10 @@ class _RowsNumber(Number):
         return np.asarray(flat.reshape(len(flat), len(z), 6).transpose(1, 0, 2) * self._scale)
 
     def rows(self, forms: Forms, count: int) -> _Rows:
-        """Return the rows over boxes from forms of them, column by column, and of their sizes."""
-        B, entries, t = forms.a.shape
-        m = entries // 7
-        (c, a, r), sizes = forms, forms.c[:, 6 * m :]
+        """Return the rows over boxes from forms of them, column by column, of their sizes, and of more."""
+        m = self.problem.scaled.rows.shape[0]
+        c, a, r = forms.part(slice(0, 7 * m))
+        (B, _, t), sizes = a.shape, c[:, 6 * m :]
         with np.errstate(all="ignore"):
             unit = 1 / np.where(sizes > 0, sizes, np.nan)
             A = c[:, : 6 * m].reshape(B, 6, m).transpose(0, 2, 1) * self._scale * unit[:, :, None]
@@ -137,6 +137,8 @@ class SingularValues(_RowsNumber):
     ) -> None:
         super().__init__(problem, length, machines)
         self._is_condition, self._change, self._machines = is_condition, change, machines
+        if is_condition:
+            self.entries = ca.vertcat(self.entries, ca.vec(ca.densify(problem.scaled.jacobian)))
 
     @cached_property
     def _slopes(self) -> ca.Function:
@@ -179,10 +181,20 @@ class SingularValues(_RowsNumber):
             norm = _schatten(_at_corners(fixed, linear)) + _frobenius(rest)
             found = least = np.maximum(1 / norm - self._change, 0.0) if self._change else 1 / norm
             if self._is_condition:
-                largest = _largest(rows) + self._change
+                largest = self._largest(rows, forms.part(slice(7 * rows.A.shape[1], None))) + self._change
                 found = -largest / least if self._change else -largest * norm
         floor = -np.inf if self._is_condition else 0.0
         return Bounds(np.where(np.isfinite(found), found, floor)[:, None], shares)
+
+    def _largest(self, rows: _Rows, forms: Forms) -> FloatArray:
+        """Return an upper bound (B,) of the largest singular value of J from forms of it, column by column."""
+        (B, _, t), scale = forms.a.shape, self._scale[:, None]
+        c, r = (each.reshape(B, 6, -1) * scale for each in (forms.c, forms.r))
+        a = forms.a.reshape(B, 6, -1, t).transpose(0, 3, 1, 2) * scale
+        corners, rest = _at_corners(c, a[:, : rows.coordinates]), r + rows.spread(a[:, rows.coordinates :])
+        known = np.asarray(np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2)))
+        values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
+        return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)
 
 
 class WorstError(_RowsNumber):
@@ -269,21 +281,6 @@ def _schatten(matrices: FloatArray) -> FloatArray:
         power = power @ power
     norm = np.sqrt(trace) * np.trace(power, axis1=2, axis2=3) ** (0.5 / 2**_SQUARINGS)
     return np.asarray(norm.max(axis=1) * (1 + ROUNDING))
-
-
-def _largest(rows: _Rows) -> FloatArray:
-    """Return an upper bound (B,) of the largest singular value of J."""
-    d = rows.spread(rows.bend) + rows.slack
-    # 1 / (1 + e) = 1 - e + e^2 / (1 + e) for the deviation e of a size from 1.
-    room = np.where(d < 1, 1 - d, np.nan)
-    linear = rows.terms - rows.A[:, None] * rows.bend[..., None]
-    rest = rows.rest / room[..., None] + (rows.spread(rows.terms) * (d / room)[..., None])
-    rest += np.abs(rows.A) * (rows.slack + d * d / room)[..., None]
-    rest += rows.spread(linear[:, rows.coordinates :])
-    corners = _at_corners(rows.A, linear[:, : rows.coordinates])
-    known = np.asarray(np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2)))
-    values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
-    return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)
 
 
 def _frobenius(r: FloatArray) -> FloatArray:
