@@ -5,11 +5,12 @@ import numpy as np
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Task
 from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Minimum, Number, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.clearance import Clearance
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox
-from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
+from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem, family_of
 
 #: A robot of any six straight legs.
 HEXAPOD = hexapod()
@@ -53,7 +54,10 @@ def case_of_legs(robot: Legs) -> Case:
 def subject_of(robot: Legs, box: PoseBox, shortest: float = 0.0) -> Subject:
     """Six legs over a box."""
     case = case_of_legs(robot)
-    return Subject(case, HEXAPOD, build_problem(case, HEXAPOD, box), shortest=shortest)
+    machines = build_problem(case, HEXAPOD, box)
+    if robot.tolerance:
+        machines = family_of(case, built_model(HEXAPOD), machines, robot.tolerance)
+    return Subject(case, HEXAPOD, machines, shortest=shortest)
 
 
 def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> Clearance:

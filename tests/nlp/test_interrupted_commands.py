@@ -153,7 +153,9 @@ def press(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest
         with monkeypatch.context() as patch:
             for name in ("_awaited", "_parting", "_written", "_unfinished", "_answers", "_requested"):
                 patch.setattr(interruption, name, type(getattr(interruption, name))())
-            patch.setattr(interruption, "signal", SimpleNamespace(SIGINT=2, getsignal=lambda _: None, default_int_handler=0))
+            patch.setattr(
+                interruption, "signal", SimpleNamespace(SIGINT=2, getsignal=lambda _: None, default_int_handler=0)
+            )
             patch.setattr(interruption.os, "_exit", leave)
             status, err = interruption.INTERRUPTED, ""
             with key_at_call(n) as count, suppress(Left):

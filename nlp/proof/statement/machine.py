@@ -88,15 +88,15 @@ def legs_of(case: Case) -> Legs | None:
     return joint_centres(case) if has_straight_legs(case.model) else None
 
 
-def joint_centres(case: Case) -> Legs | None:
-    """Return the straight legs of a robot with fixed dimensions, with the case's tolerance; None without legs."""
+def joint_centres(case: Case) -> Legs:
+    """Return the straight legs, if any, of a robot with fixed dimensions, with the case's tolerance."""
     model = case.model
-    if not model.legs:
-        return None
     symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
     parts = [value for name in case.parameters for value in case.components(name)]
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
-    ends = [ca.densify(ca.horzcat(*[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")]
+    ends = [
+        ca.densify(ca.horzcat(ca.SX(3, 0), *[getattr(leg, end) for leg in model.legs])) for end in ("base", "platform")
+    ]
     found = ca.Function("legs", [symbols], ends).call([values])
     base, platform = (frozen_array(np.array(each).T, (len(model.legs), 3)) for each in found)
     return Legs(base, platform, case.joint_centre_tolerance or 0.0)

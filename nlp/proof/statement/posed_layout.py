@@ -62,18 +62,19 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
             table.add(f"{prefix}{name}", Dimension.ANGLE, value).symbols
             for name, value in zip(("roll", "pitch", "yaw"), turns.angles, strict=True)
         ]
-        turned = _turn(2, angles[2]) @ _turn(1, angles[1]) @ _turn(0, angles[0])
+        about = [turn_about(k, ca.cos(angle), ca.sin(angle)) for k, angle in enumerate(angles)]
+        turned = about[2] @ about[1] @ about[0]
         return StatedPoseSymbols(turned, position.symbols, position.places, position.symbols, None, [], (HERE,))
 
     return lay_out(one, one.tasks, add_turns)
 
 
-def _turn(about: int, angle: SX) -> SX:
-    """Return the rotation matrix (3, 3) about a coordinate axis."""
+def turn_about(about: int, cosine: SX, sine: SX, scale: SX | float = 1.0) -> SX:
+    """Return the rotation matrix (3, 3) about a coordinate axis times a scale, by which its cosine and sine are too."""
     i, j = (about + 1) % 3, (about + 2) % 3
-    matrix = SX.eye(3)
-    matrix[i, i] = matrix[j, j] = ca.cos(angle)
-    matrix[j, i], matrix[i, j] = ca.sin(angle), -ca.sin(angle)
+    matrix = SX.eye(3) * scale
+    matrix[i, i] = matrix[j, j] = cosine
+    matrix[j, i], matrix[i, j] = sine, -sine
     return matrix
 
 

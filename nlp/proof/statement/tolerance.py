@@ -192,10 +192,9 @@ def machine_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoor
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
     """Return a limit on angles of joints with the mounting axes of the design as numbers; another one as it is."""
-    legs = joint_centres(case)
-    if legs is None or not (isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
+    if not (case.model.legs and isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose)):
         return limit
-    home = limit.about
+    home, legs = limit.about, joint_centres(case)
     axis = SX(unit_axes((home.axis,), 1)[0].tolist())
     R = np.array(ca.evalf(matrix_from_axis_angle(axis, SX(home.angle))))
     n = np.array(home.position) + legs.platform @ R.T - legs.base

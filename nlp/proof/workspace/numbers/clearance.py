@@ -14,11 +14,12 @@ import itertools
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
-from .....models import FloatArray, Model
+from .....models import FloatArray
 from ...enclosure.forms import Forms
 from ...statement.machine import Legs
-from ..robot.posed_model import PosedModel
+from ..robot.pose_box import polynomial_rotation
 from ..robot.posed_robot import Problem, steepest
 from .bound_search import Bounds, Number
 
@@ -35,23 +36,19 @@ class Clearance(Number):
 
     Args:
         problem: the robot.
-        posed: the same in the coordinates of the problem.
-        model: its model, with legs.
+        legs: joint centres of its legs, with the tolerance that is meant.
         places: those of the two legs.
-        legs: joint centres of its legs, with the tolerance that is meant; None for the design alone.
     """
 
-    def __init__(
-        self, problem: Problem, posed: PosedModel, model: Model, places: tuple[int, int], *, legs: Legs | None = None
-    ) -> None:
-        R, p = model.pose.rotation, model.pose.position
-        ends = ca.vertcat(*[end for k in places for end in (model.legs[k].base, p + R @ model.legs[k].platform)])
-        plain, scaled = posed.scaled_points(ends)
-        super().__init__(problem, ca.densify(ca.vertcat(scaled, posed.scale)))
-        self._nearer, self._ends = 0.0, ca.Function("ends", [posed.z], [ca.densify(plain)])
-        self._legs, self._places = legs if legs is not None and legs.tolerance else None, places
-        if self._legs is not None:
-            self._nearer = 2 * self._legs.tolerance
+    def __init__(self, problem: Problem, legs: Legs, places: tuple[int, int]) -> None:
+        y = problem.box.symbols(problem.z)
+        turned, scale = polynomial_rotation(problem.box, y[3:])
+        pairs = [(SX(legs.base[k].tolist()), SX(legs.platform[k].tolist())) for k in places]
+        ends = [end for base, arm in pairs for end in (scale * base, scale * y[:3] + turned @ arm)]
+        scaled = ca.densify(ca.vertcat(*ends))
+        super().__init__(problem, ca.vertcat(scaled, scale))
+        self._ends = ca.Function("ends", [problem.z], [scaled / scale])
+        self._legs, self._places, self._nearer = legs, places, 2 * legs.tolerance
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the distances (P, 1) at points (P, n)."""
@@ -64,7 +61,7 @@ class Clearance(Number):
 
     def worst(self, y: FloatArray) -> FloatArray | None:
         """Return the errors (m, 3) with which the legs are nearest at a pose (6,); None for the design."""
-        if self._legs is None:
+        if not self._nearer:
             return None
         between = self.between(y[None, list(self.problem.free)])
         signs = np.zeros(len(self._legs.base))

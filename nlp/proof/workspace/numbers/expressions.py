@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
-from ..ranks.krawczyk import ROUNDING, by_centres, inverses
+from ..ranks.krawczyk import ROUNDING, by_centres
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.posed_robot import Problem, steepest
+from ..robot.closed_loops import inverses
+from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 
 #: Slope, as a part of the largest at a point, that is rounding error.
@@ -92,10 +93,7 @@ class Expressions(Number):
         """Return the machines (P, n) with the smallest values to first order, from derivatives of the design."""
         parts = slopes[:, self.problem.of_errors].reshape(len(z), -1, 3)
         sizes = np.linalg.norm(parts, axis=2, keepdims=True)
-        z = z.copy()
-        errors = steepest(np.where(sizes > _FLAT * _sizes(sizes), -parts, 0.0), self.problem.tolerance)
-        z[:, self.problem.of_errors] = errors.reshape(len(z), -1)
-        return z
+        return self.problem.with_errors(z, np.where(sizes > _FLAT * _sizes(sizes), -parts, 0.0))
 
     def _at_corner(self, z: FloatArray, slopes: FloatArray, boxes: LoopBoxes) -> FloatArray:
         """Return points with the pose in the corner of a box that the derivatives point to."""

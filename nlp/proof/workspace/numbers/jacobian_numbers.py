@@ -10,7 +10,7 @@ What is of first order in the coordinates is kept as it is, so that a convex num
 
 The smallest singular value of J is at least 1 over the norm of any left inverse. The norm ``(tr (P P')^n)^(1/2n)`` is
 convex in P, not below the largest singular value and close to it. The largest singular value of J itself is bounded
-likewise. The Frobenius norm of a rest bounds what it adds.
+likewise, from forms of its own entries. The Frobenius norm of a rest bounds what it adds.
 
 Errors of joint centres count as further terms of the rows. Those of six straight legs, up to t, change J by a matrix
 whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg of any
@@ -24,21 +24,26 @@ size of its position, or of its rotation, is met where every ``d_i`` is 1 or -1.
 from __future__ import annotations
 
 import itertools
+import math
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
 from ...statement.machine import LEGS, Legs
-from ..ranks.krawczyk import by_centres, inverses
+from ..ranks.krawczyk import by_centres
+from ..robot.closed_loops import inverses
 from ..robot.posed_robot import Problem
-from ..tolerance.leg_errors import change_of_rows, worst_rows
 from .bound_search import Bounds, Number
 
 #: Part of its size by which a computed number may be off: rounding of products and of LAPACK.
 ROUNDING = 1e-10
+#: Part of itself by which the bound of a change moves outwards: its own rounding.
+_OUTWARDS = 1 + 1e-12
 #: Part of C below which a singular value of the middle matrix is zero.
 _ZERO = 1e-14
 #: Part by which a computed bound of an inverse is made larger, so that it surely is one.
@@ -80,24 +85,25 @@ class _RowsNumber(Number):
     Args:
         problem: the design, or all machines that are meant.
         length: by which moments about the platform's origin are divided.
+        machines: those of which values are; of the problem if left out.
     """
 
-    def __init__(self, problem: Problem, length: float) -> None:
-        scaled = problem.scaled
+    def __init__(self, problem: Problem, length: float, machines: Problem | None = None) -> None:
+        scaled, of = problem.scaled, machines or problem
         super().__init__(problem, ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes))
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
-        self._jacobian = ca.Function("J", [problem.z], [ca.densify(scaled.jacobian)])
+        self._jacobian = ca.Function("J", [of.z], [ca.densify(of.scaled.jacobian)])
 
     def jacobian(self, z: FloatArray) -> FloatArray:
-        """Return J (P, m, 6) at points (P, n)."""
+        """Return J (P, m, 6) at points (P, n) of the machines."""
         flat = self._jacobian(z.T).full()
         return np.asarray(flat.reshape(len(flat), len(z), 6).transpose(1, 0, 2) * self._scale)
 
     def rows(self, forms: Forms, count: int) -> _Rows:
-        """Return the rows over boxes from forms of them, column by column, and of their sizes."""
-        B, entries, t = forms.a.shape
-        m = entries // 7
-        (c, a, r), sizes = forms, forms.c[:, 6 * m :]
+        """Return the rows over boxes from forms of them, column by column, of their sizes, and of more."""
+        m = self.problem.scaled.rows.shape[0]
+        c, a, r = forms.part(slice(0, 7 * m))
+        (B, _, t), sizes = a.shape, c[:, 6 * m :]
         with np.errstate(all="ignore"):
             unit = 1 / np.where(sizes > 0, sizes, np.nan)
             A = c[:, : 6 * m].reshape(B, 6, m).transpose(0, 2, 1) * self._scale * unit[:, :, None]
@@ -111,15 +117,15 @@ class _RowsNumber(Number):
 class SingularValues(_RowsNumber):
     """Smallest singular value of J, or minus its condition number.
 
-    With legs, bounds are those of all machines within their tolerance, and values those of the machine that is worst to
-    first order at each point.
+    With machines, values are those of the one that is worst to first order at each point: with u and v the vectors of a
+    singular value, it is ``u . J v``, whose derivatives by the errors are those of the entries of J alone.
 
     Args:
         problem: the design, or all machines that are meant, whose errors count entry by entry.
         length: by which moments about the platform's origin are divided.
         is_condition: whether minus the condition number is meant, whose smallest value is that of the worst pose.
-        legs: joint centres of six straight legs with the tolerance that is meant; None for another robot.
-        shortest: no leg of any machine is shorter over the workspace; used with a tolerance of legs alone.
+        machines: all that are meant, where the problem is the design alone.
+        change: by which every singular value of theirs differs from the design's at most.
     """
 
     def __init__(
@@ -128,23 +134,35 @@ class SingularValues(_RowsNumber):
         length: float,
         *,
         is_condition: bool,
-        legs: Legs | None = None,
-        shortest: float = 0.0,
+        machines: Problem | None = None,
+        change: float = 0.0,
     ) -> None:
-        super().__init__(problem, length)
-        self._length, self._is_condition = length, is_condition
-        self._legs = legs if legs is not None and legs.tolerance else None
-        self._change = 0.0 if self._legs is None else change_of_rows(self._legs, length, shortest)
+        super().__init__(problem, length, machines)
+        self._is_condition, self._change, self._machines = is_condition, change, machines
+        if is_condition:
+            self.entries = ca.vertcat(self.entries, ca.vec(ca.densify(problem.scaled.jacobian)))
+
+    @cached_property
+    def _slopes(self) -> ca.Function:
+        """The derivatives of u . J v by the errors of machines."""
+        of = self._machines or self.problem
+        J = of.scaled.jacobian * ca.repmat(SX(self._scale.tolist()).T, of.scaled.rows.shape[0], 1)
+        u, v = SX.sym("u", J.shape[0]), SX.sym("v", J.shape[1])
+        return ca.Function("slopes", [of.z, u, v], [ca.densify(ca.gradient(ca.dot(u, J @ v), of.errors))])
+
+    def _worst(self, machines: Problem, z: FloatArray) -> FloatArray:
+        """Return the machines that are worst to first order at points (P, n) of the design."""
+        z = machines.exact(z)
+        u, s, v = np.linalg.svd(np.nan_to_num(self.jacobian(z)))
+        slopes = np.zeros((len(z), len(machines.of_errors)))
+        # The logarithm of the condition number falls with that of the smallest one, and grows with that of the largest.
+        for k, weight in ((5, -1.0), (0, 1.0)) if self._is_condition else ((5, -1.0),):
+            slopes += weight / s[:, k, None] * self._slopes(z.T, u[:, :, k].T, v[:, k].T).full().T
+        return machines.with_errors(z, slopes)
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (P, 1) at points (P, n)."""
-        if self._legs is not None:
-            y = self.problem.pose_of(z)
-            J = worst_rows(self._legs, self.problem.box, y, self._length, self._is_condition)[0]
-            with np.errstate(all="ignore"):
-                J = J / np.linalg.norm(J[:, :, :3], axis=2, keepdims=True) / [1, 1, 1, *[self._length] * 3]
-        else:
-            J = self.jacobian(z)
+        J = self.jacobian(z if self._machines is None else self._worst(self._machines, z))
         known = np.asarray(np.isfinite(J).all(axis=(1, 2)))
         values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
         with np.errstate(all="ignore"):
@@ -152,11 +170,11 @@ class SingularValues(_RowsNumber):
         return np.where(known, found, np.nan)[:, None]
 
     def worst(self, y: FloatArray) -> FloatArray | None:
-        """Return the errors (12, 3) that are worst at a pose (6,) to first order; None for the design."""
-        if self._legs is None:
+        """Return the errors (m, 3) that are worst at a pose (6,) to first order; None for the design."""
+        if self._machines is None:
             return None
-        _, base, platform = worst_rows(self._legs, self.problem.box, y[None], self._length, self._is_condition)
-        return np.stack([base[0], platform[0]], axis=1).reshape(-1, 3)
+        machine = self._worst(self._machines, y[None, list(self.problem.free)])[0]
+        return self._machines.errors_of(machine).vectors
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
@@ -166,10 +184,41 @@ class SingularValues(_RowsNumber):
             norm = _schatten(_at_corners(fixed, linear)) + _frobenius(rest)
             found = least = np.maximum(1 / norm - self._change, 0.0) if self._change else 1 / norm
             if self._is_condition:
-                largest = _largest(rows) + self._change
+                largest = self._largest(rows, forms.part(slice(7 * rows.A.shape[1], None))) + self._change
                 found = -largest / least if self._change else -largest * norm
         floor = -np.inf if self._is_condition else 0.0
         return Bounds(np.where(np.isfinite(found), found, floor)[:, None], shares)
+
+    def _largest(self, rows: _Rows, forms: Forms) -> FloatArray:
+        """Return an upper bound (B,) of the largest singular value of J from forms of it, column by column."""
+        (B, _, t), scale = forms.a.shape, self._scale[:, None]
+        c, r = (each.reshape(B, 6, -1) * scale for each in (forms.c, forms.r))
+        a = forms.a.reshape(B, 6, -1, t).transpose(0, 3, 1, 2) * scale
+        corners, rest = _at_corners(c, a[:, : rows.coordinates]), r + rows.spread(a[:, rows.coordinates :])
+        known = np.asarray(np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2)))
+        values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
+        return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)
+
+
+def change_of_rows(legs: Legs, length: float, shortest: float) -> float:
+    """Return a bound of the Frobenius norm of the change of J by errors within the legs' tolerance.
+
+    Args:
+        legs: joint centres.
+        length: by which moments are divided.
+        shortest: no leg of any of the machines is shorter.
+
+    Returns:
+        0 without a tolerance; infinite where the errors may take up a whole leg.
+    """
+    t = legs.tolerance
+    if not t:
+        return 0.0
+    if not shortest > 0:
+        return math.inf
+    turned = 2 * t / shortest
+    moments = (np.linalg.norm(legs.platform, axis=1) * turned + t) / length
+    return float(np.sqrt((turned**2 + moments**2).sum())) * _OUTWARDS
 
 
 class WorstError(_RowsNumber):
@@ -227,7 +276,7 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
         known &= np.isfinite(E).all(axis=(1, 2))
         E = np.where(known[:, None, None], E, 0.0)
         # |(I + E)^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.
-        X = _solutions(eye - E, size) * (1 + _ROOM)
+        X = inverses(eye - E) @ size * (1 + _ROOM)
         known &= (X >= 0).all(axis=(1, 2)) & (size <= X - E @ X).all(axis=(1, 2))
         # Rows are divided by 1 + d with |d| <= spread of the sizes.
         change = C[:, None] * rows.bend[:, :, None] - slopes @ C[:, None]
@@ -238,14 +287,6 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
     rest = np.where(known[:, None, None] & np.isfinite(rest), rest, np.inf)
     shares = (slopes[:, :f] ** 2).sum(axis=(2, 3))[:, None]
     return C, change[:, :f], rest, shares
-
-
-def _solutions(matrices: FloatArray, right: FloatArray) -> FloatArray:
-    """Return the solutions of systems (B, 6, 6) with right sides (B, 6, m); -1 for singular ones."""
-    good = np.abs(np.linalg.det(matrices)) > 0
-    found: FloatArray = np.full_like(right, -1.0)
-    found[good] = np.linalg.solve(matrices[good], right[good])
-    return found
 
 
 def _at_corners(fixed: FloatArray, linear: FloatArray) -> FloatArray:
@@ -264,21 +305,6 @@ def _schatten(matrices: FloatArray) -> FloatArray:
         power = power @ power
     norm = np.sqrt(trace) * np.trace(power, axis1=2, axis2=3) ** (0.5 / 2**_SQUARINGS)
     return np.asarray(norm.max(axis=1) * (1 + ROUNDING))
-
-
-def _largest(rows: _Rows) -> FloatArray:
-    """Return an upper bound (B,) of the largest singular value of J."""
-    d = rows.spread(rows.bend) + rows.slack
-    # 1 / (1 + e) = 1 - e + e^2 / (1 + e) for the deviation e of a size from 1.
-    room = np.where(d < 1, 1 - d, np.nan)
-    linear = rows.terms - rows.A[:, None] * rows.bend[..., None]
-    rest = rows.rest / room[..., None] + (rows.spread(rows.terms) * (d / room)[..., None])
-    rest += np.abs(rows.A) * (rows.slack + d * d / room)[..., None]
-    rest += rows.spread(linear[:, rows.coordinates :])
-    corners = _at_corners(rows.A, linear[:, : rows.coordinates])
-    known = np.asarray(np.isfinite(corners).all(axis=(1, 2, 3)) & np.isfinite(rest).all(axis=(1, 2)))
-    values = np.linalg.norm(np.where(known[:, None, None, None], corners, 0.0), ord=2, axis=(2, 3)).max(axis=1)
-    return np.where(known, values * (1 + ROUNDING) + _frobenius(rest), np.inf)
 
 
 def _frobenius(r: FloatArray) -> FloatArray:

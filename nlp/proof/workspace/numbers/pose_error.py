@@ -23,12 +23,13 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import Dimension, FloatArray, axis_angle_from_matrix, matrix_from_axis_angle
+from .....models import Dimension, FloatArray
 from ....case.limits.constraint import LENGTH, Reading
 from ....case.task import Sense
 from ...statement.claims import Claim
 from ...statement.machine import Legs
-from ..robot.pose_box import PoseBox
+from ..robot.closed_loops import Loops
+from ..robot.pose_box import PoseNumbers, cayley_rotation
 from .bound_search import Goal, Minimum, smallest_values
 from .extremes import Extreme, extreme_of
 from .jacobian_numbers import WorstError
@@ -41,10 +42,6 @@ if TYPE_CHECKING:
 _ROUNDING = 1e-10
 #: Steps in the search of the smallest r.
 _STEPS = 200
-#: Steps of Newton's method for a pose whose errors are small.
-_NEWTON = 8
-#: Part of the longest leg by which lengths may differ from those that are wanted: rounding.
-_CLOSED = 1e-10
 #: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
 _GAP = 0.1
 #: The errors of the pose, as claims.
@@ -67,8 +64,8 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
         paper: records the searches for a proof.
     """
     legs, shortest = subject.legs, subject.shortest
-    eps = leg_error + 2 * (0.0 if legs is None else legs.tolerance)
-    if legs is None or not eps > 0:
+    eps = leg_error + 2 * legs.tolerance
+    if not eps > 0:
         return
     problem = subject.problem
     searches: list[tuple[WorstError, Minimum]] = []
@@ -86,13 +83,13 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
     exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
     whole = with_rest(first, eps, exact, reach)
     for k, (claim, (number, found)) in enumerate(zip(_CLAIMS, searches, strict=True)):
-        y, worst = problem.pose_of(found.at), eps * number.worst(found.at)
+        pose, worst = problem.box.pose(problem.pose_of(found.at)), eps * number.worst(found.at)
         # To first order both signs give the same error.
-        both = [displaced(legs, problem.box, y, sign * worst) for sign in (-1.0, 1.0)]
-        reached = max((each[k] for each in both if each is not None), default=-math.inf)
+        both = displaced(legs, pose, np.stack([-worst, worst], axis=1))[k]
+        reached = float(np.nan_to_num(both, nan=-math.inf).max())
         reason = found.reason or ("" if math.isfinite(whole[k]) else _TOO_LARGE)
-        pose = problem.box.pose(y) if math.isfinite(reached) else None
-        yield extreme_of(claim, found._replace(bound=-whole[k], value=-reached, reason=reason), pose)
+        shown = pose if math.isfinite(reached) else None
+        yield extreme_of(claim, found._replace(bound=-whole[k], value=-reached, reason=reason), shown)
 
 
 class PoseErrors(NamedTuple):
@@ -128,35 +125,22 @@ def with_rest(first: PoseErrors, eps: float, shortest: float, reach: float) -> P
     return PoseErrors(math.inf, math.inf)
 
 
-def displaced(legs: Legs, box: PoseBox, y: FloatArray, errors: FloatArray) -> PoseErrors | None:
-    """Return the errors of the pose of a machine whose legs are longer by given lengths, by Newton's method.
+def displaced(legs: Legs, pose: PoseNumbers, errors: FloatArray) -> FloatArray:
+    """Return the errors (2, K) of position and rotation of a machine whose legs are longer by given lengths.
 
-    None where it finds no pose with these lengths, as about a singular one.
+    They are NaN where Newton's method finds no pose with these lengths, as about a singular one.
 
     Args:
         legs: joint centres.
-        box: the poses.
-        y: (6,) the pose without errors.
-        errors: (6,) of the lengths of the legs.
+        pose: the pose without errors.
+        errors: (6, K) of the lengths of the legs.
     """
-    pose = box.pose(y)
-    position, rotation = pose.position, pose.rotation
-    wanted = np.linalg.norm(legs.spans(position, rotation), axis=1) + errors
-    for _ in range(_NEWTON):
-        arm = legs.platform @ rotation.T
-        span = position + arm - legs.base
-        lengths = np.linalg.norm(span, axis=1)
-        unit = span / lengths[:, None]
-        try:
-            step = np.linalg.solve(np.hstack([unit, np.cross(arm, unit)]), wanted - lengths)
-        except np.linalg.LinAlgError:
-            return None
-        angle = float(np.linalg.norm(step[3:]))
-        position = position + step[:3]
-        if angle:
-            rotation = np.array(ca.evalf(matrix_from_axis_angle(SX(step[3:] / angle), SX(angle)))) @ rotation
-    lengths = np.linalg.norm(legs.spans(position, rotation), axis=1)
-    if not np.abs(lengths - wanted).max() <= _CLOSED * wanted.max():
-        return None
-    turned = axis_angle_from_matrix(rotation @ pose.rotation.T).angle
-    return PoseErrors(float(np.linalg.norm(position - pose.position)), turned)
+    z, lengths = SX.sym("z", 12), np.linalg.norm(legs.spans(pose.position, pose.rotation), axis=1, keepdims=True)
+    # The platform's origin moves, and a Cayley vector turns the platform; the wanted lengths follow.
+    size = float(lengths.max())
+    move, (turned, scale), wanted = z[:3], cayley_rotation(z[3:6]), z[6:]
+    ends = ca.repmat(pose.position + move, 1, 6) + turned @ (pose.rotation @ legs.platform.T) / scale
+    equations = (ca.sqrt(ca.sum1((ends - legs.base.T) ** 2)).T - wanted) / size
+    loops = Loops(z, equations, equations, SX(0, 1), np.repeat([size, 1.0, size], [3, 3, 6]))
+    found = loops.all_closed(np.vstack([np.zeros(errors.shape), lengths + errors]), list(range(6)))
+    return np.stack([np.linalg.norm(found[:3], axis=0), 2 * np.arctan(np.linalg.norm(found[3:6], axis=0))])

@@ -21,12 +21,11 @@ from ....case.task import Sense
 from ....errors import UncoveredError
 from ...statement.claims import Claim, asked_name, asked_spectra
 from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
-from ..robot.posed_model import posed_model
 from ..robot.posed_robot import NotJudgedError, Problem
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
 from .extremes import Extreme, extreme_of, goal_of
-from .jacobian_numbers import SingularValues
+from .jacobian_numbers import SingularValues, change_of_rows
 
 if TYPE_CHECKING:
     from ..proof_writer import PaperRecord
@@ -65,8 +64,8 @@ class Subject:
         return None if vectors is None or self.machines is None else JointErrors(self.machines.names, vectors)
 
     @cached_property
-    def legs(self) -> Legs | None:
-        """Joint centres of straight legs, with the tolerance; None for a robot without any."""
+    def legs(self) -> Legs:
+        """Joint centres of straight legs, with the tolerance."""
         return joint_centres(self.case)
 
     @property
@@ -82,20 +81,16 @@ class Subject:
 
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
         """Return the smallest singular value of J, or minus its condition number."""
+        problem = self.problem
+        if not (self.legs.tolerance and has_straight_legs(self.case.model)):
+            return SingularValues(self.machines or problem, length, is_condition=is_condition)
         # The change of J by errors of six straight legs has a bound of its own.
-        has_legs, problem = has_straight_legs(self.case.model), self.problem
-        return SingularValues(
-            problem if has_legs else self.machines or problem,
-            length,
-            is_condition=is_condition,
-            legs=self.legs if has_legs else None,
-            shortest=self.shortest,
-        )
+        change = change_of_rows(self.legs, length, self.shortest)
+        return SingularValues(problem, length, is_condition=is_condition, machines=self.machines, change=change)
 
     def clearance(self, places: tuple[int, int]) -> Clearance:
         """Return the distance of two legs."""
-        posed = posed_model(self.case, self.model, self.problem.box, z=self.problem.z)
-        return Clearance(self.problem, posed, self.model, places, legs=self.legs)
+        return Clearance(self.problem, self.legs, places)
 
 
 def searched_extremes(

@@ -50,7 +50,7 @@ def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine) 
     legs = subject.legs
     limit = next((each for each in subject.case.limits if isinstance(each, Actuator)), None)
     found, added = list(extremes), list[Extreme]()
-    if limit is None or legs is None:
+    if limit is None:
         return found
     kinds = (
         ("actuator.stroke_max", Sense.MAX, limit.stroke_max, (-1.0, 1.0)),

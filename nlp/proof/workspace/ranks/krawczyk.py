@@ -21,6 +21,7 @@ import numpy as np
 
 from .....models import FloatArray
 from ...enclosure.forms import Forms
+from ..robot.closed_loops import inverses
 
 #: Part of the sum of the sizes of all terms by which a computed product may be off: products here have fewer than 400
 #: terms, each with a rounding of 2^-53.
@@ -103,12 +104,3 @@ def with_relation(forms: Forms, relation: Relation, of: Coordinates) -> Forms:
         rest = forms.r + (size @ relation.rho[:, :, None])[:, :, 0]
         terms = np.abs(forms.c) + np.abs(others).sum(axis=2) + (size @ relation.reach[:, :, None])[:, :, 0]
         return Forms(middle, slopes, rest * (1 + ROUNDING) + ROUNDING * terms)
-
-
-def inverses(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of matrices (B, k, k); NaN for singular ones."""
-    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
-    found: FloatArray = np.full_like(matrices, np.nan)
-    found[good] = np.linalg.inv(matrices[good])
-    return found

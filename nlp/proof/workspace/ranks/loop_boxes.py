@@ -21,13 +21,13 @@ from .....models.arrays import first_largest
 from ...boxes.engine import MOST_VARIABLES
 from ...boxes.search import Boxes, Rule, bisected, joined, some
 from ...enclosure.forms import Encloser, Forms
+from ..robot.closed_loops import inverses
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from .krawczyk import (
     Coordinates,
     Relation,
     by_centres,
-    inverses,
     no_relation,
     relation_of,
     with_relation,

@@ -31,9 +31,10 @@ from .....models import FloatArray, frozen_array
 from .....models.arrays import first_largest
 from ...enclosure.forms import Encloser
 from ...statement.machine import JointErrors
+from ..robot.closed_loops import inverses
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem, steepest
-from .krawczyk import ROUNDING, inverses
+from .krawczyk import ROUNDING
 from .loop_boxes import Examined
 
 if TYPE_CHECKING:
@@ -195,9 +196,9 @@ class SingularPose:
         problem, machine = self._problem, z.copy()
         errors = problem.of_errors
         for step in range(_MACHINES):
-            closed = problem.loops.closed(machine, list(problem.dependent)) if problem.dependent else machine
-            slopes = None if closed is None else self.slopes(closed)
-            if closed is None or slopes is None:
+            closed = problem.loops.all_closed(machine[:, None], problem.dependent)[:, 0]
+            slopes = self.slopes(closed)
+            if slopes is None:
                 return
             machine, end = closed.copy(), steepest(-slopes[errors].reshape(-1, 3), problem.tolerance).ravel()
             machine[errors] += 2 / (step + 2) * (end - machine[errors])

@@ -17,8 +17,8 @@ _CLOSED = 1e-10
 _STEPS = 15
 #: Steps from home's assembly, where the equations have residuals at another pose, to closed loops.
 _WAY = 40
-#: Singular values below this part of the largest are zero in a step.
-_DEPENDENT = 1e-9
+#: Singular values below this part of the largest are zero in a step of more coordinates than equations.
+DEPENDENT = 1e-9
 
 
 class Loops:
@@ -68,50 +68,51 @@ class Loops:
         residual, signs = (each.full().ravel() for each in self._every(z))
         return bool((np.abs(residual) <= 1e3 * _CLOSED).all() and (signs > 0).all())
 
-    def closed(self, z: FloatArray, moving: list[int]) -> FloatArray | None:
-        """Return a closed point (n,) near a point, from which some coordinates move; None where there is none."""
-        for _ in range(_STEPS):
-            if float(np.abs(self.values(z[:, None])).max(initial=0.0)) <= _CLOSED:
-                return z
-            moved = self.moved(z, moving, np.zeros(self.count))
-            if moved is None:
-                return None
-            z = moved
-        return None
-
-    def moved(self, z: FloatArray, moving: list[int], left: FloatArray) -> FloatArray | None:
-        """Return a point (n,) after a step toward left sides (k,) of the equations; None where there is no step."""
-        residual = self.values(z[:, None])[0] - left
-        slopes = (self.slopes(z[:, None])[0] * self.size)[:, moving]
-        if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
-            return None
-        z = z.copy()
-        z[moving] -= self.size[moving] * np.linalg.lstsq(slopes, residual, rcond=_DEPENDENT)[0]
-        return z
-
-    def all_closed(self, z: FloatArray, moving: list[int]) -> FloatArray:
-        """Return closed points (n, B) near points, in which the same coordinates move, as many as equations.
+    @np.errstate(all="ignore")
+    def all_closed(
+        self, z: FloatArray, moving: Sequence[int], *, steps: int = 1, zero: float | None = None
+    ) -> FloatArray:
+        """Return closed points (n, B) at the ends of ways from points, along which left sides fall to 0.
 
         A point that does not close is NaN.
+
+        Args:
+            z: (n, B) the points.
+            moving: coordinates that move; as many as equations without ``zero``.
+            steps: of the way.
+            zero: part of the largest singular value of the slopes below which others are zero.
         """
-        z = z.copy()
+        z, moving = z.copy(), list(moving)
         if not z.size:
             return z
-        with np.errstate(all="ignore"):
-            for _ in range(_STEPS):
-                residual, slopes = self.values(z), self.slopes(z)[:, :, moving] * self.size[moving]
-                known = np.asarray(np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(residual).all(axis=1))
-                known &= np.abs(np.linalg.det(np.where(known[:, None, None], slopes, np.eye(len(moving))))) > 0
-                step = np.linalg.solve(
-                    np.where(known[:, None, None], slopes, np.eye(len(moving))),
-                    np.where(known[:, None], residual, np.nan)[:, :, None],
-                )[:, :, 0]
+        first = self.values(z)
+        off = np.maximum(np.abs(first).max(axis=1, initial=0.0) / steps, _CLOSED)
+        for k in range(1, steps + 1):
+            left = 1 - k / steps
+            for _ in range(2 if left else _STEPS):
+                residual, slopes = self.values(z) - left * first, self.slopes(z)[:, :, moving] * self.size[moving]
+                step = (inverses(slopes, zero) @ residual[:, :, None])[:, :, 0]
                 z[moving] -= (self.size[moving] * step).T
                 if not np.nanmax(np.abs(step), initial=0.0) > _CLOSED:
                     break
-            residual = np.abs(self.values(z)).max(axis=1, initial=0.0)
-        z[:, ~(residual <= _CLOSED)] = np.nan
+            # Beyond a fold there are no left sides that fall: steps from there may end in any assembly.
+            residual = np.abs(self.values(z) - left * first).max(axis=1, initial=0.0)
+            z[:, ~(residual <= (off if left else _CLOSED))] = np.nan
         return z
+
+
+def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
+    """Return the inverses of matrices (B, k, k); NaN for singular ones.
+
+    With ``zero`` they are pseudo-inverses (B, n, k) of matrices (B, k, n), whose singular values below this part of the
+    largest are zero.
+    """
+    good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    if zero is None:
+        good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
+    found: FloatArray = np.full(matrices.transpose(0, 2, 1).shape, np.nan)
+    found[good] = np.linalg.inv(matrices[good]) if zero is None else np.linalg.pinv(matrices[good], rcond=zero)
+    return found
 
 
 def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | None:
@@ -126,18 +127,8 @@ def closed_from_home(loops: Loops, z: FloatArray, pose: int) -> FloatArray | Non
     """
     if not loops.count:
         return z if loops.is_closed(z) else None
-    unknowns, every, first = list(range(pose, len(z))), list(range(len(z))), loops.values(z[:, None])[0]
-    off = max(np.abs(first).max(initial=0.0) / _WAY, _CLOSED)
-    for moving in (unknowns, every):
-        found: FloatArray | None = z
-        for share in np.linspace(1, 0, _WAY + 1)[1:]:
-            for _ in range(2):
-                found = None if found is None else loops.moved(found, moving, share * first)
-            # Beyond a fold there are no left sides that fall: steps from there may end in any assembly.
-            if found is None or not np.abs(loops.values(found[:, None])[0] - share * first).max(initial=0.0) <= off:
-                break
-        else:
-            found = None if found is None else loops.closed(found, moving)
-            if found is not None and loops.is_closed(found):
-                return found
+    for begin in (pose, 0):
+        found = loops.all_closed(z[:, None], range(begin, len(z)), steps=_WAY, zero=DEPENDENT)[:, 0]
+        if loops.is_closed(found):
+            return found
     return None

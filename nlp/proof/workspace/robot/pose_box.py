@@ -23,6 +23,7 @@ from casadi import SX
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
+from ...statement.posed_layout import turn_about
 from ...statement.tolerance import PoseCoordinates
 
 if TYPE_CHECKING:
@@ -72,6 +73,12 @@ class PoseBox:
     def free(self) -> tuple[int, ...]:
         """Indices of the coordinates that vary."""
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
+
+    def symbols(self, z: SX) -> SX:
+        """Return the six coordinates (6, 1), of which those that vary are the first symbols of z (n, 1)."""
+        y = SX((0.5 * self.lower + 0.5 * self.upper).tolist())
+        y[list(self.free)] = z[: len(self.free)]
+        return y
 
     @cached_property
     def _inner(self) -> tuple[FloatArray, FloatArray, float]:
@@ -214,7 +221,8 @@ def _tangent(angle: float, outwards: float) -> float:
 def rotation_of(box: PoseBox, turn: SX) -> SX:
     """Return the rotation (3, 3) with coordinates (3, 1) of a box."""
     if box.kind is TurnKind.ROLL_PITCH_YAW:
-        about = [_turn(k, turn[k]) for k in range(3)]
+        factors = [2 / (1 + turn[k] * turn[k]) for k in range(3)]
+        about = [turn_about(k, factor - 1, factor * turn[k]) for k, factor in enumerate(factors)]
         return about[2] @ about[1] @ about[0]
     r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
     scaled = 2 / (1 + ca.sumsqr(r)) * r
@@ -227,22 +235,12 @@ def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
         turned, scale = SX.eye(3), SX(1)
         for k in range(3):
             one = 1 + turn[k] ** 2
-            i, j = (k + 1) % 3, (k + 2) % 3
-            single = SX.eye(3) * one
-            single[i, i] = single[j, j] = 1 - turn[k] ** 2
-            single[j, i], single[i, j] = 2 * turn[k], -2 * turn[k]
-            turned, scale = single @ turned, one * scale
+            turned, scale = turn_about(k, 1 - turn[k] ** 2, 2 * turn[k], one) @ turned, one * scale
         return turned, scale
-    r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
+    return cayley_rotation(turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist()))
+
+
+def cayley_rotation(r: SX) -> tuple[SX, SX]:
+    """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a Cayley vector (3, 1)."""
     square = ca.sumsqr(r)
     return (1 - square) * SX.eye(3) + 2 * (r @ r.T) + 2 * ca.skew(r), 1 + square
-
-
-def _turn(about: int, tangent: SX) -> SX:
-    """Return the rotation about a coordinate axis by an angle, from the tangent of its half."""
-    i, j = (about + 1) % 3, (about + 2) % 3
-    factor = 2 / (1 + tangent * tangent)
-    matrix = SX.eye(3)
-    matrix[i, i] = matrix[j, j] = factor - 1
-    matrix[j, i], matrix[i, j] = factor * tangent, -factor * tangent
-    return matrix

@@ -22,7 +22,7 @@ so lose the division: their forms over a box are then exact but for terms of thi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -32,6 +32,7 @@ from casadi import SX
 
 from .....models import Actuator, FloatArray, Member, Model, Substitution, Wrench, WrenchKind, jacobian, rate_relations
 from .....models.instance import homogenised, sizes_at
+from .....models.member import scaled_twists
 from ....case.case import Case
 from ....case.pose import Free
 from .closed_loops import Loops
@@ -92,11 +93,7 @@ class Limbs:
 
     def twists(self, screws: SX) -> SX:
         """Return twists (6, k), angular velocity, then velocity at the world's origin, as ``(v, length omega)``."""
-        found = [
-            ca.vertcat(screws[3:, j] + ca.cross(screws[:3, j], self.position), self.length * screws[:3, j])
-            for j in range(screws.shape[1])
-        ]
-        return ca.horzcat(SX(6, 0), *found)
+        return scaled_twists(screws, self.position, SX(self.length), 6)
 
 
 def locked_matrix(limbs: Limbs) -> SX:
@@ -182,80 +179,71 @@ class PosedModel:
     Attributes:
         loops: equations of order 1 in the coordinates.
         free: indices of the pose's numbers, which are the first coordinates.
-        limbs: rows, members and actuators.
+        limbs: rows, members and actuators, with symbols for the rotation.
         characteristic_length: by which couples are multiplied in J.
-        turned: the limbs with ``inverse * s R`` as the rotation.
-        inverse: symbol that stands for ``1 / s``.
-        scale: ``s``, a polynomial.
-        symbols: of the model: parameters, unknowns, rotation, position.
-        given: what is put in their place, plain and turned.
+        rotation: (3, 3) these symbols of the rotation R.
+        turned: R, ``s R`` and the polynomial ``s`` in the coordinates.
     """
 
     loops: Loops
     free: tuple[int, ...]
     limbs: Limbs
     characteristic_length: float
-    turned: Limbs
-    inverse: SX
-    scale: SX
-    symbols: list[SX]
-    given: tuple[list[SX], list[SX]]
+    rotation: SX
+    turned: tuple[SX, SX, SX]
 
     @property
     def z(self) -> SX:
         """Symbols (n, 1) of the coordinates."""
         return self.loops.z
 
+    def plain(self, expression: SX) -> SX:
+        """Return an expression of the limbs in the coordinates."""
+        return ca.substitute(expression, self.rotation, self.turned[0])
+
     def values(self, expression: SX, z: FloatArray) -> FloatArray:
-        """Return a matrix of expressions at a point (n,)."""
-        return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
+        """Return a matrix of expressions of the limbs at a point (n,)."""
+        return np.asarray(ca.Function("values", [self.z], [ca.densify(self.plain(expression))])(z).full())
 
     def reduced(self, chosen: Chosen) -> PosedModel:
         """Return the model with the equations and screws that are chosen."""
-        limbs, turned = (each.reduced(*chosen[1:]) for each in (self.limbs, self.turned))
-        return replace(self, loops=self.loops.some(chosen.equations), limbs=limbs, turned=turned)
+        return replace(self, loops=self.loops.some(chosen.equations), limbs=self.limbs.reduced(*chosen[1:]))
 
     @property
     def locked(self) -> RankMatrix:
         """The matrix with locked actuators, rows that are linear in the rotation without a division."""
-        return RankMatrix(self.polynomial(locked_matrix(self.limbs), locked_matrix(self.turned)), 0)
+        return RankMatrix(self.polynomial(locked_matrix(self.limbs)), 0)
+
+    @property
+    def unlocked(self) -> SX:
+        """The matrix with free actuators."""
+        return ca.sparsify(self.plain(free_matrix(self.limbs)))
 
     @property
     def scaled(self) -> ScaledRows:
         """J with moments about the platform's origin divided by the length of the limbs."""
-
-        def wrenches(limbs: Limbs) -> SX:
-            """Return rows of forces and couples, and 1 in a last column: the factor that makes them polynomials."""
-            rows = [ca.horzcat(limbs.about_platform(row), 1) for row in limbs.wrenches]
-            return ca.vertcat(SX(0, 7), *rows)
-
         L, limbs = SX(self.characteristic_length), self.limbs
-        rows = ca.densify(self.polynomial(wrenches(limbs), wrenches(self.turned)))
+        # Rows of forces and couples, and 1 in a last column: the factor that makes them polynomials.
+        wrenches = [ca.horzcat(limbs.about_platform(row), 1) for row in limbs.wrenches]
+        rows = ca.densify(self.polynomial(ca.vertcat(SX(0, 7), *wrenches)))
         factors = [L if row.kind is WrenchKind.COUPLE else SX(1) for row in limbs.wrenches]
-        sizes = [rows[i, 6] * ca.sqrt(row.square) / factors[i] for i, row in enumerate(limbs.wrenches)]
+        sizes = [rows[i, 6] * ca.sqrt(self.plain(row.square)) / factors[i] for i, row in enumerate(limbs.wrenches)]
         of_members = ca.horzcat(*homogenised(jacobian([], L, limbs.members), limbs.position, limbs.length))
+        of_members = self.plain(of_members)
         ones = SX.ones(of_members.shape[0])
         return ScaledRows(ca.vertcat(rows[:, :6], of_members), ca.vertcat(SX(0, 1), *sizes, ones))
 
-    def scaled_points(self, points: SX) -> tuple[SX, SX]:
-        """Return points (3 k, 1) in the symbols of the model as expressions of the coordinates, and these times s."""
-        function = ca.Function("points", self.symbols, [points])
-        plain, turned = (ca.horzcat(function.call(each)[0], SX.ones(points.shape[0])) for each in self.given)
-        rows = self.polynomial(plain, turned)
-        scaled = [rows[i, 0] * (self.scale if rows[i, 1].is_one() else 1) for i in range(rows.shape[0])]
-        return plain[:, 0], ca.vertcat(SX(0, 1), *scaled)
+    def polynomial(self, matrix: SX) -> SX:
+        """Return a matrix (m, c) of the limbs in the coordinates.
 
-    def polynomial(self, plain: SX, turned: SX) -> SX:
-        """Return a matrix whose rows that are linear in the rotation are multiplied by its scale, without a division.
-
-        Args:
-            plain: (m, c).
-            turned: the same with ``inverse * s R`` as the rotation.
+        Rows that are linear in the rotation are multiplied by its scale, without a division.
         """
-        slopes = ca.reshape(ca.jacobian(ca.densify(turned), self.inverse), *turned.shape)
-        constant = ca.substitute(turned, self.inverse, 0)
+        (_, turned, scale), inverse, plain = self.turned, SX.sym("1 / s"), self.plain(matrix)
+        whole = ca.substitute(matrix, self.rotation, inverse * turned)
+        slopes = ca.reshape(ca.jacobian(ca.densify(whole), inverse), *whole.shape)
+        constant = ca.substitute(whole, inverse, 0)
         found = [
-            plain[i, :] if ca.depends_on(slopes[i, :], self.inverse) else constant[i, :] * self.scale + slopes[i, :]
+            plain[i, :] if ca.depends_on(slopes[i, :], inverse) else constant[i, :] * scale + slopes[i, :]
             for i in range(plain.shape[0])
         ]
         return ca.sparsify(ca.vertcat(SX(0, plain.shape[1]), *found))
@@ -274,12 +262,12 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
     free, errors = box.free, SX(0, 1) if errors is None else errors
     if z is None:
         z = ca.vertcat(SX(0, 1), *[SX.sym(f"y{k}") for k in free], *[SX.sym(item.name) for item in model.unknowns])
-    y = SX((0.5 * box.lower + 0.5 * box.upper).tolist())
-    y[list(free)] = z[: len(free)]
+    y = box.symbols(z)
     position, turn = y[:3], y[3:]
     values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
     numbers = ca.vertcat(SX(0, 1), *values, errors)
-    given = Substitution(numbers, z[len(free) :], rotation_of(box, turn), position)
+    own = Substitution.identity(model)
+    given = replace(own, parameters=numbers, unknowns=z[len(free) :], position=position)
     every = (*model.closure, *model.loops)
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
@@ -289,38 +277,26 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
         *[each.value for each in model.signs],
         *[each.expression for each in every],
     ]
-    symbols = Substitution.identity(model).all
-    function = ca.Function("model", symbols, outputs)
-
-    def limbs_of(following: Iterator[SX]) -> Limbs:
-        """Return the limbs from the first outputs."""
-        rows = [
-            replace(row, force=next(following), moment=next(following), square=next(following))
-            for row in model.wrenches
-        ]
-        members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
-        driven = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
-        return Limbs(rows, members, driven, [next(following) for _ in model.nested], position, 1.0)
-
-    following = iter(function.call(given.all))
-    limbs, signs = limbs_of(following), [next(following) for _ in model.signs]
-    polynomial, scale = polynomial_rotation(box, turn)
-    inverse = SX.sym("inverse")
-    turned = replace(given, rotation=inverse * polynomial)
+    following = iter(ca.Function("model", own.all, outputs).call(given.all))
+    rows = [
+        replace(row, force=next(following), moment=next(following), square=next(following)) for row in model.wrenches
+    ]
+    members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
+    driven = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
+    nested, signs = ([next(following) for _ in each] for each in (model.nested, model.signs))
+    limbs = Limbs(rows, members, driven, nested, position, 1.0)
     ones = SX.ones(len(every) + len(model.unknowns))
     sizes = sizes_at(model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), ones)
     scaled = [next(following) / sizes[k] for k in range(len(every))]
     ranges = (0.5 * (box.upper - box.lower))[list(free)]
     size = np.concatenate([ranges, np.array(ca.DM(sizes[len(every) :, :])).ravel()])
-    whole = ca.vertcat(SX(0, 1), *scaled)
+    turned = rotation_of(box, turn), *polynomial_rotation(box, turn)
+    whole, positive = (ca.substitute(ca.vertcat(SX(0, 1), *each), own.rotation, turned[0]) for each in (scaled, signs))
     return PosedModel(
-        loops=Loops(z, whole[: len(model.closure)], whole, ca.vertcat(SX(0, 1), *signs), size),
+        loops=Loops(z, whole[: len(model.closure)], whole, positive, size),
         free=free,
         limbs=limbs,
         characteristic_length=case.characteristic_length,
-        turned=limbs_of(iter(function.call(turned.all))),
-        inverse=inverse,
-        scale=scale,
-        symbols=symbols,
-        given=(given.all, turned.all),
+        rotation=own.rotation,
+        turned=turned,
     )

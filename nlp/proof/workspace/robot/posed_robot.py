@@ -23,9 +23,9 @@ from .....models.rows import independent_rows
 from ....case.case import Case
 from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
-from .closed_loops import Loops, closed_from_home
+from .closed_loops import DEPENDENT, Loops, closed_from_home
 from .pose_box import PoseBox
-from .posed_model import Chosen, Limbs, PosedModel, RankMatrix, ScaledRows, free_matrix, posed_model
+from .posed_model import Chosen, PosedModel, RankMatrix, ScaledRows, posed_model
 
 #: Points of the workspace at which the equations that are needed are found, beside its middle, and number of machines
 #: in which those that were left out are tested.
@@ -127,6 +127,12 @@ class Problem:
         own = z[self.of_errors].reshape(-1, 3)
         return JointErrors(self.names, frozen_array(own, own.shape))
 
+    def with_errors(self, z: FloatArray, slopes: FloatArray) -> FloatArray:
+        """Return points (P, n) with errors as large as the tolerance along derivatives (P, 3 m)."""
+        z = z.copy()
+        z[:, self.of_errors] = steepest(slopes.reshape(len(z), -1, 3), self.tolerance).reshape(len(z), -1)
+        return z
+
     def within(self, z: FloatArray) -> FloatArray:
         """Return points (..., n) with the pose moved into the workspace, and the errors into the tolerance."""
         z = z.copy()
@@ -161,7 +167,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     dependent = _dependent(loops, start, count)
     # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
     middle[list(dependent)] = start[list(dependent)]
-    moved = loops.all_closed(middle[:, None], list(dependent))[:, 0]
+    moved = loops.all_closed(middle[:, None], dependent)[:, 0]
     start = moved if loops.is_closed(moved) else start
     chosen = _chosen(posed, model, start, needed, case.characteristic_length)
     posed = posed.reduced(chosen)
@@ -200,26 +206,26 @@ def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) 
         loops=Loops(ca.vertcat(design.z, errors), loops.equations, loops.every, loops.signs, size),
         start=np.concatenate([design.start, np.zeros(errors.numel())]),
         locked=posed.locked,
-        unactuated=None if free is None else RankMatrix(free_matrix(posed.limbs), free.nullity),
+        unactuated=None if free is None else RankMatrix(posed.unlocked, free.nullity),
         scaled=posed.scaled,
         names=built.names,
         tolerance=tolerance,
         design=design,
     )
     if built.names:
-        _check_freedoms(family, whole.limbs)
+        _check_freedoms(family, whole)
     return family
 
 
-def _check_freedoms(family: Problem, limbs: Limbs) -> None:
+def _check_freedoms(family: Problem, whole: PosedModel) -> None:
     """Refuse machines in which equations or screws that were left out do not follow from the others.
 
     Raises:
         NotJudgedError: they do not follow at random errors.
     """
     loops, own, errors = family.loops, list(family.independent), family.of_errors
-    members = [each for each in limbs.members if each.rank < each.screws.shape[1]]
-    columns = [scaled_twists(each.screws, each.centre, SX(family.length), each.size) for each in members]
+    members = [each for each in whole.limbs.members if each.rank < each.screws.shape[1]]
+    columns = [whole.plain(scaled_twists(each.screws, each.centre, SX(family.length), each.size)) for each in members]
     function = ca.Function("every", [family.z], [ca.densify(each) for each in (loops.every, *columns)])
     rng = np.random.default_rng(_SEED)
     for _ in range(_POINTS):
@@ -227,8 +233,8 @@ def _check_freedoms(family: Problem, limbs: Limbs) -> None:
         z = family.start.copy()
         z[own] += _SPREAD * family.size[own] * rng.uniform(-1, 1, len(own))
         z[errors] = _OFF * family.length * rng.uniform(-1, 1, len(errors))
-        found = loops.closed(z, list(family.dependent))
-        if found is None:
+        found = loops.all_closed(z[:, None], family.dependent)[:, 0]
+        if not np.isfinite(found).all():
             raise NotJudgedError("the loops do not close with errors of joint centres in the middle of the workspace")
         every, *screws = (np.array(each) for each in function.call([ca.DM(found)]))
         if float(np.abs(every).max(initial=0.0)) > _CLOSED:
@@ -245,13 +251,11 @@ def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     rng = np.random.default_rng(_SEED)
     slopes = [loops.slopes(start[:, None])[0] * loops.size]
     for _ in range(_POINTS):
-        z = start.copy()
-        z[:count] += _SPREAD * loops.size[:count] * rng.uniform(-1, 1, count)
-        found = loops.closed(z, list(range(count, len(z)))) if len(z) > count else z
-        if found is None or not loops.is_closed(found):
-            found = loops.closed(z, list(range(len(z))))
-        if found is not None and loops.is_closed(found):
-            slopes.append(loops.slopes(found[:, None])[0] * loops.size)
+        z = start[:, None].copy()
+        z[:count, 0] += _SPREAD * loops.size[:count] * rng.uniform(-1, 1, count)
+        every = (loops.all_closed(z, range(begin, len(z)), zero=DEPENDENT) for begin in (count, 0))
+        found = next((each for each in every if loops.is_closed(each[:, 0])), None)
+        slopes += [] if found is None else [loops.slopes(found)[0] * loops.size]
     if not any(np.abs(each).max() > _ZERO for each in slopes):
         return ()
     return tuple(sorted(independent_rows(slopes)))
@@ -332,7 +336,7 @@ def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatri
     generic, limbs = model.generic, posed.limbs
     if (generic is not None and generic.constraints == 0) or (not limbs.actuators and model.members):
         return None
-    matrix = free_matrix(limbs)
+    matrix = posed.unlocked
     if not matrix.numel():
         return None
     freedoms, idle = matrix.shape[1] - _rank_of(posed.values(matrix, start)), 0

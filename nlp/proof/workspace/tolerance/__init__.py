@@ -1,5 +1,5 @@
 """Numbers of any robot over every machine within a tolerance of joint centres.
 
 The modules import each other in this order: ``second_order_change`` (bounds of second derivatives by the errors),
-``machines`` (all claims); and by itself ``leg_errors`` (worst machines of six straight legs).
+``machines`` (all claims).
 """
