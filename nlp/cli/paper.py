@@ -74,7 +74,7 @@ def verify_paper(proof: Proof, case: Case, leg_error: float) -> None:
     from ..proof.checker.premises import exact
     from ..proof.checker.proof_file import ProofError
     from ..proof.checker.workspace.check import check_workspace_proof
-    from ..proof.checker.workspace.statement import ERRORS
+    from ..proof.statement.claims import ERRORS
 
     try:
         checked = check_workspace_proof(proof, case, leg_error=leg_error)
@@ -91,7 +91,7 @@ def verify_paper(proof: Proof, case: Case, leg_error: float) -> None:
         typer.echo(f"  {one_line(line)}")
     legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
     for each in checked.claims:
-        of = f", for lengths of legs that are {legs}" if each.name in ERRORS else ""
+        of = f", for lengths of legs that are {legs}" if any(each.name == error.name for error in ERRORS) else ""
         typer.echo(f"  {one_line(each.name)}: {_words(each, case)}{of}")
     _echo_unproved(proof.unproved, err=False)
     if proof.unproved:

@@ -1,17 +1,20 @@
-"""Claims about numbers over a workspace: limits of a case, lengths of legs, F of each task, measures of the robot."""
+"""Claims about a workspace: ranks, limits of a case, lengths of legs, F of each task, measures of the robot."""
 
 from __future__ import annotations
 
+import enum
+import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
-from ...case.limits.constraint import SQUARED_LENGTH, Reading
+from ...case.limits.clearance import LegClearance
+from ...case.limits.constraint import LENGTH, NUMBER, SQUARED_LENGTH, Reading
 from ...case.limits.legs import Actuator, LegLength
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...case.task import Sense
@@ -25,10 +28,21 @@ if TYPE_CHECKING:
 REGULAR, CONSTRAINTS = "regular", "constraints regular"
 #: Key of the claims that limbs reach every pose.
 REACH = "reach"
-#: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
-_OWN_SEARCHES = ("leg_clearance", "smallest_singular_value", "condition_number")
 #: Names of the measures that are no quantities of a robot.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
+#: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
+_OWN_SEARCHES = (LegClearance.key, *SPECTRAL)
+
+
+class ClaimKind(enum.Enum):
+    """What a claim is about, which decides its rule."""
+
+    RANK = "rank of J, or of the constraint wrenches"
+    EXPRESSION = "expression of the pose"
+    LENGTHS = "shortest and longest length of a leg, combined"
+    CLEARANCE = "distance between two legs"
+    SPECTRUM = "smallest singular value of J, or its condition number"
+    ERROR = "error of the pose"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,22 +52,40 @@ class Claim:
     Attributes:
         name: in the words of a case.
         sense: whether the smallest or the largest value is meant.
-        expression: (1, 1) in the symbols of the layout; it grows with the number.
-        reading: how the expression reads as the number.
+        expression: (1, 1) in the symbols of the layout, of this kind; it grows with the number.
+        reading: how the expression, or the number of another kind, reads in results.
         key: dotted key, below ``limits``, of the number in the case; empty where the number has no limit.
         limit: largest or smallest value allowed of the expression; None where the number has no limit.
-        leg: index of the leg whose length the number is; None for another.
+        kind: what the claim is about.
+        legs: index of the leg whose length, or lengths, the number is; of the two legs of a clearance; else empty.
+        weights: of the longest and of the shortest length of this leg, where they are combined.
+        length: by which moments are divided in a spectrum, length.
         uncovered: reason for a claim about the exact machine where others are meant; else empty.
     """
 
     name: str
     sense: Sense
-    expression: SX
-    reading: Reading
+    expression: SX = field(default_factory=SX)
+    reading: Reading = NUMBER
     key: str = ""
     limit: float | None = None
-    leg: int | None = None
+    kind: ClaimKind = ClaimKind.EXPRESSION
+    legs: tuple[int, ...] = ()
+    weights: tuple[float, float] = (0.0, 0.0)
+    length: float = 1.0
     uncovered: str = ""
+
+    @property
+    def label(self) -> tuple[str, str]:
+        """Name and sense, which tell claims apart; a rank has no sense."""
+        return self.name, "" if self.kind is ClaimKind.RANK else self.sense.value
+
+
+#: Errors of the platform's position and rotation, for machines within their tolerances.
+ERRORS = (
+    Claim("position error", Sense.MAX, reading=LENGTH, kind=ClaimKind.ERROR),
+    Claim("rotation error", Sense.MAX, reading=Reading(Dimension.ANGLE), kind=ClaimKind.ERROR),
+)
 
 
 def one_machine_name(claim: str) -> str:
@@ -61,21 +93,51 @@ def one_machine_name(claim: str) -> str:
     return f"{claim}, lengths of one machine"
 
 
-def asked_spectra(case: Case, names: Sequence[str]) -> list[str]:
-    """Return the measures of the singular values of J among names; not those that are limited with the same length."""
-    length = case.characteristic_length
-    same = [each for each in case.limits if isinstance(each, SmallestSingularValue | ConditionNumber)]
-    limited = {each.key for each in same if each.length == length}
-    return [name for name in dict.fromkeys(names) if name in SPECTRAL and name not in limited]
+def length_claims(case: Case) -> Iterator[Claim]:
+    """Yield the claims about the stroke, and about the dead length, of each telescoping leg."""
+    for limit in (each for each in case.limits if isinstance(each, Actuator)):
+        ends = (
+            ("stroke_max", Sense.MAX, limit.stroke_max, (1.0, -1.0)),
+            ("dead_length", Sense.MIN, limit.dead_length, (-1.0, 2.0)),
+        )
+        for (i, leg), (end, sense, value, weights) in itertools.product(enumerate(case.model.legs), ends):
+            if value is not None:
+                key = f"{limit.key}.{end}"
+                number = Claim(f"{key} limb {leg.name}", sense, reading=LENGTH, key=key, limit=value)
+                yield replace(number, kind=ClaimKind.LENGTHS, legs=(i,), weights=weights)
 
 
-def asked_name(case: Case, name: str) -> str:
-    """Return the name of a measure of the singular values of J that is asked for.
+def searched_claims(case: Case, quantities: Sequence[str] = ()) -> Iterator[Claim]:
+    """Yield the claims about clearances of legs and about spectra, first those of the case's limits.
 
-    A limit on it divides moments by a length of its own, and has the shorter name.
+    The smallest singular value, or the largest condition number, is yielded where it is among the quantities and the
+    case does not limit it; moments about the platform's origin are then divided by the characteristic length.
     """
-    is_limited = any(limit.key == name for limit in case.limits)
-    return f"{name} with the characteristic length" if is_limited else name
+    limited = dict[str, float]()
+    for limit in case.limits:
+        if isinstance(limit, SmallestSingularValue):
+            limited[limit.key] = limit.length
+            yield _spectrum(limit.key, limit.length, f"{limit.key}.min", limit.min)
+        elif isinstance(limit, ConditionNumber):
+            limited[limit.key] = limit.length
+            yield _spectrum(limit.key, limit.length, f"{limit.key}.max", limit.max)
+        elif isinstance(limit, LegClearance):
+            for (i, one), (j, other) in itertools.combinations(enumerate(case.model.legs), 2):
+                name = f"{limit.key} limbs {one.name} and {other.name}"
+                number = Claim(name, Sense.MIN, reading=LENGTH, key=f"{limit.key}.min", limit=limit.min)
+                yield replace(number, kind=ClaimKind.CLEARANCE, legs=(i, j))
+    length = case.characteristic_length
+    for measure in dict.fromkeys(quantities):
+        if measure in SPECTRAL and limited.get(measure) != length:
+            asked = _spectrum(measure, length)
+            # A limit on it divides moments by a length of its own, and has the shorter name.
+            yield replace(asked, name=f"{measure} with the characteristic length") if measure in limited else asked
+
+
+def _spectrum(measure: str, length: float, key: str = "", limit: float | None = None) -> Claim:
+    """Return the claim about the smallest singular value of J, or about its condition number."""
+    sense = Sense.MAX if measure == ConditionNumber.key else Sense.MIN
+    return Claim(measure, sense, key=key, limit=limit, kind=ClaimKind.SPECTRUM, length=length)
 
 
 def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective: bool = True) -> list[Claim]:
@@ -117,7 +179,7 @@ def _of_legs(layout: Layout) -> Iterator[Claim]:
             allowed = None if limit is None else getattr(limit, sense.value)
             key, square = ("", None) if allowed is None else (f"leg_length.{sense.value}", allowed**2)
             name = f"leg_length limb {leg.name}"
-            yield Claim(name, sense, ca.sumsqr(leg.span), SQUARED_LENGTH, key, square, leg=i)
+            yield Claim(name, sense, ca.sumsqr(leg.span), SQUARED_LENGTH, key, square, legs=(i,))
 
 
 def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:

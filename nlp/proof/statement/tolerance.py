@@ -260,4 +260,4 @@ def length_of_one_machine(machines: MachineLayout, leg: int, sense: Sense, about
     e, f = machines.errors[6 * leg : 6 * leg + 3], machines.errors[6 * leg + 3 : 6 * leg + 6]
     same = ca.dot(f, SX(about.platform.tolist())) - ca.dot(e, SX(about.base.tolist()))
     length = ca.norm_2(machines.layout.robots[0].legs[leg].span)
-    return Claim(one_machine_name(about.claim), sense, length - same, LENGTH, leg=leg)
+    return Claim(one_machine_name(about.claim), sense, length - same, LENGTH, legs=(leg,))

@@ -277,7 +277,7 @@ class _Numbers:
         if is_requested() or (about is not None and self.machines is None):
             return None
         if about is None or self.machines is None:
-            claim = next(each for each in self._claims if each.leg == leg and each.sense is sense)
+            claim = next(each for each in self._claims if each.legs == (leg,) and each.sense is sense)
         else:
             claim = length_of_one_machine(self.machines.symbols, leg, sense, about)
             if self.paper is not None:

@@ -15,8 +15,8 @@ from ..certificate.certificate import CertificateStatus
 from ..checker.premises import fingerprint
 from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_numbers
 from ..checker.tree import Node
-from ..checker.workspace.statement import ERRORS, ExpectedClaim, expected_claims, legs_numbers, robot_claims
-from ..statement.claims import REACH, REGULAR, one_machine_name
+from ..checker.workspace.statement import expected_claims, legs_numbers, robot_claims
+from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_machine_name
 from ..statement.machine import INSIDE, legs_of
 from ..statement.tolerance import second_order_name
 from .numbers.extremes import slack_of
@@ -25,7 +25,6 @@ from .verdict import Outcome, RankVerdict
 if TYPE_CHECKING:
     from ...program.nlp import Nlp
     from ..certificate.certificate import Certificate
-    from ..statement.claims import Claim
     from ..statement.tolerance import Directions
     from .judge import Judgement
     from .numbers.extremes import Extreme
@@ -110,16 +109,16 @@ def paper_of(
     unproved = []
     for each in expected:
         try:
-            writer.proved[each.key] = writer.proof(each)
+            writer.proved[each.label] = writer.proof(each)
         except ProofError as error:
-            unproved.append(Unproved(*each.key, str(error)))
-    known = {each.key for each in expected}
+            unproved.append(Unproved(*each.label, str(error)))
+    known = {each.label for each in expected}
     unproved += [Unproved(*key, _NO_RULES) for key in writer.extremes if key not in known]
     # The whole errors follow from those of first order together, and from the lengths of legs.
-    missing = [each for each in ERRORS if (each, "max") not in writer.proved]
+    missing = [each for each in ERRORS if each.label not in writer.proved]
     for other in ERRORS if len(missing) == 1 else ():
-        if writer.proved.pop((other, "max"), None):
-            unproved.append(Unproved(other, "max", f"the {missing[0]} has no proof"))
+        if writer.proved.pop(other.label, None):
+            unproved.append(Unproved(*other.label, f"the {missing[0].name} has no proof"))
     premises = Premises(
         workspace=workspace_numbers(judged.workspace),
         legs=legs_numbers(legs_of(judged.case)),
@@ -152,7 +151,7 @@ class _Writer:
         self.extremes = {(each.name, each.sense.value): each for each in reversed(judged.extremes)}
         self.proved: dict[Key, ProofClaim] = {}
 
-    def proof(self, each: ExpectedClaim) -> ProofClaim:
+    def proof(self, each: Claim) -> ProofClaim:
         """Return a claim with its proof; one that rests on others comes after them.
 
         Raises:
@@ -160,16 +159,16 @@ class _Writer:
         """
         if self._case.joint_centre_tolerance and self.robot.machines is None:
             raise ProofError(_AS_BUILT)
-        if each.kind == "rank":
+        if each.kind is ClaimKind.RANK:
             return self._rank(each.name)
-        if each.key not in self.extremes:
+        if each.label not in self.extremes:
             raise ProofError(_NOT_JUDGED)
-        found = self.extremes[each.key]
+        found = self.extremes[each.label]
         if found.outcome is not Outcome.PROVED:
             raise ProofError(_words(found))
-        if each.kind == "number":
+        if each.kind is ClaimKind.EXPRESSION:
             return self._program(found)
-        if each.kind == "lengths":
+        if each.kind is ClaimKind.LENGTHS:
             return self._of_lengths(found)
         return self._boxes(each, found)
 
@@ -222,11 +221,11 @@ class _Writer:
         sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
         return ProofClaim(found.name, found.sense.value, "one machine", found.bound, sides=sides)
 
-    def _boxes(self, each: ExpectedClaim, found: Extreme) -> ProofClaim:
+    def _boxes(self, each: Claim, found: Extreme) -> ProofClaim:
         """Return a claim with a tree of a search of its own."""
-        if each.kind == "error" or (self._case.joint_centre_tolerance and each.kind != "clearance"):
+        if each.kind is ClaimKind.ERROR or (self._case.joint_centre_tolerance and each.kind is not ClaimKind.CLEARANCE):
             self._need_lengths([leg.name for leg in self._case.model.legs], ("min",))
-        if each.kind == "error":
+        if each.kind is ClaimKind.ERROR:
             bound = self._record.firsts[each.name] * (1 + _OUTWARDS)
         else:
             sign = found.sense.sign
@@ -236,7 +235,7 @@ class _Writer:
             if not math.isfinite(bound) or (each.limit is None and not bound > 0):
                 raise ProofError(_NO_BOUND)
         tree = self._record.own(each.name).tree(with_open=True)
-        return ProofClaim(each.name, each.sense, "boxes", bound, tree=tree)
+        return ProofClaim(*each.label, "boxes", bound, tree=tree)
 
     def _need_lengths(self, legs: Sequence[str], senses: Sequence[str]) -> None:
         """Refuse a claim where the shortest, or longest, lengths of legs that it rests on have no proof.

@@ -21,7 +21,7 @@ from ....case.limits.constraint import LENGTH
 from ....case.task import Sense
 from ....errors import InputError, UncoveredError
 from ....program.layout import Layout
-from ...statement.claims import REACH, Claim
+from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
 from ...statement.machine import Legs, check_leg_error, workspace_of_case
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name
@@ -32,12 +32,14 @@ from .motion_matrix import PosedRobot
 from .number_claims import ClearanceClaim, ErrorClaim, SecondOrderClaim, SingularClaim, change_of_jacobian, whole_errors
 from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
 from .ranks import rank_claim
-from .statement import ERRORS, ExpectedClaim, Machines, expected_claims, hold_premises, leg_error_of, robot_claims
+from .statement import Machines, expected_claims, hold_premises, leg_error_of, robot_claims
 
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
 #: Part of a limit by which a bound may be beyond it and still count as on it: rounding, as in the search.
 _ON_LIMIT = 1e-9
+#: Names of the errors of the pose, whose bounds to first order a proof states.
+_FIRSTS = tuple(each.name for each in ERRORS)
 #: The tree of one leaf.
 _WHOLE = bytes([Node.BOUNDED])
 
@@ -99,7 +101,7 @@ def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -
     check_leg_error(case, leg_error)
     checker = _Checker(proof, case, leg_error)
     given = {(each.name, each.sense): each for each in proof.claims}
-    expected = {each.key: each for each in checker.expected}
+    expected = {each.label: each for each in checker.expected}
     # What a proof does not claim may be more than the claims that have proofs at all.
     named = [*given, *(key for each in proof.unproved if (key := (each.name, each.sense)) in expected)]
     if sorted(named) != sorted(expected) or len(given) != len(proof.claims):
@@ -126,7 +128,7 @@ class _Checker:
         hold_premises(case, workspace, robot.legs, leg_error, premises)
         self._case, self._root, self._tolerance = case, pose_root(workspace), case.joint_centre_tolerance or 0.0
         self._firsts = {
-            each.name: each.bound for each in proof.claims if each.name in ERRORS and each.bound is not None
+            each.name: each.bound for each in proof.claims if each.name in _FIRSTS and each.bound is not None
         }
         self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
         self._eps = leg_error_of(case, leg_error)
@@ -137,31 +139,31 @@ class _Checker:
         except InputError as error:
             raise ProofError(f"the proof names a measure that the case does not have: {error}") from None
 
-    def check(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+    def check(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check one claim."""
-        rules: dict[tuple[str, str], Callable[[ExpectedClaim, ProofClaim], float]] = {
-            ("number", "program"): self._number,
-            ("lengths", "lengths"): self._lengths,
-            ("lengths", "one machine"): self._lengths,
-            ("error", "boxes"): self._error,
-            ("clearance", "boxes"): self._clearance,
-            ("singular value", "boxes"): self._singular,
+        rules: dict[tuple[ClaimKind, str], Callable[[Claim, ProofClaim], float]] = {
+            (ClaimKind.EXPRESSION, "program"): self._number,
+            (ClaimKind.LENGTHS, "lengths"): self._lengths,
+            (ClaimKind.LENGTHS, "one machine"): self._lengths,
+            (ClaimKind.ERROR, "boxes"): self._error,
+            (ClaimKind.CLEARANCE, "boxes"): self._clearance,
+            (ClaimKind.SPECTRUM, "boxes"): self._singular,
         }
         if self._tolerance and self.robot.machines is None:
             raise ProofError("errors of joint centres take freedoms from this robot")
-        if each.kind == "rank" and given.reason in ("regular", "singular"):
+        if each.kind is ClaimKind.RANK and given.reason in ("regular", "singular"):
             return self._rank(each, given)
         if (each.kind, given.reason) not in rules:
             raise ProofError(f"'{given.reason}' is no reason of this claim")
         _stated(given)
         bound, limit, read = rules[each.kind, given.reason](each, given), each.limit, each.reading.from_value
         if limit is not None:
-            beyond = bound - limit if each.sense == Sense.MAX.value else limit - bound
+            beyond = bound - limit if each.sense is Sense.MAX else limit - bound
             if not beyond <= _ON_LIMIT * max(abs(limit), abs(bound)):
                 raise ProofError(f"the bound {bound:.10g} does not keep the case's limit {limit:.10g}")
-        self._bounds[each.key] = bound
+        self._bounds[each.label] = bound
         kept = None if limit is None else read(limit)
-        return CheckedClaim(each.name, each.sense, each.reading.dimension, read(bound), kept)
+        return CheckedClaim(*each.label, each.reading.dimension, read(bound), kept)
 
     def _show(self, claim: BoxClaim, tree: bytes) -> None:
         """Show a claim on every leaf of a tree."""
@@ -169,7 +171,7 @@ class _Checker:
         self.leaves += leaves
         self.pieces += pieces
 
-    def _rank(self, each: ExpectedClaim, given: ProofClaim) -> CheckedClaim:
+    def _rank(self, each: Claim, given: ProofClaim) -> CheckedClaim:
         """Check that J, or the constraint wrenches, keep their rank, or that J is singular between two points."""
         is_refuted, machines = given.reason == "singular", self.robot.machines
         by_machine = is_refuted and any(len(side) > COORDINATES for side in given.sides)
@@ -185,7 +187,7 @@ class _Checker:
         else:
             self._show(claim, given.tree)
             claim.finish()
-        return CheckedClaim(each.name, each.sense, is_refuted=is_refuted, by_machine=by_machine)
+        return CheckedClaim(*each.label, is_refuted=is_refuted, by_machine=by_machine)
 
     def _program(self, expression: SX, sense: Sense, given: ProofClaim, layout: Layout) -> float:
         """Return the bound of an expression in the symbols of a layout that a tree of ``certify`` proves."""
@@ -196,14 +198,12 @@ class _Checker:
         self.pieces += checked.pieces
         return -nlp.sign * checked.bound
 
-    def _number(self, each: ExpectedClaim, given: ProofClaim) -> float:
+    def _number(self, claim: Claim, given: ProofClaim) -> float:
         """Return the bound of a number that a tree of ``certify`` proves, of all machines with a lemma."""
-        claim, layout = each.claim, each.layout
-        if claim is None or layout is None:
-            raise ProofError("the claim has no number")
+        layout = self.robot.place if claim.key == REACH else self.robot.layout
         if self.robot.machines is None:
             return self._program(claim.expression, claim.sense, given, layout)
-        if claim.key != REACH and any(reach.key not in self._bounds for reach in self.robot.reaches):
+        if claim.key != REACH and any(reach.label not in self._bounds for reach in self.robot.reaches):
             raise ProofError("the reach of limbs of every machine has no proof")
         return self._of_machines(self.robot.machines, claim, given)
 
@@ -242,7 +242,7 @@ class _Checker:
             raise ProofError("the case's robot is not six straight legs")
         return self.robot.legs, min(self._length(leg.name, Sense.MIN) for leg in self._case.model.legs)
 
-    def _lengths(self, each: ExpectedClaim, given: ProofClaim) -> float:
+    def _lengths(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of a number made of the longest and the shortest length of a leg."""
         senses, machines = (Sense.MAX, Sense.MIN), self.robot.machines
         left, (leg,) = 0.0, each.legs
@@ -262,30 +262,30 @@ class _Checker:
             left = abs(sum(each.weights)) * self._tolerance * sum(float(np.linalg.norm(side)) for side in about)
         parts = [weight * length for weight, length in zip(each.weights, lengths, strict=True)]
         off = left + 16 * _ROUNDING * (abs(parts[0]) + abs(parts[1]) + left)
-        return sum(parts) + (off if each.sense == Sense.MAX.value else -off)
+        return sum(parts) + (off if each.sense is Sense.MAX else -off)
 
-    def _clearance(self, each: ExpectedClaim, given: ProofClaim) -> float:
+    def _clearance(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of a distance between two legs, which are nearer by twice the tolerance."""
         bound, nearer = _stated(given), 2 * self._tolerance
         least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
         self._show(ClearanceClaim(self._posed, each.legs, least), given.tree)
         return bound
 
-    def _singular(self, each: ExpectedClaim, given: ProofClaim) -> float:
+    def _singular(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of the smallest singular value of J, or of its condition number."""
         bound, change = _stated(given), 0.0
         if self._tolerance:
             legs, shortest = self._of_legs()
             change = change_of_jacobian(legs, self._tolerance, each.length, shortest)
-        is_condition = each.sense == Sense.MAX.value
+        is_condition = each.sense is Sense.MAX
         self._show(SingularClaim(self._posed, each.length, bound, is_condition=is_condition, change=change), given.tree)
         return bound
 
-    def _error(self, each: ExpectedClaim, given: ProofClaim) -> float:
+    def _error(self, each: Claim, given: ProofClaim) -> float:
         """Return the bound of an error of the pose: its part of first order by a tree, the whole from both parts."""
-        if len(self._firsts) < len(ERRORS):
+        if len(self._firsts) < len(_FIRSTS):
             raise ProofError("one of the two errors has no proof")
-        position, rotation = (self._firsts[name] for name in ERRORS)
+        position, rotation = (self._firsts[name] for name in _FIRSTS)
         is_rotation = each.reading is not LENGTH
         self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.tree)
         legs, shortest = self._of_legs()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,17 +10,24 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import Dimension, Model, WrenchKind
+from .....models import Model, WrenchKind
 from .....models.joints import RobotError
 from .....models.joints.closedform import closed_form
 from ....case.case import Case
-from ....case.limits.clearance import LegClearance
-from ....case.limits.constraint import LENGTH, NUMBER, Reading
-from ....case.limits.legs import Actuator
-from ....case.limits.singular_values import ConditionNumber, SmallestSingularValue
+from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....program.layout import Layout
-from ...statement.claims import CONSTRAINTS, REGULAR, SPECTRAL, Claim, asked_name, asked_spectra, claims_of
+from ...statement.claims import (
+    CONSTRAINTS,
+    ERRORS,
+    REGULAR,
+    SPECTRAL,
+    Claim,
+    ClaimKind,
+    claims_of,
+    length_claims,
+    searched_claims,
+)
 from ...statement.machine import Legs, legs_of
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
@@ -30,44 +36,8 @@ from ..proof_file import Premises, ProofError, workspace_numbers
 from .motion_matrix import turned_rotation
 from .pose_boxes import PoseRoot, pose_root
 
-#: Errors of the pose, of its position and of its rotation, and how they read.
-ERRORS = {"position error": LENGTH, "rotation error": Reading(Dimension.ANGLE)}
 #: Part of the largest coordinate by which joint centres may differ: the same case gives other last digits elsewhere.
 _SAME = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class ExpectedClaim:
-    """A claim about a case over its workspace.
-
-    Attributes:
-        name: in the words of the command.
-        sense: ``min`` or ``max`` for a number, else empty.
-        kind: ``rank``, ``number``, ``lengths`` of a leg, ``clearance``, ``singular value`` or ``error``.
-        reading: how the number of its search reads in results.
-        limit: of this number; None without one.
-        claim: of a number that the search of ``certify`` bounds.
-        layout: whose symbols this claim has.
-        legs: indices of the two legs of a clearance, or of the leg of whose lengths the number is made.
-        weights: of the longest and of the shortest length of this leg.
-        length: by which moments are divided.
-    """
-
-    name: str
-    sense: str
-    kind: str
-    reading: Reading = NUMBER
-    limit: float | None = None
-    claim: Claim | None = None
-    layout: Layout | None = None
-    legs: tuple[int, ...] = ()
-    weights: tuple[float, float] = (0.0, 0.0)
-    length: float = 1.0
-
-    @property
-    def key(self) -> tuple[str, str]:
-        """Name and sense, which tell claims apart."""
-        return self.name, self.sense
 
 
 class Machines:
@@ -133,6 +103,7 @@ class RobotClaims:
         legs: joint centres of six straight legs; None for another robot.
         layout: the case as symbols of the pose in which its numbers are bounded: without the unknowns that follow in
             closed form, where all limbs reach every pose.
+        place: the same for claims about reach.
         model: the robot without these unknowns, over whose poses its ranks are claimed.
         reaches: claims that limbs reach every pose.
         numbers_at: assemblies that its numbers are about, in words; empty for a robot without unknowns.
@@ -143,7 +114,8 @@ class RobotClaims:
     legs: Legs | None
     layout: Layout
     model: Model
-    reaches: tuple[ExpectedClaim, ...] = ()
+    place: Layout
+    reaches: tuple[Claim, ...] = ()
     numbers_at: str = ""
     machines: Machines | None = None
 
@@ -159,20 +131,18 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         else:
             layout, home = machines.symbols.layout, "the assembly of home" if is_open else ""
             reaches, _ = machines.symbols.claims(())
-            return RobotClaims(legs, layout, closed.model, _of_numbers(reaches, layout), home, machines)
-    claims: tuple[ExpectedClaim, ...] = ()
-    if closed.reaches:
-        place, every = reach_claims(case, closed, workspace)
-        claims = _of_numbers(every, place)
-        if all(each.name in reached for each in every):
-            partly = "every assembly in which limbs in closed form are as at home"
-            numbers_at = partly if closed.model.unknowns else "the assembly of home"
-            return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, claims, numbers_at)
+            return RobotClaims(legs, layout, closed.model, layout, tuple(reaches), home, machines)
+    layout = posed_layout(case, workspace)
+    place, every = reach_claims(case, closed, workspace) if closed.reaches else (layout, ())
+    if every and all(each.name in reached for each in every):
+        partly = "every assembly in which limbs in closed form are as at home"
+        numbers_at = partly if closed.model.unknowns else "the assembly of home"
+        return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, place, every, numbers_at)
     numbers_at = "every assembly" if is_open else ""
-    return RobotClaims(legs, posed_layout(case, workspace), closed.model, claims, numbers_at)
+    return RobotClaims(legs, layout, closed.model, place, every, numbers_at)
 
 
-def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[ExpectedClaim]:
+def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[Claim]:
     """Return the claims about a case over its workspace, and about measures that were asked for.
 
     Raises:
@@ -180,8 +150,11 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
     """
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
-    every = [*(ExpectedClaim(name, "", "rank") for name in ranks), *robot.reaches, *_of_numbers(claims, robot.layout)]
-    return every if robot.legs is None else [*every, *_of_legs(case, quantities, leg_error)]
+    every = [*(Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in ranks), *robot.reaches, *claims]
+    if robot.legs is None:
+        return every
+    errors = ERRORS if leg_error_of(case, leg_error) > 0 else ()
+    return [*every, *length_claims(case), *searched_claims(case, quantities), *errors]
 
 
 def _has_constraints(model: Model) -> bool:
@@ -189,49 +162,6 @@ def _has_constraints(model: Model) -> bool:
     if model.generic is not None:
         return 0 < model.generic.constraints < 6
     return not model.members and any(row.kind is WrenchKind.COUPLE for row in model.wrenches)
-
-
-def _of_numbers(claims: Sequence[Claim], layout: Layout) -> tuple[ExpectedClaim, ...]:
-    """Return the claims about numbers that the search of ``certify`` bounds, in the symbols of a layout."""
-    return tuple(
-        ExpectedClaim(each.name, each.sense.value, "number", each.reading, each.limit, each, layout) for each in claims
-    )
-
-
-def _of_legs(case: Case, quantities: Sequence[str], leg_error: float) -> Iterator[ExpectedClaim]:
-    """Yield the claims about six straight legs that have rules of their own."""
-    names = [leg.name for leg in case.model.legs]
-    for each in case.limits:
-        if isinstance(each, Actuator):
-            yield from _of_strokes(each, names)
-        elif isinstance(each, SmallestSingularValue):
-            yield _of_spectrum(each.key, each.key, each.length, each.min)
-        elif isinstance(each, ConditionNumber):
-            yield _of_spectrum(each.key, each.key, each.length, each.max)
-        elif isinstance(each, LegClearance):
-            for i, j in itertools.combinations(range(len(names)), 2):
-                name = f"{each.key} limbs {names[i]} and {names[j]}"
-                yield ExpectedClaim(name, "min", "clearance", LENGTH, each.min, legs=(i, j))
-    for key in asked_spectra(case, quantities):
-        yield _of_spectrum(asked_name(case, key), key, case.characteristic_length)
-    if leg_error_of(case, leg_error) > 0:
-        yield from (ExpectedClaim(name, "max", "error", reading) for name, reading in ERRORS.items())
-
-
-def _of_strokes(limit: Actuator, names: Sequence[str]) -> Iterator[ExpectedClaim]:
-    """Yield the claims about the stroke of each leg with these names, and about its dead length."""
-    for k, name in enumerate(names):
-        for end, sense, weights in (("stroke_max", "max", (1.0, -1.0)), ("dead_length", "min", (-1.0, 2.0))):
-            most = getattr(limit, end)
-            if most is not None:
-                full = f"{limit.key}.{end} limb {name}"
-                yield ExpectedClaim(full, sense, "lengths", LENGTH, most, legs=(k,), weights=weights)
-
-
-def _of_spectrum(name: str, key: str, length: float, limit: float | None = None) -> ExpectedClaim:
-    """Return the claim about the smallest singular value of J, or its condition number."""
-    sense = "max" if key == ConditionNumber.key else "min"
-    return ExpectedClaim(name, sense, "singular value", limit=limit, length=length)
 
 
 def leg_error_of(case: Case, leg_error: float) -> float:

@@ -24,9 +24,7 @@ import numpy as np
 from casadi import SX
 
 from .....models import Dimension, FloatArray
-from ....case.limits.constraint import LENGTH, Reading
-from ....case.task import Sense
-from ...statement.claims import Claim
+from ...statement.claims import ERRORS
 from ...statement.machine import Legs
 from ..robot.closed_loops import Loops
 from ..robot.pose_box import PoseNumbers, cayley_rotation
@@ -44,11 +42,6 @@ _ROUNDING = 1e-10
 _STEPS = 200
 #: Gap of an error of the pose as a part of that at the middle of the workspace: a finer one takes many more boxes.
 _GAP = 0.1
-#: The errors of the pose, as claims.
-_CLAIMS = (
-    Claim("position error", Sense.MAX, SX(), LENGTH),
-    Claim("rotation error", Sense.MAX, SX(), Reading(Dimension.ANGLE)),
-)
 #: Reason for errors of which nothing is proved.
 _TOO_LARGE = "the errors are too large for a bound of their terms of second order"
 
@@ -69,7 +62,7 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
         return
     problem = subject.problem
     searches: list[tuple[WorstError, Minimum]] = []
-    for claim in _CLAIMS:
+    for claim in ERRORS:
         number = WorstError(problem, is_rotation=claim.reading.dimension is Dimension.ANGLE)
         goal = Goal(_GAP * abs(float(number.values(problem.start[None])[0, 0])))
         recorder = None if paper is None else paper.own(claim.name)
@@ -82,7 +75,7 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
     # The design's legs may be longer than those of every machine.
     exact = shortest + 2 * legs.tolerance if shortest > 0 else -math.inf
     whole = with_rest(first, eps, exact, reach)
-    for k, (claim, (number, found)) in enumerate(zip(_CLAIMS, searches, strict=True)):
+    for k, (claim, (number, found)) in enumerate(zip(ERRORS, searches, strict=True)):
         pose, worst = problem.box.pose(problem.pose_of(found.at)), eps * number.worst(found.at)
         # To first order both signs give the same error.
         both = displaced(legs, pose, np.stack([-worst, worst], axis=1))[k]

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from casadi import SX
 
 from .....models import FloatArray, Model
 from ....case.case import Case
-from ....case.limits.clearance import LegClearance
-from ....case.limits.constraint import LENGTH, NUMBER
-from ....case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ....case.task import Sense
 from ....errors import UncoveredError
-from ...statement.claims import Claim, asked_name, asked_spectra
+from ...statement.claims import Claim, ClaimKind, searched_claims
 from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
 from ..robot.posed_robot import NotJudgedError, Problem
 from .bound_search import Minimum, smallest_values
@@ -36,9 +31,6 @@ _NEAR_ZERO = 0.1
 _TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
 #: Number of poses at which the width of a bound over machines is taken, and as many near corners.
 _POINTS, _SEED = 64, 0
-
-#: A number with its limit, and the function that returns what has bounds of it, or of minus it.
-Question = tuple[Claim, Callable[[], SingularValues | Clearance]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +71,12 @@ class Subject:
             raise NotJudgedError(self.reason)
         return self.machines.problem
 
+    def number(self, claim: Claim) -> SingularValues | Clearance:
+        """Return what has bounds of the number of a claim about a clearance or a spectrum, or of minus it."""
+        if claim.kind is ClaimKind.CLEARANCE:
+            return self.clearance((claim.legs[0], claim.legs[1]))
+        return self.spectrum(claim.length, is_condition=claim.sense is Sense.MAX)
+
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
         """Return the smallest singular value of J, or minus its condition number."""
         problem = self.problem
@@ -96,10 +94,7 @@ class Subject:
 def searched_extremes(
     subject: Subject, names: Sequence[str], *, gap: float, paper: PaperRecord | None = None
 ) -> Iterator[Extreme]:
-    """Yield the extremes of the case's limits that have searches of their own, and of measures of singular values.
-
-    The smallest singular value, or the largest condition number, is yielded where it is asked for and the case does not
-    limit it; moments about the platform's origin are then divided by the case's characteristic length.
+    """Yield the extremes of :func:`~.claims.searched_claims`.
 
     Args:
         subject: the robot.
@@ -107,40 +102,14 @@ def searched_extremes(
         gap: allowed distance of a bound from the best value known, as a part of it.
         paper: records the searches for a proof.
     """
-    case, length = subject.case, subject.case.characteristic_length
-    of_limits = (question for limit in case.limits for question in questions(subject, limit))
-    asked = (_spectral(subject, name, length, asked_name(case, name)) for name in asked_spectra(case, names))
-    for question in (*of_limits, *asked):
-        yield _answer(subject, question, gap, paper)
+    for claim in searched_claims(subject.case, names):
+        yield _answer(subject, claim, gap, paper)
 
 
-def questions(subject: Subject, limit: object) -> Iterator[Question]:
-    """Yield the numbers that a limit is about."""
-    if isinstance(limit, SmallestSingularValue):
-        yield _spectral(subject, limit.key, limit.length, limit.key, f"{limit.key}.min", limit.min)
-    elif isinstance(limit, ConditionNumber):
-        yield _spectral(subject, limit.key, limit.length, limit.key, f"{limit.key}.max", limit.max)
-    elif isinstance(limit, LegClearance):
-        for (i, one), (j, other) in itertools.combinations(enumerate(subject.model.legs), 2):
-            name = f"{limit.key} limbs {one.name} and {other.name}"
-            claim = Claim(name, Sense.MIN, SX(), LENGTH, f"{limit.key}.min", limit.min)
-            yield claim, partial(subject.clearance, (i, j))
-
-
-def _spectral(
-    subject: Subject, measure: str, length: float, name: str, key: str = "", limit: float | None = None
-) -> Question:
-    """Return the question of a measure of the singular values of J."""
-    is_condition = measure == ConditionNumber.key
-    claim = Claim(name, Sense.MAX if is_condition else Sense.MIN, SX(), NUMBER, key, limit)
-    return claim, partial(subject.spectrum, length, is_condition=is_condition)
-
-
-def _answer(subject: Subject, question: Question, gap: float, paper: PaperRecord | None) -> Extreme:
+def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | None) -> Extreme:
     """Return the extreme of a number; the search of a limit ends as soon as it is decided."""
-    claim, make = question
     try:
-        number, problem = make(), subject.problem
+        number, problem = subject.number(claim), subject.problem
         allowed = _asked_gap(subject, number, gap) if claim.limit is None else gap * max(abs(claim.limit), _NEAR_ZERO)
         recorder = None if paper is None or problem.dependent else paper.own(claim.name)
         (found,) = smallest_values(number, [goal_of(claim, allowed)], recorder=recorder)

@@ -8,13 +8,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from casadi import SX
 
 from .....models import FloatArray
-from ....case.limits.constraint import LENGTH
-from ....case.limits.legs import Actuator
 from ....case.task import Sense
-from ...statement.claims import Claim
+from ...statement.claims import Claim, length_claims
 from ...statement.machine import JointErrors, Legs
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
@@ -47,27 +44,17 @@ def with_strokes(subject: Subject, extremes: Sequence[Extreme], refine: Refine) 
         extremes: among them the smallest and the largest length of each leg.
         refine: proves a length more finely.
     """
-    legs = subject.legs
-    limit = next((each for each in subject.case.limits if isinstance(each, Actuator)), None)
     found, added = list(extremes), list[Extreme]()
-    if limit is None:
-        return found
-    kinds = (
-        ("actuator.stroke_max", Sense.MAX, limit.stroke_max, (-1.0, 1.0)),
-        ("actuator.dead_length", Sense.MIN, limit.dead_length, (2.0, -1.0)),
-    )
     place = {(each.name, each.sense): k for k, each in enumerate(found)}
-    for i, leg in enumerate(subject.case.model.legs):
-        own = [place[f"leg_length limb {leg.name}", sense] for sense in (Sense.MIN, Sense.MAX)]
-        for key, sense, value, factors in kinds:
-            if value is None:
-                continue
-            claim = Claim(f"{key} limb {leg.name}", sense, SX(), LENGTH, key, value)
-            number = _Combined(subject, legs, claim, i, np.array(factors), refine)
-            ends, extreme = number.refined([found[k] for k in own])
-            for k, each in zip(own, ends, strict=True):
-                found[k] = each
-            added.append(extreme)
+    for claim in length_claims(subject.case):
+        (leg,) = claim.legs
+        name = f"leg_length limb {subject.case.model.legs[leg].name}"
+        own = [place[name, sense] for sense in (Sense.MIN, Sense.MAX)]
+        number = _Combined(subject, subject.legs, claim, leg, np.array(claim.weights[::-1]), refine)
+        ends, extreme = number.refined([found[k] for k in own])
+        for k, each in zip(own, ends, strict=True):
+            found[k] = each
+        added.append(extreme)
     return [*found, *added]
 
 

@@ -23,13 +23,13 @@ from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ...enclosure.forms import Encloser
-from ...statement.claims import Claim
+from ...statement.claims import Claim, searched_claims
 from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
 from ..numbers.extremes import slack_of
 from ..numbers.jacobian_numbers import SingularValues
-from ..numbers.searched import Subject, questions
+from ..numbers.searched import Subject
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import PoseBox
@@ -101,8 +101,8 @@ class SliceLimits:
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
         subject = Subject(case, closed.model, problem)
         self._others: list[_Other] = []
-        for claim, make in (each for limit in case.limits for each in questions(subject, limit)):
-            number = make()
+        for claim in searched_claims(case):
+            number = subject.number(claim)
             if problem.dependent or not _is_covered(number):
                 uncovered[claim.key] = None
                 continue
