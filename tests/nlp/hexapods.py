@@ -62,7 +62,7 @@ def subject_of(robot: Legs, box: PoseBox, shortest: float = 0.0) -> Subject:
 
 def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> Clearance:
     """The distance of two legs."""
-    return subject_of(robot, box).clearance((one, other))
+    return Clearance(subject_of(robot, box).problem, robot, (one, other))
 
 
 def values_of(number: Number, points: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ twice the tolerance: that of two legs that are moved towards each other.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
@@ -40,7 +41,7 @@ class Clearance(Number):
         places: those of the two legs.
     """
 
-    def __init__(self, problem: Problem, legs: Legs, places: tuple[int, int]) -> None:
+    def __init__(self, problem: Problem, legs: Legs, places: Sequence[int]) -> None:
         y = problem.box.symbols(problem.z)
         turned, scale = polynomial_rotation(problem.box, y[3:])
         pairs = [(SX(legs.base[k].tolist()), SX(legs.platform[k].tolist())) for k in places]

@@ -74,7 +74,7 @@ class Subject:
     def number(self, claim: Claim) -> SingularValues | Clearance:
         """Return what has bounds of the number of a claim about a clearance or a spectrum, or of minus it."""
         if claim.kind is ClaimKind.CLEARANCE:
-            return self.clearance((claim.legs[0], claim.legs[1]))
+            return Clearance(self.problem, self.legs, claim.legs)
         return self.spectrum(claim.length, is_condition=claim.sense is Sense.MAX)
 
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
@@ -85,10 +85,6 @@ class Subject:
         # The change of J by errors of six straight legs has a bound of its own.
         change = change_of_rows(self.legs, length, self.shortest)
         return SingularValues(problem, length, is_condition=is_condition, machines=self.machines, change=change)
-
-    def clearance(self, places: tuple[int, int]) -> Clearance:
-        """Return the distance of two legs."""
-        return Clearance(self.problem, self.legs, places)
 
 
 def searched_extremes(
