@@ -2,8 +2,8 @@
 
 import flint
 import numpy as np
+from numpy_engine.first_order import Enclosures
 
-from screwsynth.nlp.proof.enclosure.forms import Enclosures
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
 BINARY = (Op.ADD, Op.SUB, Op.MUL, Op.DIV)

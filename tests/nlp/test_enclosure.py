@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from kernel_enclosures import enclose
 from numpy_engine import first_order, intervals, univariate
+from numpy_engine.first_order import Enclosures
 from numpy_engine.intervals import midpoints
 from random_graphs import random_boxes, random_function
 
 from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.errors import UncoveredError
 from screwsynth.nlp.proof.boxes.engine import search_tape
-from screwsynth.nlp.proof.enclosure.forms import Encloser, Enclosures, enclose
+from screwsynth.nlp.proof.enclosure.forms import Encloser
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape, compile_tape
 from screwsynth.nlp.proof.statement.form import without_ties
 from screwsynth.nlp.proof.statement.standard_form import standard_form

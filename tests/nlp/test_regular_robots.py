@@ -10,6 +10,7 @@ import flint
 import numpy as np
 import pytest
 from hexapods import bounds_of, smallest, values_of
+from kernel_enclosures import enclose
 from numpy_engine import first_order
 from typer.testing import CliRunner
 
@@ -19,7 +20,7 @@ from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.proof.enclosure.forms import Encloser, Forms, enclose
+from screwsynth.nlp.proof.enclosure.forms import ULP, Encloser, Forms
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
@@ -154,6 +155,11 @@ def test_the_kernel_has_the_forms_of_the_reference_and_is_undefined_where_they_a
         ours, theirs = (each.swapaxes(1, -1)[known] for each in (values, getattr(numpy, name)))
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
     assert np.isinf(c.hi[~known]).all()
+    forms = Encloser(x, expressions)(centre - half, centre + half)
+    middle, spread = 0.5 * (c.p + c.q), 0.5 * (c.q - c.p)
+    rest = spread + c.s + 4 * ULP * (spread + np.abs(c.c) + np.abs(middle))
+    for ours, theirs in zip(forms, (c.c + middle, c.a.swapaxes(0, 1), rest), strict=True):
+        np.testing.assert_array_equal(ours, theirs.T)
 
 
 def test_forms_hold_against_balls_of_200_bits() -> None:

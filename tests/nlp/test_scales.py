@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from casadi import SX
+from kernel_enclosures import enclose
 from numpy_engine.bounding import NumpyEngine
 from numpy_engine.intervals import midpoints
 from numpy_engine.limb_models import NumpyLimbEngine
@@ -16,7 +17,7 @@ from screwsynth.nlp import formulate, load_case
 from screwsynth.nlp.proof.boxes.engine import Engine, Verdict
 from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.polynomials import middles, places
-from screwsynth.nlp.proof.enclosure.forms import enclose, forms_of
+from screwsynth.nlp.proof.enclosure.forms import Encloser
 from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import StandardForm
 
@@ -120,7 +121,8 @@ def of_search(function: ca.Function, low: np.ndarray, high: np.ndarray) -> dict[
     tape, at = compile_tape(function), monomials(N)
     centre, radius = midpoints(low, high)
     one, two = enclose(tape, low, high), enclose_second(tape, low, high)
-    c = forms_of(one)
+    x = SX.sym("x", N)
+    c = Encloser(x, function(x))(low, high)
     numbers = {engine: bounds(function, low, high, engine) for engine in ENGINES}
 
     def first(k: int, point: np.ndarray) -> tuple[object, object] | None:

@@ -144,7 +144,7 @@ static PyObject *enclose(PyObject *module, PyObject *args)
 {
     PyObject *tuple, *arrays;
     Tape tape = {0};
-    Enclosed found = {0};
+    Forms found = {0};
     int n;
     Borrowed all = {.count = 0};
     Room room = {0};
@@ -153,9 +153,8 @@ static PyObject *enclose(PyObject *module, PyObject *args)
         return NULL;
     int good = n > 0 && (found.order == 1 || n <= MOST_VARIABLES) && found.B > 0 && read_tape(&all, tuple, &tape);
     Py_ssize_t B = found.B, rows = tape.outputs * B, terms = rows * (Py_ssize_t)terms_of_order(n, found.order);
-    good = good && BORROW(arrays, READ(found.lower, n * B), READ(found.upper, n * B), WRITE(found.c, rows), WRITE(found.p, rows),
-                          WRITE(found.q, rows), WRITE(found.s, rows), WRITE(found.lo, rows), WRITE(found.hi, rows),
-                          WRITE(found.a, terms));
+    good = good && BORROW(arrays, READ(found.lower, n * B), READ(found.upper, n * B), WRITE(found.middle, rows),
+                          WRITE(found.a, terms), WRITE(found.rest, rows));
     CALL(good, enclose_all(&tape, n, &found, &room))
     return finish_call(&all, room);
 }
@@ -213,7 +212,7 @@ static PyObject *rank(PyObject *module, PyObject *args)
 static PyMethodDef methods[] = {
     {"rank", rank, METH_VARARGS, "Judge the rank of a matrix over B boxes."},
     {"models", models, METH_VARARGS, "Write upper bounds of B quadratic models, or the ends of points that can reach levels."},
-    {"enclose", enclose, METH_VARARGS, "Write forms and ranges of the results of a tape over B boxes."},
+    {"enclose", enclose, METH_VARARGS, "Write forms of the results of a tape over B boxes."},
     {"examine", examine, METH_VARARGS, "Examine the boxes begin <= i < finish of B."},
     {NULL, NULL, 0, NULL},
 };

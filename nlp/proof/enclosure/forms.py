@@ -1,6 +1,6 @@
 """Forms and quadratic models of expressions over many boxes, by the C kernel, with rigorous rounding terms.
 
-On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, each value ``v`` has two enclosures: for ``0 <= t <= 1``
+On the box ``x_i = c_i + r_i e_i``, ``|e_i| <= 1``, the kernel has two enclosures of a value ``v``: for ``0 <= t <= 1``
 
     v(t e) in c + t sum_i a_i e_i + t^2 [p, q] +- s        and        lo <= v <= hi,
 
@@ -28,44 +28,6 @@ from .tape import Tape, compile_tape
 ULP = 2.0**-51
 #: More than underflow can cost an operation. Additions are exact there.
 TINY = 1e-300
-
-
-@dataclass(eq=False)
-class Enclosures:
-    """Enclosures of R values over B boxes.
-
-    Attributes:
-        c: (R, B) values at the centres.
-        a: (R, n, B) scaled gradients there.
-        p, q: (R, B) least and largest sum of the terms of second order, ``p <= 0 <= q``.
-        s: (R, B) bounds of the rounding errors; infinite where a value is poisoned.
-        lo, hi: (R, B) intervals.
-    """
-
-    c: FloatArray
-    a: FloatArray
-    p: FloatArray
-    q: FloatArray
-    s: FloatArray
-    lo: FloatArray
-    hi: FloatArray
-
-
-def enclose(tape: Tape, lower: FloatArray, upper: FloatArray, order: int = 1) -> Enclosures:
-    """Return enclosures of a tape's results over boxes.
-
-    Args:
-        tape: the instructions.
-        lower: (n, B) lower ends of the boxes.
-        upper: (n, B) upper ends of the boxes.
-        order: of the forms; with 2, ``a`` has coefficients of pairs of variables too, and ``[p, q]`` what is left.
-    """
-    n, count = lower.shape
-    c, p, q, s, lo, hi = (np.empty((tape.outputs, count)) for _ in range(6))
-    a = np.empty((tape.outputs, n if order == 1 else n * (n + 3) // 2, count))
-    ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
-    kernel().enclose(n, tape.head, (*ends, c, p, q, s, lo, hi, a), count, order)
-    return Enclosures(c, a, p, q, s, lo, hi)
 
 
 class Forms(NamedTuple):
@@ -107,25 +69,27 @@ class Encloser:
 
     def __call__(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms over boxes with ends (n, B)."""
-        return forms_of(enclose(self.tape, lower, upper))
+        return self._forms(lower, upper, 1)
 
     def second(self, lower: FloatArray, upper: FloatArray) -> Forms:
         """Return the forms of second order over boxes with ends (n, B): ``e_i e_j``, i <= j, follow row by row.
 
         Each ``e_i^2`` is ``1/2 + 1/2 e`` with e in [-1, 1].
         """
-        c, a, r = forms_of(enclose(self.tape, lower, upper, 2))
+        c, a, r = self._forms(lower, upper, 2)
         n = len(lower)
         squares = n + np.cumsum([0, *range(n, 1, -1)])
         a[:, :, squares] *= 0.5
         return Forms(c + a[:, :, squares].sum(axis=2), a, r)
 
-
-def forms_of(found: Enclosures) -> Forms:
-    """Return enclosures as forms with one remainder."""
-    middle, half = 0.5 * (found.p + found.q), 0.5 * (found.q - found.p)
-    rest = half + found.s + 4 * ULP * (half + np.abs(found.c) + np.abs(middle))
-    return Forms((found.c + middle).T, found.a.transpose(2, 0, 1), rest.T)
+    def _forms(self, lower: FloatArray, upper: FloatArray, order: int) -> Forms:
+        """Return the forms of an order."""
+        n, count = lower.shape
+        c, r = (np.empty((self.tape.outputs, count)) for _ in range(2))
+        a = np.empty((self.tape.outputs, n if order == 1 else n * (n + 3) // 2, count))
+        ends = np.ascontiguousarray(lower), np.ascontiguousarray(upper)
+        kernel().enclose(n, self.tape.head, (*ends, c, a, r), count, order)
+        return Forms(c.T, a.transpose(2, 0, 1), r.T)
 
 
 class Ends(NamedTuple):

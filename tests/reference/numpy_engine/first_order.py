@@ -7,11 +7,11 @@ roundings can cost (see ``docs/certificate.md``).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from screwsynth.nlp.proof.enclosure.forms import Enclosures
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
 from .intervals import LARGEST, TINY, ULP, interval_product, midpoints, widen
@@ -19,6 +19,27 @@ from .univariate import RULES
 
 if TYPE_CHECKING:
     from screwsynth.models import FloatArray
+
+
+@dataclass(eq=False)
+class Enclosures:
+    """Enclosures of R values over B boxes.
+
+    Attributes:
+        c: (R, B) values at the centres.
+        a: (R, n, B) scaled gradients there; in forms of second order, coefficients of pairs of variables follow.
+        p, q: (R, B) least and largest sum of the terms of second order, ``p <= 0 <= q``, or of what is left of them.
+        s: (R, B) bounds of the rounding errors; infinite where a value is poisoned.
+        lo, hi: (R, B) intervals.
+    """
+
+    c: FloatArray
+    a: FloatArray
+    p: FloatArray
+    q: FloatArray
+    s: FloatArray
+    lo: FloatArray
+    hi: FloatArray
 
 
 def zeros(values: int, symbols: int, boxes: int) -> Enclosures:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp.proof.enclosure import forms
-from screwsynth.nlp.proof.enclosure.forms import Enclosures, Ends
+from screwsynth.nlp.proof.enclosure.forms import Ends
 
+from .first_order import Enclosures
 from .intervals import TINY, ULP
 
 #: Rounds of the coordinate-wise search for a tangent point: any result of it gives a bound.

@@ -30,9 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp.proof.enclosure.forms import Enclosures
 from screwsynth.nlp.proof.enclosure.squared_quotients import Quotient
 
+from .first_order import Enclosures
 from .intervals import LARGEST, TINY, ULP
 from .quadratic_models import GradientModel, SquareSums
 

@@ -46,30 +46,33 @@ static void run_block(const Run *x, const double *lower, const double *upper, Py
     (x->order > 1 ? run2 : run1)(x->tape, x->n, x->work, x->out, x->box, x->terms);
 }
 
+/* Forms middle + a e + [-rest, rest] of a tape's results over B boxes. */
 typedef struct {
-    const double *lower, *upper;         /* (n, B) */
-    double *c, *p, *q, *s, *lo, *hi, *a; /* (R, B), a: (R, n, B), or (R, n + n (n + 1) / 2, B) for forms of second order */
+    const double *lower, *upper; /* (n, B) */
+    double *middle, *a, *rest;   /* (R, B), a: (R, n, B), or (R, n + n (n + 1) / 2, B) for forms of second order */
     Py_ssize_t B;
     int order;
-} Enclosed;
+} Forms;
 
-/* Writes the forms and ranges of a tape's results; without memory, what is needed of it is counted only. */
-static void enclose_all(const Tape *tape, int n, const Enclosed *found, Room *room)
+/* Writes forms; without memory, what is needed of it is counted only. */
+static void enclose_all(const Tape *tape, int n, const Forms *found, Room *room)
 {
     Py_ssize_t B = found->B;
     Run run = prepare(tape, n, found->order, room);
     size_t terms = terms_of_order(n, found->order);
     for (Py_ssize_t start = 0; room->at && start < B; start += LANES) {
         run_block(&run, found->lower, found->upper, B, NULL, start, B);
-        size_t bytes = (size_t)(B - start < LANES ? B - start : LANES) * sizeof(double);
+        size_t count = (size_t)(B - start < LANES ? B - start : LANES);
         for (int k = 0; k < tape->outputs; k++) {
             const Value *v = value_of(run.out, k);
-            const double *from[] = {v->c, v->p, v->q, v->s, v->lo, v->hi};
-            double *to[] = {found->c, found->p, found->q, found->s, found->lo, found->hi};
-            for (size_t part = 0; part < COUNT(to); part++)
-                memcpy(to[part] + k * B + start, from[part], bytes);
+            double *to = found->middle + k * B + start, *rest = found->rest + k * B + start;
+            for (size_t l = 0; l < count; l++) {
+                double middle = 0.5 * (v->p[l] + v->q[l]), half = 0.5 * (v->q[l] - v->p[l]);
+                to[l] = v->c[l] + middle;
+                rest[l] = half + v->s[l] + 4 * ULP * (half + fabs(v->c[l]) + fabs(middle));
+            }
             for (size_t i = 0; i < terms; i++)
-                memcpy(found->a + ((size_t)k * terms + i) * (size_t)B + start, terms_of(v)[i], bytes);
+                memcpy(found->a + ((size_t)k * terms + i) * (size_t)B + start, terms_of(v)[i], count * sizeof(double));
         }
     }
 }
