@@ -40,12 +40,12 @@ from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, Goal, Number, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.expressions import Expressions
 from screwsynth.nlp.proof.workspace.numbers.extremes import goal_of
+from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
-from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
 from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
 from screwsynth.nlp.solver.certified import certify
 

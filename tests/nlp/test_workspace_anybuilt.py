@@ -32,16 +32,16 @@ from screwsynth.nlp.proof.statement.machine import joint_centres, workspace_of_c
 from screwsynth.nlp.proof.statement.tolerance import built_model, is_smooth
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers import expressions
+from screwsynth.nlp.proof.workspace.numbers import machines as tolerance
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
+from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
-from screwsynth.nlp.proof.workspace.tolerance import machines as tolerance
-from screwsynth.nlp.proof.workspace.tolerance.machines import Machines
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.jsondata import json_data
 from screwsynth.nlp.results.schema import result_schema

@@ -31,12 +31,12 @@ from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
+from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, pose_coordinates
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
-from screwsynth.nlp.proof.workspace.tolerance.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult

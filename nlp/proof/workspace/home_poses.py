@@ -28,8 +28,8 @@ from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import JointErrors
 from ..statement.posed_layout import extreme_program, posed_layout
 from .numbers.extremes import Extreme, slack_of
+from .numbers.machines import Machines
 from .robot.pose_box import PoseBox, pose_coordinates
-from .tolerance.machines import Machines
 from .verdict import Outcome
 
 #: Reasons for a claim that poses of other assemblies leave open.

@@ -20,13 +20,13 @@ from ..statement.tolerance import Directions, length_of_one_machine
 from .home_poses import Homes
 from .numbers.bound_search import Minimum
 from .numbers.extremes import GAP, Extreme, extreme_of, prove_extreme
+from .numbers.machines import Machines
 from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, searched_extremes
 from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import pose_box, pose_coordinates
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
-from .tolerance.machines import Machines
 from .verdict import Outcome, RankVerdict
 
 if TYPE_CHECKING:

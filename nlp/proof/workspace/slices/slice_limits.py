@@ -29,12 +29,12 @@ from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
 from ..numbers.extremes import slack_of
 from ..numbers.jacobian_numbers import SingularValues
+from ..numbers.machines import Machines
 from ..numbers.searched import Subject
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import build_problem
-from ..tolerance.machines import Machines
 
 #: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
 KEPT, UNDECIDED = -1, -2

@@ -40,11 +40,11 @@ from ...statement.tolerance import (
     machine_layout,
     second_order_name,
 )
-from ..numbers.bound_search import Minimum, smallest_values
-from ..numbers.expressions import Expressions
-from ..numbers.extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
 from ..robot.pose_box import PoseNumbers, pose_coordinates
 from ..robot.posed_robot import NotJudgedError, Problem, family_of
+from .bound_search import Minimum, smallest_values
+from .expressions import Expressions
+from .extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
