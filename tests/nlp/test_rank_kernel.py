@@ -139,15 +139,15 @@ class Copy:
         shutil.copytree(FOLDER, folder / "copy", ignore=shutil.ignore_patterns("*.so", "*.py", "__pycache__"))
         header = folder / "copy" / "kernel" / "rank.h"
         text = header.read_text(encoding="utf-8")
-        keep = "            found->sign["
-        for before, after in ((keep, f"            if (!l) keep_parts(m, parts);\n{keep}"), (old, new)):
+        judged = "found->regular[start + l] = judge_lane(m, found, l, parts, found->shares + start + l);"
+        for before, after in ((judged, f"{{ {judged} if (!l) keep_parts(m, parts); }}"), (old, new)):
             assert not before or text.count(before) == 1, before
             text = text.replace(before, after) if before else text
         start = "static void rank_all("
         kept = (
             "double kept_C[4096], kept_B[4096];\n"
             "static void keep_parts(const Matrix *m, RankParts x)\n{\n"
-            "    memcpy(kept_C, x.inverse, (size_t)(m->columns * m->rows) * sizeof(double));\n"
+            "    for (int k = 0; k < m->columns * m->rows; k++) kept_C[k] = x.C[k][0];\n"
             "    memcpy(kept_B, x.B, (size_t)(m->columns * m->columns) * sizeof(double));\n}\n\n"
         )
         header.write_text(text.replace(start, kept + start), encoding="utf-8")
@@ -187,7 +187,7 @@ def is_found(copy: Copy, meant: Problem) -> bool:
         C, B = copy.kept(columns)
         if found.is_regular[0] and np.abs(np.linalg.eigvals(B)).max() >= 1:
             return True
-        if not np.isfinite(found.smallest[0]) or not found.smallest[0] or not np.isfinite(B).all():
+        if not np.isfinite(B).all():
             continue
         ends = np.where(rng.random((8, n)) < 0.5, lower, upper)
         for y in np.vstack([ends, centre[None], rng.uniform(lower, upper, (4, n))]):

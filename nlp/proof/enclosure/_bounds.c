@@ -187,20 +187,17 @@ static PyObject *rank(PyObject *module, PyObject *args)
     Borrowed all = {.count = 0};
     Room room = {0};
     (void)module;
-    if (!PyArg_ParseTuple(args, "(iiiiO!)(iii)O!n", &matrix.rows, &matrix.columns, &matrix.nullity, &matrix.entries,
-                          &PyTuple_Type, &parts, &found.terms, &found.coordinates, &found.errors, &PyTuple_Type, &arrays,
-                          &found.B))
+    if (!PyArg_ParseTuple(args, "(iiiO!)(iii)O!n", &matrix.rows, &matrix.columns, &matrix.entries, &PyTuple_Type, &parts,
+                          &found.terms, &found.coordinates, &found.errors, &PyTuple_Type, &arrays, &found.B))
         return NULL;
     int good = found.coordinates >= 0 && found.errors >= 0 && found.errors % 3 == 0 && found.B > 0 &&
                found.coordinates + found.errors <= found.terms;
-    good = good && matrix.entries >= 0 && matrix.columns > 0 && matrix.columns <= MOST_COLUMNS && matrix.nullity >= 0 &&
-           matrix.nullity < matrix.columns && matrix.rows + matrix.nullity >= matrix.columns;
-    Py_ssize_t B = found.B, E = matrix.entries;
-    good = good && BORROW(parts, READ(matrix.at, 2 * E), READ(matrix.scale, E),
-                          READ(matrix.constant, (Py_ssize_t)matrix.rows * matrix.columns));
-    good = good && BORROW(arrays, READ(found.middle, E * B), READ(found.a, E * found.terms * B), READ(found.rest, E * B),
-                          WRITE(found.regular, B), WRITE(found.shares, found.coordinates * B), WRITE(found.smallest, B),
-                          WRITE(found.sign, B));
+    good = good && matrix.entries >= 0 && matrix.columns > 0 && matrix.rows >= matrix.columns;
+    Py_ssize_t B = found.B, E = matrix.entries, c = matrix.columns;
+    good = good && BORROW(parts, READ(matrix.at, 2 * E), READ(matrix.scale, E));
+    good = good && BORROW(arrays, READ(found.inverse, c * matrix.rows * B), READ(found.off, c * c * B),
+                          READ(found.a, E * found.terms * B), READ(found.rest, E * B), WRITE(found.regular, B),
+                          WRITE(found.shares, found.coordinates * B));
     for (Py_ssize_t e = 0; good && e < E; e++)
         good = matrix.at[2 * e] >= 0 && matrix.at[2 * e] < matrix.rows && matrix.at[2 * e + 1] >= 0 &&
                matrix.at[2 * e + 1] < matrix.columns;

@@ -27,7 +27,7 @@ class NumpyRankTest(RankTest):
         M0, M, R = self.matrices(forms)
         columns, last = M0.shape[2], M.shape[1] - errors
         _, values, right = np.linalg.svd(M0, full_matrices=True)
-        nullity: int = self._head[2]
+        nullity = self._nullity
         rank = columns - nullity
         signs = np.linalg.slogdet(M0)[0] if M0.shape[1] == columns and not nullity else np.zeros(len(M0))
         if nullity:
@@ -56,9 +56,8 @@ class NumpyRankTest(RankTest):
 
         Where one is not finite, the rest is infinite, and the others are 0.
         """
-        at: NDArray[np.int32]
-        (middle, slope, rest), (at, scale, constant) = forms, self._head[4]
-        rows, columns = at.T
+        (middle, slope, rest), scale, constant = forms, self._scale, self._constant
+        rows, columns = self._at.T
         M0 = np.broadcast_to(constant, (len(middle), *constant.shape)).copy()
         R, M = np.zeros_like(M0), np.zeros((len(middle), slope.shape[2], *constant.shape))
         M0[:, rows, columns] += middle * scale

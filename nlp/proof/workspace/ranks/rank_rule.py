@@ -28,9 +28,11 @@ from casadi import SX
 
 from .....models import FloatArray
 from ...enclosure.engine import kernel
-from ...enclosure.forms import Encloser, Forms
+from ...enclosure.forms import TINY, Encloser, Forms
+from ..robot.closed_loops import inverses
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
+from .krawczyk import ROUNDING
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -50,7 +52,8 @@ class Tested(NamedTuple):
     Attributes:
         is_regular: (B,) whether the rank is proved to be full.
         shares: (B, f) share of each independent coordinate in the bound.
-        smallest: (B,) smallest singular value at the middle as a part of the largest: a computed number.
+        smallest: (B,) smallest singular value at the middle as a part of the largest: a computed number; infinite where
+            the rank is proved, or nothing is known.
         signs: (B,) sign of the determinant of a square matrix at the middle: a computed number; 0 for other matrices.
             Where the rank is proved, it is that at every pose of the box.
     """
@@ -93,8 +96,9 @@ class RankTest:
                 entries.append(entry)
         self.entries: SX = ca.vertcat(SX(0, 1), *entries)
         at = np.array(places, dtype=np.int32).reshape(-1, 2)
-        parts = at, np.ascontiguousarray(scale[at[:, 0]]), constant * scale[:, None]
-        self._head = (*whole.shape, matrix.nullity, len(places), parts)
+        self._nullity, self._at, self._constant = matrix.nullity, at, constant * scale[:, None]
+        self._scale = np.ascontiguousarray(scale[at[:, 0]])
+        self._head = (whole.shape[0] + matrix.nullity, whole.shape[1], len(at), (at, self._scale))
 
     def unknown(self, count: int, f: int) -> Tested:
         """Return the results for boxes of which nothing is known."""
@@ -103,12 +107,42 @@ class RankTest:
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
         """Return the verdict on boxes from forms of the entries, as of :class:`~.loop_boxes.Test`."""
-        count, terms = len(forms.c), forms.a.shape[2]
-        regular, signs = np.empty(count, dtype=np.int32), np.empty(count, dtype=np.int32)
-        shares, smallest = np.zeros((f, count)), np.empty(count)
-        given = [np.ascontiguousarray(each) for each in (forms.c.T, forms.a.transpose(1, 2, 0), forms.r.T)]
-        kernel().rank(self._head, (terms, f, errors), (*given, regular, shares, smallest, signs), count)
-        return Tested(regular.astype(bool), shares.T, smallest, signs)
+        count, terms, (rows, columns) = len(forms.c), forms.a.shape[2], self._head[:2]
+        is_known = np.asarray((np.isfinite(forms.c) & np.isfinite(forms.r)).all(axis=1))
+        M0 = self._middles(np.where(is_known[:, None], forms.c, 0.0))
+        with np.errstate(all="ignore"):
+            C = _left_inverses(M0)
+            off = np.abs(C @ M0 - np.eye(columns)) + ROUNDING * (np.abs(C) @ np.abs(M0) + np.eye(columns))
+        off[~is_known] = np.inf
+        regular, shares = np.empty(count, dtype=np.int32), np.zeros((f, count))
+        given = (C, off, forms.a.transpose(1, 2, 0), forms.r.T)
+        arrays = (*(np.ascontiguousarray(each) for each in given), regular, shares)
+        kernel().rank(self._head, (terms, f, errors), arrays, count)
+        is_regular, smallest = regular.astype(bool), np.full(count, np.inf)
+        is_open = is_known & ~is_regular
+        values = np.linalg.svd(M0[is_open], compute_uv=False)
+        smallest[is_open] = values[:, -1] / np.maximum(values[:, 0], TINY)
+        is_square = rows == columns and not self._nullity
+        signs = (np.linalg.slogdet(M0)[0] if is_square else np.zeros(count)).astype(np.int32)
+        return Tested(is_regular, shares.T, smallest, signs)
+
+    def _middles(self, entries: FloatArray) -> FloatArray:
+        """Return scaled matrices (B, m, c) from entries (B, E), with a basis of what their rows miss below."""
+        shape = (len(entries), *self._constant.shape)
+        found = np.array(np.broadcast_to(self._constant, shape))
+        found[:, self._at[:, 0], self._at[:, 1]] = entries * self._scale
+        if not self._nullity:
+            return found
+        missed = np.linalg.svd(found, full_matrices=True)[2][:, -self._nullity :]
+        return np.concatenate([found, missed], axis=1)
+
+
+def _left_inverses(matrices: FloatArray) -> FloatArray:
+    """Return left inverses (B, c, m) of matrices (B, m, c); NaN for those without full column rank."""
+    if matrices.shape[1] == matrices.shape[2]:
+        return inverses(matrices)
+    Q, R = np.linalg.qr(matrices)
+    return np.asarray(inverses(R) @ Q.transpose(0, 2, 1))
 
 
 def is_polynomial(entries: SX, coordinates: SX) -> bool:
