@@ -28,8 +28,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ...enclosure.engine import kernel
-from ...enclosure.forms import TINY, Encloser, Forms
-from ..robot.closed_loops import inverses
+from ...enclosure.forms import Encloser, Forms
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from .krawczyk import ROUNDING
@@ -107,24 +106,21 @@ class RankTest:
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
         """Return the verdict on boxes from forms of the entries, as of :class:`~.loop_boxes.Test`."""
-        count, terms, (rows, columns) = len(forms.c), forms.a.shape[2], self._head[:2]
+        count, terms, columns = len(forms.c), forms.a.shape[2], self._head[1]
         is_known = np.asarray((np.isfinite(forms.c) & np.isfinite(forms.r)).all(axis=1))
         M0 = self._middles(np.where(is_known[:, None], forms.c, 0.0))
         with np.errstate(all="ignore"):
-            C = _left_inverses(M0)
+            C, signs = _left_inverses(M0)
             off = np.abs(C @ M0 - np.eye(columns)) + ROUNDING * (np.abs(C) @ np.abs(M0) + np.eye(columns))
         off[~is_known] = np.inf
         regular, shares = np.empty(count, dtype=np.int32), np.zeros((f, count))
         given = (C, off, forms.a.transpose(1, 2, 0), forms.r.T)
         arrays = (*(np.ascontiguousarray(each) for each in given), regular, shares)
         kernel().rank(self._head, (terms, f, errors), arrays, count)
-        is_regular, smallest = regular.astype(bool), np.full(count, np.inf)
-        is_open = is_known & ~is_regular
-        values = np.linalg.svd(M0[is_open], compute_uv=False)
-        smallest[is_open] = values[:, -1] / np.maximum(values[:, 0], TINY)
-        is_square = rows == columns and not self._nullity
-        signs = (np.linalg.slogdet(M0)[0] if is_square else np.zeros(count)).astype(np.int32)
-        return Tested(is_regular, shares.T, smallest, signs)
+        # Frobenius norms: at most as many times smaller than the singular value as there are columns.
+        smallest = 1 / (np.linalg.norm(M0, axis=(1, 2)) * np.linalg.norm(C, axis=(1, 2)))
+        signs = signs if not self._nullity else np.zeros_like(signs)
+        return Tested(regular.astype(bool), shares.T, np.where(is_known, np.nan_to_num(smallest), np.inf), signs)
 
     def _middles(self, entries: FloatArray) -> FloatArray:
         """Return scaled matrices (B, m, c) from entries (B, E), with a basis of what their rows miss below."""
@@ -137,12 +133,19 @@ class RankTest:
         return np.concatenate([found, missed], axis=1)
 
 
-def _left_inverses(matrices: FloatArray) -> FloatArray:
-    """Return left inverses (B, c, m) of matrices (B, m, c); NaN for those without full column rank."""
-    if matrices.shape[1] == matrices.shape[2]:
-        return inverses(matrices)
-    Q, R = np.linalg.qr(matrices)
-    return np.asarray(inverses(R) @ Q.transpose(0, 2, 1))
+def _left_inverses(matrices: FloatArray) -> tuple[FloatArray, NDArray[np.int32]]:
+    """Return left inverses (B, c, m) of matrices (B, m, c), and the signs (B,) of determinants of square ones, else 0.
+
+    They are NaN for matrices without full column rank.
+    """
+    is_square = matrices.shape[1] == matrices.shape[2]
+    Q, R = (None, matrices) if is_square else np.linalg.qr(matrices)
+    signs = np.sign(np.linalg.det(R)).astype(np.int32)
+    found: FloatArray = np.full(matrices.transpose(0, 2, 1).shape, np.nan)
+    good = signs != 0
+    inverse = np.linalg.inv(R[good])
+    found[good] = inverse if Q is None else inverse @ Q[good].transpose(0, 2, 1)
+    return found, signs if is_square else np.zeros_like(signs)
 
 
 def is_polynomial(entries: SX, coordinates: SX) -> bool:

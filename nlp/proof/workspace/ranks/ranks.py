@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..proof_writer import PaperRecord
 
 #: Number of boxes examined at once.
-_BLOCK = 1024
+_BLOCK = 512
 #: Widths of a box, in parts of the whole box, below which it is not bisected.
 _LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Callback with seconds, number of boxes examined, and number of boxes open.
