@@ -112,7 +112,7 @@ def test_models_of_limbs_are_those_of_the_reference() -> None:
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
         for name in ("lower", "upper"):
             np.testing.assert_allclose(getattr(one, name)[m:], getattr(other, name)[m:], rtol=1e-9, atol=1e-9)
-        for name in ("slope_lo", "slope_hi", "high", "value"):
+        for name in ("slope_lo", "slope_hi", "bound", "value"):
             np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9, atol=1e-9)
         for name, values in vars(one.L).items():
             np.testing.assert_allclose(values, getattr(other.L, name), rtol=1e-9, atol=1e-9)

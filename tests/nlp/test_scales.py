@@ -239,7 +239,7 @@ def test_models_of_squared_quotients_hold_at_every_scale(name: str, engine: str)
         limbs = Engine(form, 1, 0) if engine == "c" else NumpyLimbEngine(NumpyEngine(form, apart=True), 0)
         found = limbs.limb_models(low, high)
         with np.errstate(all="ignore"):
-            bound = np.where(found.defined, np.fmin(found.L.bound(), found.high), np.inf)
+            bound = np.where(found.defined, np.fmin(found.L.bound(), found.bound), np.inf)
         for point in points_of(low, high, 4, 3):
             for k in range(low.shape[1]):
                 (exact,), (is_sharp,) = balls.decided_balls(tape, point[:, k])

@@ -120,38 +120,29 @@ class Examination:
 
 
 @dataclass(frozen=True, eq=False)
-class LimbModels:
-    """Upper models over B boxes of a limb with n variables, the first m of them shared with other limbs.
+class LimbModels(Examination):
+    """Results for B boxes of a limb with n variables, the first m of them shared with other limbs, and upper models.
 
     Nothing may be said of a shared variable from one limb alone: monotonicity and contraction are those of own
-    variables, by the limb's conditions.
+    variables, by the limb's conditions; of shared ones where there are no own ones. The bound is the function's.
 
     Attributes:
         is_possible: (B,) whether an optimum may lie in the box.
         defined: (B,) whether the limb's function has a value in the whole box.
         holds: (B,) whether every condition of the limb holds on the whole box.
-        lower, upper: (n, B) the part of the box that is left; of shared variables where there are no own ones.
         L: upper models of the Lagrangian, whose multipliers make its gradient small in the own variables.
         slope_lo, slope_hi: (m, B) gradient of the function along shared variables.
         stops_up, stops_down: (m, B) whether a condition may stop a point from moving along a shared variable.
-        high: (B,) upper bound of the function.
-        value: (B,) lower bound of the function at the centre; -inf where a condition may be violated there.
-        centre: (n, B).
     """
 
     is_possible: NDArray[np.bool_]
     defined: NDArray[np.bool_]
     holds: NDArray[np.bool_]
-    lower: FloatArray
-    upper: FloatArray
     L: QuadraticModel
     slope_lo: FloatArray
     slope_hi: FloatArray
     stops_up: NDArray[np.bool_]
     stops_down: NDArray[np.bool_]
-    high: FloatArray
-    value: FloatArray
-    centre: FloatArray
 
 
 class Engine:
@@ -251,19 +242,15 @@ class Engine:
         sides = rows[3 + 4 * n + n * n :].reshape(m, 4, count)
         closing = (Verdict.INFEASIBLE, Verdict.MONOTONE, Verdict.EMPTIED) if tilts is None else (Verdict.INFEASIBLE,)
         return LimbModels(
+            **vars(found),
             is_possible=~np.isin(found.verdict, closing),
             defined=(rows[0] == 1) | (rows[0] == 3),
             holds=rows[0] >= 2,
-            lower=found.lower,
-            upper=found.upper,
             L=QuadraticModel(rows[1], vectors[0], H, vectors[1], vectors[2], vectors[3], rows[2]),
             slope_lo=sides[:, 0],
             slope_hi=sides[:, 1],
             stops_up=sides[:, 2] > 0,
             stops_down=sides[:, 3] > 0,
-            high=found.bound,
-            value=found.value,
-            centre=found.centre,
         )
 
 

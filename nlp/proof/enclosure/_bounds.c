@@ -192,7 +192,8 @@ static PyObject *rank(PyObject *module, PyObject *args)
         return NULL;
     int good = found.coordinates >= 0 && found.errors >= 0 && found.errors % 3 == 0 && found.B > 0 &&
                found.coordinates + found.errors <= found.terms;
-    good = good && matrix.entries >= 0 && matrix.columns > 0 && matrix.rows >= matrix.columns;
+    good = good && matrix.entries >= 0 && matrix.columns > 0 && matrix.rows >= matrix.columns &&
+           matrix.rows <= MOST_ROWS;
     Py_ssize_t B = found.B, E = matrix.entries, c = matrix.columns;
     good = good && BORROW(parts, READ(matrix.at, 2 * E), READ(matrix.scale, E));
     good = good && BORROW(arrays, READ(found.inverse, c * matrix.rows * B), READ(found.off, c * c * B),

@@ -50,17 +50,22 @@ class NumpyLimbEngine:
         g_lo, g_hi = model.gradient_lo[:, :m], model.gradient_hi[:, :m]
         holds = (middle[J:] + error[J:] <= 0).all(axis=0)
         return LimbModels(
+            verdict=left.verdict,
+            reason=left.reason,
+            bound=np.where(defined, high[:J].min(axis=0), np.inf),
+            lower=np.where(defined, np.concatenate([lower[:m], left.lower[m:]]), lower),
+            upper=np.where(defined, np.concatenate([upper[:m], left.upper[m:]]), upper),
+            cut_lower=left.cut_lower,
+            cut_upper=left.cut_upper,
+            split=np.zeros_like(left.verdict),
+            value=np.where(holds, (middle[:J] - error[:J]).min(axis=0), -np.inf),
+            centre=box.centre,
             is_possible=~(closed | impossible.any(axis=0)),
             defined=defined,
             holds=((high < 0) & ~engine.equation[:, None])[J:].all(axis=0),
-            lower=np.where(defined, np.concatenate([lower[:m], left.lower[m:]]), lower),
-            upper=np.where(defined, np.concatenate([upper[:m], left.upper[m:]]), upper),
             L=L,
             slope_lo=g_lo[:J].min(axis=0),
             slope_hi=g_hi[:J].max(axis=0),
             stops_up=(stops & (is_equation | ~(g_hi < 0))).any(axis=0),
             stops_down=(stops & (is_equation | ~(g_lo > 0))).any(axis=0),
-            high=np.where(defined, high[:J].min(axis=0), np.inf),
-            value=np.where(holds, (middle[:J] - error[:J]).min(axis=0), -np.inf),
-            centre=box.centre,
         )

@@ -164,7 +164,7 @@ def bound_limb(
     # The bound of the limb itself, and that of minus its tilt.
     apart = np.abs(tilt.g).sum(axis=0) + 0.5 * np.abs(tilt.Q).sum(axis=(0, 1))
     # The two may cancel: their rounding is in parts of their sizes.
-    other = models.high + apart[own.of] + (np.abs(models.high) + apart[own.of]) * (64 * ULP) + TINY
+    other = models.bound + apart[own.of] + (np.abs(models.bound) + apart[own.of]) * (64 * ULP) + TINY
     bounds = np.fmin(bounds, other)
     is_possible = models.is_possible & ~(bounds < reached[own.of])
     bounds = np.where(is_possible, np.where(np.isnan(bounds), np.inf, bounds), -np.inf)

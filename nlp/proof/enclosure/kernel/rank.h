@@ -5,9 +5,10 @@
 #include <Python.h>
 #include "values.h"
 
-/* Part of the sum of the sizes of all terms by which a computed sum of products may be off: fewer than 400 roundings, those
- * of the middles among them. */
+/* Part of the sum of the sizes of all terms by which a computed sum of products may be off: fewer than 900 roundings, those
+ * of the middles among them. A sum has as many as the matrix has rows, and a few. */
 #define PRODUCTS 1e-13
+#define MOST_ROWS 800
 #define RANK_POWERS 12
 
 typedef struct {

@@ -109,7 +109,7 @@ def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
     """
     good = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     if zero is None:
-        good &= np.abs(np.linalg.det(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))) > 0
+        good &= np.linalg.slogdet(np.where(good[:, None, None], matrices, np.eye(matrices.shape[1])))[0] != 0
     found: FloatArray = np.full(matrices.transpose(0, 2, 1).shape, np.nan)
     found[good] = np.linalg.inv(matrices[good]) if zero is None else np.linalg.pinv(matrices[good], rcond=zero)
     return found
