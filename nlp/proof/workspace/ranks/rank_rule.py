@@ -61,6 +61,12 @@ class Tested(NamedTuple):
     signs: NDArray[np.int32]
 
 
+def not_regular(shares: FloatArray, smallest: FloatArray) -> Tested:
+    """Return the results for boxes of which none is regular."""
+    signs = np.zeros(len(smallest), dtype=np.int32)
+    return Tested(signs.astype(bool), shares, smallest, signs)
+
+
 class RankTest:
     """The test of a matrix.
 
@@ -72,7 +78,10 @@ class RankTest:
     Attributes:
         entries: (E, 1) what is not constant.
         sign: of the determinant of a square matrix at the start; 0 for other matrices.
+        unknown: smallest singular value where nothing is known.
     """
+
+    unknown: FloatArray = np.array(np.inf)
 
     def __init__(self, matrix: RankMatrix, z: SX, start: FloatArray) -> None:
         whole = matrix.matrix
@@ -95,11 +104,6 @@ class RankTest:
         at = np.array(places, dtype=np.int32).reshape(-1, 2)
         parts = at, np.ascontiguousarray(scale[at[:, 0]]), constant * scale[:, None]
         self._head = (*whole.shape, matrix.nullity, len(places), parts)
-
-    def unknown(self, count: int, f: int) -> Tested:
-        """Return the results for boxes of which nothing is known."""
-        nothing = np.zeros(count, dtype=np.int32)
-        return Tested(nothing.astype(bool), np.zeros((count, f)), np.full(count, np.inf), nothing)
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
         """Return the verdict on boxes from forms of the entries, as of :class:`~.loop_boxes.Test`."""
