@@ -15,6 +15,7 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
@@ -41,7 +42,8 @@ def measure(name: str) -> str:
             cells += ["", ""]
             continue
         begin = time.process_time()
-        found = prove_rank(problem, matrix, time_limit=_SECONDS)
+        with within(_SECONDS):
+            found = prove_rank(problem, matrix)
         reason = f", {found.reason}" if found.reason else ""
         cells += [f"{found.outcome.value}, {found.boxes:,}{reason}", f"{time.process_time() - begin:.2f}"]
         begin = time.process_time()

@@ -4,6 +4,7 @@ import numpy as np
 
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.nlp import Case, Task
+from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Minimum, Number, smallest_values
@@ -78,5 +79,6 @@ def bounds_of(number: Number, lower: FloatArray, upper: FloatArray) -> FloatArra
 
 def smallest(number: Number, goal: Goal, time_limit: float | None = None) -> Minimum:
     """The smallest value of one number."""
-    (found,) = smallest_values(number, [goal], time_limit=time_limit)
+    with within(time_limit):
+        (found,) = smallest_values(number, [goal])
     return found

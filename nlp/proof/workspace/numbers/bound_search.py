@@ -18,7 +18,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from ....interruption import one_search
-from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Verdicts, joined, some
 from ...enclosure.forms import Forms
 from ..ranks.loop_boxes import (
     APART,
@@ -30,7 +30,7 @@ from ..ranks.loop_boxes import (
     are_between,
     coordinates_to_split,
 )
-from ..ranks.rank_rule import Tested
+from ..ranks.rank_rule import Tested, not_regular
 from ..robot.posed_robot import Problem
 
 if TYPE_CHECKING:
@@ -40,8 +40,6 @@ if TYPE_CHECKING:
 
 #: Number of boxes examined at once, and number of those with the smallest bounds at which values are computed.
 _BLOCK, _TRIED = 256, 8
-#: Widths of a box, in parts of the whole box, below which it is not bisected.
-_LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Value below which gaps are parts of this one.
 _NEAR_ZERO = 1e-6
 #: Random points from which the search of a small value begins, steps from the best of them, and points in each step.
@@ -70,12 +68,13 @@ class Number(ABC):
 
     Attributes:
         problem, entries, count: as given.
+        unknown: (K,) bounds over a box of which nothing is known.
         levels: (K,) bounds from which on a number has no part in where boxes are bisected.
     """
 
     def __init__(self, problem: Problem, entries: SX, count: int = 1) -> None:
         self.problem, self.entries, self.count = problem, entries, count
-        self.levels = np.full(count, np.inf)
+        self.unknown, self.levels = np.full(count, -np.inf), np.full(count, np.inf)
 
     @abstractmethod
     def over(self, forms: Forms, count: int) -> Bounds:
@@ -105,13 +104,7 @@ class Number(ABC):
         lower, shares = self.over(forms, f)
         shares = np.nan_to_num(shares, posinf=0.0)
         shares /= np.maximum(shares.sum(axis=2, keepdims=True), np.finfo(float).tiny)
-        none = self.unknown(len(lower), f)
-        return none._replace(shares=(shares * ~(lower >= self.levels)[:, :, None]).sum(axis=1), smallest=lower)
-
-    def unknown(self, count: int, f: int) -> Tested:
-        """Return the results for boxes of which nothing is known."""
-        nothing = np.zeros(count, dtype=np.int32)
-        return Tested(nothing.astype(bool), np.zeros((count, f)), np.full((count, self.count), -np.inf), nothing)
+        return not_regular((shares * ~(lower >= self.levels)[:, :, None]).sum(axis=1), lower)
 
     def bounds(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Return lower bounds (B, K) over boxes (B, n) of the design, without dependent coordinates."""
@@ -197,17 +190,12 @@ class SmallestValues(LoopRule):
 
     def __init__(self, number: Number, goals: Sequence[Goal], recorder: TreeRecord | None = None) -> None:
         super().__init__(number.problem, number.examiner, recorder)
-        self._number, self._goals, self.block = number, goals, _BLOCK if number.problem.dependent else 2 * _BLOCK
+        self._number, self._goals, self._more = number, goals, number.unknown[None]
+        self.block = _BLOCK if number.problem.dependent else 2 * _BLOCK
         self._best = _Best(np.full(len(goals), np.inf), np.tile(number.problem.start, (len(goals), 1)))
         self._closed = np.full(len(goals), np.inf)
         if not self._problem.dependent:
             self._start_from_poses()
-
-    @property
-    def root(self) -> Boxes[Followed]:
-        """The whole workspace."""
-        root = super().root
-        return root._replace(more=root.more._replace(more=np.full((1, len(self._goals)), -np.inf)))
 
     def _levels(self) -> FloatArray:
         """Return the bounds (K,) at which boxes are closed: of several numbers those that are enough."""
@@ -284,8 +272,7 @@ class SmallestValues(LoopRule):
     def minima(self) -> list[Minimum]:
         """Search the workspace; return the smallest value of each number."""
         effort, is_one = Effort(), len(self._goals) == 1
-        order = Order.LARGEST if is_one else Order.NEWEST
-        search = Search(self, self.root, whole=self.whole, least=_LEAST_WIDTHS, order=order)
+        search = self.search(Order.LARGEST if is_one else Order.NEWEST)
 
         def ending() -> str | None:
             if is_one and -search.bound >= self._goals[0].levels(float(self._best.value[0]))[1]:
@@ -306,20 +293,17 @@ class SmallestValues(LoopRule):
         ]
 
 
-def smallest_values(
-    number: Number, goals: Sequence[Goal], *, time_limit: float | None = None, recorder: TreeRecord | None = None
-) -> list[Minimum]:
+def smallest_values(number: Number, goals: Sequence[Goal], recorder: TreeRecord | None = None) -> list[Minimum]:
     """Prove the smallest values of numbers of a robot over its poses.
 
     Args:
         number: K numbers.
         goals: K bounds that are to be reached.
-        time_limit: seconds after which the search stops with the bounds reached.
         recorder: records the boxes for a proof, without dependent coordinates; every leaf has a bound of at least that
             of the result.
 
     Raises:
         UncoveredError: an expression holds an operation without a rule.
     """
-    with one_search(time_limit):
+    with one_search():
         return SmallestValues(number, goals, recorder).minima()

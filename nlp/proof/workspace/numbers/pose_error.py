@@ -66,7 +66,7 @@ def pose_errors(subject: Subject, leg_error: float, *, paper: PaperRecord | None
         number = WorstError(problem, is_rotation=claim.reading.dimension is Dimension.ANGLE)
         goal = Goal(_GAP * abs(float(number.values(problem.start[None])[0, 0])))
         recorder = None if paper is None else paper.own(claim.name)
-        (found,) = smallest_values(number, [goal], recorder=recorder)
+        (found,) = smallest_values(number, [goal], recorder)
         searches.append((number, found))
         if paper is not None:
             paper.firsts[claim.name] = -found.bound

@@ -108,7 +108,7 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
         number, problem = subject.number(claim), subject.problem
         allowed = _asked_gap(subject, number, gap) if claim.limit is None else gap * max(abs(claim.limit), _NEAR_ZERO)
         recorder = None if paper is None or problem.dependent else paper.own(claim.name)
-        (found,) = smallest_values(number, [goal_of(claim, allowed)], recorder=recorder)
+        (found,) = smallest_values(number, [goal_of(claim, allowed)], recorder)
     except (UncoveredError, NotJudgedError) as error:
         return extreme_of(claim, Minimum(reason=str(error)))
     # A smallest singular value of at least 0, or an infinite condition number, says nothing.

@@ -110,7 +110,7 @@ class _ChangeRule(Rule[FloatArray]):
         errors = np.full((len(now.lower), 3 * self._count), self._tolerance)
         forms = self._encloser(np.hstack([now.lower, -errors]).T, np.hstack([now.upper, errors]).T)
         with np.errstate(all="ignore"):
-            found = self._changes(np.abs(forms.c) + np.abs(forms.a).sum(axis=2) + forms.r)
+            found = self._changes(forms.sizes)
         width = (self.whole.upper - self.whole.lower)[0]
         split = first_largest((now.upper - now.lower) / np.where(width > 0, width, np.inf))
         bound, middles = np.where(np.isfinite(found), found, np.inf), np.nan_to_num(self._changes(np.abs(forms.c)))

@@ -19,20 +19,13 @@ from casadi import SX
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ...boxes.engine import MOST_VARIABLES
-from ...boxes.search import Boxes, Rule, bisected, joined, some
+from ...boxes.search import Boxes, Order, Rule, Search, bisected, joined, some
 from ...enclosure.forms import Encloser, Forms
 from ..robot.closed_loops import inverses
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
-from .krawczyk import (
-    Coordinates,
-    Relation,
-    by_centres,
-    no_relation,
-    relation_of,
-    with_relation,
-)
-from .rank_rule import EntryChange, RankTest, Tested, is_polynomial
+from .krawczyk import Coordinates, Relation, by_centres, no_relation, relation_of, with_relation
+from .rank_rule import EntryChange, RankTest, Tested, is_polynomial, not_regular
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,6 +35,8 @@ if TYPE_CHECKING:
 #: Factors by which widths of dependent coordinates are made wider: the first guess, from slopes at the middle of a box,
 #: and later ones, from the relation that was found with the guess before.
 _WIDER, _AGAIN = 1.1, 1.05
+#: Widths of a box, in parts of the whole box, below which it is not bisected.
+_LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Attempts to find widths of dependent coordinates in which they surely stay.
 _ATTEMPTS = 8
 #: Smallest half width of a dependent coordinate, in parts of its size: more than rounding.
@@ -103,12 +98,11 @@ class Test(Protocol):
 
     Attributes:
         entries: (R, 1) the expressions.
+        unknown: smallest number, or numbers (K,), of a box of which nothing is known.
     """
 
     entries: SX
-
-    def unknown(self, count: int, f: int) -> Tested:
-        """Return the results for boxes of which nothing is known."""
+    unknown: FloatArray
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
         """Return the results for boxes.
@@ -180,7 +174,8 @@ class Examiner:
             return Examined(boxes, relation, *self._test.examine(forms, f, 0))
         slopes = slice(k, k + self._single.entries.numel())
         lower, upper, near, known = some(boxes, np.arange(B))
-        tested = self._test.unknown(B, f)
+        smallest = np.tile(self._test.unknown, (B, *[1] * self._test.unknown.ndim))
+        tested = not_regular(np.zeros((B, f)), smallest)
         columns: tuple[NDArray[Any], ...] = (*relation, *tested)
         new = np.flatnonzero(~known)
         if new.size:
@@ -376,6 +371,9 @@ class LoopRule(Rule[Followed]):
         whole: (n,) widths of the whole workspace along independent coordinates; 0 for others.
     """
 
+    #: Further columns of the whole workspace, as a tuple or an array.
+    _more: Any = ()
+
     def __init__(self, problem: Problem, examiner: Examiner, recorder: TreeRecord | None = None) -> None:
         self._problem, self._examiner, self._independent = problem, examiner, list(problem.independent)
         self._recorder = recorder
@@ -389,8 +387,12 @@ class LoopRule(Rule[Followed]):
     def root(self) -> Boxes[Followed]:
         """The whole workspace."""
         lower, upper, near, is_known = self._start
-        columns = Followed(near, is_known, no_relation(1, self._examiner.of))
+        columns = Followed(near, is_known, no_relation(1, self._examiner.of), self._more)
         return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), columns)
+
+    def search(self, order: Order) -> Search[Rule[Followed]]:
+        """Return the search of the whole workspace in an order."""
+        return Search(self, self.root, whole=self.whole, least=_LEAST_WIDTHS, order=order)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
         """Return the parts of boxes, with their dependent coordinates."""

@@ -63,6 +63,12 @@ class Tested(NamedTuple):
     signs: NDArray[np.int32]
 
 
+def not_regular(shares: FloatArray, smallest: FloatArray) -> Tested:
+    """Return the results for boxes of which none is regular."""
+    signs = np.zeros(len(smallest), dtype=np.int32)
+    return Tested(signs.astype(bool), shares, smallest, signs)
+
+
 class RankTest:
     """The test of a matrix.
 
@@ -74,7 +80,10 @@ class RankTest:
     Attributes:
         entries: (E, 1) what is not constant.
         sign: of the determinant of a square matrix at the start; 0 for other matrices.
+        unknown: smallest singular value where nothing is known.
     """
+
+    unknown: FloatArray = np.array(np.inf)
 
     def __init__(self, matrix: RankMatrix, z: SX, start: FloatArray) -> None:
         whole = matrix.matrix
@@ -98,11 +107,6 @@ class RankTest:
         self._nullity, self._at, self._constant = matrix.nullity, at, constant * scale[:, None]
         self._scale = np.ascontiguousarray(scale[at[:, 0]])
         self._head = (whole.shape[0] + matrix.nullity, whole.shape[1], len(at), (at, self._scale))
-
-    def unknown(self, count: int, f: int) -> Tested:
-        """Return the results for boxes of which nothing is known."""
-        nothing = np.zeros(count, dtype=np.int32)
-        return Tested(nothing.astype(bool), np.zeros((count, f)), np.full(count, np.inf), nothing)
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
         """Return the verdict on boxes from forms of the entries, as of :class:`~.loop_boxes.Test`."""

@@ -11,7 +11,7 @@ import numpy as np
 from .....models import frozen_array
 from ....errors import UncoveredError
 from ....interruption import one_search
-from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Search, Verdicts, joined, some
+from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Verdicts, joined, some
 from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
 from ..home_poses import Homes
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
 #: Number of boxes examined at once.
 _BLOCK = 512
-#: Widths of a box, in parts of the whole box, below which it is not bisected.
-_LEAST_WIDTHS = 2.0**-24, 2.0**-24
 #: Callback with seconds, number of boxes examined, and number of boxes open.
 RankProgress = Callable[[float, int, int], None]
 #: Search for a singular pose from the boxes that were examined last, and the number of all.
@@ -94,7 +92,6 @@ def prove_rank(
     problem: Problem,
     matrix: RankMatrix,
     *,
-    time_limit: float | None = None,
     most_boxes: int | None = None,
     progress: RankProgress | None = None,
     recorder: TreeRecord | None = None,
@@ -105,7 +102,6 @@ def prove_rank(
     Args:
         problem: the robot.
         matrix: one of its two matrices.
-        time_limit: seconds after which the search stops.
         most_boxes: number of boxes after which it stops.
         progress: called about ten times a second.
         recorder: records the boxes for a proof.
@@ -115,9 +111,9 @@ def prove_rank(
         UncoveredError: an expression holds an operation without a rule.
     """
     effort = Effort(most_boxes)
-    with one_search(time_limit):
+    with one_search():
         rule = _RankRule(problem, matrix, recorder, look or SingularSearch(problem, matrix).look)
-        search = Search(rule, rule.root, whole=rule.whole, least=_LEAST_WIDTHS, order=Order.NEWEST)
+        search = rule.search(Order.NEWEST)
 
         def ending() -> str | None:
             if rule.singular is not None:

@@ -33,7 +33,7 @@ from ...enclosure.forms import Encloser
 from ...statement.machine import JointErrors
 from ..robot.closed_loops import inverses
 from ..robot.posed_model import RankMatrix
-from ..robot.posed_robot import Problem, steepest
+from ..robot.posed_robot import Problem
 from .krawczyk import ROUNDING
 from .loop_boxes import Examined
 
@@ -193,15 +193,14 @@ class SingularPose:
 
     def machines(self, z: FloatArray) -> Iterator[FloatArray]:
         """Yield points (n,) of machines with smaller and smaller singular values, from a point of the design."""
-        problem, machine = self._problem, z.copy()
-        errors = problem.of_errors
+        problem, machine = self._problem, z
         for step in range(_MACHINES):
             closed = problem.loops.all_closed(machine[:, None], problem.dependent)[:, 0]
             slopes = self.slopes(closed)
             if slopes is None:
                 return
-            machine, end = closed.copy(), steepest(-slopes[errors].reshape(-1, 3), problem.tolerance).ravel()
-            machine[errors] += 2 / (step + 2) * (end - machine[errors])
+            end = problem.with_errors(closed[None], -slopes[None, problem.of_errors])[0]
+            machine = closed + 2 / (step + 2) * (end - closed)
             yield machine
 
 

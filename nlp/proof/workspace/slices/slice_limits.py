@@ -127,16 +127,16 @@ class SliceLimits:
         return np.full((1, self._reaches + len(self._places)), LimitState.OPEN, dtype=np.int8)
 
     def examine(self, boxes: LoopBoxes, relation: Relation, known: NDArray[np.int8]) -> NDArray[np.int8]:
-        """Return the states (B, K) of the claims over boxes whose dependent coordinates are known.
+        """Return the states (B, K) of the claims over boxes.
 
         Args:
-            boxes: (B,) boxes.
+            boxes: (B,) boxes. Of those whose dependent coordinates are not known nothing more is said.
             relation: of the dependent coordinates, to which it is set.
             known: (B, K) states over larger boxes.
         """
         states, enclosed, k = known.copy(), len(self._leasts), len(self._of.dependent)
-        is_open = states == LimitState.OPEN
-        rows = np.flatnonzero(is_open[:, :enclosed].any(axis=1) | bool(self.problem.dependent))
+        is_open = (states == LimitState.OPEN) & boxes.is_known[:, None]
+        rows = np.flatnonzero(is_open[:, :enclosed].any(axis=1) | (boxes.is_known & bool(k)))
         if rows.size:
             forms = self._encloser(boxes.lower[rows].T, boxes.upper[rows].T)
             own = relation_of(forms.part(slice(0, k)), self._of)

@@ -195,6 +195,7 @@ class _SliceRule(LoopRule):
     def __init__(self, robot: _Robot, chosen: list[int], lower: FloatArray, upper: FloatArray) -> None:
         problem = robot.problem
         super().__init__(problem, robot.examiners[0])
+        self._more = robot.limits.unknown, np.zeros(1, dtype=bool), np.zeros(1, dtype=np.int32)
         # Boxes without loops are examined in C: many at once.
         self.block = 512 if problem.dependent else 4096
         self._robot, self._limits, self._dependent = robot, robot.limits, list(problem.dependent)
@@ -210,8 +211,6 @@ class _SliceRule(LoopRule):
     def cover(self) -> tuple[FloatArray, NDArray[np.int8], NDArray[np.int16]]:
         """Return boxes (B, 4) that cover the slice, and the indices of their regions and limits."""
         root = self.root
-        more = self._limits.unknown, np.zeros(1, dtype=bool), np.zeros(1, dtype=np.int32)
-        root = root._replace(more=root.more._replace(more=more))
         search = Search(self, root, whole=np.nan_to_num((root.upper - root.lower)[0]), least=(0, 0), order=Order.NEWEST)
         while search.is_open:
             search.step(-math.inf)
@@ -234,23 +233,15 @@ class _SliceRule(LoopRule):
         if self._dependent:
             inside, is_empty = self._with_near(inside, low, high)
         inside = self._with_ranks(inside, has_ranks, signs)
-        relation, states = some(boxes.more.relation, np.arange(len(signs))), known
-        rows = np.flatnonzero(inside.is_known)
-        if rows.size:
-            own = some(relation, rows)
-            states[rows] = self._limits.examine(some(inside, rows), own, known[rows])
-            for whole, part in zip(relation, own, strict=True):
-                whole[rows] = part
+        relation = some(boxes.more.relation, np.arange(len(signs)))
+        states = self._limits.examine(inside, relation, known)
         reached, unreached = self._limits.reached(states)
         reached &= inside.is_known
         is_regular = has_ranks & reached
         binding, is_same = self._first.of(self._limits.of_limits(states), low, high)
-        same_sign = np.where(
-            signs == self._robot.sign, _REGIONS.index(Region.REGULAR), _REGIONS.index(self._robot.other)
-        )
-        region = np.where(reached, _REGIONS.index(Region.OPEN), _REGIONS.index(Region.UNKNOWN))
-        region = np.where(is_regular, same_sign, region)
-        region[unreached] = _REGIONS.index(Region.UNREACHED)
+        cases = unreached, is_regular & (signs == self._robot.sign), is_regular, reached
+        regions = Region.UNREACHED, Region.REGULAR, self._robot.other, Region.OPEN
+        region = np.select(cases, list(map(_REGIONS.index, regions)), _REGIONS.index(Region.UNKNOWN))
         binding[~reached] = UNDECIDED
         is_small = (high - low <= (self._upper - self._lower) / _SIDE).all(axis=1)
         done = (is_regular & is_same) | unreached | is_small | (is_empty & ~inside.is_known)
@@ -292,9 +283,9 @@ class _SliceRule(LoopRule):
         count += total[begin[:, 0], begin[:, 1]] - total[end[:, 0], begin[:, 1]]
         return boxes._replace(near=np.where(use[:, None], closed, boxes.near)), ~boxes.is_known & ~(count > 0)
 
-    def _in_grid(self, points: FloatArray) -> FloatArray:
-        """Return points (B, 2) of the slice as fractional indices of the grid."""
-        return (points - self._lower) / (self._upper - self._lower) * (POINTS - 1)
+    def _in_grid(self, points: FloatArray, steps: int = POINTS - 1) -> FloatArray:
+        """Return points (B, 2) of the slice as fractional indices of a grid with steps to each side."""
+        return (points - self._lower) / (self._upper - self._lower) * steps
 
     def _closed_grid(self) -> FloatArray:
         """Return closed loops (N, N, n) at the points of the grid, followed from the middle; NaN where they end."""
@@ -322,10 +313,8 @@ class _SliceRule(LoopRule):
 
         Boxes that touch are found on the grid of the smallest ones.
         """
-        low, high = (
-            np.rint((each[:, self._places] - self._lower) / (self._upper - self._lower) * _SIDE).astype(np.intp)
-            for each in (boxes.lower, boxes.upper)
-        )
+        ends = (each[:, self._places] for each in (boxes.lower, boxes.upper))
+        low, high = (np.rint(self._in_grid(each, _SIDE)).astype(np.intp) for each in ends)
         owner = np.empty((_SIDE, _SIDE), dtype=np.int64)
         for k, (begin, end) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):
             owner[begin[0] : end[0], begin[1] : end[1]] = k
