@@ -10,6 +10,7 @@ import numpy as np
 from builders import Array
 from mechanism_robots import Engine, projector
 from mujoco_robots import column_space, null_space
+from robot_gallery import CHI, LENGTH
 
 from screwsynth.models import Model, Substitution, axis_angle_from_matrix, constraint_rows, robot
 from screwsynth.models.mechanism import Mechanism, mechanism_of, wrenches_of
@@ -19,8 +20,6 @@ from screwsynth.nlp.case.pose import Rotation
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.paths import velocities_at
 
-CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
-LENGTH = 0.7
 #: Singular values of regular configurations are above this part of the largest: nearer to a singularity more digits
 #: are lost than the comparison allows.
 REGULAR = 1e-4

@@ -7,57 +7,23 @@ links = ["base", "crank", "coupler", "rocker", "rod", "bar", "platform"]
 points = { A = [0, 0, 0], B = [-0.2, "0.5*s", 0], C = [0.5, 0.6, 0], D = [0.6, 0, 0], E = [0.3, 1, 0] }
 [dimensions]
 s = { typical = 1.0 }
-[[joint]]
-name = "motor"
-type = "R"
-between = ["base", "crank"]
-at = "A"
-axis = "z"
-actuated = true
-[[joint]]
-name = "knee"
-type = "R"
-between = ["crank", "coupler"]
-at = "B"
-axis = "z"
-[[joint]]
-name = "wrist"
-type = "R"
-between = ["coupler", "rocker"]
-at = "C"
-axis = "z"
-[[joint]]
-name = "pivot"
-type = "R"
-between = ["base", "rocker"]
-at = "D"
-axis = "z"
-[[joint]]
-name = "hand"
-type = "R"
-between = ["rocker", "platform"]
-at = "E"
-axis = "z"
-[[joint]]
-name = "slide"
-type = "P"
-between = ["base", "rod"]
-at = [-1, 1.3, 0]
-axis = "x"
-actuated = true
-[[joint]]
-name = "tip"
-type = "R"
-between = ["rod", "bar"]
-at = [-0.6, 1.3, 0]
-axis = "z"
-[[joint]]
-name = "toe"
-type = "R"
-between = ["bar", "platform"]
-at = [-0.3, 1, 0]
-axis = "z"
 """
+#: Name, type, links, place and axis of each joint, and whether it is driven.
+_JOINTS = (
+    ("motor", "R", ("base", "crank"), '"A"', "z", True),
+    ("knee", "R", ("crank", "coupler"), '"B"', "z", False),
+    ("wrist", "R", ("coupler", "rocker"), '"C"', "z", False),
+    ("pivot", "R", ("base", "rocker"), '"D"', "z", False),
+    ("hand", "R", ("rocker", "platform"), '"E"', "z", False),
+    ("slide", "P", ("base", "rod"), "[-1, 1.3, 0]", "x", True),
+    ("tip", "R", ("rod", "bar"), "[-0.6, 1.3, 0]", "z", False),
+    ("toe", "R", ("bar", "platform"), "[-0.3, 1, 0]", "z", False),
+)
+ROBOT += "".join(
+    f'[[joint]]\nname = "{name}"\ntype = "{kind}"\nbetween = ["{inner}", "{outer}"]\nat = {at}\naxis = "{axis}"\n'
+    + "actuated = true\n" * driven
+    for name, kind, (inner, outer), at, axis, driven in _JOINTS
+)
 CASE = """[robot]
 file = "robot.toml"
 parameters = { s = { min = 0.9, max = 1.1 } }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import mujoco
@@ -169,11 +168,3 @@ def projector(twists: Array, centre: Array, length: float) -> Array:
     """``P_k`` in scaled coordinates about a centre from the twists that a member allows."""
     basis = left_null_space(scaled_twists(centre, length) @ twists)
     return np.asarray(basis @ basis.T)
-
-
-def turn(axis: Array, degrees: float) -> Array:
-    """Rotation matrix by Rodrigues' formula."""
-    x, y, z = axis / np.linalg.norm(axis)
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = math.radians(degrees)
-    return np.asarray(np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * (K @ K))

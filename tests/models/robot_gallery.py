@@ -3,6 +3,7 @@
 Files in ``special`` have joints, limbs and keys that no robot of the gallery has.
 """
 
+import copy
 import math
 import tomllib
 from functools import cache
@@ -87,6 +88,15 @@ REFERENCE: dict[str, tuple[dict[str, float], float, float, list[float], float]] 
 @cache
 def table(name: str) -> dict[str, Any]:
     return tomllib.loads(FILES[name].read_text(encoding="utf-8"))
+
+
+def snu() -> dict[str, Any]:
+    """The 3-UPU with the first axes of its universal joints along the radius."""
+    tables = copy.deepcopy(table("3-upu"))
+    for k in (0, 2):
+        joint = tables["limb"][0]["joints"][k]
+        joint["axes"] = ["x" if axis == "y" else "cross(x, A - B)" for axis in joint["axes"]]
+    return tables
 
 
 def size_of(robot: Robot) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from builders import Array, turn_about
 from casadi import SX
-from robot_gallery import CHI, LENGTH, RANKS, REFERENCE, UPS, table
+from robot_gallery import CHI, LENGTH, RANKS, REFERENCE, snu, table
 
 from screwsynth.models import (
     Model,
@@ -24,7 +24,6 @@ from screwsynth.models import (
     reporting_matrix,
     robot,
     robot_function,
-    three_upu,
 )
 
 RPS = """
@@ -53,15 +52,6 @@ def gallery(name: str, dimensions: Mapping[str, float]) -> Model:
     tables = copy.deepcopy(table(name))
     for key, value in dimensions.items():
         tables["dimensions"][key]["typical"] = value
-    return robot(**tables)
-
-
-def snu() -> Model:
-    """The 3-UPU with the first axes of its universal joints along the radius."""
-    tables = copy.deepcopy(table("3-upu"))
-    for k in (0, 2):
-        joint = tables["limb"][0]["joints"][k]
-        joint["axes"] = ["x" if axis == "y" else "cross(x, A - B)" for axis in joint["axes"]]
     return robot(**tables)
 
 
@@ -172,35 +162,8 @@ def test_robots_have_the_numbers_of_an_independent_computation(name: str) -> Non
     assert (model.generic.jacobian, model.generic.constraints) == (6, ranks.constraints)
 
 
-def test_hexapod_and_three_upu_by_joints_are_those_by_rows() -> None:
-    rng = np.random.default_rng(3)
-    legs = Robot(gallery("6-ups", UPS))
-    angles = [math.radians(120 * k) + side * np.array([0.35, 0.75]) for side in (-1, 1) for k in range(3)]
-    base = np.array([[math.cos(b), math.sin(b), 0.0] for b, _ in angles])
-    platform = np.array([[0.6 * math.cos(a), 0.6 * math.sin(a), 0.0] for _, a in angles])
-    hexapod = robot_function("hexapod")()
-    own = Substitution.identity(hexapod)
-    rows = ca.Function("rows", [*own.all], [instantiate(hexapod, own, SX(1), [SX(CHI)]).jacobian])
-    values = np.hstack([base.ravel(), platform.ravel()])
-    order = [f"{part}_{k + 1}" for part in ("base", "platform") for k in range(6)]
-    places = {name: values[3 * k : 3 * k + 3] for k, name in enumerate(order)}
-    parameters = np.hstack([places[item.name] for item in hexapod.parameters])
-    tsai = three_upu(axes="tsai")
-    theirs = Substitution.identity(tsai)
-    upu_rows = ca.Function("rows", [*theirs.all], [instantiate(tsai, theirs, SX(LENGTH), [SX(CHI)]).jacobian])
-    upu = Robot(gallery("3-upu", {}))
-    for _ in range(4):
-        pose = np.concatenate([rng.uniform(-0.2, 0.2, 3), np.array([0, 0, 1.2]) + rng.uniform(-0.2, 0.2, 3)])
-        R = ca.Function("R", [], [matrix_from_cayley(SX(pose[:3]))])()["o0"].full()
-        assert pytest.approx(rows(parameters, [], R, pose[3:]).full(), abs=1e-14) == legs.at(pose).J
-        # Its own motion is a translation, where the lower joints stay parallel to the upper ones.
-        reached = upu.driven(rng.uniform(-0.1, 0.1, 3))
-        J, K = upu.at(reached).J, upu_rows([0.57735, 0.288675], [], np.eye(3), reached[3:6]).full()
-        assert pytest.approx(K.T @ K, abs=1e-10) == J.T @ J
-
-
 def test_published_facts_of_the_three_upu_hold() -> None:
-    tsai, other = (Robot(model, length=1.0) for model in (gallery("3-upu", {}), snu()))
+    tsai, other = (Robot(model, length=1.0) for model in (gallery("3-upu", {}), robot(**snu())))
     about_z = np.array([0, 0, 1.0, 0, 0, 0])
     values = np.linalg.svd(tsai.at(tsai.home).J, compute_uv=False)[:6]
     assert values == pytest.approx(np.repeat([1.601235, 0.896811, 0.243109], 2), abs=1e-6)
@@ -215,19 +178,6 @@ def test_published_facts_of_the_three_upu_hold() -> None:
     for angle in (0.0, 0.7, 2.0):
         line = np.array([math.cos(angle), math.sin(angle), 0.0])
         assert other.at(other.home, np.hstack([line, np.cross([0, 0, 1.4], line)])).F < 1e-20
-
-
-def test_rows_of_the_three_rps_are_those_of_joshi_and_tsai() -> None:
-    here = Robot(written(RPS))
-    J = here.at(here.home).J
-    for k in range(3):
-        t = 2 * math.pi * k / 3
-        turn = np.array([[math.cos(t), -math.sin(t), 0], [math.sin(t), math.cos(t), 0], [0, 0, 1]])
-        b, a, u = turn @ [1, 0, 0], turn @ [0.6, 0, 1.1], turn @ [0, 1, 0]
-        s = (a - b) / np.linalg.norm(a - b)
-        expected = np.array([np.hstack([f, np.cross(a, f)]) for f in (s, u)])
-        rows = J[2 * k : 2 * k + 2]
-        assert rows.T @ rows == pytest.approx(expected.T @ expected, abs=1e-14)
 
 
 @pytest.mark.parametrize("name", ["delta", "delta-parallelogram"])

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import copy
 import math
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array
-from mechanism_robots import Engine, four_bar_delta, geared, projector, turn, without
+from builders import Array, turn_about
+from mechanism_robots import Engine, four_bar_delta, geared, projector, without
 from mujoco_robots import Oracle
 from robot_files import Joint, every_joint, robot_of
+from robot_gallery import CHI, GALLERY, LENGTH, snu, table
 
-import screwsynth.models
 from screwsynth.models import Model, Substitution, axis_angle_from_matrix, instantiate, robot
 from screwsynth.models.mechanism import (
     Coupling,
@@ -39,16 +36,6 @@ from screwsynth.models.mechanism import (
     wrenches_of,
 )
 from screwsynth.nlp.evidence.assembly import unknowns_from_home
-
-GALLERY = Path(screwsynth.models.__file__).parent / "robots"
-NAMES = sorted(path.stem for path in GALLERY.glob("*.toml"))
-CHI = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
-LENGTH = 0.7
-
-
-@cache
-def table(name: str) -> dict[str, Any]:
-    return tomllib.loads((GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def driven(mechanism: Mechanism, seed: int, reach: float = 0.05) -> dict[str, float]:
@@ -79,7 +66,7 @@ def values_of(model: Model, plate: MechanismLink) -> tuple[list[float], list[Any
     return [float(home[0]), float(there[0])], [home[1].full(), there[1].full()]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", GALLERY)
 def test_gallery_at_home_and_driven_is_that_of_the_engine(name: str) -> None:
     """Universal joints are two hinges here, and parallelograms four, in a loop of their own."""
     oracle, mechanism = Oracle(robot_of(table(name)), LENGTH), mechanism_of(table(name))
@@ -187,7 +174,7 @@ def test_the_symbolic_form_of_nested_loops_has_the_numbers_of_the_mechanism() ->
 
 def test_numbers_do_not_depend_on_frame_tree_or_order() -> None:
     """Moved in the world, with links in another order, and joints given from the other side."""
-    R, t = turn(np.array([1.0, 2, -1]), 70), np.array([3.0, -2, 1])
+    R, t = turn_about([1, 2, -1], math.radians(70)), np.array([3.0, -2, 1])
     for name in ("delta", "delta-parallelogram", "exechon"):
         mechanism = mechanism_of(table(name))
         moved = replace(
@@ -206,14 +193,6 @@ def test_numbers_do_not_depend_on_frame_tree_or_order() -> None:
         assert other.objective(chi) == pytest.approx(one.objective(CHI), rel=1e-9)
         assert other.rates(chi) == pytest.approx(dict(one.rates(CHI)), rel=1e-9)
         assert sorted(other.ranks.passive) == sorted(one.ranks.passive)
-
-
-def snu() -> dict[str, Any]:
-    changed = copy.deepcopy(table("3-upu"))
-    for k in (0, 2):
-        joint = changed["limb"][0]["joints"][k]
-        joint["axes"] = ["x" if axis == "y" else "cross(x, A - B)" for axis in joint["axes"]]
-    return changed
 
 
 def with_points(name: str, **points: Any) -> dict[str, Any]:  # noqa: ANN401 - expressions
@@ -433,7 +412,7 @@ LIMBS: dict[tuple[str, int], Limb] = {
 
 @pytest.mark.parametrize(("name", "limb"), LIMBS)
 def test_wrenches_of_a_member_are_those_of_its_mechanics(name: str, limb: int) -> None:
-    robot = robot_of(tomllib.loads((GALLERY / f"{name}.toml").read_text(encoding="utf-8")))
+    robot = robot_of(table(name))
     expected = LIMBS[name, limb](every_joint(robot.limbs[limb]))
     rows = [np.concatenate([f / np.linalg.norm(f), np.zeros(3)]) for f in expected.forces]
     rows += [np.concatenate([np.zeros(3), m / np.linalg.norm(m)]) for m in expected.couples]
@@ -445,4 +424,4 @@ def test_wrenches_of_a_member_are_those_of_its_mechanics(name: str, limb: int) -
 
 
 def test_every_robot_of_the_gallery_has_a_limb_here() -> None:
-    assert {name for name, _ in LIMBS} == {path.stem for path in GALLERY.glob("*.toml")}
+    assert {name for name, _ in LIMBS} == set(GALLERY)

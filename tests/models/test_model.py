@@ -33,7 +33,7 @@ from screwsynth.models import (
     stewart_gough,
     three_upu,
 )
-from screwsynth.nlp import Case, Nlp, RobotState, Rotation, Task, evaluate, formulate
+from screwsynth.nlp import Case, Nlp, Rotation, Task, evaluate, formulate
 
 
 @dataclass(frozen=True)
@@ -316,76 +316,6 @@ def test_a_robot_given_by_closure_equations_is_the_direct_one_where_they_hold() 
         np.testing.assert_allclose(g, 3 * lengths**2, rtol=1e-14)
 
 
-def three_limbs(axes: str, *, scale: float = 1.0) -> Model:
-    """Three limbs between triangles, each with a universal joint at the platform that keeps it from turning.
-
-    The joint's first axis is fixed in the platform, radial or tangential, its second square to it and to the limb.
-    ``scale`` lengthens the couples' directions, which must not matter.
-    """
-    pose = PoseSymbols()
-    rows = []
-    for i in range(3):
-        azimuth = 2 * math.pi * i / 3
-        radial = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        first = radial if axes == "radial" else np.array([-radial[1], radial[0], 0.0])
-        limb = pose.position + pose.rotation @ ca.DM(0.288675 * radial) - ca.DM(0.57735 * radial)
-        u1 = pose.rotation @ ca.DM(first)
-        u2 = ca.cross(limb, u1)
-        rows.append(force_along(str(i + 1), ca.DM(0.57735 * radial), limb))
-        rows.append(couple_about(str(i + 1), scale * ca.cross(u1, u2)))
-    return Model("three-limbs", "a toy", (), pose, (0.0, 0.0, 0.7), tuple(rows))
-
-
-def three_limb_rows(axes: str, position: Array, R: Array) -> tuple[Array, Array]:
-    """Unit forces and unit couples (3, 6) in plain numbers."""
-    forces, couples = [], []
-    for azimuth in np.deg2rad([0.0, 120.0, 240.0]):
-        radial = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-        tangential = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-        end = position + R @ (0.288675 * radial)
-        along = (end - 0.57735 * radial) / np.linalg.norm(end - 0.57735 * radial)
-        u1 = R @ (radial if axes == "radial" else tangential)
-        u2 = np.cross(along, u1) / np.linalg.norm(np.cross(along, u1))
-        forces.append([*along, *np.cross(end, along)])
-        couples.append([0.0, 0.0, 0.0, *np.cross(u1, u2)])
-    return np.array(forces), np.array(couples)
-
-
-def state_of(model: Model, twist: Array, length: float, pose: tuple[Array, Array, float] | None = None) -> RobotState:
-    position, axis, angle = pose or (np.array([0.0, 0.0, 0.7]), np.array([0.0, 0.0, 1.0]), 0.0)
-    case = Case(model, {}, position.tolist(), [Task(twist)], Rotation(axis, angle), characteristic_length=length)
-    return evaluate(formulate(case), np.zeros(0))
-
-
-@pytest.mark.parametrize("axes", ["radial", "tangential"])
-def test_couple_rows_are_unit_couples_times_the_characteristic_length(axes: str) -> None:
-    rng = np.random.default_rng(13)
-    model, longer = three_limbs(axes), three_limbs(axes, scale=-17.0)
-    assert model.has_couples
-    for _ in range(10):
-        position, axis, angle = (
-            rng.uniform([-0.3, -0.3, 0.6], [0.3, 0.3, 1]),
-            rng.normal(size=3),
-            rng.uniform(-0.5, 0.5),
-        )
-        twist, length = rng.normal(size=6), float(rng.uniform(0.1, 10))
-        forces, couples = three_limb_rows(axes, position, turn_about(axis, angle))
-        state = state_of(model, twist, length, (position, axis, float(angle)))
-        expected = np.empty((6, 6))
-        expected[0::2], expected[1::2] = forces, length * couples
-        np.testing.assert_allclose(state.jacobian, expected, rtol=0, atol=2e-15 * max(1.0, length))
-        # F = F of the forces + length^2 * (angular velocity along the couples)^2.
-        force_rates = forces[:, 3:] @ twist[:3] + forces[:, :3] @ twist[3:]
-        couple_rates = couples[:, 3:] @ twist[:3]
-        F = force_rates @ force_rates + length**2 * couple_rates @ couple_rates
-        assert pytest.approx(F, rel=1e-13) == state.F
-        np.testing.assert_allclose(state.rates[1::2], length * couple_rates, rtol=0, atol=1e-14 * length)
-        # A couple's direction counts, its length and sign do not.
-        other = state_of(longer, twist, length, (position, axis, float(angle)))
-        assert pytest.approx(state.F, rel=1e-14) == other.F
-        np.testing.assert_allclose(other.rates[1::2], -state.rates[1::2], rtol=0, atol=1e-14 * length)
-
-
 def test_the_characteristic_length_means_nothing_to_robots_without_couples() -> None:
     rng = np.random.default_rng(14)
     legs = Legs(rng.uniform(-15, 15, (6, 3)), rng.uniform(-8, 8, (6, 3)))
@@ -396,34 +326,6 @@ def test_the_characteristic_length_means_nothing_to_robots_without_couples() -> 
         np.testing.assert_allclose(np.linalg.norm(forces, axis=1), np.ones(6), rtol=1e-15)
         rates = state.jacobian[:, 3:] @ [1, 2, 3] + forces @ [4, 5, 6]
         assert pytest.approx(float(rates @ rates), rel=1e-13) == state.F
-
-
-def test_translational_three_limb_robots_have_their_known_ranks_and_work_rates() -> None:
-    vertical = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    # Tangential axes: each couple is along its limb, whose cosine with the vertical is 0.7 over the limb's length.
-    square = 0.7**2 + (0.57735 - 0.288675) ** 2
-    tangential = state_of(three_limbs("tangential"), vertical, 1.0)
-    assert pytest.approx(3 * 0.7**2 / square, rel=1e-14) == tangential.F
-    assert (tangential.rank, tangential.is_singular) == (6, False)
-    # Radial axes: each couple is vertical; the limbs meet at twice the platform's height.
-    radial = state_of(three_limbs("radial"), vertical, 1.0)
-    assert pytest.approx(3.0, rel=1e-14) == radial.F
-    assert (radial.rank, radial.is_singular) == (4, True)
-    for azimuth in np.linspace(0, math.pi, 7):
-        axis = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        through_apex = np.concatenate([axis, np.cross([0.0, 0.0, 1.4], axis)])
-        state = state_of(three_limbs("radial"), through_apex, 1.0)
-        # Rates of rounding size, squared.
-        assert state.F < 1e-30
-        assert state.is_zero
-        # Both freedoms of the robot turn about the apex, and so leave it where it is.
-        assert state.free_twists.shape == (2, 6)
-        for twist in state.free_twists:
-            still = twist[3:] + np.cross(twist[:3], [0.0, 0.0, 1.4])
-            np.testing.assert_allclose(still, np.zeros(3), rtol=0, atol=1e-14 * float(np.linalg.norm(twist)))
-            assert abs(twist[2]) < 1e-14
-        below = np.concatenate([axis, np.cross([0.0, 0.0, 1.3], axis)])
-        assert not state_of(three_limbs("radial"), below, 1.0).is_zero
 
 
 @pytest.mark.parametrize("model", [stewart_gough(), hexapod(), three_upu(axes="tsai"), three_upu()])

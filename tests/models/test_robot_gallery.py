@@ -1,6 +1,6 @@
 """Every robot file of the gallery, in MuJoCo and in the package: dimensions, ranks, F, rates, wrenches and places."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,12 +8,10 @@ import pytest
 from mujoco_robots import Oracle, scaled_twists
 from robot_files import every_joint, robot_of
 from robot_gallery import (
-    CHI,
     FILES,
     GALLERY,
     LENGTH,
     RANKS,
-    REFERENCE,
     Array,
     random_dimensions,
     random_displacements,
@@ -23,9 +21,9 @@ from robot_gallery import (
 )
 
 from screwsynth.models import Dimension, robot
-from screwsynth.nlp import Case, Free, Rotation, Task, evaluate, formulate
+from screwsynth.nlp import Case, Free, RobotState, Rotation, Task, evaluate, formulate
 from screwsynth.nlp.evidence.kkt import close_equations
-from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
 
 #: Lengths of links by the name of the dimension that states them: the joints between which, in the first limb.
 LINKS: dict[str, dict[str, tuple[int, int]]] = {
@@ -106,44 +104,6 @@ def test_dimensions_and_ranks_at_home_and_away_from_it_and_for_other_dimensions(
         assert oracle.ranks() == RANKS[name]
 
 
-@pytest.mark.parametrize("name", REFERENCE)
-def test_reference_numbers_at_home_and_driven_away_from_it(name: str) -> None:
-    dimensions, F, F_feasible, rates, F_driven = REFERENCE[name]
-    oracle = Oracle(robot_of(table(name), dimensions), LENGTH)
-    feasible = oracle.feasible(CHI)
-    found = [oracle.objective(CHI), oracle.objective(feasible)]
-    np.testing.assert_allclose(oracle.rates(feasible), rates, rtol=0, atol=6e-7)
-    oracle.drive([0.05] * oracle.robot.actuators)
-    np.testing.assert_allclose([*found, oracle.objective(CHI)], [F, F_feasible, F_driven], rtol=0, atol=1e-10)
-
-
-@dataclass(frozen=True)
-class LibraryValues:
-    """Values of the package for one robot at one pose.
-
-    Attributes:
-        F: objective.
-        wrenches: rows (d, 6) of each limb, force then moment about the world origin, couples times the length.
-        rank: of the Jacobian.
-        constraints: rank of all constraints together.
-        freedoms: of the platform with free actuators.
-        rates: (actuators,) in the order of the file.
-        closure: largest residual of a loop equation, of order 1.
-        singularities: kinds of those that were found.
-        constrained: part of F that constraints carry.
-    """
-
-    F: float
-    wrenches: list[Array]
-    rank: int
-    constraints: int
-    freedoms: int
-    rates: Array
-    closure: float
-    singularities: list[str]
-    constrained: float
-
-
 class Library:
     """A robot file in the package: a program in which all dimensions, the pose and the internal unknowns are free."""
 
@@ -160,11 +120,15 @@ class Library:
             characteristic_length=LENGTH,
         )
         self.nlp = formulate(case)
-        self.limbs = range(len(robot_of(table(name)).limbs))
 
-    def at(self, dimensions: dict[str, float], pose: tuple[Array, Array], twist: Array) -> LibraryValues:
-        """Values with these dimensions (degrees for angles), pose and task; unknowns from home, closed at the pose."""
-        model, places = self.nlp.program.model, self.nlp.program.places
+    def at(
+        self, dimensions: dict[str, float], pose: tuple[Array, Array], twist: Array
+    ) -> tuple[RobotState, Mobility, float]:
+        """State, mobility and largest residual of a loop, with unknowns from home, closed at the pose.
+
+        ``dimensions`` have degrees for angles, ``twist`` is the task.
+        """
+        places = self.nlp.program.places
         arguments = np.array(self.nlp.arguments)
         arguments[places.twists[0]] = twist
         nlp = replace(self.nlp, arguments=arguments)
@@ -180,21 +144,10 @@ class Library:
         closed = close_equations(nlp, x)
         np.testing.assert_array_equal(closed[: count + 6], x[: count + 6])  # the unknowns alone close the loops
         numbers = nlp.program.kernels.robot_state(closed, nlp.arguments)
-        state, mobility = evaluate(nlp, closed), mobility_of(nlp, closed, evaluate(nlp, closed))
-        names = [str(k + 1) for k in self.limbs]
-        wrenches = [state.jacobian[[row.limb == name for row in model.rows]] for name in names]
+        state = evaluate(nlp, closed)
+        mobility = mobility_of(nlp, closed, state)
         assert mobility is not None
-        return LibraryValues(
-            F=state.F,
-            wrenches=wrenches,
-            rank=state.rank,
-            constraints=mobility.constraint_rank,
-            freedoms=mobility.freedoms,
-            rates=np.array(list(mobility.actuator_rates.values())),
-            closure=float(np.abs(numbers.loops).max(initial=0.0)),
-            singularities=[each.kind.name for each in mobility.singularities],
-            constrained=mobility.constrained,
-        )
+        return state, mobility, float(np.abs(numbers.loops).max(initial=0.0))
 
 
 def limb_forms(oracle: Oracle) -> list[Array]:
@@ -221,16 +174,19 @@ def test_library_equals_mujoco(name: str) -> None:
         general = random_twist(oracle.robot, rng)
         feasible = oracle.feasible(general)
         for twist in (general, feasible):
-            found = library.at(values, pose, twist)
+            state, mobility, closure = library.at(values, pose, twist)
             # F in parts of its size without cancellation: the feasible part of a twist may move no actuator.
             size = sum(float(np.abs(twist) @ np.abs(form) @ np.abs(twist)) for form in limb_forms(oracle))
-            assert pytest.approx(oracle.objective(twist), rel=1e-9, abs=1e-12 * size) == found.F
-        assert found.closure < 1e-12
-        assert found.constrained < 1e-9
-        assert not found.singularities
-        assert (found.rank, found.constraints, found.freedoms) == (ranks.J, ranks.constraints, ranks.freedoms)
-        np.testing.assert_allclose(found.rates, oracle.rates(feasible), rtol=1e-8, atol=1e-8)
-        turned = [rows[:, [3, 4, 5, 0, 1, 2]] for rows in found.wrenches]
-        for rows, form in zip(turned, limb_forms(oracle), strict=True):
+            assert pytest.approx(oracle.objective(twist), rel=1e-9, abs=1e-12 * size) == state.F
+        assert closure < 1e-12
+        assert mobility.constrained < 1e-9
+        assert not mobility.singularities
+        assert (state.rank, mobility.constraint_rank, mobility.freedoms) == (ranks.J, ranks.constraints, ranks.freedoms)
+        rates = list(mobility.actuator_rates.values())
+        np.testing.assert_allclose(rates, oracle.rates(feasible), rtol=1e-8, atol=1e-8)
+        limbs = np.array([row.limb for row in library.nlp.program.model.rows])
+        wrenches = state.jacobian[:, [3, 4, 5, 0, 1, 2]]
+        by_limb = [wrenches[limbs == str(k + 1)] for k in range(len(oracle.robot.limbs))]
+        for rows, form in zip(by_limb, limb_forms(oracle), strict=True):
             np.testing.assert_allclose(rows.T @ rows, form, rtol=0, atol=1e-9 * max(1.0, np.abs(form).max()))
-        assert sum(map(len, turned)) == sum(ranks.W)
+        assert sum(map(len, by_limb)) == sum(ranks.W)

@@ -56,16 +56,6 @@ def matrix(n: Array, angle: float) -> Array:
 
 
 @pytest.mark.parametrize("function", [from_quaternion, from_cayley, from_axis_angle])
-def test_a_quarter_turn_about_each_axis_takes_the_next_to_the_one_after(
-    function: Callable[[Array, float], Array],
-) -> None:
-    for i in range(3):
-        R = function(np.eye(3)[i], np.pi / 2)
-        np.testing.assert_allclose(R @ np.eye(3)[(i + 1) % 3], np.eye(3)[(i + 2) % 3], rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(R @ np.eye(3)[i], np.eye(3)[i], rtol=0, atol=ROUNDING)
-
-
-@pytest.mark.parametrize("function", [from_quaternion, from_cayley, from_axis_angle])
 def test_no_rotation_is_the_identity(function: Callable[[Array, float], Array]) -> None:
     np.testing.assert_array_equal(function(np.array([0.6, 0.0, 0.8]), 0.0), np.eye(3))
 

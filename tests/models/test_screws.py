@@ -162,19 +162,6 @@ def test_a_line_is_normal_to_its_moment_and_holds_both_points(first: Array, seco
 
 
 @many
-@given(points, points, points)
-def test_intersecting_lines_are_reciprocal(meet: Array, one: Array, other: Array) -> None:
-    assume(min(np.linalg.norm(one - meet), np.linalg.norm(other - meet)) > 0.01)
-    assert abs(float(reciprocal_product(line_through(one, meet), line_through(meet, other)))) < 1e-13
-
-
-@many
-@given(directions, points, points)
-def test_parallel_lines_are_reciprocal(n: Array, one: Array, other: Array) -> None:
-    assert abs(float(reciprocal_product(screw_from_axis(n, one, 0), screw_from_axis(n, other, 0)))) < 1e-13
-
-
-@many
 @given(directions, points, st.floats(0, 50), st.floats(-math.pi, math.pi), pitches, pitches, points)
 def test_work_rate_of_two_screws_from_distance_angle_and_pitches(
     n: Array, foot: Array, a: float, alpha: float, pitch: float, other_pitch: float, slide: Array
@@ -221,30 +208,6 @@ def test_a_moved_screw_is_the_screw_of_the_moved_axis(
     np.testing.assert_allclose(moved, screw_from_axis(R @ n, R @ s0 + shift, h, 2), rtol=0, atol=5e-13)
     translation = moved_screw(screw_from_axis(n, s0, math.inf, 2), R, shift)
     np.testing.assert_allclose(translation, [0, 0, 0, *(2 * R @ unit(n))], rtol=0, atol=2e-15)
-
-
-@many
-@given(triples(10), triples(10), triples(10), triples(10), directions, st.floats(-math.pi, math.pi), points)
-def test_moving_both_screws_keeps_their_work_rate(
-    f: Triple, m: Triple, omega: Triple, v: Triple, about: Array, angle: float, shift: Array
-) -> None:
-    R = turn_about(about, angle)
-    wrench, twist = np.array([*f, *m]), np.array([*omega, *v])
-    before = float(reciprocal_product(wrench, twist))
-    after = float(reciprocal_product(moved_screw(wrench, R, shift), moved_screw(twist, R, shift)))
-    # Moments grow by arms of 173 times forces of 17, and meet angular velocities of 17.
-    assert after == pytest.approx(before, rel=0, abs=2e-11)
-
-
-def test_moves_compose() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        screw, t, u = rng.normal(size=6), rng.normal(size=3), rng.normal(size=3)
-        R, S = turn_about(rng.normal(size=3), rng.uniform(-3, 3)), turn_about(rng.normal(size=3), rng.uniform(-3, 3))
-        twice = moved_screw(moved_screw(screw, R, t), S, u)
-        np.testing.assert_allclose(twice, moved_screw(screw, S @ R, S @ t + u), rtol=0, atol=2e-14)
-        back = moved_screw(moved_screw(screw, R, t), R.T, -R.T @ t)
-        np.testing.assert_allclose(back, screw, rtol=0, atol=2e-14)
 
 
 @pytest.mark.parametrize(

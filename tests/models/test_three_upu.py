@@ -50,13 +50,6 @@ def unit(vectors: Array) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-def orthonormal_pairs(generator: np.random.Generator) -> tuple[Array, Array]:
-    first = unit(generator.normal(size=(3, 3)))
-    second = generator.normal(size=(3, 3))
-    second = unit(second - first * np.sum(first * second, axis=1, keepdims=True))
-    return first, second
-
-
 class Drawn:
     """A random robot and pose, with what can be worked out of them by hand."""
 
@@ -66,7 +59,9 @@ class Drawn:
         self.p: Array = generator.uniform([-30, -30, 40], [30, 30, 100])
         self.axis: Array = generator.normal(size=3)
         self.angle = float(generator.uniform(-1.2, 1.2))
-        self.u1, self.u2 = orthonormal_pairs(generator)
+        self.u1 = unit(generator.normal(size=(3, 3)))
+        second = generator.normal(size=(3, 3))
+        self.u2 = unit(second - self.u1 * np.sum(self.u1 * second, axis=1, keepdims=True))
         self.twist: Array = generator.normal(size=6) * [1, 1, 1, 20, 20, 20]
         self.length = float(generator.uniform(0.1, 40))
 
@@ -159,7 +154,10 @@ def test_turning_about_the_vertical() -> None:
 @pytest.mark.parametrize("axes", ["free", "limb", "snu", "tsai"])
 def test_rows_are_those_made_by_hand(axes: Axes, seed: int) -> None:
     drawn = Drawn(seed)
-    J = state(drawn.case(axes)).jacobian
+    found = state(drawn.case(axes))
+    J = found.jacobian
+    np.testing.assert_allclose(found.rates, J @ np.roll(drawn.twist, 3), rtol=1e-12, atol=1e-12)
+    assert pytest.approx(float(found.rates @ found.rates), rel=1e-12) == found.F
     forces = drawn.force_rows()
     scale = np.linalg.norm(forces, axis=1, keepdims=True)
     np.testing.assert_allclose(J[:3] / scale, forces / scale, atol=1e-14)
@@ -183,66 +181,6 @@ def test_rows_come_force_by_force_and_then_couple_by_couple() -> None:
     rows = three_upu().wrenches
     assert [row.limb for row in rows] == ["1", "2", "3"] * 2
     assert [row.kind for row in rows] == [WrenchKind.FORCE] * 3 + [WrenchKind.COUPLE] * 3
-
-
-def displacement(twist: Array, t: float) -> Array:
-    """exp(t chi) as a (4, 4) matrix, by its series: t |omega| is small here."""
-    wx, wy, wz, vx, vy, vz = t * twist
-    X = np.array([[0, -wz, wy, vx], [wz, 0, -wx, vy], [-wy, wx, 0, vz], [0, 0, 0, 0]])
-    total, term = np.eye(4), np.eye(4)
-    for k in range(1, 12):
-        term = term @ X / k
-        total = total + term
-    return total
-
-
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("axes", ["free", "snu"])
-def test_force_rows_give_leg_rates_and_couple_rows_give_turning(axes: Axes, seed: int) -> None:
-    drawn = Drawn(100 + seed)
-    found = state(drawn.case(axes))
-    joints = drawn.p + on_circle(drawn.platform) @ drawn.R.T
-
-    def lengths(t: float) -> Array:
-        g = displacement(drawn.twist, t)
-        return np.linalg.norm(joints @ g[:3, :3].T + g[:3, 3] - on_circle(drawn.base), axis=1)
-
-    # Fourth-order differences: the truncation is 1e-14 of the rates, cancellation 1e-16 * 100 / 1e-3.
-    h = 1e-3
-    rates = (8 * (lengths(h) - lengths(-h)) - (lengths(2 * h) - lengths(-2 * h))) / (12 * h)
-    np.testing.assert_allclose(found.rates[:3], rates, atol=1e-9 * np.max(np.abs(drawn.twist)))
-    turning = found.jacobian[3:, 3:] @ drawn.twist[:3]
-    np.testing.assert_allclose(found.rates[3:], turning, rtol=1e-12, atol=1e-12)
-    assert pytest.approx(float(rates @ rates + turning @ turning), rel=1e-9) == found.F
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_turning_the_axes_about_their_common_normal_changes_nothing(seed: int) -> None:
-    drawn = Drawn(200 + seed)
-    before = state(drawn.case("free"))
-    for k, angle in enumerate(np.random.default_rng(seed).uniform(-3, 3, 3)):
-        normal = np.cross(drawn.u1[k], drawn.u2[k])
-        drawn.u1[k], drawn.u2[k] = turn_about(normal, angle) @ drawn.u1[k], turn_about(normal, angle) @ drawn.u2[k]
-    after = state(drawn.case("free"))
-    assert pytest.approx(before.F, rel=1e-12) == after.F
-    np.testing.assert_allclose(after.jacobian, before.jacobian, atol=1e-13 * np.abs(before.jacobian).max())
-
-
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("axes", ["free", "limb", "snu", "tsai"])
-def test_a_third_of_a_turn_only_renames_the_limbs(axes: Axes, seed: int) -> None:
-    drawn = Drawn(300 + seed)
-    before = state(drawn.case(axes))
-    Z = turn_about([0, 0, 1], 2 * math.pi / 3)
-    # The platform frame is turned with the world's: its joint of limb k lies where that of limb k + 1 was defined.
-    drawn.p, drawn.axis = Z @ drawn.p, Z @ drawn.axis
-    drawn.u1, drawn.u2 = np.roll(drawn.u1 @ Z.T, 1, axis=0), np.roll(drawn.u2 @ Z.T, 1, axis=0)
-    drawn.twist = np.concatenate([Z @ drawn.twist[:3], Z @ drawn.twist[3:]])
-    after = state(drawn.case(axes))
-    assert pytest.approx(before.F, rel=1e-12) == after.F
-    size = np.max(np.abs(before.rates))
-    np.testing.assert_allclose(after.rates[:3], np.roll(before.rates[:3], 1), atol=1e-13 * size)
-    np.testing.assert_allclose(after.rates[3:], np.roll(before.rates[3:], 1), atol=1e-13 * size)
 
 
 @pytest.fixture(scope="module", params=["paper-4.4-min", "paper-4.4-max"])

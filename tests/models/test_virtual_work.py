@@ -1,14 +1,10 @@
-"""The work rate of a leg in a twist against two computations that share no code with the package.
-
-One moves the platform along the finite screw motion and differentiates the leg lengths; the other is a physics engine.
-"""
+"""Rows and work rates of legs against a physics engine and formulas that share no code with the package."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -48,35 +44,10 @@ class Scene:
         """World coordinates of the platform joints."""
         return self.position + self.platform @ turn_about(self.axis, self.angle).T
 
-    def top_speed(self, twist: Array) -> float:
-        """Speed of the fastest platform joint: no leg's rate can be larger, so the natural scale of an error."""
-        return float(np.max(np.linalg.norm(np.cross(twist[:3], self.ends) + twist[3:], axis=1)))
-
     @staticmethod
     def reach(twist: Array) -> float:
         """Size of the terms that ``m . omega + f . v`` adds up, with arms of 60 length units at most."""
         return float(np.linalg.norm(twist[3:]) + 60 * np.linalg.norm(twist[:3]))
-
-
-def finite_motion(twist: Array, time: float) -> tuple[Array, Array]:
-    """Rotation and translation of ``exp(time * [[omega]x v; 0 0])``, in closed form."""
-    omega, v = twist[:3], twist[3:]
-    rate = float(np.linalg.norm(omega))
-    if rate == 0:
-        return np.eye(3), time * v
-    x, y, z = omega / rate
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    theta = rate * time
-    along = time * np.eye(3) + (1 - np.cos(theta)) / rate * K + (time - np.sin(theta) / rate) * (K @ K)
-    return turn_about(omega, theta), along @ v
-
-
-def extrapolated_slope(f: Callable[[float], Array], step: float, levels: int = 5) -> Array:
-    """Derivative at 0 by central differences at steps halved ``levels - 1`` times, Richardson extrapolated."""
-    table = [(f(h) - f(-h)) / (2 * h) for h in step / 2.0 ** np.arange(levels)]
-    for order in range(1, levels):
-        table = [b + (b - a) / (4.0**order - 1) for a, b in pairwise(table)]
-    return np.asarray(table[0])
 
 
 def circle_joints(layout: str, x1: float, x2: float, x3: float, x4: float) -> Joints:
@@ -190,33 +161,12 @@ def platform_on_tendons(scene: Scene) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_rates_are_the_slopes_of_leg_lengths_along_the_finite_screw_motion(kind: str) -> None:
-    worst = 0.0
-    for scene in scenes(kind):
-        for twist, state in zip(scene.twists, scene.states, strict=True):
-
-            def lengths(time: float, scene: Scene = scene, twist: Array = twist) -> Array:
-                R, t = finite_motion(twist, time)
-                return np.asarray(np.linalg.norm(scene.ends @ R.T + t - scene.base, axis=1))
-
-            # Steps in which the fastest joint moves by 1, 1/2, ... 1/16 of a length unit, legs being 10 and longer:
-            # what five levels leave of the truncation error is (1 * 1/2 * ... * 1/16)^2 / 10^10 = 1e-16 of the speed.
-            speed = scene.top_speed(twist)
-            slopes = extrapolated_slope(lengths, 1.0 / speed)
-            worst = max(worst, float(np.max(np.abs(state.rates - slopes))) / speed)
-            # F is down to 3e-4 of what it would be without cancellation, so its relative error is larger.
-            assert pytest.approx(float(slopes @ slopes), rel=2e-11) == state.F
-    # The rounding error: lengths of 50 to 7e-15, differenced over 2 * 1/16 of a length unit, then extrapolated.
-    assert worst < 2e-12
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_rates_are_the_tendon_velocities_of_a_physics_engine(kind: str) -> None:
     # Both sides are closed forms in double precision: some tens of rounding units of their terms remain.
     for scene, (velocities, lengths) in zip(scenes(kind), engine_rates(kind), strict=True):
         for twist, state, rates in zip(scene.twists, scene.states, velocities, strict=True):
             np.testing.assert_allclose(state.rates, rates, rtol=0, atol=4e-15 * scene.reach(twist))
-            # ... and F is down to 3e-4 of them.
+            # F is down to 3e-4 of what it would be without cancellation, so its relative error is larger.
             assert pytest.approx(float(rates @ rates), rel=1e-13) == state.F
         np.testing.assert_allclose(scene.states[0].quantities["leg_length"], lengths, rtol=4e-15)
 
@@ -249,16 +199,6 @@ def test_joint_angles_are_those_between_a_leg_and_the_plates(kind: str) -> None:
             np.testing.assert_allclose(
                 np.sin(angles) * (scene.states[0].quantities[name] - angles), np.zeros(6), rtol=0, atol=2e-15
             )
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_pure_translation_is_felt_by_the_legs_direction_only(kind: str) -> None:
-    # Moving the moment reference would change a rotation's F but not this one: it tells the twist's halves apart.
-    for scene in scenes(kind)[:20]:
-        twist, state = scene.twists[2], scene.states[2]
-        spans = scene.ends - scene.base
-        cosines = spans @ twist[3:] / np.linalg.norm(spans, axis=1)
-        np.testing.assert_allclose(state.rates, cosines, rtol=0, atol=2e-15 * scene.reach(twist))
 
 
 def test_the_random_scenes_are_worth_testing() -> None:
