@@ -163,6 +163,14 @@ class Embedded:
         given = [each if isinstance(each, int) else _address(each) for each in arguments]
         return int(getattr(self._library, f"{self.prefix}_{function}")(*given))
 
+    def curvature(self, x: np.ndarray, k: np.ndarray, multipliers: np.ndarray, work: np.ndarray) -> np.ndarray:
+        """Hessian (n, n) of the Lagrangian at a point, with the weight 0.7 of F."""
+        H, weight = np.zeros((self.n, self.n)), np.array([0.7])
+        given = np.array([each.ctypes.data for each in (x, k, weight, multipliers)], dtype=np.uintp)
+        made = np.array([H.ctypes.data], dtype=np.uintp)
+        assert self.call("SQP_curvature", given, made, work) == 0
+        return H
+
     def compare(self, nlp: Nlp, count: int, close: float = 1e-14) -> None:
         """Compare every function with the program's own, at random points."""
         p, kernels, n = np.ascontiguousarray(nlp.arguments), nlp.program.kernels, nlp.n

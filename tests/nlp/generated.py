@@ -16,6 +16,11 @@ needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is inst
 #: Flags by which generated C compiles without a warning, as C and as C++.
 WARNINGS = "-Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror"
 STRICT = f"-std=c99 {WARNINGS}"
+#: What generated C may take from outside: functions of the mathematics library, and what compilers write themselves.
+ALLOWED = {
+    "sin", "sincos", "cos", "sqrt", "atan2", "fmin", "fmax", "memcpy", "memset", "__stack_chk_fail",
+    "_GLOBAL_OFFSET_TABLE_",  # of -fPIC, and no function
+}  # fmt: skip
 
 
 def written(case: Case | str, folder: Path) -> Path:
@@ -37,3 +42,16 @@ def run(*words: str, where: Path) -> str:
 def made(where: Path, *words: str) -> str:
     """Run make in a folder."""
     return run("make", *words, where=where)
+
+
+def assert_only_mathematics_is_needed(where: Path, prefix: str) -> None:
+    """Assert that the objects of a folder take nothing from outside but mathematics, and have no data that change.
+
+    So they call no function that could take memory.
+    """
+    objects = [str(path) for path in sorted(where.glob(f"{prefix}*.o"))]
+    assert len(objects) >= 8
+    lines = run("nm", *objects, where=where).splitlines()
+    wanted = {line.split()[-1] for line in lines if " U " in line}
+    assert {symbol for symbol in wanted if not symbol.startswith(prefix)} <= ALLOWED
+    assert not [line for line in lines if line.split()[-2:-1] in (["D"], ["B"], ["d"], ["b"])]

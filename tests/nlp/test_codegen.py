@@ -10,8 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from generated import COMPILERS, STRICT, made, needs_compiler, run, written
+from generated import COMPILERS, STRICT, assert_only_mathematics_is_needed, made, needs_compiler, run, written
 
 from screwsynth.nlp import formulate, load_case, shipped_cases
 from screwsynth.nlp.case.task import Method
@@ -69,16 +70,8 @@ def test_compiled_values_are_those_of_the_program_at_random_points(
 
 @needs_compiler
 def test_only_the_mathematics_library_is_needed(embedded: Callable[[str], Embedded]) -> None:
-    where, prefix = embedded("paper-4.1-helical").folder, identifier("paper-4.1-helical")
-    objects = [str(path) for path in sorted(where.glob(f"{prefix}*.o"))]
-    assert len(objects) >= 8
-    lines = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout.splitlines()
-    wanted = {line.split()[-1] for line in lines if " U " in line}
-    assert {symbol for symbol in wanted if not symbol.startswith(prefix)} <= {
-        "sin", "sincos", "cos", "sqrt", "atan2", "fmin", "fmax", "memcpy", "memset", "__stack_chk_fail",
-        "_GLOBAL_OFFSET_TABLE_",  # of -fPIC, and no function
-    }  # fmt: skip
-    assert not [line for line in lines if line.split()[-2:-1] in (["D"], ["B"], ["d"], ["b"])]
+    c = embedded("paper-4.1-helical")
+    assert_only_mathematics_is_needed(c.folder, c.prefix)
 
 
 @needs_compiler
@@ -117,49 +110,15 @@ def test_units_of_f_twists_rates_and_multipliers_are_data() -> None:
     assert (drill["F_unit"], drill["tasks"][0]["rate_unit"]) == ("(mm/mm)\N{SUPERSCRIPT TWO}", "mm/mm")
 
 
-def test_the_header_serves_cpp(tmp_path: Path, embedded: Callable[[str], Embedded]) -> None:
-    compiler = shutil.which("g++")
-    if compiler is None:
-        pytest.skip("no C++ compiler is installed")
-    where, prefix = embedded("paper-4.3").folder, identifier("paper-4.3")
-    (tmp_path / "use.cpp").write_text(
-        f"""#include "{prefix}.h"
-int main() {{
-    double work[{prefix.upper()}_WORK], k[{prefix.upper()}_K], F;
-    if ({prefix}_prepare({prefix}_parameter_defaults, k, work)) return 2;
-    return {prefix}_F({prefix}_variable_starts, k, &F, work);
-}}
-""",
-        encoding="utf-8",
-    )
-    objects = [str(path) for path in where.glob(f"{prefix}*.o")]
-    flags = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wno-unused-variable", f"-I{where}"]
-    subprocess.run([compiler, *flags, "use.cpp", *objects, "-lm", "-o", "use"], cwd=tmp_path, check=True)
-    assert subprocess.run([str(tmp_path / "use")], check=False).returncode == 0
-
-
 @needs_compiler
-def test_a_limb_of_zero_length_is_told(tmp_path: Path, embedded: Callable[[str], Embedded]) -> None:
-    where, prefix = embedded("paper-4.2-translation").folder, identifier("paper-4.2-translation")
-    z = [each.name for each in formulate(load_case("paper-4.2-translation")).program.arguments].index("p_z")
-    (tmp_path / "zero.c").write_text(
-        f"""#include "{prefix}.h"
-int main(void) {{
-    double work[{prefix.upper()}_WORK], k[{prefix.upper()}_K], F, x[4] = {{4, 4, 0.2, 0.2}}, p[{prefix.upper()}_P];
-    int i;
-    for (i = 0; i < {prefix.upper()}_P; ++i) p[i] = {prefix}_parameter_defaults[i];
-    if ({prefix}_prepare(p, k, work) != 0 || {prefix}_F(x, k, &F, work) != 0) return 2;
-    p[{z}] = 0;
-    if ({prefix}_prepare(p, k, work) != 0) return 4;
-    return {prefix}_F(x, k, &F, work) == 1 ? 0 : 3;
-}}
-""",
-        encoding="utf-8",
-    )
-    objects = [str(path) for path in where.glob(f"{prefix}*.o")]
-    command = [COMPILERS[0], "-std=c99", f"-I{where}", "zero.c", *objects, "-lm", "-o", "zero"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    assert subprocess.run([str(tmp_path / "zero")], check=False).returncode == 0
+def test_a_limb_of_zero_length_is_told(embedded: Callable[[str], Embedded]) -> None:
+    c, nlp = embedded("paper-4.2-translation"), formulate(load_case("paper-4.2-translation"))
+    p, x, F = np.array(nlp.arguments), np.array([4, 4, 0.2, 0.2]), np.zeros(1)
+    k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
+    assert c.call("prepare", p, k, work) == c.call("F", x, k, F, work) == 0
+    p[[each.name for each in nlp.program.arguments].index("p_z")] = 0
+    assert c.call("prepare", p, k, work) == 0
+    assert c.call("F", x, k, F, work) == 1
 
 
 def test_the_same_case_gives_the_same_bytes() -> None:

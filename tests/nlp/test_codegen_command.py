@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +23,18 @@ from screwsynth.nlp.embedding.measure import CORTEX_M7, X86_64, measure
 from screwsynth.nlp.embedding.measured import NOT_MEASURED, with_figures
 
 
-def test_size_is_said_before_the_folder_is_written(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_line_writes_the_folder_and_its_size(
+    tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = output_of(cli("codegen", "paper-4.1-helical", "--no-measure", "--out", str(tmp_path / "made")))
     size, words = out.splitlines()[0].split(" ", 1)
     files = [path for path in (tmp_path / "made").iterdir() if path.suffix in {".c", ".h"}]
     assert int(size) == pytest.approx(sum(path.stat().st_size for path in files) / 1000, abs=1)
     assert words == "kB of C"
+    assert "make -C" in out
+    names = {path.name for path in (tmp_path / "made").iterdir()}
+    assert {"case.toml", "Makefile", "CMakeLists.txt", "README.md", "selftest.c", "bench.c"} <= names
+    assert not [name for name in names if name.startswith(".")]
     monkeypatch.setattr("screwsynth.nlp.embedding.codegen._LARGE", 100_000)
     case = load_case("hexapod-machining")
     assert "most of it for joint_spacing" in size_words(case, {"a.c": " " * 200_000})
@@ -67,14 +72,6 @@ def test_what_a_case_says_cannot_break_the_c(tmp_path: Path) -> None:
     }
     where = written(case_from(tables, "3 legs!"), tmp_path)
     assert "0 failed" in made(where, f"CFLAGS={STRICT} -O2 -Wno-trigraphs", "test")
-
-
-def test_the_command_line_writes_the_folder(tmp_path: Path, cli: Run) -> None:
-    out = output_of(cli("codegen", "paper-4.1-helical", "--no-measure", "--out", str(tmp_path / "made")))
-    assert "make -C" in out
-    names = {path.name for path in (tmp_path / "made").iterdir()}
-    assert {"case.toml", "Makefile", "CMakeLists.txt", "README.md", "selftest.c", "bench.c"} <= names
-    assert not [name for name in names if name.startswith(".")]
 
 
 @pytest.mark.parametrize("option", [("--language", "c"), ("--precision", "double")])
@@ -148,44 +145,6 @@ def test_valgrind_finds_nothing_and_no_heap(tmp_path: Path) -> None:
     done = checked(where, "-O1", valgrind, "--error-exitcode=9", "--leak-check=full", "--show-leak-kinds=all")
     # What printf takes is one buffer; the library takes nothing.
     assert re.search(r"total heap usage: 1 allocs", done.stderr), done.stderr
-
-
-@needs_compiler
-def test_ten_million_calls_take_no_memory(tmp_path: Path, embedded: Callable[[str], Embedded]) -> None:
-    statm = Path("/proc/self/statm")
-    if not statm.exists():
-        pytest.skip("the system has no /proc/self/statm to read the size of a process from")
-    where, prefix = embedded("paper-4.1-helical").folder, identifier("paper-4.1-helical")
-    (tmp_path / "many.c").write_text(
-        f"""#include "{prefix}.h"
-#include <stdio.h>
-static long pages(void) {{
-    long size = 0;
-    FILE *file = fopen("/proc/self/statm", "r");
-    if (!file || fscanf(file, "%ld", &size) != 1) size = -1;
-    if (file) fclose(file);
-    return size;
-}}
-int main(void) {{
-    static double work[{prefix.upper()}_WORK], k[{prefix.upper()}_K], F, sum;
-    long before, call;
-    if ({prefix}_prepare({prefix}_parameter_defaults, k, work)) return 2;
-    pages();
-    before = pages();
-    for (call = 0; call < 10000000; ++call) {{
-        if ({prefix}_F({prefix}_variable_starts, k, &F, work)) return 3;
-        sum += F;
-    }}
-    printf("%ld %ld %g\\n", before, pages(), sum);
-    return pages() == before && before > 0 ? 0 : 1;
-}}
-""",
-        encoding="utf-8",
-    )
-    objects = [str(where / f"{prefix}{end}.o") for end in ("", "-casadi")]
-    command = [COMPILERS[0], "-std=c99", "-O2", f"-I{where}", "many.c", *objects, "-lm", "-o", "many"]
-    subprocess.run(command, cwd=tmp_path, check=True)
-    assert subprocess.run([str(tmp_path / "many")], check=False).returncode == 0
 
 
 # Flash and stack that ``codegen`` writes: from compilers, the same each time, and a clear line without one.

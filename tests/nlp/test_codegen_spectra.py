@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
-import re
+import shutil
 import subprocess
 import tomllib
 from collections.abc import Callable
@@ -12,9 +11,9 @@ from typing import Any
 
 import numpy as np
 from builders import case_from
-from generated import COMPILERS, STRICT, made, needs_compiler, written
+from generated import COMPILERS, STRICT, assert_only_mathematics_is_needed, made, needs_compiler, written
 
-from screwsynth.nlp import Nlp, formulate, solve
+from screwsynth.nlp import formulate, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.program.sampling import starting_points
 
@@ -47,12 +46,6 @@ starts = 4
 """
 
 
-def spectral(target: Path) -> tuple[Path, Nlp]:
-    """The folder of a case with limits on singular values, and its program."""
-    case = case_from(SPECTRA, "spectra")
-    return written(case, target), formulate(case)
-
-
 @needs_compiler
 def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_path: Path) -> None:
     tables = tomllib.loads(find_case("paper-4.1-helical").read_text(encoding="utf-8")) | {
@@ -65,45 +58,29 @@ def test_singular_values_without_a_loop_over_legs_compile_without_warnings(tmp_p
 
 
 @needs_compiler
-def test_limits_on_singular_values_are_small_and_exact(tmp_path: Path) -> None:
-    where, nlp = spectral(tmp_path)
-    assert sum(path.stat().st_size for path in where.glob("screwsynth_spectra*")) <= 400_000
+def test_limits_on_singular_values_are_small_and_exact(embed: Callable[..., Embedded], tmp_path: Path) -> None:
+    case = case_from(SPECTRA, "spectra")
+    c, nlp = embed(case), formulate(case)
+    where = Path(shutil.copytree(c.folder, tmp_path / "c"))
+    assert sum(path.stat().st_size for path in where.glob(f"{c.prefix}*.[ch]*")) <= 400_000
     assert "0 failed" in made(where, f"CC={COMPILERS[0]}", f"CFLAGS={STRICT} -O2 -fPIC", "test")
-    objects = sorted(str(path) for path in where.glob("screwsynth_spectra*.o"))
-    lines = subprocess.run(["nm", *objects], capture_output=True, text=True, check=True).stdout.splitlines()
-    wanted = {line.split()[-1] for line in lines if " U " in line}
-    assert {symbol for symbol in wanted if not symbol.startswith("screwsynth_spectra")} <= {
-        "sin", "sincos", "cos", "sqrt", "atan2", "fmin", "fmax", "memcpy", "memset", "__stack_chk_fail",
-        "_GLOBAL_OFFSET_TABLE_",  # of -fPIC, and no function
-    }  # fmt: skip
-    assert not [line for line in lines if line.split()[-2:-1] in (["D"], ["B"], ["d"], ["b"])]
-    library = str(where / "all.so")
-    subprocess.run([COMPILERS[0], "-shared", *objects, "-lm", "-o", library], check=True)
-    c, prefix = ctypes.CDLL(library), "screwsynth_spectra"
-    header = (where / f"{prefix}.h").read_text(encoding="utf-8")
-    sizes = {name: int(value) for name, value in re.findall(r"#define SCREWSYNTH_SPECTRA_(\w+) (\d+)", header)}
-    n, limits, p = nlp.n, len(nlp.program.constraints), np.ascontiguousarray(nlp.arguments)
-    k, work = np.zeros(sizes["K"] + 1), np.zeros(sizes["WORK"])
-    address = ctypes.POINTER(ctypes.c_double)
-
-    def at(array: np.ndarray) -> ctypes._Pointer[ctypes.c_double]:
-        return array.ctypes.data_as(address)
-
-    assert c[f"{prefix}_prepare"](at(p), at(k), at(work)) == 0
+    assert_only_mathematics_is_needed(where, c.prefix)
+    limits, p = len(nlp.program.constraints), np.ascontiguousarray(nlp.arguments)
+    k, work = np.zeros(c.macro("K") + 1), np.zeros(c.macro("WORK"))
+    assert c.call("prepare", p, k, work) == 0
     generator = np.random.default_rng(5)
     singular = [j for j, each in enumerate(nlp.program.constraints) if each.spectral is not None]
     assert len(singular) == 2
     for x in starting_points(nlp, 101, 7)[1:]:
-        g, dg, H, weight = np.zeros(limits), np.zeros((limits, n)), np.zeros((n, n)), np.array([0.7])
-        assert c[f"{prefix}_limits"](at(x), at(k), at(g), at(dg), at(work)) == 0
+        g, dg = np.zeros(limits), np.zeros((limits, nlp.n))
+        assert c.call("limits", x, k, g, dg, work) == 0
         _, _, constraint, slopes = nlp.program.kernels.derivatives(x, p)
         np.testing.assert_allclose(g, constraint.ravel(), rtol=1e-10, atol=1e-12)
         for j in range(limits):
             np.testing.assert_allclose(dg[j], slopes[j], rtol=0, atol=1e-10 * max(1e-3, np.abs(slopes[j]).max()))
         multipliers = generator.normal(size=limits) * (np.arange(limits) >= min(singular))
-        inputs, outputs = (address * 8)(at(x), at(k), at(weight), at(multipliers)), (address * 8)(at(H))
-        assert c[f"{prefix}_SQP_curvature"](inputs, outputs, at(work)) == 0
         second = nlp.program.kernels.hessian(x, p, 0.7, multipliers)
+        H = c.curvature(x, k, multipliers, work)
         np.testing.assert_allclose(H, second, rtol=0, atol=1e-10 * np.abs(second).max())
 
 
