@@ -13,6 +13,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from builders import Array
+from mujoco_robots import null_space
 
 #: Singular values below this part of the largest are zero: regular ones are above 1e-4 of it, rounding leaves 1e-14.
 ZERO = 1e-9
@@ -25,14 +26,6 @@ class Joint(NamedTuple):
     one: int
     other: int
     screws: Array
-
-
-def null_space(matrix: Array) -> Array:
-    if not matrix.size:
-        return np.eye(matrix.shape[1])
-    _, values, rows = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.sum(values > ZERO * values[0]))
-    return np.asarray(rows[rank:].T)
 
 
 @dataclass

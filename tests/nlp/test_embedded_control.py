@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import case_from
-from generated import COMPILERS, written
+from builders import case_from, turn_about
+from generated import BAD_INPUT, BUDGET, COMPILERS, INFEASIBLE, OK, written
 
 from screwsynth.nlp import Case, Nlp, formulate, load_case
 from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.program.sampling import starting_points
 
-OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT, BUDGET = range(5)
 FEASIBLE = 1e-9
 #: Half widths of the bounds around the last answer, in parts of the case's ranges.
 WIDTHS = (1e-3, 1e-5, 1e-8, 1e-10, 1e-12, 0.0)
@@ -55,24 +54,26 @@ def limited(embed: Callable[[Case], Embedded]) -> tuple[Embedded, Nlp]:
 
 def turned(nlp: Nlp, angle: float) -> np.ndarray:
     """The case's fixed numbers with the task turned about the z axis of the world."""
-    turn = np.array([[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]])
+    turn = turn_about([0, 0, 1], angle)
     p, at = np.array(nlp.arguments), nlp.program.places.twists[0].start
     p[at : at + 3], p[at + 3 : at + 6] = turn @ p[at : at + 3], turn @ p[at + 3 : at + 6]
     return p
 
 
-def track(c: Embedded, nlp: Nlp, width: float, ticks: int) -> tuple[Counter[int], float]:
-    """Statuses while the task turns and the bounds are narrowed around the last answer, and how far x goes."""
+def track(c: Embedded, nlp: Nlp, width: float, ticks: int) -> tuple[Counter[int], float, float]:
+    """Statuses while the task turns and the bounds are narrowed around the last answer, x's way, its longest step."""
     best, statuses = c.solve(), Counter[int]()
     assert best.status == OK
-    x, room = best.x, width * (nlp.upper - nlp.lower)
+    ranges = nlp.upper - nlp.lower
+    x, room, longest = best.x, width * ranges, 0.0
     for tick in range(ticks):
         lower, upper = np.maximum(nlp.lower, x - room), np.minimum(nlp.upper, x + room)
         solved = c.solve(p=turned(nlp, 1e-4 * tick), x0=x, seeds=0, lower=lower, upper=upper)
         statuses[solved.status] += 1
         assert np.all((lower <= solved.x) & (solved.x <= upper))
+        longest = max(longest, float(np.max(np.abs(solved.x - x) / ranges)))
         x = solved.x
-    return statuses, float(np.max(np.abs(x - best.x) / (nlp.upper - nlp.lower)))
+    return statuses, float(np.max(np.abs(x - best.x) / ranges)), longest
 
 
 @pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.3", "limited"])
@@ -80,11 +81,17 @@ def test_narrowed_bounds_give_no_false_status(name: str, embedded: EmbeddedCase,
     c, nlp = limited if name == "limited" else (embedded(name), formulate(load_case(name)))
     way = track(c, nlp, 1.0, 60)[1]
     for width in WIDTHS:
-        statuses, gone = track(c, nlp, width, 60)
+        statuses, gone, _ = track(c, nlp, width, 60)
         assert statuses == {OK: 60}, f"within {width}: {statuses}"
         # x follows the optimum as fast as the bounds allow.
         assert gone <= 60 * width * (1 + 1e-6) + 1e-15
         assert gone >= 0.3 * min(60 * width, way) - 1e-12
+
+
+def test_tracking_follows_an_optimum_without_a_jump(embedded: EmbeddedCase) -> None:
+    statuses, _, longest = track(embedded("paper-4.3"), formulate(load_case("paper-4.3")), 1.0, 2000)
+    assert statuses == {OK: 2000}
+    assert longest < 0.005
 
 
 @pytest.mark.slow

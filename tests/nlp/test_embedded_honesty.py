@@ -14,13 +14,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 from builders import case_from, starter_tables
-from generated import COMPILERS, written
+from generated import BAD_INPUT, COMPILERS, INFEASIBLE, OK, OTHER_ASSEMBLY, RANGE_END, written
 
 from screwsynth.nlp import Case, CompiledCase, load_case, load_compiled, shipped_cases
 from screwsynth.nlp.case.source import find_case
 
 BENCH = Path(__file__).parents[2] / "bench" / "soak"
-OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT, BUDGET, OTHER_ASSEMBLY, RANGE_END = range(7)
 
 Compiled = Callable[[str], CompiledCase]
 

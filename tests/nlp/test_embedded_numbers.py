@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import case_from, starter_tables
-from generated import COMPILERS, written
+from generated import COMPILERS, INFEASIBLE, OK, written
 
 from screwsynth.nlp import CompiledCase, formulate, load_compiled
 from screwsynth.nlp.embedding.held import held_by_fixed_numbers
 
 BENCH = Path(__file__).parents[2] / "bench" / "soak"
-OK, INFEASIBLE = 0, 2
 
 PLATE = """
 [robot]

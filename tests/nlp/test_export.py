@@ -1,7 +1,5 @@
 """Solved robots in other formats: MuJoCo finds their wrenches and rates, nested loops too, and an import their J."""
 
-import csv
-import io
 import re
 import tomllib
 from dataclasses import replace
@@ -12,7 +10,7 @@ import ezdxf
 import mujoco
 import numpy as np
 import pytest
-from builders import Array, case_from, starter
+from builders import Array, case_from, rows_of, starter, turn_about
 from link_robots import CASE, COUPLING, ROBOT
 from mujoco_trees import Tree
 
@@ -267,12 +265,12 @@ def test_tables_hold_the_joints_in_every_frame() -> None:
     files = exported_files(found, ["csv"])
     assert list(files) == ["README.md", "joints.csv", "links.csv", "plates.csv"]
     frames = {}
-    for row in csv.DictReader(io.StringIO(files["links.csv"])):
+    for row in rows_of(files["links.csv"]):
         origin = np.array([float(row[f"{c} [{units.length}]"]) for c in "xyz"])
         axes = np.array([[float(row[f"{own} axis {c}"]) for c in "xyz"] for own in "xyz"]).T
         np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-14)
         frames[row["link"]] = origin, axes
-    rows = list(csv.DictReader(io.StringIO(files["joints.csv"])))
+    rows = rows_of(files["joints.csv"])
     assert len(rows) == len(found.mechanism.joints)
     for row, joint in zip(rows, found.mechanism.joints, strict=True):
         for frame, link in (("base", "base"), ("platform", "platform"), ("inner", joint.inner), ("outer", joint.outer)):
@@ -294,7 +292,7 @@ def test_plates_are_drawn_to_scale_with_their_unit_and_their_offsets(tmp_path: P
     files = exported_files(tilted, ["dxf"])
     assert files == exported_files(tilted, ["dxf"])
     assert "joint centres of the base are not in one plane" in " ".join(files["README.md"].split())
-    rows = list(csv.DictReader(io.StringIO(files["plates.csv"])))
+    rows = rows_of(files["plates.csv"])
     offsets = [float(row["offset from plane [cm]"]) for row in rows if row["plate"] == "base"]
     assert max(map(abs, offsets)) > 0.02
     for plate in ("base", "platform"):
@@ -312,29 +310,18 @@ def test_plates_are_drawn_to_scale_with_their_unit_and_their_offsets(tmp_path: P
 
 
 def test_rotations_survive_their_three_forms() -> None:
-    rng = np.random.default_rng(1)
+    rng, (x, y, z) = np.random.default_rng(1), np.eye(3)
     for _ in range(200):
         R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         R *= np.linalg.det(R)
         if rng.uniform() < 0.5:  # half a turn, and a pitch of 90 degrees, where the forms have their seams
-            R = R @ np.diag([1.0, -1.0, -1.0]) @ R.T if rng.uniform() < 0.5 else _pitched(rng.uniform(-3, 3))
+            pitched = turn_about(z, rng.uniform(-3, 3)) @ turn_about(y, np.pi / 2)
+            R = R @ np.diag([1.0, -1.0, -1.0]) @ R.T if rng.uniform() < 0.5 else pitched
         found = np.zeros(9)
         mujoco.mju_quat2Mat(found, quaternion(R))
         np.testing.assert_allclose(found.reshape(3, 3), R, atol=1e-14)
         roll, pitch, yaw = roll_pitch_yaw(R)
-        np.testing.assert_allclose(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), R, atol=1e-14)
-
-
-def _about(axis: int, angle: float) -> Array:
-    one, other = (axis + 1) % 3, (axis + 2) % 3
-    R = np.eye(3)
-    R[one, one] = R[other, other] = np.cos(angle)
-    R[other, one], R[one, other] = np.sin(angle), -np.sin(angle)
-    return R
-
-
-def _pitched(yaw: float) -> Array:
-    return _about(2, yaw) @ _about(1, np.pi / 2)
+        np.testing.assert_allclose(turn_about(z, yaw) @ turn_about(y, pitch) @ turn_about(x, roll), R, atol=1e-14)
 
 
 def test_links_that_are_limbs_are_exported_with_the_labels_of_limbs() -> None:

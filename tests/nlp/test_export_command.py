@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import pytest
 import yaml
-from builders import Run, case_from, output_of
+from builders import Run, case_from, output_of, refusal_of, saved
 from mujoco_trees import Tree
 
 from screwsynth.models import robot, robot_function
@@ -48,25 +48,19 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
         ("--format", "mjcf", "--out", str(tmp_path / "full")): "holds mine.txt, which screwsynth did not write",
         ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
     }.items():
-        status, said, wrong = cli("export", case, *words)
-        assert (status, said) == (2, ""), words
-        assert fault in wrong
-        assert wrong.count("\n") == 1
+        refusal_of(cli("export", case, *words), fault)
     monkeypatch.setattr("screwsynth.nlp.formats.writing.dxf.find_spec", lambda _: None)
-    status, _, wrong = cli("export", case, "--format", "all", "--out", str(out))
-    assert status == 2
-    assert "ezdxf, which is not installed: pip install 'screwsynth[robots]'" in wrong
+    missing = "ezdxf, which is not installed: pip install 'screwsynth[robots]'"
+    refusal_of(cli("export", case, "--format", "all", "--out", str(out)), missing)
     assert not out.exists()
     assert [path.name for path in (tmp_path / "full").iterdir()] == ["mine.txt"]
 
 
 def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_path: Path, cli: Run) -> None:
     text = starter_case(robot_function("hexapod")())
-    (tmp_path / "case.toml").write_text(text + "\n[limits]\nleg_length = { max = 1 }\n", encoding="utf-8")
-    out = tmp_path / "robot"
-    status, _, wrong = cli(
-        "export", str(tmp_path / "case.toml"), "--format", "mjcf", "--out", str(out), "--starts", "2"
-    )
+    path, out = saved(tmp_path / "case.toml", text + "\n[limits]\nleg_length = { max = 1 }\n"), tmp_path / "robot"
+    words = ("export", str(path), "--format", "mjcf", "--out", str(out))
+    status, _, wrong = cli(*words, "--starts", "2")
     assert status == 1
     assert "the solve is infeasible: nothing is exported" in wrong
     assert not out.exists()
@@ -76,19 +70,7 @@ def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_pat
         for each, value in zip(nlp.program.variables, nlp.start, strict=True)
         if not each.name.startswith("q")
     ]
-    output_of(
-        cli(
-            "export",
-            str(tmp_path / "case.toml"),
-            "--format",
-            "mjcf",
-            "--out",
-            str(out),
-            *fixed,
-            "--set=angle=0",
-            "--set=axis=0,0,1",
-        )
-    )
+    output_of(cli(*words, *fixed, "--set=angle=0", "--set=axis=0,0,1"))
 
 
 def test_a_result_is_exported_without_a_solve(tmp_path: Path, cli: Run) -> None:
@@ -113,15 +95,12 @@ def test_a_result_of_another_case_or_assembly_is_refused(tmp_path: Path, cli: Ru
     words = ("--format", "mjcf", "--out", str(out), "--of", str(result))
     assert cli("evaluate", "paper-4.1-helical", "--json", str(result))[0] == 0
     assert cli("export", "paper-4.1-helical", *words)[0] == 0
-    status, _, wrong = cli("export", "free-wrist", *words)
-    assert status == 2
-    assert "is a result of the case 'paper-4.1-helical' with the robot 'stewart-gough', not of 'free-wrist'" in wrong
+    other = "is a result of the case 'paper-4.1-helical' with the robot 'stewart-gough', not of 'free-wrist'"
+    refusal_of(cli("export", "free-wrist", *words), other)
     data = json.loads(result.read_text(encoding="utf-8"))
     data["jacobian"][0][0] += 1e-3
     result.write_text(json.dumps(data), encoding="utf-8")
-    status, _, wrong = cli("export", "paper-4.1-helical", *words)
-    assert status == 2
-    assert "another assembly of its joints" in wrong
+    refusal_of(cli("export", "paper-4.1-helical", *words), "another assembly of its joints")
     result.write_text("{}", encoding="utf-8")
     assert cli("export", "paper-4.1-helical", *words)[0] == 2
 

@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 import pytest
 import reachy
-from builders import Array, Run, output_of, saved
+from builders import Array, Run, output_of, refusal_of, saved, turn_about
 
 from screwsynth.models import Substitution, jacobian
 from screwsynth.models.joints import RobotError, robot
@@ -60,9 +60,7 @@ def test_motor_rates_of_reachy_mini_are_its_makers() -> None:
     worst_angle = worst_rate = 0.0
     for _ in range(40):
         axis = rng.normal(size=3)
-        K = np.cross(np.eye(3), -axis / np.linalg.norm(axis))
-        angle = rng.uniform(-0.35, 0.35)
-        R = np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+        R = turn_about(axis, rng.uniform(-0.35, 0.35))
         p = reachy.HOME + rng.uniform(-0.01, 0.01, 3)
         q = np.zeros(unknowns.numel())
         for _ in range(12):
@@ -199,21 +197,8 @@ def test_suggestions_become_dimensions(tmp_path: Path, cli: Run) -> None:
     text = output_of(cli("import", str(model), "--platform", "head", "--close", "--suggest"))
     for words in ("circle1", "circle2", "circle3", "limbs 1, 3, 5; 2, 4, 6 are copies by 120 deg", "mirror"):
         assert words in text
-    output_of(
-        cli(
-            "import",
-            str(model),
-            "--platform",
-            "nose",
-            "--close",
-            "--out",
-            str(out),
-            "--free",
-            "fold",
-            "circle3=rp",
-            "stewart_1.axis",
-        )
-    )
+    dimensions = ("--free", "fold", "circle3=rp", "stewart_1.axis")
+    output_of(cli("import", str(model), "--platform", "nose", "--close", "--out", str(out), *dimensions))
     tables = tomllib.loads(out.read_text(encoding="utf-8"))
     assert tables["dimensions"]["rp"]["typical"] == pytest.approx(0.03, abs=1e-6)
     assert [limb["repeat"]["count"] for limb in tables["limb"]] == [3, 3]
@@ -225,23 +210,20 @@ def test_suggestions_become_dimensions(tmp_path: Path, cli: Run) -> None:
     np.testing.assert_allclose([np.hypot(*end[:2]) for end in ends], 0.035, atol=1e-6)
     assert platform.position[0] == pytest.approx(0.05, abs=1e-6)
     # Without copies and dimensions the robot is that of the model, to rounding; with them, to its decimals.
-    plain = work_rates(
-        tomllib.loads(output_of(cli("import", str(model), "--platform", "head", "--close", "--out", "-")))
-    )
+    text = output_of(cli("import", str(model), "--platform", "head", "--close", "--out", "-"))
+    plain = work_rates(tomllib.loads(text))
     np.testing.assert_allclose(work_rates(tables), plain, rtol=0, atol=1e-4 * plain.max())
 
 
 def test_a_slide_follows_the_joints_that_it_joins(tmp_path: Path, cli: Run) -> None:
+    feet = [(1, 0), (-0.5, 0.8), (-0.5, -0.8), (0.9, 0.3), (-0.2, 0.9), (-0.7, -0.5)]
     legs = "".join(
         f'<body name="leg{k}" pos="{x} {y} 0"><joint name="b{k}" type="ball"/><body name="rod{k}">'
         f'<joint name="p{k}" type="slide" axis="{0.6 * x - x} {0.6 * y - y} 1"/><site name="a{k}_1" pos="{0.6 * x - x} '
         f'{0.6 * y - y} 1"/></body></body>'
-        for k, (x, y) in enumerate([(1, 0), (-0.5, 0.8), (-0.5, -0.8), (0.9, 0.3), (-0.2, 0.9), (-0.7, -0.5)])
+        for k, (x, y) in enumerate(feet)
     )
-    sites = "".join(
-        f'<site name="a{k}_2" pos="{0.6 * x} {0.6 * y} 0"/>'
-        for k, (x, y) in enumerate([(1, 0), (-0.5, 0.8), (-0.5, -0.8), (0.9, 0.3), (-0.2, 0.9), (-0.7, -0.5)])
-    )
+    sites = "".join(f'<site name="a{k}_2" pos="{0.6 * x} {0.6 * y} 0"/>' for k, (x, y) in enumerate(feet))
     connects = "".join(f'<connect name="a{k}" site1="a{k}_1" site2="a{k}_2"/>' for k in range(6))
     motors = "".join(f'<motor joint="p{k}"/>' for k in range(6))
     model, out = tmp_path / "sps.xml", tmp_path / "sps.toml"
@@ -253,13 +235,12 @@ def test_a_slide_follows_the_joints_that_it_joins(tmp_path: Path, cli: Run) -> N
     output_of(cli("import", str(model), "--platform", "top", "--out", str(out), "--free", "a0=A", "b3"))
     text = out.read_text(encoding="utf-8")
     out.write_text("mine\n", encoding="utf-8")
-    again = cli("import", str(model), "--platform", "top", "--out", str(out))
-    assert again[0] == 2
-    assert "screwsynth did not write it" in again[2]
+    refusal_of(cli("import", str(model), "--platform", "top", "--out", str(out)), "screwsynth did not write it")
     tables = tomllib.loads(text)
     moved = mechanism_of(tables, {"A_x": 0.7, "b3_z": -0.2})
     joints = {joint.name: joint for joint in moved.joints}
-    for leg, (ball, slide, end) in {"p0": ("p0:1", "p0:2", "p0:3"), "p3": ("p3:1", "p3:2", "p3:3")}.items():
+    for leg in ("p0", "p3"):
+        ball, slide, end = (f"{leg}:{k}" for k in (1, 2, 3))
         way = joints[end].point - joints[ball].point
         np.testing.assert_allclose(joints[slide].axis, way / np.linalg.norm(way), atol=1e-14, err_msg=leg)
     assert len(robot(**tables).parameters) == 6

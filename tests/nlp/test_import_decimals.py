@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, Run, output_of, refusal_of
+from builders import Array, Run, edited, output_of, refusal_of
 
 from screwsynth.models.joints import robot
 from screwsynth.models.mechanism import (
@@ -24,7 +24,7 @@ from screwsynth.models.mechanism import (
 from screwsynth.nlp import InputError
 from screwsynth.nlp.formats.reading.checking import check_text
 from screwsynth.nlp.formats.reading.filetext import robot_file_text
-from screwsynth.nlp.formats.reading.importing import Request, import_robot
+from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.reading.snapping import near_misses, snapped
 
@@ -238,16 +238,19 @@ def bars(kind: str, off: float, axis: str = "", mimic: str = "") -> str:
     return FIVE_BAR.format(links=links, kind=kind, off=off, axis=axis)
 
 
+def imported(path: Path, text: str, *, closes: bool = True) -> Imported:
+    path.write_text(text)
+    return import_robot(Request(path, Ends("d"), closes=closes))
+
+
 def test_overconstrained_loops_are_closed_by_least_squares(tmp_path: Path) -> None:
     """A hinge closes a planar loop that is off by 3e-7 across the plane: the rest is closed, and what is left told."""
     path = tmp_path / "bars.urdf"
     axis = '<axis xyz="0 0 1"/>'
-    path.write_text(bars("revolute", 0.0, axis))
-    exact = import_robot(Request(path, Ends("d"), closes=True))
+    exact = imported(path, bars("revolute", 0.0, axis))
     assert wrenches_of(exact.mechanism, 1.0).ranks.freedoms == 2
     assert not any("stays open" in note for note in exact.notes)
-    path.write_text(bars("revolute", 3e-7, axis))
-    found = import_robot(Request(path, Ends("d"), closes=True))
+    found = imported(path, bars("revolute", 3e-7, axis))
     (note,) = [note for note in found.notes if "stays open" in note]
     assert "tip stays open by 3e-07 and 0 deg, the least squares of numbers that contradict each other" in note
     for one, other in zip(found.mechanism.joints, exact.mechanism.joints, strict=True):
@@ -255,25 +258,22 @@ def test_overconstrained_loops_are_closed_by_least_squares(tmp_path: Path) -> No
     # With axes that are parallel but for 2e-7, and one motor, the joints could close it by turning far: they do not.
     for off in (0.0, 3e-7):
         text = bars("revolute", off, axis).replace('<transmission><joint name="right"/></transmission>', "")
-        path.write_text(text.replace('xyz="0 0 1"/><parent link="a"', f'xyz="{2 / 3 * off!r} 0 1"/><parent link="a"'))
-        tilted = import_robot(Request(path, Ends("d"), closes=True))
+        text = text.replace('xyz="0 0 1"/><parent link="a"', f'xyz="{2 / 3 * off!r} 0 1"/><parent link="a"')
+        tilted = imported(path, text)
         assert any("stays open" in note for note in tilted.notes) == (off > 0)
         exact = tilted if off == 0 else exact
     for one, other in zip(tilted.mechanism.joints, exact.mechanism.joints, strict=True):
         np.testing.assert_allclose(one.point, other.point, atol=1e-5)
-    path.write_text(bars("revolute", 0.01, axis))
-    with pytest.raises(
-        InputError, match=r"the loop tip is open by 0\.01 and 0 deg.*Newton's method, which came no closer"
-    ):
-        import_robot(Request(path, Ends("d"), closes=True))
+    words = r"the loop tip is open by 0\.01 and 0 deg.*Newton's method, which came no closer"
+    with pytest.raises(InputError, match=words):
+        imported(path, bars("revolute", 0.01, axis))
 
 
 def test_loop_joints_and_offsets_of_mimic(tmp_path: Path) -> None:
     """<loop_joint> closes a loop by a ball or a hinge; a joint that mimics another with an offset is moved to it."""
     path = tmp_path / "bars.urdf"
     for kind, axis, joint in (("spherical", "", "S"), ("revolute", '<axis xyz="0 0 2"/>', "R")):
-        path.write_text(bars(kind, 0.0, axis))
-        found = import_robot(Request(path, Ends("d"), closes=True))
+        found = imported(path, bars(kind, 0.0, axis))
         assert {each.name: each.kind for each in found.mechanism.joints}["tip"] == joint
         assert wrenches_of(found.mechanism, 1.0).ranks.freedoms == 2
     for text, words in (
@@ -281,13 +281,12 @@ def test_loop_joints_and_offsets_of_mimic(tmp_path: Path) -> None:
         (bars("hinge", 0.0), 'loop_joint tip, type = "hinge": must be one of'),
         (bars("spherical", 0.0).replace('link2 link="d"', 'link2 link="x"'), 'link2 = "x": must be one of the links'),
     ):
-        path.write_text(text)
         with pytest.raises(InputError, match=words):
-            import_robot(Request(path, Ends("d"), closes=True))
-    path.write_text(bars("spherical", 0.0, mimic='<mimic joint="elbow_left" multiplier="-1" offset="0.1"/>'))
+            imported(path, text)
+    text = bars("spherical", 0.0, mimic='<mimic joint="elbow_left" multiplier="-1" offset="0.1"/>')
     with pytest.raises(InputError, match="is open by"):
-        import_robot(Request(path, Ends("d")))
-    found = import_robot(Request(path, Ends("d"), closes=True))
+        imported(path, text, closes=False)
+    found = imported(path, text)
     assert {gap.name: gap.angle for gap in found.gaps}["elbow_right mimic"] == pytest.approx(0.1)
     place = {each.name: each.point for each in found.mechanism.joints}
     angles = []
@@ -316,19 +315,12 @@ def test_motors_keep_their_names() -> None:
 
 def test_a_singular_model_is_told(tmp_path: Path) -> None:
     """A five-bar whose distal bars are in line stands where locked motors do not hold it."""
-    text = (
-        bars("revolute", 0.0, '<axis xyz="0 0 1"/>')
-        .replace("0.5 0.3 0", "0.5 -0.4 0")
-        .replace("0.5 -0.3 0", "0.5 0.4 0")
-    )
-    text = text.replace("0.8 -0.1", "0.3 -0.1").replace("0.8 0.1", "0.3 0.1")
+    elbows = ("0.5 0.3 0", "0.5 -0.4 0"), ("0.5 -0.3 0", "0.5 0.4 0")
+    tips = ("0.8 -0.1", "0.3 -0.1"), ("0.8 0.1", "0.3 0.1")
+    text = edited(bars("revolute", 0.0, '<axis xyz="0 0 1"/>'), *elbows, *tips)
     path = tmp_path / "bars.urdf"
-    path.write_text(text)
-    regular = import_robot(Request(path, Ends("d")))
+    regular = imported(path, text, closes=False)
     assert not any("singular" in note for note in regular.notes)
-    path.write_text(text.replace("0.3 -0.1", "0 -0.1").replace("0.3 0.1", "0 0.1"))
-    found = import_robot(Request(path, Ends("d")))
-    assert any(
-        "the robot is singular where it stands: the platform can move with every actuator locked" in n
-        for n in found.notes
-    )
+    found = imported(path, text.replace("0.3 -0.1", "0 -0.1").replace("0.3 0.1", "0 0.1"), closes=False)
+    words = "the robot is singular where it stands: the platform can move with every actuator locked"
+    assert any(words in note for note in found.notes)

@@ -1,6 +1,5 @@
 """Sweeps: every row is an answer with evidence, and a killed run loses and doubles nothing."""
 
-import csv
 import os
 import signal
 import subprocess
@@ -11,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, starter_tables
+from builders import Run, refusal_of, rows_of, starter_tables
 
 from screwsynth.nlp import InputError, case_from_tables, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
@@ -36,13 +35,9 @@ SAME = 1e-9
 OVER = ("--over", "task.pitch=0.2:2:4", "--over", "x1=10,12.5,14")
 
 
-def table(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def answers(rows: list[dict[str, str]]) -> list[dict[str, str]]:
-    """All columns of rows but the time that each took."""
+def answers(path: Path) -> list[dict[str, str]]:
+    """All columns of a table's rows but the time that each took."""
+    rows = rows_of(path.read_text(encoding="utf-8"))
     return [{name: cell for name, cell in row.items() if name != "seconds"} for row in rows]
 
 
@@ -91,7 +86,7 @@ def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
     out, picture = tmp_path / "sweep.csv", tmp_path / "sweep.svg"
     command = ("sweep", CASE, *OVER, "--out", str(out))
     code, said, _ = cli(*command, "--engine", "compiled", "--plot", str(picture))
-    rows = table(out)
+    rows = rows_of(out.read_text(encoding="utf-8"))
     assert (code, len(rows), [row["index"] for row in rows]) == (0, 12, [str(k) for k in range(12)])
     assert said.startswith("12 of 12 points have an answer")
     assert {row["engine"] for row in rows} == {"compiled"}
@@ -109,12 +104,10 @@ def test_compiled_rows_are_those_of_solve(tmp_path: Path, cli: Run) -> None:
     code, _, err = cli(*command)
     assert (code, out.read_bytes()) == (0, before)
     assert "holds all 12 points already" in err
-    code, _, err = cli("sweep", CASE, *OVER, "--starts", "3", "--out", str(out))
-    assert (code, out.read_bytes()) == (2, before)
-    assert (
-        err
-        == f"screwsynth: --out {out}: exists and is not the table of this sweep; choose another name, or remove it\n"
-    )
+    err = refusal_of(cli("sweep", CASE, *OVER, "--starts", "3", "--out", str(out)))
+    assert out.read_bytes() == before
+    sentence = "exists and is not the table of this sweep; choose another name, or remove it"
+    assert err == f"screwsynth: --out {out}: {sentence}\n"
 
 
 def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
@@ -143,7 +136,7 @@ def test_a_sweep_in_python_is_that_of_the_command(tmp_path: Path, cli: Run) -> N
     assert (code, err, said[:33]) == (0, "", "4 of 4 points have an answer, F f"), err
     values = {"task.pitch": (0.2, 1), "x1": (10, 12)}
     columns = run_in_python(load_case(CASE), values, starts=2, engine="ipopt", jobs=1)
-    rows = table(out)
+    rows = rows_of(out.read_text(encoding="utf-8"))
     assert columns.F.tolist() == [float(row["F"]) for row in rows]
     assert columns.design["p_z"].tolist() == [float(row["p_z"]) for row in rows]
     assert columns.numbers["x1"].tolist() == [10, 12, 10, 12]
@@ -226,9 +219,7 @@ def test_bad_input_is_one_sentence(arguments: tuple[str, ...], words: str, tmp_p
     files["SHORT"].write_text("x1,x2\n10,11\n12\n")
     out = tmp_path / "out.csv"
     given = [str(files.get(word, word)) for word in arguments]
-    code, said, err = cli("sweep", CASE, *given, "--out", str(out))
-    assert (code, said, len(err.splitlines())) == (2, "", 1), err
-    assert words in err
+    refusal_of(cli("sweep", CASE, *given, "--out", str(out)), words)
     assert not out.exists()
     assert not list(tmp_path.glob("*.journal"))
 
@@ -239,18 +230,13 @@ def test_other_outputs_are_refused(tmp_path: Path, cli: Run) -> None:
         (tmp_path / "out.txt", "must end in .parquet or .csv"),
         (tmp_path / "no" / "x.csv", "is no folder"),
     ):
-        code, _, err = cli("sweep", CASE, *OVER, "--out", str(name))
-        assert (code, words in err) == (2, True), err
-    out.write_text("mine\n")
-    code, _, err = cli("sweep", CASE, *OVER, "--out", str(out))
-    assert (code, out.read_text()) == (2, "mine\n")
-    assert "is not the table of this sweep" in err
-    out.unlink()
-    journal = tmp_path / "out.csv.journal"
-    journal.write_text("mine\n")
-    code, _, err = cli("sweep", CASE, *OVER, "--out", str(out))
-    assert (code, journal.read_text()) == (2, "mine\n")
-    assert "belongs to another sweep" in err
+        refusal_of(cli("sweep", CASE, *OVER, "--out", str(name)), words)
+    journal = Path(f"{out}.journal")
+    for path, words in ((out, "is not the table of this sweep"), (journal, "belongs to another sweep")):
+        path.write_text("mine\n")
+        refusal_of(cli("sweep", CASE, *OVER, "--out", str(out)), words)
+        assert path.read_text() == "mine\n"
+        path.unlink()
 
 
 def test_a_journal_cut_off_anywhere_keeps_whole_rows(tmp_path: Path) -> None:
@@ -288,8 +274,7 @@ def test_ipopt_without_a_compiler(sweep: Callable[..., Sweep], tmp_path: Path, m
     assert [row.engine for row in rows] == ["ipopt", "ipopt"]
     assert "needs a C compiler" in said[0]
     alone = solve(load_case(CASE, {"x1": 11.75}), starts=1)
-    one_F = rows[1].F
-    assert one_F == pytest.approx(alone.F, rel=1e-12)
+    assert pytest.approx(alone.F, rel=1e-12) == rows[1].F
 
 
 def test_a_row_group_is_in_memory_at_once(sweep: Callable[..., Sweep], tmp_path: Path) -> None:
@@ -347,9 +332,9 @@ def test_a_run_killed_three_times_has_the_same_table(tmp_path: Path, cli: Run) -
     assert sizes == sorted(sizes)
     assert not parts.exists()
     assert cli("sweep", CASE, *over, "--out", str(parts))[0] == 0
-    found = answers(table(parts))
+    found = answers(parts)
     assert len(found) == 1200
-    assert found == answers(table(whole))
+    assert found == answers(whole)
 
 
 @pytest.mark.slow

@@ -110,16 +110,12 @@ def displacements(rng: np.random.Generator, tasks: list[Task]) -> tuple[Displace
         return along_screw(rng.choice(tasks).twist, [float(each) for each in np.linspace(-0.3, 0.4, 4)])
     if kind == 2:
         return over_grid([[-1.0, 0.0, 1.0], [0.0], [float(each) for each in np.linspace(-2, 0.3, 4)]])
-    screws = [Screw(axis=each.axis, point=each.point, pitch=each.pitch, intensity=1.0) for each in axes(rng, 3)]
-    return tuple(screw_displacement(screw, float(rng.normal())) for screw in screws)
+    return tuple(screw_displacement(random_screw(rng), float(rng.normal())) for _ in range(3))
 
 
-def axes(rng: np.random.Generator, count: int) -> list[Screw]:
-    found = []
-    for _ in range(count):
-        axis = rng.normal(size=3)
-        found.append(Screw(axis / np.linalg.norm(axis), rng.normal(size=3), float(rng.normal()), 1.0))
-    return found
+def random_screw(rng: np.random.Generator) -> Screw:
+    axis = rng.normal(size=3)
+    return Screw(axis / np.linalg.norm(axis), rng.normal(size=3), float(rng.normal()), 1.0)
 
 
 def limits(rng: np.random.Generator, model: Model) -> Limits:
