@@ -127,26 +127,12 @@ class Builder:
     def geared(self, start: str, end: str, at: Array) -> None:
         """A planar limb of two hinges that a gear couples with its motor's, beside a driven slide with two hinges."""
         x, y, z = frame(self.rng)
-        names = self.chain(
-            start,
-            end,
-            [
-                ("R", at - 0.5 * x, [z], True),
-                ("R", at - 0.6 * x + 0.5 * y, [z], False),
-                ("R", at + 0.8 * y, [z], False),
-            ],
-        )
+        steps = [("R", at - 0.5 * x, [z], True), ("R", at - 0.6 * x + 0.5 * y, [z], False)]
+        names = self.chain(start, end, [*steps, ("R", at + 0.8 * y, [z], False)])
         pair = names[:2] if self.rng.random() < 0.5 else names[1:]
         self.couplings.append({"factors": {pair[0]: 1.0, pair[1]: float(self.rng.uniform(-1, -0.4))}})
-        self.chain(
-            start,
-            end,
-            [
-                ("P", at + 0.6 * x, [x + 0.2 * y], True),
-                ("R", at + 0.7 * x + 0.1 * y, [z], False),
-                ("R", at + 0.3 * x + 0.9 * y, [z], False),
-            ],
-        )
+        steps = [("P", at + 0.6 * x, [x + 0.2 * y], True), ("R", at + 0.7 * x + 0.1 * y, [z], False)]
+        self.chain(start, end, [*steps, ("R", at + 0.3 * x + 0.9 * y, [z], False)])
 
     def crossed(self, start: str, end: str, at: Array) -> None:
         """A driven four-bar whose coupler carries a driven strut, and a limb from the start: loops in loops."""

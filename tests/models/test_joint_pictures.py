@@ -21,16 +21,8 @@ from screwsynth.nlp.output.report.report import report_of
 
 #: Robots with every kind of limb; the others are slow tests.
 QUICK = (
-    "3-rps",
-    "3-upu",
-    "6-rus",
-    "delta",
-    "delta-parallelogram",
-    "exechon",
-    "spherical-3-rrr",
-    "tricept",
-    "tripteron",
-)
+    "3-rps", "3-upu", "6-rus", "delta", "delta-parallelogram", "exechon", "spherical-3-rrr", "tricept", "tripteron",
+)  # fmt: skip
 ROBOTS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in GALLERY]
 
 

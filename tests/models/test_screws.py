@@ -47,20 +47,18 @@ def perpendicular(n: Array) -> Array:
     return unit(np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))]))
 
 
-def test_screw_of_finite_pitch_by_hand() -> None:
-    # s0 x s + h s = (0, 2, 0) x (0, 0, 1) + 5 (0, 0, 1) = (2, 0, 5), twice over.
-    screw = screw_from_axis((0, 0, 10), (0, 2, 7), 5, intensity=2)
-    np.testing.assert_array_equal(screw, [0, 0, 2, 4, 0, 10])
-
-
-def test_screw_through_a_point_by_hand() -> None:
-    # The axis (2, 2, 1) / 3 through (2, 3, 6) with pitch 1: (3 - 12, 12 - 2, 4 - 6) / 3 + (2, 2, 1) / 3.
-    expected = [2 / 3, 2 / 3, 1 / 3, -7 / 3, 4, -1 / 3]
-    np.testing.assert_allclose(screw_from_axis((2, 2, 1), (2, 3, 6), 1), expected, rtol=4e-16)
-
-
-def test_screw_of_infinite_pitch_by_hand() -> None:
-    np.testing.assert_allclose(screw_from_axis((3, 0, 4), (1, 2, 3), math.inf, 10), [0, 0, 0, 6, 0, 8], rtol=4e-16)
+@pytest.mark.parametrize(
+    ("axis", "point", "pitch", "intensity", "expected"),
+    [
+        # s0 x s + h s = (0, 2, 0) x (0, 0, 1) + 5 (0, 0, 1) = (2, 0, 5), twice over.
+        ((0, 0, 10), (0, 2, 7), 5, 2, [0, 0, 2, 4, 0, 10]),
+        # The axis (2, 2, 1) / 3 through (2, 3, 6) with pitch 1: (3 - 12, 12 - 2, 4 - 6) / 3 + (2, 2, 1) / 3.
+        ((2, 2, 1), (2, 3, 6), 1, 1, [2 / 3, 2 / 3, 1 / 3, -7 / 3, 4, -1 / 3]),
+        ((3, 0, 4), (1, 2, 3), math.inf, 10, [0, 0, 0, 6, 0, 8]),
+    ],
+)
+def test_screws_by_hand(axis: Triple, point: Triple, pitch: float, intensity: float, expected: list[float]) -> None:
+    np.testing.assert_allclose(screw_from_axis(axis, point, pitch, intensity), expected, rtol=4e-16)
 
 
 def test_line_by_hand() -> None:

@@ -132,6 +132,8 @@ typedef struct {
     mxArray given[3];
 } SimStruct;
 #define SS_OPTION_EXCEPTION_FREE_CODE 1
+#define START(S) ((S).given[0].number = 1e-3, (S).given[1].number = 16, (S).given[2].number = -1, \\
+                  mdlInitializeSizes(&(S)), mdlInitializeSampleTimes(&(S)), mdlStart(&(S)))
 #define mxGetScalar(a) ((a)->number)
 #define ssSetNumSFcnParams(S, n) ((S)->parameters = (n))
 #define ssGetNumSFcnParams(S) ((S)->parameters)
@@ -163,12 +165,7 @@ int main(void) {
     static SimStruct S;
     double x;
     int k;
-    S.given[0].number = 1e-3;
-    S.given[1].number = 16;
-    S.given[2].number = -1;
-    mdlInitializeSizes(&S);
-    mdlInitializeSampleTimes(&S);
-    mdlStart(&S);
+    START(S);
     for (k = 0; k < 6; ++k)
         S.twist[k] = screwsynth_paper_4_1_helical_parameter_defaults[SCREWSYNTH_PAPER_4_1_HELICAL_TWIST + k];
     mdlOutputs(&S, 0);
@@ -291,12 +288,7 @@ int main(void) {
     static SimStruct S;
     const double *p = screwsynth_peg_in_hole_parameter_defaults;
     int task, i;
-    S.given[0].number = 1e-3;
-    S.given[1].number = 16;
-    S.given[2].number = -1;
-    mdlInitializeSizes(&S);
-    mdlInitializeSampleTimes(&S);
-    mdlStart(&S);
+    START(S);
     for (task = 0; task < 2; ++task) {
         for (i = 0; i < 6; ++i) S.twist[6 * task + i] = p[SCREWSYNTH_PEG_IN_HOLE_TWIST_OF(1 - task) + i];
         S.twist[12 + task] = p[screwsynth_peg_in_hole_weights[1 - task]];
