@@ -110,6 +110,18 @@ def test_help_does_not_import_the_numerical_libraries() -> None:
     assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
 
 
+def test_a_solve_loads_neither_robots_nor_tables_nor_proofs_that_its_case_has_none_of() -> None:
+    unused = ("models.joints.robot", "models.mechanism", "nlp.case.limits.registry", "nlp.case.workspacetable")
+    proofs = ("nlp.proof.boxes", "nlp.proof.enclosure", "nlp.proof.checker")
+    names = [f"screwsynth.{name}" for name in (*unused, *proofs)]
+    code = (
+        "import sys\nfrom screwsynth.nlp.cli.main import run\nsys.argv = ['screwsynth', 'solve', 'paper-4.1-helical']\n"
+        f"assert run() == 0\nsys.exit(', '.join(n for n in {names} if n in sys.modules) or 0)"
+    )
+    ended = subprocess.run([sys.executable, "-P", "-c", code], check=False, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
 @pytest.mark.slow
 def test_the_wheel_holds_every_module_and_case_and_runs(tmp_path: Path) -> None:
     """Built without a C compiler, for want of which nothing fails but proofs."""
