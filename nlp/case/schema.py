@@ -319,7 +319,8 @@ class Document(Table):
     )
 
     title: str = Field(default=Case.title, description="one line for people")
-    units: UnitsTable = UnitsTable()
+    # Defaults are constructed without validators, which are built when a document is first read.
+    units: UnitsTable = UnitsTable.model_construct()
     robot: RobotTable
     # A document that names CSV files has their rows here by the time that it is checked.
     pose: Poses = Field(default_factory=list)
@@ -330,8 +331,8 @@ class Document(Table):
     limits: LimitsTable | None = None
     tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
     workspace: WorkspaceTable | None = None
-    solve: SolveTable = SolveTable()
-    expect: ExpectTable = ExpectTable()
+    solve: SolveTable = SolveTable.model_construct()
+    expect: ExpectTable = ExpectTable.model_construct()
     published: list[PublishedTable] = Field(default_factory=list)
 
     @model_validator(mode="after")
