@@ -148,9 +148,13 @@ __all__ = [
 ]
 
 
+#: The modules of names that most runs do not need: each is imported when its name is first used.
+_JOINTS = {"RobotError": ".joints.forms", "robot": ".joints.robot"}
+
+
 def __getattr__(name: str) -> object:
-    """Return a name of :mod:`.joints`, which most runs do not need and which is imported when it is first used."""
-    if name not in ("RobotError", "robot"):
+    """Return a name of :mod:`.joints`."""
+    if name not in _JOINTS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found: object = getattr(import_module(".joints", __name__), name)
+    found: object = getattr(import_module(_JOINTS[name], __name__), name)
     return found

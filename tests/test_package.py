@@ -105,9 +105,21 @@ def test_public_names_show_before_they_are_loaded() -> None:
 
 
 def test_help_does_not_import_the_numerical_libraries() -> None:
-    heavy = "('casadi', 'numpy', 'rich.table')"
+    heavy = "('casadi', 'numpy', 'pydantic', 'rich.table', 'screwsynth.nlp.cli.solve')"
     code = f"import sys, screwsynth.nlp.cli.app; sys.exit(any(m in sys.modules for m in {heavy}))"
     assert subprocess.run([sys.executable, "-P", "-c", code], check=False).returncode == 0
+
+
+def test_a_solve_loads_neither_robots_nor_tables_nor_proofs_that_its_case_has_none_of() -> None:
+    unused = ("models.joints.robot", "models.mechanism", "nlp.case.limits.registry", "nlp.case.workspacetable")
+    proofs = ("nlp.proof.workspace", "nlp.proof.boxes", "nlp.proof.enclosure", "nlp.proof.checker")
+    names = [f"screwsynth.{name}" for name in (*unused, *proofs)]
+    code = (
+        "import sys\nfrom screwsynth.nlp.cli.main import run\nsys.argv = ['screwsynth', 'solve', 'paper-4.1-helical']\n"
+        f"assert run() == 0\nsys.exit(', '.join(n for n in {names} if n in sys.modules) or 0)"
+    )
+    ended = subprocess.run([sys.executable, "-P", "-c", code], check=False, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
 
 
 @pytest.mark.slow

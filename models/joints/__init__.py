@@ -13,10 +13,12 @@ that follow), ``modes`` (signs of home's assembly), ``resistance`` (rows and mem
 (its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model), ``centres`` (the model
 with errors of joint centres), ``closedform`` (a model without unknowns that follow from the pose in closed form),
 ``limbequations``, ``elimination`` and ``replacing`` (unknowns that follow one after the other, of any dimensions).
+
+The model is imported from ``robot`` itself, or as :func:`screwsynth.models.robot`: what asks for one module here, or
+for the kinds of faults, does not load them all.
 """
 
 from .expression import ExpressionError
 from .forms import RobotError
-from .robot import robot
 
-__all__ = ["ExpressionError", "RobotError", "robot"]
+__all__ = ["ExpressionError", "RobotError"]

@@ -3,11 +3,15 @@
 The classes mirror the file, in the user's units and words. They check keys, types and finite numbers, for which no
 robot need be known. Everything else is checked once, by :class:`screwsynth.nlp.case.case.Case`. A key that may be left
 out has the default of the value that it becomes.
+
+The tables of limits and of the workspace take as long to make as all others together. A file without them is read
+without them; :mod:`.wholeschema` has the document with them.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from types import NoneType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     ConfigDict,
@@ -25,11 +29,16 @@ from ..errors import listing
 from ..units import Units
 from .case import Case
 from .faults import case_error
-from .limits.registry import LimitsTable
 from .settings import Expectation, Published, Search
 from .table import Table, Vector
 from .task import Task
-from .workspacetable import WorkspaceTable
+
+if TYPE_CHECKING:
+    from .limits.registry import LimitsTable
+    from .workspacetable import WorkspaceTable
+else:
+    # A document that states neither has nothing at these keys.
+    LimitsTable = WorkspaceTable = NoneType
 
 #: Forms of a fixed rotation, each of which stands alone.
 _FIXED = ("rpy", "matrix", "quaternion")
@@ -297,7 +306,7 @@ class PublishedTable(Table):
 
 
 class Document(Table):
-    """A whole case file."""
+    """A case file that states no limits and no workspace."""
 
     model_config = ConfigDict(
         title="screwsynth case file",
@@ -310,7 +319,8 @@ class Document(Table):
     )
 
     title: str = Field(default=Case.title, description="one line for people")
-    units: UnitsTable = UnitsTable()
+    # Defaults are constructed without validators, which are built when a document is first read.
+    units: UnitsTable = UnitsTable.model_construct()
     robot: RobotTable
     # A document that names CSV files has their rows here by the time that it is checked.
     pose: Poses = Field(default_factory=list)
@@ -318,11 +328,11 @@ class Document(Table):
     poses: FileName | None = Field(default=None, description="CSV file beside this one with a pose in each row")
     tasks: FileName | None = Field(default=None, description="CSV file beside this one with a task in each row")
     combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
-    limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
+    limits: LimitsTable | None = None
     tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
-    workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
-    solve: SolveTable = SolveTable()
-    expect: ExpectTable = ExpectTable()
+    workspace: WorkspaceTable | None = None
+    solve: SolveTable = SolveTable.model_construct()
+    expect: ExpectTable = ExpectTable.model_construct()
     published: list[PublishedTable] = Field(default_factory=list)
 
     @model_validator(mode="after")
@@ -344,6 +354,15 @@ def parse_document(tables: dict[str, Any]) -> Document:
         CaseError: the first fault, with its dotted key.
     """
     try:
-        return Document.model_validate(tables)
+        return _kind_of(tables).model_validate(tables)
     except ValidationError as error:
         raise case_error(error.errors(include_url=False)[0]) from None
+
+
+def _kind_of(tables: dict[str, Any]) -> type[Document]:
+    """Return the schema of a document, with the tables of limits and of the workspace where it states one of them."""
+    if tables.keys().isdisjoint(("limits", "workspace")):
+        return Document
+    from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
+
+    return WholeDocument

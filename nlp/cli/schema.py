@@ -21,7 +21,7 @@ def schema(
 
         found: object = result_schema()
     else:
-        from ..case.schema import Document
+        from ..case.wholeschema import WholeDocument
 
-        found = Document.model_json_schema()
+        found = WholeDocument.model_json_schema()
     typer.echo(json.dumps(found, indent=2))

@@ -4,7 +4,7 @@ A solve that failed has no ``F``: the point reached is under ``reached``, so tha
 """
 
 from collections.abc import Mapping
-from typing import Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 from ..case.task import Method, Sense
 from ..evidence.optimality import PointKind
@@ -24,7 +24,9 @@ from .parts import (
     VersionsData,
     ViolationData,
 )
-from .workspace import WorkspaceProofData
+
+if TYPE_CHECKING:
+    from .workspace import WorkspaceProofData
 
 
 class ReachedData(JsonObject):
@@ -183,7 +185,7 @@ class SolveResult(JsonObject):
     tolerance: Absent[ToleranceData]
     starts: StartsData
     certificate: CertificateData | None
-    workspace: Absent[WorkspaceProofData]
+    workspace: Absent["WorkspaceProofData"]
     seed: int
     versions: VersionsData
     seconds: float

@@ -8,7 +8,7 @@ short command a thirtieth slower.
 import enum
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, TypeAlias, TypeVar, dataclass_transform, get_origin
+from typing import Annotated, ClassVar, TypeAlias, TypeVar, dataclass_transform, get_origin, get_type_hints
 
 import numpy as np
 
@@ -67,6 +67,17 @@ class JsonObject:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{name}={getattr(self, name)!r}' for name in self.marks)})"
+
+
+def kinds_of(kind: type[JsonObject]) -> dict[str, object]:
+    """Return the annotations of an object's fields by name.
+
+    A type whose module few commands need stands in an annotation as text, such as ``Absent["ProofData"]``. Who calls
+    this has imported that module.
+    """
+    objects = {each.__name__: each for each in JsonObject.__subclasses__()}
+    found = get_type_hints(kind, localns=objects, include_extras=True)
+    return {name: found[name] for name in kind.marks}
 
 
 def _mark_of(kind: object) -> Mark | None:

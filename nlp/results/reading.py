@@ -16,7 +16,7 @@ from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .front import FrontResult
-from .jsondata import JsonObject, Mark
+from .jsondata import JsonObject, Mark, kinds_of
 from .parts import SCHEMA
 from .schema import RESULTS
 from .sweep import SweepResult
@@ -100,7 +100,7 @@ def _keys(kind: type[JsonObject], *, required: bool) -> list[str]:
         required: only the keys that are never absent.
     """
     keys = []
-    for name, annotation in kind.__annotations__.items():
+    for name, annotation in kinds_of(kind).items():
         mark = kind.marks[name]
         if mark is Mark.INLINE:
             part = _inline_kind(annotation)
@@ -137,7 +137,7 @@ def _object(kind: type[JsonObject], table: object, key: str) -> JsonObject:
 def _fields(kind: type[JsonObject], table: Mapping[str, object], key: str) -> JsonObject:
     """Return an object from a table that may hold other keys too; the errors are those of :func:`_object`."""
     values: dict[str, object] = {}
-    for name, annotation in kind.__annotations__.items():
+    for name, annotation in kinds_of(kind).items():
         mark = kind.marks[name]
         if mark is Mark.INLINE:
             part = _inline_kind(annotation)

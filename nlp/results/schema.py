@@ -16,7 +16,7 @@ from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .front import FrontResult
-from .jsondata import JsonObject, JsonValue, Mark
+from .jsondata import JsonObject, JsonValue, Mark, kinds_of
 from .sweep import SweepResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
@@ -126,7 +126,7 @@ class _Fields(NamedTuple):
 def _fields(kind: type[JsonObject], definitions: Schema) -> _Fields:
     """Return the fields of an object type, those of its inline parts among them."""
     fields, descriptions = _Fields({}, [], {}), _descriptions(kind)
-    for name, annotation in kind.__annotations__.items():
+    for name, annotation in kinds_of(kind).items():
         mark = kind.marks[name]
         if mark is Mark.INLINE:
             _add_inline(fields, annotation, definitions)

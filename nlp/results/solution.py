@@ -15,10 +15,10 @@ from .design import limits_data, margins_data, relaxation_data, sensitivity_data
 from .evidence import certificate_data, optimality_data
 from .jsondata import finite_or_none
 from .point import head_data, objective, robot_data, versions, violations
-from .workspace import proof_data
 
 if TYPE_CHECKING:
     from ..solver.semi_infinite import WorkspaceProof
+    from .workspace import WorkspaceProofData
 
 
 def task_result(
@@ -54,11 +54,18 @@ def task_result(
         tolerance=tolerance_data(nlp, x) if solved else None,
         starts=starts_data(solution),
         certificate=certificate_data(certificate),
-        workspace=proof_data(workspace),
+        workspace=None if workspace is None else _proof_data(workspace),
         seed=solution.seed,
         versions=versions(),
         seconds=solution.seconds,
     )
+
+
+def _proof_data(workspace: WorkspaceProof) -> WorkspaceProofData | None:
+    """Return the proof over the workspace."""
+    from .workspace import proof_data  # noqa: PLC0415 - few cases have one, and it loads the room of proofs
+
+    return proof_data(workspace)
 
 
 def starts_data(solution: ProgramSolution) -> StartsData:

@@ -28,8 +28,6 @@ from .wording import (
     tolerance_line,
     violation_lines,
 )
-from .workspacedigest import proof_digest
-from .workspacewording import proof_lines
 
 if TYPE_CHECKING:
     from .certified import CertifiedResult
@@ -48,8 +46,13 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 def _task_summary(case: Case, result: SolveResult) -> Summary:
     """Yield the result of a solve of one task."""
     yield from heading_lines(case, result)
-    yield from proof_lines(result.workspace)
-    yield from proof_digest(case, result.workspace)
+    if result.workspace is not None:
+        # Few cases have a proof, and what shows it loads the room of proofs.
+        from .workspacedigest import proof_digest  # noqa: PLC0415
+        from .workspacewording import proof_lines  # noqa: PLC0415
+
+        yield from proof_lines(result.workspace)
+        yield from proof_digest(case, result.workspace)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
         yield from robot_tables(case, result.robot)

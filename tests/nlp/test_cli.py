@@ -19,6 +19,7 @@ import screwsynth.cases
 from screwsynth.models import model_names
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import shipped_cases
+from screwsynth.nlp.cli.app import SUMMARIES, command_of
 
 CASES = Path(screwsynth.cases.__file__).parent
 HELICAL = (CASES / "paper-4.1-helical.toml").read_text(encoding="utf-8")
@@ -101,6 +102,13 @@ def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.Complet
     folder = tmp_path_factory.mktemp("solved")
     ended = process("solve", "paper-4.1-helical", "--starts", "4", "--json", "result.json", folder=folder)
     return ended, folder / "result.json"
+
+
+@pytest.mark.parametrize("name", SUMMARIES)
+def test_help_lists_each_command_by_the_first_line_of_its_own_help(name: str) -> None:
+    command = command_of(name)
+    assert command.name == name
+    assert command.help.partition("\n\n")[0].split() == SUMMARIES[name].split()
 
 
 def test_a_solve_as_a_process_prints_only_its_table(

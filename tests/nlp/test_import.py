@@ -14,8 +14,7 @@ import pytest
 import reachy
 from builders import Array, Run, output_of, refusal_of, saved, turn_about
 
-from screwsynth.models import Substitution, jacobian
-from screwsynth.models.joints import RobotError, robot
+from screwsynth.models import RobotError, Substitution, jacobian, robot
 from screwsynth.models.mechanism import mechanism_of, wrenches_of
 from screwsynth.nlp import InputError, load_case
 from screwsynth.nlp.formats.reading.blocks import between

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from builders import Array, Run, edited, output_of, refusal_of
 
-from screwsynth.models.joints import robot
+from screwsynth.models import robot
 from screwsynth.models.mechanism import (
     Mechanism,
     MechanismJoint,

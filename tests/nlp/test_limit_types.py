@@ -23,7 +23,7 @@ from screwsynth.nlp.case.limits.constraint import LENGTH, BoundedConstraint, bet
 from screwsynth.nlp.case.limits.interval import IntervalLimit
 from screwsynth.nlp.case.limits.limit import PosedRobot
 from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
-from screwsynth.nlp.case.schema import Document
+from screwsynth.nlp.case.wholeschema import WholeDocument
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
@@ -31,7 +31,7 @@ KEYS = [key for kind in LIMIT_TYPES for key in kind.fields()]
 
 
 def test_the_schema_has_every_limit_and_no_other() -> None:
-    table = Document.model_json_schema()["$defs"]["LimitsTable"]
+    table = WholeDocument.model_json_schema()["$defs"]["LimitsTable"]
     assert list(table["properties"]) == ["over", *KEYS]
     assert all(field["description"] for field in table["properties"].values())
     # The measures of robots are the other keys.
@@ -85,7 +85,7 @@ import screwsynth.nlp
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import CaseError, Status, case_from_tables, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.platform_height import PlatformHeight
-from screwsynth.nlp.case.schema import Document
+from screwsynth.nlp.case.wholeschema import WholeDocument
 from screwsynth.nlp.case.starter import starter_case
 
 starter = tomllib.loads(starter_case(stewart_gough()))
@@ -125,7 +125,7 @@ print(
             "limits": json_data(result_of(solution))["limits"],
             "slope": (moved.F - solution.F) / 0.01,
             "relaxed": [[row.key, row.needed] for row in contradicting.relaxation],
-            "schema": Document.model_json_schema()["$defs"]["LimitsTable"]["properties"]["platform_height"],
+            "schema": WholeDocument.model_json_schema()["$defs"]["LimitsTable"]["properties"]["platform_height"],
         }
     )
 )
