@@ -86,15 +86,7 @@ def test_only_feasible_optima_count(bench: Modules) -> None:
     budget = bench.interface.Budget(300, 0.2)
     case = {"F": 407.2106717529294, "is_proved": True, "sign": -1.0, "scale": subject.nlp.objective_scale}
     counts = {}
-    for search in (
-        optimum,
-        turned_too_far,
-        slightly_worse,
-        not_a_number,
-        fault,
-        endless,
-        idle,
-    ):
+    for search in (optimum, turned_too_far, slightly_worse, not_a_number, fault, endless, idle):
         peer = bench.interface.Peer(search.__name__, "screwsynth" if search is optimum else "numpy", search)
         found = bench.race._attempt_data(bench.attempts.attempt(peer, subject, 0, budget))
         pair = {"peer": peer.name, "note": "", "losses": 0, "attempts": [found]}

@@ -11,20 +11,11 @@ import pytest
 from builders import Run, case_from, output_of, refusal_of, saved
 from casadi import SX
 from matplotlib.figure import Figure
+from measures import exponential
 
 from screwsynth.models import Body, Link, Model, Point, PoseSymbols, Scene, force_along, model_names
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import (
-    InputError,
-    Solution,
-    Task,
-    evaluate,
-    load_case,
-    plot,
-    result_of,
-    shipped_cases,
-    solve,
-)
+from screwsynth.nlp import InputError, Solution, Task, evaluate, load_case, plot, result_of, shipped_cases, solve
 from screwsynth.nlp.case.case import Case
 from screwsynth.nlp.case.robots import build_model, model_options
 from screwsynth.nlp.output.pictures import fonts
@@ -46,19 +37,6 @@ def drawing(name: str) -> Drawing:
     case = load_case(name)
     case = replace(case, search=case.search.but(4, None))
     return drawings_of(solve(case))[0]
-
-
-def exponential(twist: np.ndarray, t: float) -> np.ndarray:
-    """The displacement (4, 4) of a constant twist, by the power series of its matrix."""
-    omega, v = twist[:3], twist[3:]
-    M = np.zeros((4, 4))
-    M[:3, :3] = [[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]]
-    M[:3, 3] = v
-    total, term = np.eye(4), np.eye(4)
-    for k in range(1, 40):
-        term = term @ M * t / k
-        total = total + term
-    return total
 
 
 @pytest.mark.parametrize("name", PICTURED)

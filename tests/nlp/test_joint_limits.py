@@ -13,8 +13,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, output_of, saved, starter_tables, turn_about
+from builders import Array, Run, case_from, edited, output_of, saved, starter_tables, turn_about
+from measures import segment_distance
 
+import screwsynth.models
 from screwsynth.models import Model, Substitution, robot, stewart_gough
 from screwsynth.nlp import (
     ActuatorRate,
@@ -210,16 +212,6 @@ def angle_between(one: Array, other: Array) -> float:
     return math.atan2(float(np.linalg.norm(np.cross(one, other))), float(one @ other))
 
 
-def segment_distance(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
-    """Distance of two segments by alternating projection, which converges for a convex distance."""
-    s = t = 0.5
-    (p, d), (q, e) = one, other
-    for _ in range(400):
-        s = float(np.clip(d @ (q + t * e - p) / (d @ d), 0, 1))
-        t = float(np.clip(e @ (p + s * d - q) / (e @ e), 0, 1))
-    return float(np.linalg.norm(p + s * d - q - t * e))
-
-
 def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
     """Cranks, elbows, cones about the link and about an axis, distances of links and rates, at one pose."""
     up = [0.1, 0.2, 1.0]
@@ -263,15 +255,15 @@ def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
         for key, value in expected.items():
             assert rows[key] == pytest.approx(value, abs=1e-8), key
         links |= {
-            f"{label}:1 to {label}:2": (places[0], elbow - places[0]),
-            f"{label}:2 to {label}:3": (elbow, ball - elbow),
+            f"{label}:1 to {label}:2": (places[0], elbow),
+            f"{label}:2 to {label}:3": (elbow, ball),
         }
     pairs = [each for each in itertools.combinations(links, 2) if each[0][0] != each[1][0]]
     assert len(pairs) == 12
     for one, other in pairs:
         name = f"link_clearance links {one} and {other}"
         if name in others:
-            assert others[name] == pytest.approx(segment_distance(links[one], links[other]), abs=1e-9)
+            assert others[name] == pytest.approx(segment_distance(*links[one], *links[other]), abs=1e-9)
     # The two links of a limb share a joint.
     assert sum(name.startswith("link_clearance") for name in others) == 12
     # The rates are those of the cranks along the task's motion.
@@ -287,23 +279,17 @@ def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
         assert others[f"actuator_rate actuator {k + 1}"] == pytest.approx(abs(ahead - behind) / (2 * h), rel=1e-4)
 
 
-RPS = """
-name = "3-RPS"
-home = [0, 0, 1.1]
-dimensions = { rb = { typical = 1.0 }, rp = { typical = 0.6 } }
-[[limb]]
-repeat = { count = 3 }
-points = { B = ["rb", 0, 0], A = ["rp", 0, 1.1] }
-joints = [ { type = "R", at = "B", axis = "y" },
-           { type = "P", at = "B", axis = "A - B", actuated = true, name = "slide" },
-           { type = "S", at = "A", name = "ball" } ]
-"""
+RPS = edited(
+    (Path(screwsynth.models.__file__).parent / "robots" / "3-rps.toml").read_text(encoding="utf-8"),
+    ("actuated = true", 'actuated = true, name = "slide"'),
+    ('"S"', '"S", name = "ball"'),
+)
 RPS_CASE = """
 [units]
 length = "m"
 [robot]
 file = "robot.toml"
-parameters = { rb = { min = 0.8, max = 1.2 }, rp = { min = 0.4, max = 0.7 } }
+parameters = { rb = { min = 0.8, max = 1.2 }, rp = { min = 0.4, max = 0.7 }, h = 1.1 }
 [pose]
 position = [{ min = -0.3, max = 0.3 }, { min = -0.3, max = 0.3 }, { min = 0.9, max = 1.3 }]
 rotation = { angle = { min = -30, max = 30 } }

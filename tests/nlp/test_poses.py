@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import tomllib
@@ -13,19 +12,10 @@ import casadi as ca
 import numpy as np
 import pytest
 from builders import Array, Run, case_from, saved
+from measures import exponential, placed_joints
 
 from screwsynth.models import matrix_from_axis_angle, screw_from_axis
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    PointKind,
-    Status,
-    evaluate,
-    formulate,
-    json_data,
-    result_of,
-    solve,
-)
+from screwsynth.nlp import Case, CaseError, PointKind, Status, evaluate, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.pose import along_screw, over_grid
 from screwsynth.nlp.evidence.tolerance import BuiltRobot, tolerance_loss
 from screwsynth.nlp.program.formulation import formulate_each
@@ -91,30 +81,17 @@ def case_of(poses: str, over: str = "sum", limits: str = "", sense: str = "max")
 
 def by_hand(result: dict[str, Any], pose: dict[str, Any], twist: Array) -> tuple[float, Array]:
     """F, and the six leg lengths, at a pose of a result, from the design alone."""
-    x1, x2, x3, x4 = (result["parameters"][name] for name in ("x1", "x2", "x3", "x4"))
-    R, p = np.array(pose["pose"]["rotation_matrix"]), np.array(pose["pose"]["position"])
-    F, lengths = 0.0, []
-    for k, sign in itertools.product(range(3), (-1, 1)):
-        u, v = (math.radians(120 * k + sign * half) for half in (x3, 60 - x4))
-        b = x1 * np.array([math.cos(u), math.sin(u), 0])
-        leg = p + R @ (x2 * np.array([math.cos(v), math.sin(v), 0])) - b
-        lengths.append(np.linalg.norm(leg))
-        f = leg / lengths[-1]
-        F += (np.cross(b, f) @ twist[:3] + f @ twist[3:]) ** 2
-    return F, np.array(lengths)
+    base, _, ends = placed_joints(result, pose["pose"])
+    lengths = np.linalg.norm(ends - base, axis=1)
+    forces = (ends - base) / lengths[:, None]
+    rates = np.cross(base, forces) @ twist[:3] + forces @ twist[3:]
+    return float(rates @ rates), lengths
 
 
 def test_displacements_along_a_screw_are_its_exponential() -> None:
     twist = screw_from_axis([1, 2, 2], [3, -1, 4], 0.7)
-    omega, v = twist[:3], twist[3:]
-    A = np.zeros((4, 4))
-    A[:3, :3] = np.cross(np.eye(3), omega)
-    A[:3, 3] = v
     for amount, step in zip((-0.8, 0.0, 1.3), along_screw(twist, (-0.8, 0.0, 1.3)), strict=True):
-        series, term = np.eye(4), np.eye(4)
-        for k in range(1, 40):
-            term = term @ A * amount / k
-            series += term
+        series = exponential(twist, amount)
         np.testing.assert_allclose(step.rotation, series[:3, :3], atol=1e-12)
         np.testing.assert_allclose(step.translation, series[:3, 3], atol=1e-12)
     (moved,) = along_screw(screw_from_axis([0, 0, 3], [0, 0, 0], math.inf), [2.5])

@@ -41,12 +41,7 @@ def random_case(seed: int, sense: str) -> Case:
     x1, x2 = (float(value) for value in generator.uniform(3, 10, 2))
     return Case(
         model=stewart_gough(layout="octahedral" if seed % 2 else "aligned"),
-        parameters={
-            "x1": Free(x1, 2 * x1),
-            "x2": x2,
-            "x3": Free(0, math.radians(30)),
-            "x4": Free(0, math.radians(30)),
-        },
+        parameters={"x1": Free(x1, 2 * x1), "x2": x2, "x3": Free(0, math.radians(30)), "x4": Free(0, math.radians(30))},
         position=[Free(-10, 10), Free(-10, 10), Free(5, 50)],
         rotation=Rotation(axis=None, angle=Free(-0.8, 0.8)),
         tasks=[
