@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -66,6 +67,39 @@ def segment_distance(p: Array, q: Array, r: Array, s: Array) -> float:
         best = min(best, float(distances[nearest]))
         low, high = u[max(nearest - 1, 0)], u[min(nearest + 1, 20)]
     return best
+
+
+def leg_measures(
+    base: Array, platform: Array, R: Array, p: Array, base_axes: Array, platform_axes: Array
+) -> dict[str, float]:
+    """What limits speak of in six straight legs, each at its worst place.
+
+    Args:
+        base: (6, 3) joint centres on the base.
+        platform: (6, 3) joint centres in the platform's frame.
+        R: the platform's rotation.
+        p: its position.
+        base_axes: (6, 3) directions against which the angles of the base's joints count, radians.
+        platform_axes: (6, 3) those of the platform's joints, in the world.
+    """
+    ends = p + platform @ R.T
+    spans, pairs = ends - base, list(itertools.combinations(range(6), 2))
+    lengths = np.linalg.norm(spans, axis=1)
+
+    def lean(axes: Array) -> float:
+        cosines = np.einsum("ij,ij->i", axes, spans) / np.linalg.norm(axes, axis=1) / lengths
+        return float(np.arccos(np.clip(cosines, -1, 1)).max())
+
+    return {
+        "leg_length.min": lengths.min(),
+        "leg_length.max": lengths.max(),
+        "base_joint_angle.max": lean(base_axes),
+        "platform_joint_angle.max": lean(platform_axes),
+        "joint_spacing.min": min(np.linalg.norm(at[i] - at[j]) for at in (base, platform) for i, j in pairs),
+        "footprint.base": np.linalg.norm(base[:, :2], axis=1).max(),
+        "footprint.platform": np.linalg.norm(platform[:, :2], axis=1).max(),
+        "leg_clearance.min": min(segment_distance(base[i], ends[i], base[j], ends[j]) for i, j in pairs),
+    }
 
 
 def scaled(value: Any, factor: float) -> Any:  # noqa: ANN401 - a part of a table

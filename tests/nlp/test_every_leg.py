@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import math
 import tomllib
 from dataclasses import replace
@@ -15,7 +14,7 @@ import pytest
 from builders import Array, case_from, turn_about
 from casadi import SX
 from generated import COMPILERS, written
-from measures import circle_joints, segment_distance
+from measures import circle_joints, leg_measures
 
 from screwsynth.nlp import Case, Nlp, formulate, load_case, load_compiled, sensitivities, solve
 from screwsynth.nlp.case.limits.constraint import NUMBER, BoundedConstraint, Constraint
@@ -31,25 +30,12 @@ def measured(numbers: dict[str, float], R: Array, twist: Array) -> dict[str, flo
     """What each limit of the hexapod speaks of, over all legs."""
     base, platform = circle_joints(numbers)
     p = np.array([numbers["p_x"], numbers["p_y"], numbers["p_z"]])
-    ends = p + platform @ R.T
-    span = ends - base
-    u = span / np.linalg.norm(span, axis=1)[:, None]
-    n = HOME + platform - base
-    n /= np.linalg.norm(n, axis=1)[:, None]
+    at_home = HOME + platform - base
+    u = p + platform @ R.T - base
+    u /= np.linalg.norm(u, axis=1)[:, None]
     squares = (u @ twist[3:] + np.cross(base, u) @ twist[:3]) ** 2
-    pairs = list(itertools.combinations(range(6), 2))
-    lengths = np.linalg.norm(span, axis=1)
-    return {
-        "leg_length.min": lengths.min(),
-        "leg_length.max": lengths.max(),
-        "joint_spacing.min": min(np.linalg.norm(at[i] - at[j]) for at in (base, platform) for i, j in pairs),
-        "footprint.base": np.linalg.norm(base, axis=1).max(),
-        "footprint.platform": np.linalg.norm(platform, axis=1).max(),
-        "leg_clearance.min": min(segment_distance(base[i], ends[i], base[j], ends[j]) for i, j in pairs),
-        "base_joint_angle.max": np.arccos(np.clip((n * u).sum(1), -1, 1)).max(),
-        "platform_joint_angle.max": np.arccos(np.clip(((n @ R.T) * u).sum(1), -1, 1)).max(),
-        "rate_share.max": (squares / squares.sum()).max(),
-    }
+    share = {"rate_share.max": float((squares / squares.sum()).max())}
+    return leg_measures(base, platform, R, p, at_home, at_home @ R.T) | share
 
 
 def kept(nlp: Nlp, x: Array, p: Array) -> dict[str, float]:

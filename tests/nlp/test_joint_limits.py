@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, edited, output_of, saved, starter_tables, turn_about
+from builders import Array, Run, case_from, edited, output_of, saved_with_robot, starter_tables, turn_about
 from measures import segment_distance
 
 import screwsynth.models
@@ -254,10 +254,7 @@ def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
             expected["joint.2:3.cone", "2:3"] = angle_between(rod, R @ Q @ up)
         for key, value in expected.items():
             assert rows[key] == pytest.approx(value, abs=1e-8), key
-        links |= {
-            f"{label}:1 to {label}:2": (places[0], elbow),
-            f"{label}:2 to {label}:3": (elbow, ball),
-        }
+        links |= {f"{label}:1 to {label}:2": (places[0], elbow), f"{label}:2 to {label}:3": (elbow, ball)}
     pairs = [each for each in itertools.combinations(links, 2) if each[0][0] != each[1][0]]
     assert len(pairs) == 12
     for one, other in pairs:
@@ -303,13 +300,11 @@ slide = { min = -0.05, max = 0.08 }
 """
 
 
-def put(folder: Path, limits: str, robot_text: str = RPS) -> str:
-    (folder / "robot.toml").write_text(robot_text, encoding="utf-8")
-    return str(saved(folder / "case.toml", RPS_CASE + limits))
-
-
 def test_an_active_limit_has_its_cost_and_a_case_file_of_its_own(tmp_path: Path) -> None:
-    case = replace(load_case(put(tmp_path, '"1:1" = { min = -5 }\nball = { cone = 20 }\n')), search=Search(starts=3))
+    case = replace(
+        load_case(saved_with_robot(tmp_path, RPS, RPS_CASE + '"1:1" = { min = -5 }\nball = { cone = 20 }\n')),
+        search=Search(starts=3),
+    )
     slide, hinge = JointMotion("slide", min=-0.05, max=0.08), JointMotion("1:1", min=-math.radians(5))
     assert case.limits == Limits(slide, hinge, JointCone("ball", math.radians(20)))
     again = case_from(case.to_toml(), "case")
@@ -354,21 +349,18 @@ REFUSALS = {
 
 
 def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) -> None:
+    single = edited(RPS, ("count = 3", "count = 1"))
     for written, fault in REFUSALS.items():
-        name = put(tmp_path, "", RPS.replace("count = 3", "count = 1"))
-        text = RPS_CASE.partition("[limits.joint]")[0]
-        Path(name).write_text(
-            text + (written if written.startswith("[") else f"[limits.joint]\n{written}"), encoding="utf-8"
-        )
+        limits = written if written.startswith("[") else f"[limits.joint]\n{written}"
         with pytest.raises(CaseError) as error:
-            load_case(name)
+            load_case(saved_with_robot(tmp_path, single, RPS_CASE.partition("[limits.joint]")[0] + limits))
         sentence = str(error.value)
         assert sentence.startswith("case.toml: "), written
         assert fault in sentence, (written, sentence)
         assert "\n" not in sentence
     two = RPS.replace('type = "R", at', 'type = "R", name = "slide", at')
     with pytest.raises(CaseError, match=r"robot\.toml: limb 1, joints: has two joints with the name 'slide'"):
-        load_case(put(tmp_path, "", two))
+        load_case(saved_with_robot(tmp_path, two, RPS_CASE))
     legs = case_from_tables(starter_tables(stewart_gough()), name="legs", source="legs.toml")
     for limit, key in ((JointMotion("1:1", max=1.0), "joint.1:1"), (LinkClearance(1.0), "link_clearance")):
         with pytest.raises(CaseError, match=rf"limits\.{key}: is nothing that 'stewart-gough' has; it has leg_length"):
@@ -386,7 +378,7 @@ def test_rates_of_straight_legs_are_their_work_rates() -> None:
 
 
 def test_numbers_of_joints_are_set_on_the_command_line(tmp_path: Path, cli: Run) -> None:
-    name = put(tmp_path, "")
+    name = saved_with_robot(tmp_path, RPS, RPS_CASE)
     for setting, shown in (
         ("limits.joint.slide.max=0.01", "joint.slide.max"),
         ("limits.joint.1:1.min=-7", "joint.1:1.min"),

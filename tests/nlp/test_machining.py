@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import json
 import math
 import tomllib
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import Array, Run, case_from, saved
-from measures import placed_joints, segment_distance
+from measures import leg_measures, placed_joints
 
 from screwsynth.nlp import Case, Solution, Status, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.settings import Search
@@ -53,31 +52,17 @@ def again(tables: dict[str, Any], near: Solution) -> Solution:
 def slacks(result: dict[str, Any]) -> dict[str, float]:
     """How far inside each limit of the case a design is, by NumPy alone."""
     limits = TABLES["limits"]
-    b, a, ends = placed_joints(result)
-    spans = ends - b
-    lengths = np.linalg.norm(spans, axis=1)
-    R = np.array(result["pose"]["rotation_matrix"])
+    b, a, _ = placed_joints(result)
+    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
     at_home = np.array(limits["home"]["position"]) + a - b
-    pairs = list(itertools.combinations(range(6), 2))
-
-    def lean(axes: Array) -> float:
-        cosines = np.einsum("ij,ij->i", axes, spans) / np.linalg.norm(axes, axis=1) / lengths
-        return math.degrees(np.arccos(cosines).max())
-
-    rates = np.array(result["rates"])
-    return {
-        "leg_length.min": lengths.min() - limits["leg_length"]["min"],
-        "leg_length.max": limits["leg_length"]["max"] - lengths.max(),
-        "base_joint_angle.max": limits["base_joint_angle"]["max"] - lean(at_home),
-        "platform_joint_angle.max": limits["platform_joint_angle"]["max"] - lean(at_home @ R.T),
-        "joint_spacing.min": min(np.linalg.norm(each[i] - each[j]) for each in (a, b) for i, j in pairs)
-        - limits["joint_spacing"]["min"],
-        "footprint.base": limits["footprint"]["base"] - np.linalg.norm(b, axis=1).max(),
-        "footprint.platform": limits["footprint"]["platform"] - np.linalg.norm(a, axis=1).max(),
-        "leg_clearance.min": min(segment_distance(b[i], ends[i], b[j], ends[j]) for i, j in pairs)
-        - limits["leg_clearance"]["min"],
-        "rate_share.max": limits["rate_share"]["max"] - (rates**2).max() / (rates**2).sum(),
-    }
+    squares = np.array(result["rates"]) ** 2
+    found = leg_measures(b, a, R, p, at_home, at_home @ R.T) | {"rate_share.max": squares.max() / squares.sum()}
+    inside = {}
+    for key, value in found.items():
+        name, side = key.split(".")
+        shown = math.degrees(value) if "angle" in name else value
+        inside[key] = (shown - limits[name][side]) * (1 if side == "min" else -1)
+    return inside
 
 
 def test_the_limited_design_keeps_every_limit_and_is_found_from_many_starts(limited: Solution) -> None:

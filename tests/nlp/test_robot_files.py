@@ -7,21 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, case_from, output_of, refusal_of, saved
+from builders import Run, case_from, output_of, refusal_of, saved, saved_with_robot
 
 import screwsynth.models
 from screwsynth.models import model_names, robot, robot_function
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import (
-    CaseError,
-    Search,
-    Status,
-    evaluate,
-    formulate,
-    load_case,
-    load_result,
-    solve,
-)
+from screwsynth.nlp import CaseError, Search, Status, evaluate, formulate, load_case, load_result, solve
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
@@ -66,16 +57,11 @@ pitch = inf
 """
 
 
-def put(folder: Path, robot_text: str, case_text: str) -> str:
-    (folder / "robot.toml").write_text(robot_text, encoding="utf-8")
-    return str(saved(folder / "case.toml", case_text))
-
-
 @pytest.mark.parametrize(("robot_text", "case_text", "F"), [(RPS, RPS_CASE, 1.158234), (DELTA, DELTA_CASE, 3.926943)])
 def test_a_robot_file_beside_a_case_is_solved(
     tmp_path: Path, cli: Run, robot_text: str, case_text: str, F: float
 ) -> None:
-    name = put(tmp_path, robot_text, case_text)
+    name = saved_with_robot(tmp_path, robot_text, case_text)
     result = tmp_path / "result.json"
     out = output_of(cli("solve", name, "--starts", "6", "--json", str(result)))
     assert "freedoms  3 with free actuators" in out
@@ -99,7 +85,7 @@ def test_a_new_case_of_a_robot_file_is_read_beside_it(tmp_path: Path, cli: Run) 
 
 
 def test_an_output_never_takes_the_place_of_the_robot_file(tmp_path: Path, cli: Run) -> None:
-    name = put(tmp_path, RPS, RPS_CASE)
+    name = saved_with_robot(tmp_path, RPS, RPS_CASE)
     refusal_of(
         cli("solve", name, "--starts", "1", "--json", str(tmp_path / "robot.toml")), "is a file that the case names"
     )
@@ -107,7 +93,7 @@ def test_an_output_never_takes_the_place_of_the_robot_file(tmp_path: Path, cli: 
 
 
 def test_a_solution_closes_all_loops_and_survives_pickling(tmp_path: Path) -> None:
-    case = load_case(put(tmp_path, DELTA, DELTA_CASE))
+    case = load_case(saved_with_robot(tmp_path, DELTA, DELTA_CASE))
     solution = solve(replace(case, search=Search(starts=4)))
     own = pickle.loads(pickle.dumps(solution)).outcomes[0].own  # noqa: S301 - its own pickle
     assert own.status is Status.OPTIMAL
@@ -122,7 +108,7 @@ def test_a_solution_closes_all_loops_and_survives_pickling(tmp_path: Path) -> No
 
 
 def test_actuator_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
-    case = load_case(put(tmp_path, DELTA, DELTA_CASE.replace("{ min = 0.3, max = 0.5 }", "0.4")))
+    case = load_case(saved_with_robot(tmp_path, DELTA, DELTA_CASE.replace("{ min = 0.3, max = 0.5 }", "0.4")))
     step = 1e-5
 
     def angles(z: float) -> tuple[np.ndarray, Mobility]:
@@ -143,7 +129,6 @@ def test_actuator_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        ('file = "robot.toml"', 'file = "none.toml"', 'case.toml: robot.file = "none.toml": cannot be read'),
         ('file = "robot.toml"', "file = 3", "case.toml: robot.file: must be the name of a robot file"),
         ('file = "robot.toml"', 'file = "robot.toml"\nmodel = "hexapod"', "robot.model: cannot stand beside file"),
         ('file = "robot.toml"', 'file = "robot.toml"\naxes = "free"', "case.toml: robot.axes: no such key"),
@@ -156,7 +141,7 @@ def test_actuator_rates_are_those_of_finite_differences(tmp_path: Path) -> None:
 def test_faults_of_a_case_with_a_robot_file_are_sentences(tmp_path: Path, old: str, new: str, fault: str) -> None:
     assert old in RPS_CASE
     with pytest.raises(CaseError) as error:
-        load_case(put(tmp_path, RPS, RPS_CASE.replace(old, new, 1)))
+        load_case(saved_with_robot(tmp_path, RPS, RPS_CASE.replace(old, new, 1)))
     assert fault in str(error.value)
 
 
