@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import copy
 import csv
+import importlib.util
 import math
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,8 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from screwsynth.models import Model, robot_function
 from screwsynth.nlp import Case, case_from_tables
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.starter import starter_case
 
+DOCS = Path(__file__).parents[1] / "docs"
 Array = NDArray[np.float64]
 #: The command line in this process: exit status, standard output, standard error.
 Run = Callable[..., tuple[int, str, str]]
@@ -38,10 +44,22 @@ def starter(name: str) -> Case:
     return case_from(starter_tables(name), name)
 
 
+def shipped_tables(name: str) -> dict[str, Any]:
+    """The tables of a shipped case, without what its results are expected to be."""
+    tables = tomllib.loads(find_case(name).read_text(encoding="utf-8"))
+    return {key: value for key, value in tables.items() if key not in ("expect", "published")}
+
+
 def saved(path: Path, text: str) -> Path:
     """Write a file, and return its path."""
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def saved_with_robot(folder: Path, robot: str | bytes, case: str) -> str:
+    """Write a robot file and a case that names it into a folder, and return the path of the case."""
+    (folder / "robot.toml").write_bytes(robot if isinstance(robot, bytes) else robot.encode())
+    return str(saved(folder / "case.toml", case))
 
 
 def edited(text: str, *edits: tuple[str, str]) -> str:
@@ -50,6 +68,22 @@ def edited(text: str, *edits: tuple[str, str]) -> str:
         assert old in text, f"{old!r} is not in the text"
         text = text.replace(old, new, 1)
     return text
+
+
+def docs_script(name: str) -> ModuleType:
+    """A script of the documentation as a module."""
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def printed(*arguments: str) -> str:
+    """What the command line prints in a process of its own, where it has to succeed."""
+    command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
 def rows_of(text: str) -> list[dict[str, str]]:

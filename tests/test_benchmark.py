@@ -6,8 +6,8 @@ import importlib
 import os
 import sys
 from pathlib import Path
-from types import ModuleType
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,26 +19,13 @@ HELICAL = "paper-4.1-helical"
 KNOWN: dict[str, Any] = {}
 
 
-class Modules(NamedTuple):
-    """Modules of ``bench``, which is no package of the project."""
-
-    peers: ModuleType
-    interface: ModuleType
-    attempts: ModuleType
-    judging: ModuleType
-    problems: ModuleType
-    summary: ModuleType
-    growth: ModuleType
-    page: ModuleType
-    race: ModuleType
-
-
 @pytest.fixture(scope="module")
-def bench() -> Modules:
+def bench() -> SimpleNamespace:
+    """Modules of ``bench``, which is no package of the project."""
     sys.path.append(str(BENCH))
     names = ("attempts", "judging", "problems", "summary", "growth", "page", "race")
-    own = [importlib.import_module(f"comparison.{name}") for name in names]
-    return Modules(importlib.import_module("peers"), importlib.import_module("peers.interface"), *own)
+    places = {"peers": "peers", "interface": "peers.interface"} | {name: f"comparison.{name}" for name in names}
+    return SimpleNamespace(**{name: importlib.import_module(place) for name, place in places.items()})
 
 
 def optimum(problem: Any) -> Any:
@@ -81,41 +68,25 @@ def death(problem: Any) -> Any:
     os._exit(problem.n)
 
 
-def test_only_feasible_optima_count(bench: Modules) -> None:
+def test_only_feasible_optima_count(bench: SimpleNamespace) -> None:
     subject = bench.problems.subject_of(HELICAL)
     budget = bench.interface.Budget(300, 0.2)
     case = {"F": 407.2106717529294, "is_proved": True, "sign": -1.0, "scale": subject.nlp.objective_scale}
     counts = {}
-    for search in (
-        optimum,
-        turned_too_far,
-        slightly_worse,
-        not_a_number,
-        fault,
-        endless,
-        idle,
-    ):
+    for search in (optimum, turned_too_far, slightly_worse, not_a_number, fault, endless, idle):
         peer = bench.interface.Peer(search.__name__, "screwsynth" if search is optimum else "numpy", search)
         found = bench.race._attempt_data(bench.attempts.attempt(peer, subject, 0, budget))
         pair = {"peer": peer.name, "note": "", "losses": 0, "attempts": [found]}
         best = bench.summary.best_of(case, [pair])
         assert case["F"] == best.reference.F, "an answer that is not feasible became the best known"
         counts[search.__name__] = bench.summary.score_of(pair, best.reference, is_global=False)
-    assert {name: score.correct for name, score in counts.items()} == {
-        "optimum": 1,
-        "turned_too_far": 0,
-        "slightly_worse": 0,
-        "not_a_number": 0,
-        "fault": 0,
-        "endless": 0,
-        "idle": 0,
-    }
+    assert [(name, score.correct) for name, score in counts.items() if score.correct] == [("optimum", 1)]
     assert "no answer for 6 variables" in counts["fault"].note
     assert counts["endless"].evaluations == 300
     assert counts["endless"].spent == counts["idle"].spent == 1
 
 
-def test_feasible_is_on_the_right_side_of_a_bound(bench: Modules) -> None:
+def test_feasible_is_on_the_right_side_of_a_bound(bench: SimpleNamespace) -> None:
     nlp = bench.problems.subject_of(HELICAL).nlp
     radius = np.sqrt(nlp.g_upper[0])
     for factor, is_feasible in ((1 - 1e-7, True), (1 + 1e-7, False)):
@@ -125,7 +96,7 @@ def test_feasible_is_on_the_right_side_of_a_bound(bench: Modules) -> None:
         assert verdict.is_feasible is is_feasible, verdict
 
 
-def test_a_better_answer_becomes_the_best_known(bench: Modules) -> None:
+def test_a_better_answer_becomes_the_best_known(bench: SimpleNamespace) -> None:
     case = {"F": 10.0, "is_proved": True, "sign": -1.0, "scale": 10.0}
     verdict = {"F": 10.1, "violation": 0.0, "closed": True, "in_home_mode": True}
     elsewhere = {**verdict, "F": 10.2, "in_home_mode": False}
@@ -135,7 +106,7 @@ def test_a_better_answer_becomes_the_best_known(bench: Modules) -> None:
     assert bench.summary.elsewhere(case, pairs) == (1, 10.2)
 
 
-def test_scaled_problem_is_the_program(bench: Modules) -> None:
+def test_scaled_problem_is_the_program(bench: SimpleNamespace) -> None:
     """Derivatives of the peers' problem agree with central differences of its functions."""
     for name in (HELICAL, "3-rps"):
         subject = bench.problems.subject_of(name)
@@ -154,14 +125,14 @@ def test_scaled_problem_is_the_program(bench: Modules) -> None:
         assert (problem.gradients, len(problem.h(s)), len(problem.e(s))) == (1, problem.inequalities, problem.equations)
 
 
-def test_exponents_and_factors(bench: Modules) -> None:
+def test_exponents_and_factors(bench: SimpleNamespace) -> None:
     sizes = (1, 2, 4, 8)
     assert bench.growth.slope(sizes, [3 * size**1.7 for size in sizes], is_exponential=False) == pytest.approx(1.7)
     assert bench.growth.slope(sizes, [3 * 2.5**size for size in sizes], is_exponential=True) == pytest.approx(2.5)
     assert bench.growth.slope((4,), [1.0], is_exponential=False) is None
 
 
-def test_page_has_a_place_for_every_section(bench: Modules) -> None:
+def test_page_has_a_place_for_every_section(bench: SimpleNamespace) -> None:
     """A broken run leaves a page that says which sections were not measured."""
     text = (BENCH.parent / "docs" / "benchmarks.md").read_text(encoding="utf-8")
     machine = dict.fromkeys(("date", "processor", "system", "python", "compiler", "revision"), "x")
@@ -171,7 +142,7 @@ def test_page_has_a_place_for_every_section(bench: Modules) -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-def test_every_installed_peer_finds_an_optimum(bench: Modules) -> None:
+def test_every_installed_peer_finds_an_optimum(bench: SimpleNamespace) -> None:
     """One attempt of each on the smallest case; a process that dies is a row that says so."""
     dying = bench.interface.Peer("dying", "numpy", death)
     missing = bench.interface.Peer("missing", "no_such_package", optimum)

@@ -1,35 +1,21 @@
 """The pages about Python: the API reference is what the docstrings say, and the notebook runs."""
 
-import importlib.util
 import re
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import nbformat
 import pytest
+from builders import DOCS, docs_script
 
 import screwsynth.models
 import screwsynth.nlp
 
-ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs"
-
-
-def script(name: str) -> ModuleType:
-    """A script of the documentation as a module."""
-    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
 
 def test_the_reference_is_up_to_date() -> None:
     written = (DOCS / "api.md").read_text(encoding="utf-8")
-    assert written == script("api").page(), "run `make docs`"
+    assert written == docs_script("api").page(), "run `make docs`"
 
 
 def test_the_reference_names_every_public_object() -> None:

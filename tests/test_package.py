@@ -2,7 +2,6 @@
 
 import ast
 import html
-import importlib.util
 import os
 import pkgutil
 import re
@@ -16,6 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from builders import docs_script, printed
 
 import screwsynth.cases
 import screwsynth.models
@@ -25,6 +25,11 @@ from screwsynth.nlp.case.starter import starter_case
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def text_of(page: str) -> str:
+    """A page of the documentation."""
+    return (ROOT / "docs" / page).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("package", [screwsynth.models, screwsynth.nlp])
@@ -161,7 +166,7 @@ def test_the_readme_python_runs() -> None:
     ("page", "name"), [("several-tasks.md", "paper-4.2"), ("certificate.md", "paper-4.2-rotation")]
 )
 def test_the_python_of_the_documentation_runs(page: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(encoding="utf-8"), flags=re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", text_of(page), flags=re.DOTALL)
     case = screwsynth.nlp.load_case(name)
     space = {each: getattr(screwsynth.nlp, each) for each in screwsynth.nlp.__all__} | {"case": case}
     exec(compile(code, page, "exec"), space)  # noqa: S102 - our own page
@@ -170,14 +175,12 @@ def test_the_python_of_the_documentation_runs(page: str, name: str, capsys: pyte
 
 def test_the_readme_output_is_what_the_command_prints() -> None:
     (shown,) = re.findall(r"```text\n\$ screwsynth solve paper-4.1-helical\n(.*?)```", README, flags=re.DOTALL)
-    command = [sys.executable, "-P", "-m", "screwsynth.nlp", "solve", "paper-4.1-helical"]
-    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     def lines(text: str) -> list[str]:
         kept = [line.rstrip() for line in text.strip().splitlines()]
         return [line for line in kept if not line.startswith("evidence")]  # rounding errors differ by machine
 
-    assert lines(shown) == lines(printed)
+    assert lines(shown) == lines(printed("solve", "paper-4.1-helical"))
 
 
 def test_links_in_the_documentation_lead_somewhere() -> None:
@@ -187,9 +190,8 @@ def test_links_in_the_documentation_lead_somewhere() -> None:
 
 
 def test_the_robots_of_the_documentation_are_models(capsys: pytest.CaptureFixture[str]) -> None:
-    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
     space: dict[str, object] = {}
-    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", text_of("robots.md"), flags=re.DOTALL)
     assert len(blocks) == 2
     for code in blocks:
         exec(compile(code, "robots.md", "exec"), space)  # noqa: S102 - our own page
@@ -200,7 +202,7 @@ def test_the_robots_of_the_documentation_are_models(capsys: pytest.CaptureFixtur
 
 
 def test_the_robot_files_of_the_documentation_are_read() -> None:
-    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    text = text_of("robots.md")
     files = [tomllib.loads(each) for each in re.findall(r"^```toml\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)]
     robots = [each for each in files if "limb" in each]
     assert [each["name"] for each in robots] == ["my-robot", "Delta"]
@@ -212,7 +214,7 @@ def test_the_robot_files_of_the_documentation_are_read() -> None:
 
 
 def test_the_delta_of_the_documentation_is_what_the_commands_print(tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
+    text = text_of("robots.md")
     (case,) = (each for each in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if "[[task]]" in each)
     (tmp_path / "delta.toml").write_text(case, encoding="utf-8")
     for opening, arguments in (
@@ -220,34 +222,24 @@ def test_the_delta_of_the_documentation_is_what_the_commands_print(tmp_path: Pat
         ("solve", ["solve", str(tmp_path / "delta.toml")]),
     ):
         (shown,) = re.findall(rf"<!-- begin: {opening} -->\n```text\n(.*?)```", text, flags=re.DOTALL)
-        command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
-        printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        lines = [line.rstrip() for line in printed.splitlines()]
+        lines = [line.rstrip() for line in printed(*arguments).splitlines()]
         assert shown
         assert [line for line in shown.splitlines() if line not in lines] == []
 
 
 def test_the_gallery_of_the_documentation_is_up_to_date() -> None:
-    spec = importlib.util.spec_from_file_location("docs_gallery", ROOT / "docs" / "gallery.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    text = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
-    (written,) = re.findall(r"<!-- begin: gallery -->\n(.*?)<!-- end -->", text, flags=re.DOTALL)
-    assert written == module.table(), "run `make docs`"
+    (written,) = re.findall(r"<!-- begin: gallery -->\n(.*?)<!-- end -->", text_of("robots.md"), flags=re.DOTALL)
+    assert written == docs_script("gallery").table(), "run `make docs`"
 
 
 def test_the_case_file_of_the_documentation_is_valid() -> None:
-    text = (ROOT / "docs" / "case-files.md").read_text(encoding="utf-8")
-    (written,) = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    (written,) = re.findall(r"```toml\n(.*?)```", text_of("case-files.md"), flags=re.DOTALL)
     case = screwsynth.nlp.case_from_tables(tomllib.loads(written), name="shown", source="case-files.md")
     assert case.tasks[0].name == "drive the screw"
 
 
 def test_the_limits_of_the_documentation_are_valid() -> None:
-    text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
-    limits, joints, poses = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    limits, joints, poses = re.findall(r"```toml\n(.*?)```", text_of("limits.md"), flags=re.DOTALL)
     starter = tomllib.loads(starter_case(screwsynth.models.stewart_gough()))
     several = screwsynth.nlp.case_from_tables(starter | tomllib.loads(poses), name="shown", source="limits.md")
     assert several.pose_count == 2 + 5 + 6
@@ -274,10 +266,7 @@ def test_the_limits_of_the_documentation_are_valid() -> None:
 
 
 def test_the_limits_shown_in_the_documentation_are_what_the_command_prints() -> None:
-    text = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
-    (shown,) = re.findall(
-        r"<!-- begin: screwsynth solve hexapod-machining -->\n```text\n(.*?)```", text, flags=re.DOTALL
-    )
-    command = [sys.executable, "-P", "-m", "screwsynth.nlp", "solve", "hexapod-machining", "--starts", "4"]
-    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert shown in "".join(f"{line.rstrip()}\n" for line in printed.splitlines())
+    begin = "<!-- begin: screwsynth solve hexapod-machining -->"
+    (shown,) = re.findall(rf"{begin}\n```text\n(.*?)```", text_of("limits.md"), flags=re.DOTALL)
+    lines = printed("solve", "hexapod-machining", "--starts", "4").splitlines()
+    assert shown in "".join(f"{line.rstrip()}\n" for line in lines)

@@ -1,5 +1,6 @@
 """Case files with one fault each: the reader names the file, the key and what is allowed, in one sentence."""
 
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -91,6 +92,8 @@ POSITION = "position = [{ min = -10, max = 10 }, 0, { min = 20, max = 50 }]"
 ROTATION = "rotation = { angle = { min = -30, max = 30 } }"
 MOTION = "axis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1\n"
 X4 = "x4 = { min = 2, max = 20, start = 8 }"
+PARAMETERS = PAPER[PAPER.index("[robot.parameters]") : PAPER.index("[pose]")]
+REASON = "the printed angle is rounded"
 TASK = PAPER[PAPER.index("[[task]]") : PAPER.index("[solve]")]
 
 
@@ -113,28 +116,18 @@ def hexapod(name: str, old: str, new: str, key: str, *gist: str) -> Broken:
 
 
 NOT_TOML = [
-    paper("toml-unclosed-string", 'length = "cm"', 'length = "cm', "", "not valid TOML", "line"),
     paper("toml-unclosed-list", "point = [2, 3, 6]", "point = [2, 3, 6", "", "not valid TOML", "line"),
     paper("toml-no-value", "x1 = 12", "x1 =", "", "not valid TOML", "line"),
-    paper("toml-bare-word", 'sense = "max"', "sense = max", "", "not valid TOML", "line"),
-    paper("toml-colon", "x1 = 12", "x1: 12", "", "not valid TOML", "line"),
-    paper("toml-decimal-comma", "x1 = 12", "x1 = 12,5", "", "not valid TOML", "line"),
     paper("toml-key-twice", "x1 = 12", "x1 = 12\nx1 = 13", "", "not valid TOML", "line"),
     paper("toml-table-twice", "[expect]", "[solve]\nstarts = 3\n[expect]", "", "not valid TOML", "line"),
-    paper("toml-inline-table-over-lines", X4, "x4 = { min = 2,\nmax = 20 }", "", "not valid TOML", "line"),
-    paper("toml-unclosed-header", "[pose]", "[pose", "", "not valid TOML", "line"),
-    Broken("file-is-json", b'{"title": "a case"}', "", ("not valid TOML",)),
     Broken("file-of-nul", b"\0\0\0\0", "", ("not valid TOML",)),
     Broken("file-is-binary", bytes(range(256)), "", ("cannot be read", "UTF-8")),
-    Broken("file-is-utf16", PAPER.encode("utf-16"), "", ("cannot be read", "UTF-8")),
-    Broken("file-is-latin1", PAPER.replace("Pose", "Größe").encode("latin-1"), "", ("cannot be read", "UTF-8")),
     paper("number-of-5000-digits", "x1 = 12", f"x1 = 1{'0' * 5000}", ""),
     paper("list-nested-5000-deep", "x1 = 12", f"x1 = {'[' * 5000}{']' * 5000}", ""),
 ]
 
 MISSING = [
     Broken("file-empty", b"", "robot", ("missing",)),
-    Broken("file-of-comments", b"# nothing\n\n", "robot", ("missing",)),
     Broken("no-robot", (PAPER[: PAPER.index("[robot]")] + PAPER[PAPER.index("[pose]") :]).encode(), "robot", ("miss",)),
     Broken("no-pose", (PAPER[: PAPER.index("[pose]")] + PAPER[PAPER.index("[[task]]") :]).encode(), "pose", ("miss",)),
     paper("no-task", TASK, "", "task", "missing"),
@@ -151,28 +144,9 @@ MISSING = [
     paper("no-pitch", "pitch = 1\n", "", "task[0].pitch", "missing", "inf"),
     paper("only-min", X4, "x4 = { min = 2 }", "robot.parameters.x4.max", "missing"),
     paper("only-max", X4, "x4 = { max = 2 }", "robot.parameters.x4.min", "missing"),
-    paper("only-start", X4, "x4 = { start = 2 }", "robot.parameters.x4.m", "missing"),
     paper("empty-range", X4, "x4 = {}", "robot.parameters.x4.m", "missing"),
-    hexapod(
-        "only-min-in-list", "{ min = -10, max = 10 }", "{ min = -10 }", "robot.parameters.base_1[2].max", "missing"
-    ),
-    paper("only-min-position", "{ min = -10, max = 10 }", "{ min = -10 }", "pose.position[0].max", "missing"),
-    paper(
-        "published-without-reason",
-        'because = "the printed angle is rounded"\n',
-        "",
-        "published[0].because",
-        "missing",
-        "why",
-    ),
-    paper(
-        "published-with-empty-reason",
-        'because = "the printed angle is rounded"',
-        'because = ""',
-        "published[0].because",
-        "missing",
-        "why",
-    ),
+    paper("published-without-reason", f'because = "{REASON}"', "", "published[0].because", "missing", "why"),
+    paper("published-with-empty-reason", REASON, "", "published[0].because", "missing", "why"),
     paper("published-without-value", "value = 400.3\n", "", "published[0].value", "missing"),
     paper("published-without-source", 'source = "Section 4.1"\n', "", "published[0].source", "missing"),
     paper("published-without-verdict", "reproduced = false\n", "", "published[0].reproduced", "missing"),
@@ -180,19 +154,10 @@ MISSING = [
 
 UNKNOWN = [
     paper("unknown-top-key", "title =", "titel =", "titel", "no such key", "'title'"),
-    paper("unknown-table", "[solve]", "[solver]", "solver", "no such key", "'solve'"),
     paper("unknown-task-list", "[[task]]", "[[tasks]]", "tasks", "no such key", "'task'"),
     paper("unknown-in-units", "length =", "lenght =", "units.lenght", "no such key", "'length'"),
     paper("unknown-option", "layout =", "layuot =", "robot.layuot", "no such key", "'layout'"),
-    paper("option-of-another-robot", "layout =", "arrangement =", "robot.arrangement", "no such key", "layout"),
-    hexapod(
-        "option-where-there-is-none",
-        'model = "hexapod"',
-        'model = "hexapod"\nlayout = "aligned"',
-        "robot.layout",
-        "no such key",
-        "parameters",
-    ),
+    hexapod("option-of-no-use", "model =", "layout = 3\nmodel =", "robot.layout", "no such key", "parameters"),
     paper("unknown-in-robot", "[robot.parameters]", "[robot.paramters]", "robot.paramters", "no such", "'parameters'"),
     paper("unknown-parameter", "x1 = 12", "x1 = 12\nx5 = 3", "robot.parameters.x5", "no such parameter", "x1, x2"),
     paper("parameter-in-capitals", "x1 = 12", "X1 = 12", "robot.parameters.X1", "no such parameter", "x1"),
@@ -200,7 +165,6 @@ UNKNOWN = [
     hexapod("component-as-key", "base_4 =", "base_4_x = 1\nbase_4 =", "robot.parameters.base_4_x", "no such parameter"),
     paper("unknown-in-range", X4, "x4 = { mim = 2, max = 20 }", "robot.parameters.x4.mim", "no such key", "'min'"),
     paper("unknown-in-pose", "rotation =", "rotaton =", "pose.rotaton", "no such key", "'rotation'"),
-    paper("unknown-in-position", "max = 50", "mx = 50", "pose.position[2].mx", "no such key", "'max'"),
     paper("unknown-in-rotation", ROTATION, "rotation = { angel = 3 }", "pose.rotation.angel", "no such key", "'angle'"),
     paper("unknown-in-task", "pitch = 1", "picth = 1", "task[0].picth", "no such key", "'pitch'"),
     paper("unknown-in-solve", "starts = 2", "start = 2", "solve.start", "no such key", "'starts'"),
@@ -210,11 +174,8 @@ UNKNOWN = [
     paper("model-of-no-name", '"stewart-gough"', '""', "robot.model", "no such robot", "hexapod"),
     paper("wrong-layout", '"aligned"', '"alligned"', "robot.layout", "'aligned'", "'octahedral'"),
     paper("layout-is-number", '"aligned"', "1", "robot.layout", "'aligned'", "'octahedral'"),
-    paper("layout-is-list", '"aligned"', '["aligned"]', "robot.layout", "'aligned'", "'octahedral'"),
     paper("unknown-angle-unit", '"deg"', '"degrees"', "units.angle", "'deg'", "'rad'"),
-    paper("angle-unit-in-capitals", '"deg"', '"DEG"', "units.angle", "'deg'", "'rad'"),
     paper("bad-sense", '"max"', '"maximise"', "task[0].sense", "'max'", "'min'"),
-    paper("sense-is-number", '"max"', "1", "task[0].sense", "'max'", "'min'"),
     paper("couple-length-without-couples", "layout =", "characteristic_length = 2\nlayout =", "robot.characteristic_"),
 ]
 
@@ -226,124 +187,60 @@ WRONG_TYPES = [
     Broken("robot-is-text", b'robot = "hexapod"\npose = { position = [0, 0, 3] }\ntask = []', "robot", ("table",)),
     paper("robot-is-list", "[robot]", "[[robot]]", "robot", "table"),
     paper("model-is-number", '"stewart-gough"', "3", "robot.model", "text"),
-    paper("model-is-list", '"stewart-gough"', '["stewart-gough"]', "robot.model", "text"),
-    paper(
-        "parameters-is-list",
-        PAPER[PAPER.index("[robot.parameters]") : PAPER.index("[pose]")],
-        "parameters = [12, 8, 30, 8]\n",
-        "robot.parameters",
-        "table",
-    ),
-    paper("parameter-is-text", "x1 = 12", 'x1 = "12"', "robot.parameters.x1", *ONE),
+    paper("parameters-is-list", PARAMETERS, "parameters = [12, 8, 30, 8]\n", "robot.parameters", "table"),
     paper("parameter-is-bool", "x1 = 12", "x1 = true", "robot.parameters.x1", *ONE),
     paper("parameter-is-date", "x1 = 12", "x1 = 2024-01-01", "robot.parameters.x1", *ONE),
     paper("parameter-is-list", "x1 = 12", "x1 = [12]", "robot.parameters.x1", *ONE),
-    paper("parameter-is-list-of-3", "x1 = 12", "x1 = [12, 12, 12]", "robot.parameters.x1", *ONE),
     paper("parameter-is-empty-list", "x1 = 12", "x1 = []", "robot.parameters.x1", *ONE),
-    paper("parameter-with-unit", "x1 = 12", 'x1 = "12 cm"', "robot.parameters.x1", *ONE),
     paper("parameter-of-400-digits", "x1 = 12", f"x1 = 1{'0' * 400}", "robot.parameters.x1"),
-    paper("min-is-text", "min = 2,", 'min = "2",', "robot.parameters.x4.min", "must be a number"),
-    paper("max-is-bool", "max = 20,", "max = true,", "robot.parameters.x4.max", "must be a number"),
     paper("min-is-range", "min = 2,", "min = { min = 1, max = 2 },", "robot.parameters.x4.min", "must be a number"),
-    paper("start-is-list", "start = 8", "start = [8]", "robot.parameters.x4.start", "must be a number"),
     hexapod("joint-is-number", "base_2 = [113, 41, 0]", "base_2 = 5", "robot.parameters.base_2", "list of 3", *ONE),
-    hexapod(
-        "joint-is-range",
-        "base_2 = [113, 41, 0]",
-        "base_2 = { min = 1, max = 2 }",
-        "robot.parameters.base_2",
-        "list of 3",
-        *ONE,
-    ),
     hexapod("joint-of-two", "[113, 41, 0]", "[113, 41]", "robot.parameters.base_2", "list of 3"),
     hexapod("joint-of-four", "[113, 41, 0]", "[113, 41, 0, 0]", "robot.parameters.base_2", "list of 3"),
+    hexapod("joint-is-range", "[113, 41, 0]", "{ min = 1, max = 2 }", "robot.parameters.base_2", "list of 3", *ONE),
     hexapod("joint-nested", "[113, 41, 0]", "[[113, 41, 0]]", "robot.parameters.base_2", *ONE),
-    hexapod("joint-with-text", "[113, 41, 0]", '[113, "41", 0]', "robot.parameters.base_2[1]", *ONE),
-    hexapod("joint-with-bool", "[113, 41, 0]", "[113, 41, false]", "robot.parameters.base_2[2]", *ONE),
-    Broken(
-        "pose-without-position",
-        edited(HEXAPOD, ("[pose]", "[[pose]]\n[[pose]]")).encode(),
-        "pose[0].position",
-        ("missing",),
-    ),
+    hexapod("pose-without-position", "[pose]", "[[pose]]\n[[pose]]", "pose[0].position", "missing"),
     paper("position-is-number", POSITION, "position = 3", "pose.position", "list"),
-    paper("position-is-range", POSITION, "position = { min = 0, max = 3 }", "pose.position", "list"),
     paper("position-of-two", POSITION, "position = [0, 35]", "pose.position", "3 entries", "got 2"),
     paper("position-of-four", POSITION, "position = [0, 0, 35, 0]", "pose.position", "3 entries", "got 4"),
-    paper("position-nested", POSITION, "position = [[0, 0, 35]]", "pose.position"),
     paper("position-nested-inside", POSITION, "position = [[0], 0, 35]", "pose.position[0]", *ONE),
-    paper("position-with-text", POSITION, 'position = [0, 0, "35"]', "pose.position[2]", *ONE),
-    paper("position-with-bool", POSITION, "position = [0, true, 35]", "pose.position[1]", *ONE),
     paper("rotation-is-number", ROTATION, "rotation = 10", "pose.rotation", "table"),
-    paper("angle-is-text", ROTATION, 'rotation = { angle = "10" }', "pose.rotation.angle", *ONE),
     paper("angle-is-list", ROTATION, "rotation = { angle = [-30, 30] }", "pose.rotation.angle", *ONE),
     paper("axis-is-letter", ROTATION, 'rotation = { axis = "z", angle = 10 }', "pose.rotation.axis", "list"),
     paper("axis-of-two", ROTATION, "rotation = { axis = [0, 1], angle = 10 }", "pose.rotation.axis", "3 entries"),
-    paper("axis-with-text", ROTATION, 'rotation = { axis = [0, 0, "1"], angle = 3 }', "pose.rotation.axis[2]", "numb"),
-    paper(
-        "axis-with-range",
-        ROTATION,
-        "rotation = { axis = [0, 0, { min = 0, max = 1 }], angle = 3 }",
-        "pose.rotation.axis[2]",
-        "must be a number",
-    ),
     paper("task-is-table", "[[task]]", "[task]", "task", "list"),
     paper("task-name-is-number", '"drive the screw"', "3", "task[0].name", "text"),
     paper("task-name-empty", '"drive the screw"', '""', "task[0].name", "not be empty"),
     paper("task-axis-is-number", "axis = [2, 2, 1]", "axis = 3", "task[0].axis", "list"),
-    paper("task-axis-of-two", "axis = [2, 2, 1]", "axis = [2, 2]", "task[0].axis", "3 entries"),
-    paper("task-axis-nested", "axis = [2, 2, 1]", "axis = [[2, 2, 1]]", "task[0].axis"),
     paper("point-of-four", "point = [2, 3, 6]", "point = [2, 3, 6, 1]", "task[0].point", "3 entries"),
     paper("point-is-text", "point = [2, 3, 6]", 'point = "origin"', "task[0].point", "list"),
-    paper("point-with-bool", "point = [2, 3, 6]", "point = [2, 3, true]", "task[0].point[2]", "must be a number"),
     paper("pitch-is-text", "pitch = 1", 'pitch = "inf"', "task[0].pitch", "must be a number"),
-    paper("pitch-is-bool", "pitch = 1", "pitch = true", "task[0].pitch", "must be a number"),
-    paper("pitch-is-range", "pitch = 1", "pitch = { min = 0, max = 1 }", "task[0].pitch", "must be a number"),
-    paper("weight-is-text", "weight = 1", 'weight = "1"', "task[0].weight", "must be a number"),
-    hexapod("twist-of-five", "[0, 0.5, 0, 1, 0, 0]", "[0, 0.5, 0, 1, 0]", "task[0].twist", "6 entries", "got 5"),
     hexapod("twist-of-seven", "[0, 0.5, 0, 1, 0, 0]", "[0, 0.5, 0, 1, 0, 0, 0]", "task[0].twist", "6 entries", "got 7"),
-    hexapod("twist-nested", "[0, 0.5, 0, 1, 0, 0]", "[[0, 0.5, 0], [1, 0, 0]]", "task[0].twist"),
-    hexapod(
-        "twist-with-text", "[0, 0.5, 0, 1, 0, 0]", '["0", 0.5, 0, 1, 0, 0]', "task[0].twist[0]", "must be a number"
-    ),
+    hexapod("twist-of-five", "[0, 0.5, 0, 1, 0, 0]", "[0, 0.5, 0, 1, 0]", "task[0].twist", "6 entries", "got 5"),
     paper("solve-is-number", PAPER[PAPER.index("[solve]") : PAPER.index("[expect]")], "[[solve]]\n", "solve", "table"),
     paper("starts-is-float", "starts = 2", "starts = 2.0", "solve.starts", "whole number"),
-    paper("starts-is-text", "starts = 2", 'starts = "2"', "solve.starts", "whole number"),
-    paper("starts-is-bool", "starts = 2", "starts = true", "solve.starts", "whole number"),
     paper("seed-is-float", "seed = 0", "seed = 0.5", "solve.seed", "whole number"),
     paper("iterations-is-text", "max_iterations = 300", 'max_iterations = "many"', "solve.max_iterations", "whole"),
-    paper("expected-F-is-text", "F = 407.2107", 'F = "407"', "expect.F", "must be a number"),
     paper("singular-is-number", "singular = false", "singular = 0", "expect.singular", "true or false"),
     paper("published-is-table", "[[published]]", "[published]", "published", "list"),
     paper("quantity-empty", 'quantity = "F"', 'quantity = ""', "published[0].quantity", "not be empty"),
     paper("verdict-is-text", "reproduced = false", 'reproduced = "no"', "published[0].reproduced", "true or false"),
-    paper("published-value-is-text", "value = 400.3", 'value = "400.3"', "published[0].value", "number"),
-    paper("published-value-has-text", "value = 400.3", 'value = [1, "2"]', "published[0].value", "number"),
 ]
 
 OUT_OF_RANGE = [
     paper("min-above-max", "min = 2, max = 20", "min = 20, max = 2", "robot.parameters.x4.min", "below max = 2 deg"),
     paper("min-equals-max", "min = 2, max = 20", "min = 2, max = 2", "robot.parameters.x4.min", "below max = 2 deg"),
     paper("crossed-position", "min = 20, max = 50", "min = 50, max = 20", "pose.position[2].min", "below max = 20 cm"),
-    paper("equal-position", "min = 20, max = 50", "min = 50, max = 50", "pose.position[2].min", "below max = 50 cm"),
     paper("crossed-angle", "min = -30, max = 30", "min = 30, max = -30", "pose.rotation.angle.min", "below max = -30"),
-    hexapod(
-        "crossed-joint", "min = -10, max = 10", "min = 10, max = -10", "robot.parameters.base_1[2].min", "max = -10 mm"
-    ),
+    hexapod("crossed-joint", "min = -10", "min = 10", "robot.parameters.base_1[2].min", "below max = 10 mm"),
     paper("start-below-min", "start = 8", "start = 1", "robot.parameters.x4.start", "between 2 deg and 20 deg"),
     paper("start-above-max", "start = 8", "start = 21", "robot.parameters.x4.start", "between 2 deg and 20 deg"),
-    paper("position-start-outside", "max = 50", "max = 50, start = 51", "pose.position[2].start", "20 cm and 50 cm"),
-    paper("angle-start-outside", "max = 30 } }", "max = 30, start = 31 } }", "pose.rotation.angle.start", "30 deg"),
-    hexapod(
-        "joint-start-outside", "max = 10", "max = 10, start = -11", "robot.parameters.base_1[2].start", "-10 mm and 10"
-    ),
     paper("x3-above-domain", "x3 = 30", "x3 = 40", "robot.parameters.x3", "= 40", "between 0 deg and 30 deg"),
     paper("x3-below-domain", "x3 = 30", "x3 = -1", "robot.parameters.x3", "between 0 deg and 30 deg"),
-    paper("x1-negative", "x1 = 12", "x1 = -1", "robot.parameters.x1", "at least 0 cm"),
     paper("x4-range-past-domain", "max = 20,", "max = 31,", "robot.parameters.x4.max", "between 0 deg and 30 deg"),
     paper("x1-range-past-domain", "x1 = 12", "x1 = { min = -1, max = 2 }", "robot.parameters.x1.min", "at least 0 cm"),
     paper("zero-task-axis", "axis = [2, 2, 1]", "axis = [0, 0.0, -0.0]", "task[0].axis", "must not be zero"),
-    paper("zero-task-axis-translation", MOTION, "axis = [0, 0, 0]\npitch = inf\n", "task[0].axis", "must not be zero"),
+    paper("zero-axis-translation", MOTION, "axis = [0, 0, 0]\npitch = inf\n", "task[0].axis", "must not be zero"),
     paper("zero-rotation-axis", ROTATION, "rotation = { axis = [0, 0, 0], angle = 3 }", "pose.rotation.axis", "zero"),
     hexapod("zero-twist", "[0, 0.5, 0, 1, 0, 0]", "[0, 0, 0, 0, 0, -0.0]", "task[0].twist", "must not be zero"),
     hexapod("twist-and-axis", "twist =", "axis = [0, 0, 1]\ntwist =", "task[0].axis", "beside twist", "one way"),
@@ -356,17 +253,14 @@ OUT_OF_RANGE = [
     paper("held-axis-over-a-turn", ROTATION, "rotation = { axis = [0, 0, 1], angle = 361 }", "pose.rotation.a", "360"),
     paper("rad-read-as-deg", '"deg"', '"rad"', "robot.parameters.x3", "between 0 rad and 0.523"),
     paper("length-label-empty", '"cm"', '""', "units.length", "not be empty"),
-    paper("length-label-blank", '"cm"', '"  "', "units.length", "not be empty"),
     paper("length-label-long", '"cm"', f'"{"cm" * 20}"', "units.length", "20 characters"),
     paper("weight-zero", "weight = 1", "weight = 0", "task[0].weight", "greater than 0"),
-    paper("weight-negative", "weight = 1", "weight = -1", "task[0].weight", "greater than 0"),
     paper("starts-zero", "starts = 2", "starts = 0", "solve.starts", "greater than or equal to 1"),
-    paper("starts-negative", "starts = 2", "starts = -3", "solve.starts", "greater than or equal to 1"),
     paper("starts-too-many", "starts = 2", "starts = 100_001", "solve.starts", "less than or equal to 100000"),
     paper("seed-negative", "seed = 0", "seed = -1", "solve.seed", "greater than or equal to 0"),
     paper("iterations-zero", "max_iterations = 300", "max_iterations = 0", "solve.max_iterations", "or equal to 1"),
     paper("expected-F-negative", "F = 407.2107", "F = -1", "expect.F", "greater than or equal to 0"),
-    paper("tolerance-zero", "tolerance = 1e-6", "tolerance = 0", "expect.tolerance", "greater than 0"),
+    paper("expected-tolerance-zero", "tolerance = 1e-6", "tolerance = 0", "expect.tolerance", "greater than 0"),
 ]
 
 COMBINED = [
@@ -375,7 +269,6 @@ COMBINED = [
     paper("two-tasks-of-one-name", TASK, TASK + TASK, "task[1].name", "used by an earlier task"),
     paper("combine-misspelt", "[expect]", '[combine]\nmethod = "mean"\n[expect]', "combine.method", "average"),
     paper("angle-range-lopsided", ROTATION, "rotation = { angle = { min = -30, max = 5 } }", "pose.rotation.angle.min"),
-    paper("fault-in-second-task", TASK, TASK + '[[task]]\nsense = "most"\n', "task[1].sense", "'max'", "'min'"),
 ]
 
 
@@ -384,36 +277,30 @@ def limit(name: str, toml: str, key: str, *gist: str) -> Broken:
     return paper(name, "[expect]", f"[limits]\n{toml}\n[expect]", f"limits.{key}" if key else "limits", *gist)
 
 
+def along(name: str, toml: str, key: str, *gist: str, grid: str = "") -> Broken:
+    """The paper's case with poses along its task that are not allowed."""
+    return paper(name, ROTATION, f"{ROTATION}\nalong_task = {{ {toml} }}{grid}", key, *gist)
+
+
+CROSSED = "{ min = 3, max = 1, count = 3 }"
+HUGE = "{ " + ", ".join(f"{axis} = {{ min = 0, max = 1, count = 9 }}" for axis in "xyz") + " }"
+TWO_AXES = "{ max = 9, about = [[0, 0, 1], [0, 1, 1]] }"
 LIMITS = [
-    limit(
-        "limit-unknown", "leg_lenght = { min = 3 }", "leg_lenght", "stewart-gough", "leg_length", "platform_joint_angle"
-    ),
+    limit("limit-unknown", "leg_lenght = { min = 3 }", "leg_lenght", "stewart-gough", "leg_length", "base_joint_angle"),
     limit("limit-is-number", "leg_length = 30", "leg_length", "table"),
     limit("limit-empty", "leg_length = {}", "leg_length", "must have min, max, or both"),
     limit("limit-crossed", "leg_length = { min = 40, max = 30 }", "leg_length.min", "below max = 30 cm"),
     limit("limit-negative", "leg_length = { min = -3 }", "leg_length.min", "above 0 cm"),
-    limit("limit-infinite", "leg_length = { max = inf }", "leg_length.max", "finite"),
-    limit("limit-text", 'leg_length = { max = "far" }', "leg_length.max", "number"),
     limit("limit-misspelt-side", "leg_length = { mx = 3 }", "leg_length.mx", "allowed: min, max"),
     limit("angle-zero", "base_joint_angle = 0", "base_joint_angle.max", "above 0 deg and at most 180 deg"),
     limit("angle-too-large", "base_joint_angle = 200", "base_joint_angle.max", "at most 180 deg"),
     limit("angle-text", 'base_joint_angle = "wide"', "base_joint_angle", "number"),
     limit("angle-without-max", 'base_joint_angle = { about = "normal" }', "base_joint_angle.max", "missing"),
-    limit("axis-word", 'base_joint_angle = { max = 9, about = "up" }', "base_joint_angle.about", "'home'", "list of 3"),
     limit("axis-short", "base_joint_angle = { max = 9, about = [0, 1] }", "base_joint_angle.about", "3 entries"),
+    limit("axis-word", 'base_joint_angle = { max = 9, about = "up" }', "base_joint_angle.about", "'home'", "list of 3"),
     limit("axis-zero", "base_joint_angle = { max = 9, about = [0, 0, 0] }", "base_joint_angle.about", "not all zero"),
-    limit(
-        "axis-nested",
-        "base_joint_angle = { max = 9, about = [[0, 0], [1, 1]] }",
-        "base_joint_angle.about[0]",
-        "3 entries",
-    ),
-    limit(
-        "axes-too-few",
-        "base_joint_angle = { max = 9, about = [[0, 0, 1], [0, 1, 1]] }",
-        "base_joint_angle.about",
-        "one for each of the 6 legs, got 2",
-    ),
+    limit("axis-nested", "base_joint_angle = { max = 9, about = [[0, 0]] }", "base_joint_angle.about[0]", "3 entries"),
+    limit("axes-too-few", f"base_joint_angle = {TWO_AXES}", "base_joint_angle.about", "one for each of the 6 legs"),
     limit("home-missing", 'base_joint_angle = { max = 9, about = "home" }', "home", "missing"),
     limit("home-alone", "home = { position = [0, 0, 30] }", "home", "means nothing"),
     limit("home-short", "home = { position = [0, 30] }", "home.position", "3 entries"),
@@ -429,56 +316,16 @@ LIMITS = [
     limit("custom-wrong-sign", 'custom = ["x1 > 0"]', "custom[0]", "'>' at position 4"),
     limit("custom-free-angle", 'custom = ["angle <= 20"]', "custom[0]", "'angle' at position 1"),
     paper(
-        "tolerance-zero-joint",
-        "[expect]",
-        "[tolerance]\njoint_centre = 0\n[expect]",
-        "tolerance.joint_centre",
-        "positive",
+        "tolerance-zero", "[expect]", "[tolerance]\njoint_centre = 0\n[expect]", "tolerance.joint_centre", "positive"
     ),
     paper("over-poses-of-one", "[expect]", '[combine]\nover_poses = "sum"\n[expect]', "combine.over_poses", "one pose"),
-    paper(
-        "along-and-grid",
-        ROTATION,
-        f"{ROTATION}\nalong_task = {{ first = 0, last = 1, count = 2 }}\ngrid = {{}}",
-        "pose.grid",
-        "beside",
-    ),
-    paper(
-        "along-one",
-        ROTATION,
-        f"{ROTATION}\nalong_task = {{ first = 0, last = 1, count = 1 }}",
-        "pose.along_task.count",
-        "2",
-    ),
-    paper(
-        "along-nowhere",
-        ROTATION,
-        f"{ROTATION}\nalong_task = {{ first = 1, last = 1, count = 3 }}",
-        "pose.along_task.last",
-        "differ",
-    ),
-    paper(
-        "along-no-task",
-        ROTATION,
-        f'{ROTATION}\nalong_task = {{ task = "mill", first = 0, last = 1, count = 3 }}',
-        "pose.along_task.task",
-        "no task",
-    ),
+    along("along-and-grid", "first = 0, last = 1, count = 2", "pose.grid", "beside", grid="\ngrid = {}"),
+    along("along-one", "first = 0, last = 1, count = 1", "pose.along_task.count", "2"),
+    along("along-nowhere", "first = 1, last = 1, count = 3", "pose.along_task.last", "differ"),
+    along("along-no-task", 'task = "mill", first = 0, last = 1, count = 3', "pose.along_task.task", "no task"),
     paper("grid-empty", ROTATION, f"{ROTATION}\ngrid = {{}}", "pose.grid", "offsets"),
-    paper(
-        "grid-crossed",
-        ROTATION,
-        f"{ROTATION}\ngrid = {{ x = {{ min = 3, max = 1, count = 3 }} }}",
-        "pose.grid.x.min",
-        "below max",
-    ),
-    paper(
-        "grid-huge",
-        ROTATION,
-        f"{ROTATION}\ngrid = {{ " + ", ".join(f"{axis} = {{ min = 0, max = 1, count = 9 }}" for axis in "xyz") + " }",
-        "pose.grid",
-        "729 poses",
-    ),
+    paper("grid-crossed", ROTATION, f"{ROTATION}\ngrid.x = {CROSSED}", "pose.grid.x.min", "below max"),
+    paper("grid-huge", ROTATION, f"{ROTATION}\ngrid = {HUGE}", "pose.grid", "729 poses"),
 ]
 
 LINES = [
@@ -496,25 +343,14 @@ COINCIDING = edited(
 )
 LIMBS = [
     Broken("legs-of-no-length", COINCIDING.encode(), "robot.parameters", ("'1-'", "zero length", "coincide")),
-    Broken(
-        "legs-of-no-length-turned",
-        edited(COINCIDING, ("[0, 0, 0]", "[0, 0, 0]\nrotation = { axis = [0, 0, 3], angle = 120 }"))
-        .replace("x1 = 8", "x1 = 0")
-        .replace("x2 = 8", "x2 = 0")
-        .encode(),
-        "robot.parameters",
-        ("'1-'", "zero length"),
-    ),
-    Broken(
-        "leg-of-no-length",
-        edited(HEXAPOD, ("platform_4 = [-77, 21, 0]", "platform_4 = [-92, 77, -350]")).encode(),
-        "robot.parameters",
-        ("'4'", "zero length", "coincide"),
+    hexapod(
+        "leg-of-no-length", "[-77, 21, 0]", "[-92, 77, -350]", "robot.parameters", "'4'", "zero length", "coincide"
     ),
 ]
 
 
-def not_finite() -> list[Broken]:
+def no_numbers() -> list[Broken]:
+    """Texts, infinities and NaN in the place of each kind of number."""
     places = {
         "parameter": (PAPER, "x1 = 12", "x1 = {}", "robot.parameters.x1"),
         "min": (PAPER, "min = 2,", "min = {},", "robot.parameters.x4.min"),
@@ -534,14 +370,15 @@ def not_finite() -> list[Broken]:
         "weight": (PAPER, "weight = 1", "weight = {}", "task[0].weight"),
         "expected-F": (PAPER, "F = 407.2107", "F = {}", "expect.F"),
         "expected-tolerance": (PAPER, "tolerance = 1e-6", "tolerance = {}", "expect.tolerance"),
+        "limit": (PAPER, "[expect]", "[limits]\nleg_length = {{ max = {} }}\n[expect]", "limits.leg_length.max"),
         "published": (PAPER, "value = 400.3", "value = {}", "published[0].value"),
         "published-list": (PAPER, "value = 400.3", "value = [1, {}]", "published[0].value"),
     }
     found = []
     for place, (base, old, new, key) in places.items():
-        for value in ("nan", "inf", "-inf"):
+        for value, gist in (("nan", "finite"), ("inf", "finite"), ("-inf", "finite"), ('"1"', "must be a number")):
             text = edited(base, (old, new.format(value)))
-            found.append(Broken(f"{value}-{place}", text.encode(), key, ("finite",)))
+            found.append(Broken(f"{value}-{place}", text.encode(), key, (gist,)))
     found += [
         paper("nan-pitch", "pitch = 1", "pitch = nan", "task[0].pitch", "a number or inf"),
         paper("-inf-pitch", "pitch = 1", "pitch = -inf", "task[0].pitch", "a number or inf"),
@@ -551,7 +388,7 @@ def not_finite() -> list[Broken]:
     return found
 
 
-BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *COMBINED, *LIMITS, *LINES, *LIMBS, *not_finite()]
+BROKEN = [*NOT_TOML, *MISSING, *UNKNOWN, *WRONG_TYPES, *OUT_OF_RANGE, *COMBINED, *LIMITS, *LINES, *LIMBS, *no_numbers()]
 
 
 @pytest.fixture
@@ -569,24 +406,9 @@ def check_sentence(broken: Broken, text: str) -> None:
     assert broken.key in text
     for words in broken.gist:
         assert words in text
-    for foreign in (
-        "Traceback",
-        "pydantic",
-        "Input should",
-        "<number>",
-        "<range>",
-        "<list>",
-        ".float",
-        "list[",
-        "type=",
-        "np.float64",
-    ):
-        assert foreign not in text
-
-
-def test_the_ids_differ() -> None:
-    names = [broken.name for broken in BROKEN]
-    assert len(set(names)) == len(names) >= 60
+    assert not re.search(
+        r"Traceback|pydantic|Input should|<number>|<range>|<list>|\.float|list\[|type=|np\.float64", text
+    )
 
 
 @pytest.mark.parametrize("text", [PAPER, HEXAPOD], ids=["paper", "hexapod"])
@@ -632,16 +454,11 @@ def test_a_setting_beside_a_fault_is_still_one_sentence(broken: Broken, written:
         assert len(err.splitlines()) == (1 if code else 0), f"{broken.name} with {setting}"
 
 
-def test_json_to_standard_output_stays_empty_for_a_broken_case(tmp_path: Path, cli: Run) -> None:
+def test_a_broken_case_leaves_standard_output_empty_and_an_older_result_as_it_is(tmp_path: Path, cli: Run) -> None:
     path = saved(tmp_path / NAME, edited(PAPER, ("x1 = 12", "x1 = -1")))
-    refusal_of(cli("solve", str(path), "--json", "-"))
-
-
-def test_an_older_result_survives_a_broken_case(tmp_path: Path, cli: Run) -> None:
-    path, result = tmp_path / NAME, tmp_path / "result.json"
-    path.write_text(edited(PAPER, ("x1 = 12", "x1 = -1")), encoding="utf-8")
-    result.write_text("older", encoding="utf-8")
-    assert cli("solve", str(path), "--json", str(result))[0] == 2
+    result = saved(tmp_path / "result.json", "older")
+    for target in ("-", str(result)):
+        refusal_of(cli("solve", str(path), "--json", target))
     assert result.read_text(encoding="utf-8") == "older"
 
 

@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from builders import Array, case_from
+from builders import Array, case_from, turn_about
+from measures import circle_joints, exponential, scaled
 
 from screwsynth.nlp import Case, RobotState, Solution, evaluate, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
@@ -39,29 +40,6 @@ class Posed(NamedTuple):
     legs: Legs
     twist: Array
     F: float
-
-
-def rotation(axis: Array, angle: float) -> Array:
-    s = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    c = cross(s)
-    turned: Array = np.eye(3) + math.sin(angle) * c + (1 - math.cos(angle)) * c @ c
-    return turned
-
-
-def cross(u: Array) -> Array:
-    return np.array([[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]])
-
-
-def legs_of(x: dict[str, float], layout: str, R: Array, p: Array) -> Legs:
-    """Joints of the platform with joints on two circles, angles in radians."""
-    base, platform = [], []
-    for k, sign in itertools.product(range(3), (-1, 1)):
-        centre = math.radians(120 * k)
-        u = centre + sign * x["x3"]
-        v = centre + sign * (x["x4"] if layout == "aligned" else math.radians(60) - x["x4"])
-        base.append([x["x1"] * math.cos(u), x["x1"] * math.sin(u), 0.0])
-        platform.append([x["x2"] * math.cos(v), x["x2"] * math.sin(v), 0.0])
-    return Legs(np.array(base), p + np.array(platform) @ R.T)
 
 
 @cache
@@ -88,19 +66,14 @@ def answers(name: str) -> list[Posed]:
     return found
 
 
-def moved(points: Array, twist: Array, t: float) -> Array:
-    """Points (m, 3) after a motion with a constant twist for a time t, by the power series of its matrix."""
-    M = np.zeros((4, 4))
-    M[:3, :3], M[:3, 3] = cross(twist[:3]), twist[3:]
-    total, term = np.eye(4), np.eye(4)
-    for k in range(1, 30):
-        term = term @ M * t / k
-        total = total + term
-    return points @ total[:3, :3].T + total[:3, 3]
+def legs_of(x: dict[str, float], layout: str, R: Array, p: Array) -> Legs:
+    base, platform = circle_joints(x, layout)
+    return Legs(base, p + platform @ R.T)
 
 
 def lengths(legs: Legs, twist: Array, t: float) -> Array:
-    after: Array = np.linalg.norm(moved(legs.platform, twist, t) - legs.base, axis=1)
+    E = exponential(twist, t)
+    after: Array = np.linalg.norm(legs.platform @ E[:3, :3].T + E[:3, 3] - legs.base, axis=1)
     return after
 
 
@@ -206,19 +179,12 @@ def test_masses_that_move_with_the_legs_are_felt_times_f(name: str) -> None:
 @ALL
 def test_f_of_three_directions_sums_to_the_number_of_legs(name: str) -> None:
     for legs, _, _ in answers(name):
-        turned = rotation(np.array([1.0, 2.0, 3.0]), 0.7)
+        turned = turn_about([1, 2, 3], 0.7)
         assert sum(np.sum(rates(legs, translation(*axis)) ** 2) for axis in turned) == pytest.approx(6, rel=1e-6)
 
 
 def tables_of(name: str) -> dict[str, Any]:
     return tomllib.loads(find_case(name).read_text(encoding="utf-8"))
-
-
-def scaled(value: Any, factor: float) -> Any:  # noqa: ANN401 - what TOML holds
-    """Lengths of a table times a factor: a number, or a list or table of numbers."""
-    if isinstance(value, dict):
-        return {key: scaled(each, factor) for key, each in value.items()}
-    return [scaled(each, factor) for each in value] if isinstance(value, list) else value * factor
 
 
 def test_units_leave_f_of_a_translation_and_square_that_of_a_rotation() -> None:
@@ -285,7 +251,7 @@ def started(name: str, **values: float) -> Legs:
     pose = pose[0] if isinstance(pose, list) else pose
     p = np.array([start_of(each) for each in pose["position"]])
     turned = pose.get("rotation")
-    R = rotation(np.array(turned["axis"]), math.radians(turned["angle"])) if turned else np.eye(3)
+    R = turn_about(turned["axis"], math.radians(turned["angle"])) if turned else np.eye(3)
     return legs_of(x | values, str(case.model.options["layout"]), R, p)
 
 

@@ -111,9 +111,7 @@ def test_help_lists_each_command_by_the_first_line_of_its_own_help(name: str) ->
     assert command.help.partition("\n\n")[0].split() == SUMMARIES[name].split()
 
 
-def test_a_solve_as_a_process_prints_only_its_table(
-    solved: tuple[subprocess.CompletedProcess[str], Path],
-) -> None:
+def test_a_solve_as_a_process_prints_only_its_table(solved: tuple[subprocess.CompletedProcess[str], Path]) -> None:
     ended, _ = solved
     assert ended.returncode == 0
     assert ended.stderr == ""
@@ -454,11 +452,7 @@ EXTREMES = {
     "radius-zero": (("x1 = 12", "x1 = 0"),),
     "range-large": (("{ min = 20, max = 50 }", "{ min = -1e308, max = 1e308 }"),),
     "range-small": (("{ min = 20, max = 50 }", "{ min = 20, max = 20.000000000000004 }"),),
-    "point-fixed-large": (
-        ("[2, 3, 6]", "[1e200, 3, 6]"),
-        (POSITION, "position = [0, 0, 35]"),
-        (ROTATION, ""),
-    ),
+    "point-fixed-large": (("[2, 3, 6]", "[1e200, 3, 6]"), (POSITION, "position = [0, 0, 35]"), (ROTATION, "")),
     "radius-fixed-large": (("x1 = 12", "x1 = 1e200"), (POSITION, "position = [0, 0, 35]"), (ROTATION, "")),
 }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import math
 import tomllib
 from dataclasses import replace
@@ -15,16 +14,9 @@ import pytest
 from builders import Array, case_from, turn_about
 from casadi import SX
 from generated import COMPILERS, written
+from measures import circle_joints, leg_measures
 
-from screwsynth.nlp import (
-    Case,
-    Nlp,
-    formulate,
-    load_case,
-    load_compiled,
-    sensitivities,
-    solve,
-)
+from screwsynth.nlp import Case, Nlp, formulate, load_case, load_compiled, sensitivities, solve
 from screwsynth.nlp.case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.program.places import FreeRotation
@@ -34,55 +26,16 @@ from screwsynth.nlp.program.sampling import starting_points
 HOME = np.array([0, 0, 20.0])
 
 
-def plates(x1: float, x2: float, x3: float, x4: float) -> tuple[Array, Array]:
-    """Joint centres (6, 3) of an octahedral platform, each in the frame of its plate."""
-    base, platform = [], []
-    for centre in np.radians([0, 120, 240]):
-        for side in (-1, 1):
-            a, b = centre + side * x3, centre + side * (np.radians(60) - x4)
-            base.append([x1 * np.cos(a), x1 * np.sin(a), 0])
-            platform.append([x2 * np.cos(b), x2 * np.sin(b), 0])
-    return np.array(base), np.array(platform)
-
-
-def apart(p: Array, d: Array, q: Array, e: Array) -> float:
-    """Distance of the segments p + s d and q + t e: the least of that of the lines, and of each end to the other."""
-
-    def from_end(end: Array, start: Array, span: Array) -> float:
-        along = np.clip((end - start) @ span / (span @ span), 0, 1)
-        return float(np.linalg.norm(end - start - along * span))
-
-    least = min(from_end(p, q, e), from_end(p + d, q, e), from_end(q, p, d), from_end(q + e, p, d))
-    normal = np.cross(d, e)
-    if np.linalg.norm(normal) > 1e-6 * np.linalg.norm(d) * np.linalg.norm(e):
-        s, t, h = np.linalg.solve(np.column_stack([d, -e, normal]), q - p)
-        if 0 <= s <= 1 and 0 <= t <= 1:
-            least = min(least, abs(h) * float(np.linalg.norm(normal)))
-    return least
-
-
 def measured(numbers: dict[str, float], R: Array, twist: Array) -> dict[str, float]:
     """What each limit of the hexapod speaks of, over all legs."""
-    base, platform = plates(*(numbers[f"x{k}"] for k in range(1, 5)))
+    base, platform = circle_joints(numbers)
     p = np.array([numbers["p_x"], numbers["p_y"], numbers["p_z"]])
-    span = p + platform @ R.T - base
-    u = span / np.linalg.norm(span, axis=1)[:, None]
-    n = HOME + platform - base
-    n /= np.linalg.norm(n, axis=1)[:, None]
+    at_home = HOME + platform - base
+    u = p + platform @ R.T - base
+    u /= np.linalg.norm(u, axis=1)[:, None]
     squares = (u @ twist[3:] + np.cross(base, u) @ twist[:3]) ** 2
-    pairs = list(itertools.combinations(range(6), 2))
-    lengths = np.linalg.norm(span, axis=1)
-    return {
-        "leg_length.min": lengths.min(),
-        "leg_length.max": lengths.max(),
-        "joint_spacing.min": min(np.linalg.norm(at[i] - at[j]) for at in (base, platform) for i, j in pairs),
-        "footprint.base": np.linalg.norm(base, axis=1).max(),
-        "footprint.platform": np.linalg.norm(platform, axis=1).max(),
-        "leg_clearance.min": min(apart(base[i], span[i], base[j], span[j]) for i, j in pairs),
-        "base_joint_angle.max": np.arccos(np.clip((n * u).sum(1), -1, 1)).max(),
-        "platform_joint_angle.max": np.arccos(np.clip(((n @ R.T) * u).sum(1), -1, 1)).max(),
-        "rate_share.max": (squares / squares.sum()).max(),
-    }
+    share = {"rate_share.max": float((squares / squares.sum()).max())}
+    return leg_measures(base, platform, R, p, at_home, at_home @ R.T) | share
 
 
 def kept(nlp: Nlp, x: Array, p: Array) -> dict[str, float]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, output_of, refusal_of, saved
+from builders import Run, output_of, refusal_of, saved, turn_about
 
 import screwsynth.cases
 from screwsynth.models import model_names
@@ -40,17 +40,6 @@ def rotated(folder: Path, rotation: str) -> str:
 def data(cli: Run, *arguments: str) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(output_of(cli(*arguments, "--json", "-")))
     return found
-
-
-def turn(axis: str, degrees: float) -> np.ndarray:
-    """A rotation about a coordinate axis, written out."""
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    matrices = {
-        "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
-        "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-        "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
-    }
-    return np.array(matrices[axis])
 
 
 # --set
@@ -242,8 +231,7 @@ def test_a_csv_file_that_is_not_there_or_not_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("angles", [(10, 20, 30), (0, 0, 0), (90, 90, 0), (-170, 80, 179), (180, 0, 0), (400, -95, 3)])
 def test_forms_of_a_rotation_are_one_rotation(angles: tuple[float, float, float], tmp_path: Path, cli: Run) -> None:
-    roll, pitch, yaw = angles
-    expected = turn("z", yaw) @ turn("y", pitch) @ turn("x", roll)
+    expected = np.linalg.multi_dot([turn_about(np.eye(3)[k], math.radians(angles[k])) for k in (2, 1, 0)])
 
     def matrix(rotation: str) -> np.ndarray:
         return np.array(data(cli, "evaluate", rotated(tmp_path, rotation))["pose"]["rotation_matrix"])
@@ -261,7 +249,7 @@ def test_forms_of_a_rotation_are_one_rotation(angles: tuple[float, float, float]
 
 
 def test_forms_of_a_rotation_in_python() -> None:
-    by_matrix = Rotation.from_matrix(turn("x", 40))
+    by_matrix = Rotation.from_matrix(turn_about([1, 0, 0], math.radians(40)))
     by_angles = Rotation.from_rpy(math.radians(40), 0, 0)
     by_quaternion = Rotation.from_quaternion([math.cos(math.radians(20)), math.sin(math.radians(20)), 0, 0])
     for rotation in (by_matrix, by_angles, by_quaternion):

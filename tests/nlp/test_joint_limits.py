@@ -13,8 +13,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, output_of, saved, starter_tables, turn_about
+from builders import Array, Run, case_from, edited, output_of, saved_with_robot, starter_tables, turn_about
+from measures import segment_distance
 
+import screwsynth.models
 from screwsynth.models import Model, Substitution, robot, stewart_gough
 from screwsynth.nlp import (
     ActuatorRate,
@@ -210,16 +212,6 @@ def angle_between(one: Array, other: Array) -> float:
     return math.atan2(float(np.linalg.norm(np.cross(one, other))), float(one @ other))
 
 
-def segment_distance(one: tuple[Array, Array], other: tuple[Array, Array]) -> float:
-    """Distance of two segments by alternating projection, which converges for a convex distance."""
-    s = t = 0.5
-    (p, d), (q, e) = one, other
-    for _ in range(400):
-        s = float(np.clip(d @ (q + t * e - p) / (d @ d), 0, 1))
-        t = float(np.clip(e @ (p + s * d - q) / (e @ e), 0, 1))
-    return float(np.linalg.norm(p + s * d - q - t * e))
-
-
 def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
     """Cranks, elbows, cones about the link and about an axis, distances of links and rates, at one pose."""
     up = [0.1, 0.2, 1.0]
@@ -262,16 +254,13 @@ def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
             expected["joint.2:3.cone", "2:3"] = angle_between(rod, R @ Q @ up)
         for key, value in expected.items():
             assert rows[key] == pytest.approx(value, abs=1e-8), key
-        links |= {
-            f"{label}:1 to {label}:2": (places[0], elbow - places[0]),
-            f"{label}:2 to {label}:3": (elbow, ball - elbow),
-        }
+        links |= {f"{label}:1 to {label}:2": (places[0], elbow), f"{label}:2 to {label}:3": (elbow, ball)}
     pairs = [each for each in itertools.combinations(links, 2) if each[0][0] != each[1][0]]
     assert len(pairs) == 12
     for one, other in pairs:
         name = f"link_clearance links {one} and {other}"
         if name in others:
-            assert others[name] == pytest.approx(segment_distance(links[one], links[other]), abs=1e-9)
+            assert others[name] == pytest.approx(segment_distance(*links[one], *links[other]), abs=1e-9)
     # The two links of a limb share a joint.
     assert sum(name.startswith("link_clearance") for name in others) == 12
     # The rates are those of the cranks along the task's motion.
@@ -287,23 +276,17 @@ def test_margins_are_those_of_finite_motions_of_all_copies() -> None:
         assert others[f"actuator_rate actuator {k + 1}"] == pytest.approx(abs(ahead - behind) / (2 * h), rel=1e-4)
 
 
-RPS = """
-name = "3-RPS"
-home = [0, 0, 1.1]
-dimensions = { rb = { typical = 1.0 }, rp = { typical = 0.6 } }
-[[limb]]
-repeat = { count = 3 }
-points = { B = ["rb", 0, 0], A = ["rp", 0, 1.1] }
-joints = [ { type = "R", at = "B", axis = "y" },
-           { type = "P", at = "B", axis = "A - B", actuated = true, name = "slide" },
-           { type = "S", at = "A", name = "ball" } ]
-"""
+RPS = edited(
+    (Path(screwsynth.models.__file__).parent / "robots" / "3-rps.toml").read_text(encoding="utf-8"),
+    ("actuated = true", 'actuated = true, name = "slide"'),
+    ('"S"', '"S", name = "ball"'),
+)
 RPS_CASE = """
 [units]
 length = "m"
 [robot]
 file = "robot.toml"
-parameters = { rb = { min = 0.8, max = 1.2 }, rp = { min = 0.4, max = 0.7 } }
+parameters = { rb = { min = 0.8, max = 1.2 }, rp = { min = 0.4, max = 0.7 }, h = 1.1 }
 [pose]
 position = [{ min = -0.3, max = 0.3 }, { min = -0.3, max = 0.3 }, { min = 0.9, max = 1.3 }]
 rotation = { angle = { min = -30, max = 30 } }
@@ -317,13 +300,11 @@ slide = { min = -0.05, max = 0.08 }
 """
 
 
-def put(folder: Path, limits: str, robot_text: str = RPS) -> str:
-    (folder / "robot.toml").write_text(robot_text, encoding="utf-8")
-    return str(saved(folder / "case.toml", RPS_CASE + limits))
-
-
 def test_an_active_limit_has_its_cost_and_a_case_file_of_its_own(tmp_path: Path) -> None:
-    case = replace(load_case(put(tmp_path, '"1:1" = { min = -5 }\nball = { cone = 20 }\n')), search=Search(starts=3))
+    case = replace(
+        load_case(saved_with_robot(tmp_path, RPS, RPS_CASE + '"1:1" = { min = -5 }\nball = { cone = 20 }\n')),
+        search=Search(starts=3),
+    )
     slide, hinge = JointMotion("slide", min=-0.05, max=0.08), JointMotion("1:1", min=-math.radians(5))
     assert case.limits == Limits(slide, hinge, JointCone("ball", math.radians(20)))
     again = case_from(case.to_toml(), "case")
@@ -368,21 +349,18 @@ REFUSALS = {
 
 
 def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) -> None:
+    single = edited(RPS, ("count = 3", "count = 1"))
     for written, fault in REFUSALS.items():
-        name = put(tmp_path, "", RPS.replace("count = 3", "count = 1"))
-        text = RPS_CASE.partition("[limits.joint]")[0]
-        Path(name).write_text(
-            text + (written if written.startswith("[") else f"[limits.joint]\n{written}"), encoding="utf-8"
-        )
+        limits = written if written.startswith("[") else f"[limits.joint]\n{written}"
         with pytest.raises(CaseError) as error:
-            load_case(name)
+            load_case(saved_with_robot(tmp_path, single, RPS_CASE.partition("[limits.joint]")[0] + limits))
         sentence = str(error.value)
         assert sentence.startswith("case.toml: "), written
         assert fault in sentence, (written, sentence)
         assert "\n" not in sentence
     two = RPS.replace('type = "R", at', 'type = "R", name = "slide", at')
     with pytest.raises(CaseError, match=r"robot\.toml: limb 1, joints: has two joints with the name 'slide'"):
-        load_case(put(tmp_path, "", two))
+        load_case(saved_with_robot(tmp_path, two, RPS_CASE))
     legs = case_from_tables(starter_tables(stewart_gough()), name="legs", source="legs.toml")
     for limit, key in ((JointMotion("1:1", max=1.0), "joint.1:1"), (LinkClearance(1.0), "link_clearance")):
         with pytest.raises(CaseError, match=rf"limits\.{key}: is nothing that 'stewart-gough' has; it has leg_length"):
@@ -400,7 +378,7 @@ def test_rates_of_straight_legs_are_their_work_rates() -> None:
 
 
 def test_numbers_of_joints_are_set_on_the_command_line(tmp_path: Path, cli: Run) -> None:
-    name = put(tmp_path, "")
+    name = saved_with_robot(tmp_path, RPS, RPS_CASE)
     for setting, shown in (
         ("limits.joint.slide.max=0.01", "joint.slide.max"),
         ("limits.joint.1:1.min=-7", "joint.1:1.min"),

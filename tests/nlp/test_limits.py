@@ -19,6 +19,7 @@ from builders import Array, Run, case_from, saved
 from casadi import SX
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from measures import placed_joints, segment_distance
 
 from screwsynth.models import Model, hexapod, robot_function, stewart_gough, three_upu
 from screwsynth.nlp import (
@@ -100,46 +101,13 @@ def solved(case: Case, *first: Array, starts: int = 4) -> Solution:
     return solution_of_one_task(case, solve_program(formulate(case), search, first=first))
 
 
-def joints(result: dict[str, Any]) -> tuple[Array, Array, Array]:
-    """Base joints, platform joints in their own frame, and platform joints in the world, from the design alone."""
-    x1, x2, x3, x4 = (result["parameters"][name] for name in ("x1", "x2", "x3", "x4"))
-    base, platform = [], []
-    for k, sign in itertools.product(range(3), (-1, 1)):
-        for radius, azimuth, into in (
-            (x1, 120 * k + sign * x3, base),
-            (x2, 120 * k + sign * (60 - x4), platform),
-        ):
-            angle = math.radians(azimuth)
-            into.append([radius * math.cos(angle), radius * math.sin(angle), 0.0])
-    a, b = np.array(platform), np.array(base)
-    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
-    return b, a, p + a @ R.T
-
-
 def degrees_between(u: Array, v: Array) -> float:
     return math.degrees(math.acos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)))
 
 
-def segment_distance(p: Array, q: Array, r: Array, s: Array, rounds: int = 12) -> float:
-    """Distance between segments pq and rs: a grid over pq, refined about the point that is nearest to rs.
-
-    The distance from rs is convex along pq, so that the nearest point lies within a step of the grid's best one.
-    """
-    low, high, best, along = 0.0, 1.0, math.inf, s - r
-    for _ in range(rounds):
-        u = np.linspace(low, high, 21)
-        points = p + u[:, None] * (q - p)
-        v = np.clip((points - r) @ along / (along @ along), 0, 1)
-        distances = np.linalg.norm(points - r - v[:, None] * along, axis=1)
-        nearest = int(np.argmin(distances))
-        best = min(best, float(distances[nearest]))
-        low, high = u[max(nearest - 1, 0)], u[min(nearest + 1, 20)]
-    return best
-
-
 def measured(result: dict[str, Any], limits: dict[str, Any], home: dict[str, Any] | None = None) -> dict[str, float]:
     """What each limit measures at its worst place, by NumPy alone."""
-    b, a, ends = joints(result)
+    b, a, ends = placed_joints(result)
     R, p, spans = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"]), ends - b
     lengths = np.linalg.norm(spans, axis=1)
     J = np.array(result["jacobian"])

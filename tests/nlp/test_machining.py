@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import json
 import math
 import tomllib
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import Array, Run, case_from, saved
+from measures import leg_measures, placed_joints
 
 from screwsynth.nlp import Case, Solution, Status, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.settings import Search
@@ -49,61 +49,20 @@ def again(tables: dict[str, Any], near: Solution) -> Solution:
     return solution_of_one_task(case, solve_program(formulate(case), Search(starts=1), first=[near.x]))
 
 
-def joints(result: dict[str, Any]) -> tuple[Array, Array, Array]:
-    """Base joints, platform joints in the platform's frame and in the world, from the design alone."""
-    x1, x2, x3, x4 = (result["parameters"][name] for name in ("x1", "x2", "x3", "x4"))
-    base, platform = [], []
-    for k, sign in itertools.product(range(3), (-1, 1)):
-        u, v = (math.radians(120 * k + sign * half) for half in (x3, 60 - x4))
-        base.append([x1 * math.cos(u), x1 * math.sin(u), 0.0])
-        platform.append([x2 * math.cos(v), x2 * math.sin(v), 0.0])
-    b, a = np.array(base), np.array(platform)
-    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
-    return b, a, p + a @ R.T
-
-
-def distance(p: Array, q: Array, r: Array, s: Array) -> float:
-    """Distance between segments pq and rs by brute force over a fine grid, refined."""
-    low, high, best = np.zeros(2), np.ones(2), math.inf
-    for _ in range(12):
-        u, v = (np.linspace(low[i], high[i], 21) for i in range(2))
-        apart = (p + u[:, None] * (q - p))[:, None] - (r + v[:, None] * (s - r))[None]
-        distances = np.linalg.norm(apart, axis=2)
-        i, j = np.unravel_index(np.argmin(distances), distances.shape)
-        best = min(best, float(distances[i, j]))
-        width, centre = (high - low) / 8, np.array([u[i], v[j]])
-        low, high = np.maximum(centre - width, 0), np.minimum(centre + width, 1)
-    return best
-
-
 def slacks(result: dict[str, Any]) -> dict[str, float]:
     """How far inside each limit of the case a design is, by NumPy alone."""
     limits = TABLES["limits"]
-    b, a, ends = joints(result)
-    spans = ends - b
-    lengths = np.linalg.norm(spans, axis=1)
-    R = np.array(result["pose"]["rotation_matrix"])
+    b, a, _ = placed_joints(result)
+    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
     at_home = np.array(limits["home"]["position"]) + a - b
-    pairs = list(itertools.combinations(range(6), 2))
-
-    def lean(axes: Array) -> float:
-        cosines = np.einsum("ij,ij->i", axes, spans) / np.linalg.norm(axes, axis=1) / lengths
-        return math.degrees(np.arccos(cosines).max())
-
-    rates = np.array(result["rates"])
-    return {
-        "leg_length.min": lengths.min() - limits["leg_length"]["min"],
-        "leg_length.max": limits["leg_length"]["max"] - lengths.max(),
-        "base_joint_angle.max": limits["base_joint_angle"]["max"] - lean(at_home),
-        "platform_joint_angle.max": limits["platform_joint_angle"]["max"] - lean(at_home @ R.T),
-        "joint_spacing.min": min(np.linalg.norm(each[i] - each[j]) for each in (a, b) for i, j in pairs)
-        - limits["joint_spacing"]["min"],
-        "footprint.base": limits["footprint"]["base"] - np.linalg.norm(b, axis=1).max(),
-        "footprint.platform": limits["footprint"]["platform"] - np.linalg.norm(a, axis=1).max(),
-        "leg_clearance.min": min(distance(b[i], ends[i], b[j], ends[j]) for i, j in pairs)
-        - limits["leg_clearance"]["min"],
-        "rate_share.max": limits["rate_share"]["max"] - (rates**2).max() / (rates**2).sum(),
-    }
+    squares = np.array(result["rates"]) ** 2
+    found = leg_measures(b, a, R, p, at_home, at_home @ R.T) | {"rate_share.max": squares.max() / squares.sum()}
+    inside = {}
+    for key, value in found.items():
+        name, side = key.split(".")
+        shown = math.degrees(value) if "angle" in name else value
+        inside[key] = (shown - limits[name][side]) * (1 if side == "min" else -1)
+    return inside
 
 
 def test_the_limited_design_keeps_every_limit_and_is_found_from_many_starts(limited: Solution) -> None:
@@ -239,7 +198,7 @@ def F_of(b: Array, ends: Array, twist: Array) -> float:  # noqa: N802 - the obje
 
 def test_the_loss_by_inexact_joints_is_the_worst_that_sampling_finds(limited: Solution) -> None:
     result = json_data(result_of(limited))
-    b, a, _ = joints(result)
+    b, a, _ = placed_joints(result)
     R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
     twist, tolerance = np.array(result["task"]["twist"]), TABLES["tolerance"]["joint_centre"]
     exact = F_of(b, p + a @ R.T, twist)

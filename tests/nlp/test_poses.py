@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import tomllib
@@ -12,20 +11,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, saved
+from builders import Array, Run, case_from, output_of, refusal_of, saved
+from measures import exponential, placed_joints
 
 from screwsynth.models import matrix_from_axis_angle, screw_from_axis
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    PointKind,
-    Status,
-    evaluate,
-    formulate,
-    json_data,
-    result_of,
-    solve,
-)
+from screwsynth.nlp import Case, CaseError, PointKind, Status, evaluate, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.pose import along_screw, over_grid
 from screwsynth.nlp.evidence.tolerance import BuiltRobot, tolerance_loss
 from screwsynth.nlp.program.formulation import formulate_each
@@ -85,36 +75,26 @@ leg_clearance = { min = 3 }
 
 def case_of(poses: str, over: str = "sum", limits: str = "", sense: str = "max") -> Case:
     combine = f'[combine]\nover_poses = "{over}"\n'
-    tables = tomllib.loads(HEAD + poses + TASK.replace("SENSE", sense) + combine + limits)
-    return case_from(tables, "poses")
+    return case_from(HEAD + poses + TASK.replace("SENSE", sense) + combine + limits, "poses")
+
+
+#: The task under another name, with another pitch.
+LIFT = TASK.partition("[solve]")[0].replace("drive", "lift").replace("pitch = 1", "pitch = 5")
 
 
 def by_hand(result: dict[str, Any], pose: dict[str, Any], twist: Array) -> tuple[float, Array]:
     """F, and the six leg lengths, at a pose of a result, from the design alone."""
-    x1, x2, x3, x4 = (result["parameters"][name] for name in ("x1", "x2", "x3", "x4"))
-    R, p = np.array(pose["pose"]["rotation_matrix"]), np.array(pose["pose"]["position"])
-    F, lengths = 0.0, []
-    for k, sign in itertools.product(range(3), (-1, 1)):
-        u, v = (math.radians(120 * k + sign * half) for half in (x3, 60 - x4))
-        b = x1 * np.array([math.cos(u), math.sin(u), 0])
-        leg = p + R @ (x2 * np.array([math.cos(v), math.sin(v), 0])) - b
-        lengths.append(np.linalg.norm(leg))
-        f = leg / lengths[-1]
-        F += (np.cross(b, f) @ twist[:3] + f @ twist[3:]) ** 2
-    return F, np.array(lengths)
+    base, _, ends = placed_joints(result, pose["pose"])
+    lengths = np.linalg.norm(ends - base, axis=1)
+    forces = (ends - base) / lengths[:, None]
+    rates = np.cross(base, forces) @ twist[:3] + forces @ twist[3:]
+    return float(rates @ rates), lengths
 
 
 def test_displacements_along_a_screw_are_its_exponential() -> None:
     twist = screw_from_axis([1, 2, 2], [3, -1, 4], 0.7)
-    omega, v = twist[:3], twist[3:]
-    A = np.zeros((4, 4))
-    A[:3, :3] = np.cross(np.eye(3), omega)
-    A[:3, 3] = v
     for amount, step in zip((-0.8, 0.0, 1.3), along_screw(twist, (-0.8, 0.0, 1.3)), strict=True):
-        series, term = np.eye(4), np.eye(4)
-        for k in range(1, 40):
-            term = term @ A * amount / k
-            series += term
+        series = exponential(twist, amount)
         np.testing.assert_allclose(step.rotation, series[:3, :3], atol=1e-12)
         np.testing.assert_allclose(step.translation, series[:3, 3], atol=1e-12)
     (moved,) = along_screw(screw_from_axis([0, 0, 3], [0, 0, 0], math.inf), [2.5])
@@ -184,9 +164,8 @@ def test_what_a_stroke_costs_is_what_moving_it_does() -> None:
 
 def test_one_listed_pose_is_that_pose() -> None:
     one = LISTED.rpartition("[[pose]]")[0]
-    tables = tomllib.loads(HEAD + one + TASK.replace("SENSE", "max"))
-    alone = tomllib.loads(HEAD + one.replace("[[pose]]", "[pose]") + TASK.replace("SENSE", "max"))
-    first, second = (solve(case_from(each, "one")) for each in (tables, alone))
+    task = TASK.replace("SENSE", "max")
+    first, second = (solve(case_from(HEAD + pose + task)) for pose in (one, one.replace("[[pose]]", "[pose]")))
     assert first.F == second.F
     assert "poses" not in json_data(result_of(first))
 
@@ -203,18 +182,9 @@ def test_starting_points_lie_in_every_poses_ball() -> None:
 
 
 def test_several_tasks_over_several_poses_are_brought_together() -> None:
-    second = (
-        TASK.replace("SENSE", "max").partition("[solve]")[0].replace("drive", "lift").replace("pitch = 1", "pitch = 5")
-    )
-    text = (
-        HEAD
-        + ALONG
-        + '[combine]\nmethod = "weighted-sum"\nover_poses = "mean"\n'
-        + second
-        + TASK.replace("SENSE", "max")
-    )
-    tables = tomllib.loads(text.replace("count = 3", 'count = 3\ntask = "drive"'))
-    compromise = solve(case_from(tables, "two"))
+    combined = '[combine]\nmethod = "weighted-sum"\nover_poses = "mean"\n'
+    text = HEAD + ALONG.replace("count = 3", 'count = 3\ntask = "drive"') + combined + LIFT + TASK
+    compromise = solve(case_from(text.replace("SENSE", "max"), "two"))
     assert compromise.all_solved
     assert compromise.combination is not None
     assert compromise.combination.value == pytest.approx(sum(outcome.F for outcome in compromise.outcomes), rel=1e-9)
@@ -238,12 +208,10 @@ def test_inexact_joints_cost_what_sampling_over_all_poses_finds(over: str) -> No
 
 def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None:
     def together(longest: float) -> dict[str, Any]:
-        first = TASK.replace("SENSE", "max")
-        second = first.partition("[solve]")[0].replace("drive", "lift").replace("pitch = 1", "pitch = 5")
-        text = HEAD + ALONG.partition("[pose.along")[0] + '[combine]\nmethod = "weighted-sum"\n' + second + first
-        tables = tomllib.loads(f"{text}\n[limits]\nleg_length = {{ max = {longest} }}\n")
-        result: dict[str, Any] = json_data(result_of(solve(case_from(tables, "two"))))
-        return result["combined"]
+        text = HEAD + ALONG.partition("[pose.along")[0] + '[combine]\nmethod = "weighted-sum"\n' + LIFT + TASK
+        text = text.replace("SENSE", "max") + f"\n[limits]\nleg_length = {{ max = {longest} }}\n"
+        combined: dict[str, Any] = json_data(result_of(solve(case_from(text, "two"))))["combined"]
+        return combined
 
     (row,) = together(40.0)["limits"]
     assert row["active"]
@@ -261,15 +229,10 @@ def test_an_optimum_over_poses_has_its_evidence() -> None:
 
 
 def test_commands_and_generated_code_have_every_pose(cli: Run, tmp_path: Path) -> None:
-    path = saved(
-        tmp_path / "poses.toml", HEAD + ALONG + TASK.replace("SENSE", "max") + '[combine]\nover_poses = "worst"\n'
-    )
-    code, out, _ = cli("solve", str(path))
-    assert code == 0
-    assert "worst over 3 poses" in out
-    code, out, err = cli("evaluate", str(path), "--json", "-")
-    assert code == 0, err
-    result = json.loads(out)
+    text = HEAD + ALONG + TASK.replace("SENSE", "max") + '[combine]\nover_poses = "worst"\n'
+    path = saved(tmp_path / "poses.toml", text)
+    assert "worst over 3 poses" in output_of(cli("solve", str(path)))
+    result = json.loads(output_of(cli("evaluate", str(path), "--json", "-")))
     assert result["F"] == pytest.approx(min(pose["F"] for pose in result["poses"]))
     code, _, err = cli("codegen", str(path), "--out", str(tmp_path / "c"))
     assert code == 0, err
@@ -280,15 +243,10 @@ def test_commands_and_generated_code_have_every_pose(cli: Run, tmp_path: Path) -
 def test_numbers_of_each_listed_pose_can_be_set(cli: Run, tmp_path: Path) -> None:
     path = saved(tmp_path / "poses.toml", HEAD + LISTED + TASK.replace("SENSE", "max"))
     words = ["--set", "pose2_p_z=33", "--set", "pose2_angle=7", "--set", "x1=11", "--set", "pose1_axis=0,1,0"]
-    code, out, err = cli("evaluate", str(path), *words, "--json", "-")
-    assert code == 0, err
-    second = json.loads(out)["poses"][1]["pose"]
+    second = json.loads(output_of(cli("evaluate", str(path), *words, "--json", "-")))["poses"][1]["pose"]
     assert second["position"] == [3, 0, 33]
     assert second["angle"] == pytest.approx(7)
-    code, _, err = cli("evaluate", str(path), "--set", "angle=7")
-    assert code == 2
-    assert "angle: cannot be set" in err
-    assert "pose1_angle" in err
+    refusal_of(cli("evaluate", str(path), "--set", "angle=7"), "angle: cannot be set", "pose1_angle")
 
 
 def test_a_task_of_one_pose_has_one_program_for_all_tasks() -> None:

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from builders import Run, case_from, refusal_of, saved
 from casadi import SX
+from measures import exponential
 
 from screwsynth.models import (
     Body,
@@ -242,13 +243,9 @@ def test_published_beside_computed(page: Callable[..., Page]) -> None:
 
 
 def displaced(points: np.ndarray, twist: np.ndarray, t: float) -> np.ndarray:
-    """Points (n, 3) after a motion along a twist with a rotation, by Chasles: turn about the axis, move along it."""
-    size = float(np.linalg.norm(twist[:3]))
-    s = twist[:3] / size
-    point, pitch = np.cross(twist[:3], twist[3:]) / size**2, float(twist[:3] @ twist[3:]) / size**2
-    r, angle = points - point, size * t
-    turned = r * np.cos(angle) + np.cross(s, r) * np.sin(angle) + np.outer(r @ s, s) * (1 - np.cos(angle))
-    return np.asarray(point + turned + pitch * angle * s)
+    """Points (n, 3) after a motion with a constant twist."""
+    E = exponential(twist, t)
+    return np.asarray(points @ E[:3, :3].T + E[:3, 3])
 
 
 def rates_of_lines(view: dict[str, Any], points: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

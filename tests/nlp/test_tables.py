@@ -15,10 +15,9 @@ import pytest
 from builders import Run, case_from, refusal_of, starter_tables
 from rich.console import Console
 
-from screwsynth.models import model_names, three_upu
+from screwsynth.models import Model, model_names, three_upu
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, build_model, load_case, shipped_cases, solve
 from screwsynth.nlp.case.limits.legs import LegLength
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import evaluate
@@ -82,7 +81,6 @@ leg_clearance = { min = 30 }
 
 
 def eight() -> Case:
-
     return case_from(EIGHT, "eight")
 
 
@@ -90,6 +88,11 @@ def evaluated(case: Case) -> EvaluationResult:
     nlps = formulate_each(case)
     x = with_exact_level(nlps[0], close_equations(nlps[0], nlps[0].start))
     return evaluation_of(nlps, x, [evaluate(nlp, x) for nlp in nlps])
+
+
+def table_of(case: Case, name: str) -> TextTable:
+    """A table of the evaluation of a case."""
+    return next(i for i in evaluation_summary(case, evaluated(case)) if isinstance(i, TextTable) and i.name == name)
 
 
 def case_of(name: str) -> Case:
@@ -118,13 +121,9 @@ def check_widths(items: tuple[Line | TextTable, ...]) -> None:
 
 
 @pytest.mark.parametrize("name", ["eight", *shipped_cases()])
-def test_no_number_is_split_at_any_width(name: str) -> None:
-    check_widths(solved(name))
-
-
-@pytest.mark.parametrize("name", ["eight", *shipped_cases()])
-def test_no_number_of_an_evaluation_is_split_at_any_width(name: str) -> None:
+def test_no_number_of_a_solve_or_an_evaluation_is_split_at_any_width(name: str) -> None:
     case = case_of(name)
+    check_widths(solved(name))
     check_widths(tuple(evaluation_summary(case, evaluated(case))))
 
 
@@ -166,11 +165,11 @@ def test_no_rounding_noise_in_an_evaluation(name: str) -> None:
 def test_noise_of_a_singular_robot_is_zero_in_words_and_stays_in_json() -> None:
     case = load_case("paper-4.4-snu")
     result = evaluated(case)
-    items = list(evaluation_summary(case, result))
-    limbs, jacobian = (item for item in items if isinstance(item, TextTable) and item.name in ("limbs", "jacobian"))
+    limbs, jacobian = table_of(case, "limbs"), table_of(case, "jacobian")
     assert {row[2] for row in limbs.rows} == {"0"}
     assert all(abs(float(str(cell))) > 1e-6 or cell == "0" for row in jacobian.rows for cell in row[1:])
-    (values,) = (item.text for item in items if isinstance(item, Line) and item.label == "singular values")
+    lines = [item for item in evaluation_summary(case, result) if isinstance(item, Line)]
+    (values,) = (line.text for line in lines if line.label == "singular values")
     assert values.split()[4:] == ["0", "0"]
     assert any(0 < abs(rate) < 1e-12 for rate in result.robot.rates or ())
     assert 0 < result.robot.singular_values[5] < 1e-12
@@ -188,19 +187,16 @@ def test_numbers_below_their_error_bound() -> None:
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_motions_have_no_noise_in_any_unit(scale: float) -> None:
     case = eight()
-    nlp = formulate(case)
-
     axis, point = np.array([0.0, 1.0, 0.0]), scale * np.array([0.25, 0.0, 0.5])
     noise = scale * 1e-13 * np.array([1.0, -1.0, 1.0])
     twist = np.concatenate([axis, np.cross(point, axis) + noise])
-    assert motion_words(motion_data(twist), nlp.case.units).startswith("rotation about (0, 1, 0) through (")
+    assert motion_words(motion_data(twist), case.units).startswith("rotation about (0, 1, 0) through (")
     assert f"({0.25 * scale:.4g}, 0, {0.5 * scale:.4g})" in motion_words(motion_data(twist), case.units)
 
 
 def test_the_sign_of_an_angle_along_a_task_is_shown() -> None:
     case = eight()
-    poses = next(i for i in evaluation_summary(case, evaluated(case)) if isinstance(i, TextTable) and i.name == "poses")
-    angles = [float(str(row[6])) for row in poses.rows]
+    angles = [float(str(row[6])) for row in table_of(case, "poses").rows]
     assert angles == pytest.approx(np.linspace(-20, 20, 8), abs=1e-4)
 
 
@@ -230,7 +226,7 @@ def test_the_table_shows_the_angles_that_the_limits_speak_of() -> None:
     """An independent reckoning: the angle of each leg to its own direction at home."""
     case = load_case("hexapod-machining", {"p_x": 2, "p_y": -1, "p_z": 21})
     result = evaluated(case)
-    limbs = next(i for i in evaluation_summary(case, result) if isinstance(i, TextTable) and i.name == "limbs")
+    limbs = table_of(case, "limbs")
     assert "base joint angle\nfrom home, deg" in limbs.headers
     assert "platform joint angle\nfrom home, deg" in limbs.headers
     robot, home = result.robot, np.array([0.0, 0.0, 20.0])
@@ -249,7 +245,7 @@ def test_the_table_shows_the_angles_that_the_limits_speak_of() -> None:
 
 def test_without_such_limits_angles_are_from_the_normal() -> None:
     case = load_case("paper-4.1-helical")
-    limbs = next(i for i in evaluation_summary(case, evaluated(case)) if isinstance(i, TextTable) and i.name == "limbs")
+    limbs = table_of(case, "limbs")
     assert "base joint angle\ndeg" in limbs.headers
     assert evaluated(case).robot.limited_quantities is None
 
@@ -306,16 +302,11 @@ def test_csv_that_cannot_be_is_refused_before_the_work(
     assert not list(tmp_path.iterdir())
 
 
-def infeasible() -> SolveResult:
+def test_a_margin_of_an_infeasible_answer_is_violated() -> None:
     case = replace(load_case("paper-4.1-helical"), limits=Limits(LegLength(max=15.0)))
     result = result_of(solve(case, starts=2))
     assert isinstance(result, SolveResult)
     assert result.F is None
-    return result
-
-
-def test_a_margin_of_an_infeasible_answer_is_violated() -> None:
-    result = infeasible()
     (limit,) = (row for row in result.limits if row.key == "leg_length.max")
     assert limit.margin is not None
     assert limit.margin < 0
@@ -362,20 +353,9 @@ def test_a_singular_answer_that_nobody_asked_for_is_no_green_bar() -> None:
     assert 'class="answer"' in page_of(replace(report, case=asked))
 
 
-@pytest.mark.parametrize("name", model_names())
-def test_every_starter_case_solves_to_rank_six(name: str) -> None:
-
-    case = case_from_tables(starter_tables(name), name=name, source=name)
-    state = solve(case, starts=4).state
-    assert state is not None
-    assert state.rank == 6
-
-
-@pytest.mark.parametrize("axes", ["free", "limb", "snu", "tsai"])
-def test_every_3_upu_has_a_starter_of_rank_six(axes: str) -> None:
-
-    case = case_from_tables(starter_tables(three_upu(axes=axes)), name="upu", source="upu")  # type: ignore[arg-type]
-    state = solve(case, starts=4).state
+@pytest.mark.parametrize("robot", [*model_names(), *(three_upu(axes=axes) for axes in ("limb", "snu", "tsai"))])
+def test_every_starter_case_solves_to_rank_six(robot: str | Model) -> None:
+    state = solve(case_from(starter_tables(robot)), starts=4).state
     assert state is not None
     assert state.rank == 6
 

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from builders import case_from, starter_tables
+from measures import scaled
 from numpy_engine.first_order import enclose
 from numpy_engine.quadratic_models import multipliers
 from numpy_engine.second_order import enclose_second
@@ -62,19 +63,13 @@ def tables_of(model: Model, unit: str) -> Tables:
     tables["solve"]["starts"] = 4
     for item in model.parameters:
         if item.dimension is Dimension.LENGTH:
-            tables["robot"]["parameters"][item.name] = times(tables["robot"]["parameters"][item.name], f)
+            tables["robot"]["parameters"][item.name] = scaled(tables["robot"]["parameters"][item.name], f)
     if model.has_couples:
         tables["robot"]["characteristic_length"] *= f
-    tables["pose"]["position"] = times(tables["pose"]["position"], f)
+    tables["pose"]["position"] = scaled(tables["pose"]["position"], f)
     for task in tables["task"]:
-        task["point"], task["pitch"] = times(task["point"], f), times(task["pitch"], f)
+        task["point"], task["pitch"] = scaled(task["point"], f), scaled(task["pitch"], f)
     return tables
-
-
-def times(value: Any, factor: float) -> Any:  # noqa: ANN401 - a part of a table
-    if isinstance(value, dict):
-        return {key: times(each, factor) for key, each in value.items()}
-    return [times(each, factor) for each in value] if isinstance(value, list) else value * factor
 
 
 def leaves(value: object, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -194,7 +189,7 @@ def fixed_over_box(model: Model, unit: str, part: float, degrees: float) -> Tabl
         several = value if isinstance(value, list) else [value]
         fixed = [(each["min"] + each["max"]) / 2 if isinstance(each, dict) else each for each in several]
         tables["robot"]["parameters"][key] = fixed if isinstance(value, list) else fixed[0]
-    middle = times(list(model.home), f)
+    middle = scaled(list(model.home), f)
     tables["pose"] = {"position": middle}
     tables["workspace"] = {"position": [{"min": each - half, "max": each + half} for each in middle]}
     if model.name not in TRANSLATIONS:
