@@ -17,7 +17,6 @@ from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import prove_extreme
-from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box, pose_coordinates
 
 # The machine of LinuxCNC's hexapod kinematics; see cases/hexapod-machining.toml.
 TEXT = """
@@ -66,7 +65,7 @@ def by_dimension(case: Case) -> None:
         began = time.process_time()
         regular = judge_workspace(replace(case, workspace=workspace), with_limits=False).regularity
         taken = time.process_time() - began
-        layout = posed_layout(case, pose_coordinates(pose_box(workspace)))
+        layout = posed_layout(case, workspace)
         boxes, seconds = {"length": 0, "F": 0}, {"length": 0.0, "F": 0.0}
         for claim in claims_of(layout):
             kind = "F" if claim.name == "F" else "length"

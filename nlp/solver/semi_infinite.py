@@ -32,7 +32,7 @@ from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import Judgement, judge_workspace
 from ..proof.workspace.numbers.extremes import prove_extreme
 from ..proof.workspace.ranks.ranks import not_judged
-from ..proof.workspace.robot.pose_box import pose_box, pose_coordinates
+from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
 from .multistart import ProgramSolution
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
@@ -123,7 +123,7 @@ def _judged(case: Case) -> Judgement:
     """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     if closed.reaches:
-        layout, claims = reach_claims(case, closed, pose_coordinates(pose_box(workspace)))
+        layout, claims = reach_claims(case, closed, workspace)
         found = tuple(prove_extreme(layout, claim, gap=_GAP, jobs=1) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
             return Judgement(case, workspace, not_judged(pose_box(workspace), _UNREACHED), found)

@@ -35,7 +35,7 @@ from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMac
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
-from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, pose_coordinates
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.schema import result_schema
@@ -438,7 +438,7 @@ def test_the_command_shows_the_machine_that_refutes(tmp_path: Path) -> None:
 
 
 def test_robots_without_a_rule_stay_open(case: Case) -> None:
-    layout = posed_layout(case, pose_coordinates(pose_box(workspace_of_case(case))))
+    layout = posed_layout(case, workspace_of_case(case))
     claim = replace(claims_of(layout)[-1], uncovered="not covered")
     found = prove_extreme(layout, claim)
     assert (found.outcome, found.reason) == (Outcome.OPEN, "not covered")

@@ -19,7 +19,8 @@ from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.evidence.closing import closed_in_place
 from screwsynth.nlp.evidence.state import evaluate
-from screwsynth.nlp.proof.statement.posed_layout import extreme_program, posed_layout
+from screwsynth.nlp.proof.statement.posed_layout import extreme_program
+from screwsynth.nlp.proof.statement.tolerance import coordinate_layout
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box, pose_coordinates
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -68,7 +69,7 @@ class AtPoses:
 
     def __init__(self, case: Case, box: PoseBox, length: float) -> None:
         self._length = length
-        layout = posed_layout(replace(case, limits=Limits(), joint_centre_tolerance=None), pose_coordinates(box))
+        layout = coordinate_layout(replace(case, limits=Limits(), joint_centre_tolerance=None), pose_coordinates(box))
         self._nlp = nlp = extreme_program(layout, ca.SX(0), Sense.MIN)
         robot, inner = layout.robots[0], set(nlp.program.places.inner)
         self._given = [k for k in range(nlp.n) if k not in inner]

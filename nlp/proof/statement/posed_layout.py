@@ -5,10 +5,8 @@ Some unknowns of a robot follow in closed form: then its limbs must reach every 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -17,9 +15,11 @@ from casadi import SX
 from ....models import Dimension, Model, Substitution
 from ....models.joints.closedform import ClosedForm, Reach
 from ...case.case import Case
-from ...case.limits.constraint import BoundedConstraint, Constraint, Reading
-from ...case.pose import HERE, Free, Pose, Rotation, Value
+from ...case.limits.constraint import Reading
+from ...case.limits.limits import Limits
+from ...case.pose import HERE, Pose, Rotation, Value
 from ...case.task import Sense
+from ...case.workspace import TurnKind, Workspace
 from ...program.assembly import assemble
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
 from ...program.nlp import Nlp
@@ -47,37 +47,35 @@ def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Ca
     )
 
 
-class PoseCoordinates(NamedTuple):
-    """Coordinates of the poses of a workspace.
+def posed_layout(case: Case, workspace: Workspace) -> Layout:
+    """Return a case with fixed dimensions, whose own poses are not used, as symbols of one pose of a workspace."""
+    turns = workspace.turns
+    if turns.kind is not TurnKind.ROLL_PITCH_YAW:
+        axis = turns.axis if turns.kind is TurnKind.AXIS else None
+        one = at_one_pose(case, workspace.position, Rotation(axis, turns.angles[0]))
+        return lay_out(one, one.tasks)
+    one = at_one_pose(case, workspace.position, Rotation(None, 0.0))
 
-    Attributes:
-        values: three of position, and three of rotation: the range of the tangent of half an angle, or of a component
-            of a Cayley vector, where it varies, and else the angle.
-        rotation: returns the rotation (3, 3) with three coordinates (3, 1).
-        ball: largest squared size of a Cayley vector; infinite where rotations are no ball.
-    """
+    def add_turns(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
+        position = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position))
+        angles = [
+            table.add(f"{prefix}{name}", Dimension.ANGLE, value).symbols
+            for name, value in zip(("roll", "pitch", "yaw"), turns.angles, strict=True)
+        ]
+        about = [turn_about(k, ca.cos(angle), ca.sin(angle)) for k, angle in enumerate(angles)]
+        turned = about[2] @ about[1] @ about[0]
+        return StatedPoseSymbols(turned, position.symbols, position.places, position.symbols, None, [], (HERE,))
 
-    values: Sequence[Value]
-    rotation: Callable[[SX], SX]
-    ball: float
+    return lay_out(one, one.tasks, add_turns)
 
 
-def posed_layout(case: Case, at: PoseCoordinates) -> Layout:
-    """Return a case, whose own poses are not used, as symbols of one pose in the coordinates of a search."""
-    one = at_one_pose(case, tuple(at.values[:3]), Rotation(None, 0.0))
-
-    def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
-        placed, turns = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position)), []
-        for k, value in enumerate(at.values[3:]):
-            kind = Dimension.NUMBER if isinstance(value, Free) else Dimension.ANGLE
-            symbol = table.add(f"{prefix}turn{k + 1}", kind, value).symbols
-            turns.append(symbol if isinstance(value, Free) else ca.tan(symbol / 2))
-        turn = ca.vertcat(*turns)
-        ball = Constraint(f"{prefix}turn", ca.sumsqr(turn), Reading(Dimension.NUMBER))
-        held = [BoundedConstraint(ball, -math.inf, at.ball)] if at.ball < math.inf else []
-        return StatedPoseSymbols(at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (HERE,))
-
-    return lay_out(one, one.tasks, add_pose)
+def turn_about(about: int, cosine: SX, sine: SX, scale: SX | float = 1.0) -> SX:
+    """Return the rotation matrix (3, 3) about a coordinate axis times a scale, by which its cosine and sine are too."""
+    i, j = (about + 1) % 3, (about + 2) % 3
+    matrix = SX.eye(3) * scale
+    matrix[i, i] = matrix[j, j] = cosine
+    matrix[j, i], matrix[i, j] = sine, -sine
+    return matrix
 
 
 def extreme_program(layout: Layout, expression: SX, sense: Sense) -> Nlp:
@@ -101,12 +99,13 @@ def varies(layout: Layout, expressions: Sequence[SX]) -> list[bool]:
     return [bool(x.numel()) and any(ca.which_depends(each, x, 1, True)) for each in expressions]
 
 
-def reach_claims(case: Case, closed: ClosedForm, at: PoseCoordinates) -> tuple[Layout, tuple[Claim, ...]]:
+def reach_claims(case: Case, closed: ClosedForm, workspace: Workspace) -> tuple[Layout, tuple[Claim, ...]]:
     """Return the claims that limbs reach every pose, one for each unknown in closed form, and the case they are about.
 
-    The case is one of symbols of the pose, without loops and signs: where a limb does not reach, its loop has no value.
+    The case is one of symbols of the pose, without loops, signs and limits: where a limb does not reach, its loop has
+    no value.
     """
-    layout = design_layout(case, closed.model, at)
+    layout = _bare_layout(case, closed.model, workspace)
     return layout, reach_claims_on(layout, closed.reaches)
 
 
@@ -119,7 +118,7 @@ def reach_claims_on(layout: Layout, reaches: Sequence[Reach]) -> tuple[Claim, ..
     )
 
 
-def closed_layout(case: Case, closed: ClosedForm, at: PoseCoordinates) -> Layout:
+def closed_layout(case: Case, closed: ClosedForm, workspace: Workspace) -> Layout:
     """Return a case as symbols of the pose, with unknowns in closed form: all of its limbs reach every pose.
 
     Loop equations that hold at every pose by themselves are left out; with unknowns all are kept. A Delta that is held
@@ -128,7 +127,7 @@ def closed_layout(case: Case, closed: ClosedForm, at: PoseCoordinates) -> Layout
     """
     model = closed.model
     if not model.unknowns and model.closure:
-        layout = design_layout(case, model, at)
+        layout = _bare_layout(case, model, workspace)
         nlp = extreme_program(layout, SX(0), Sense.MIN)
         scaled = _on(layout, [ca.vertcat(*[each.scaled for each in model.closure])])
         function = ca.Function("closure", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in scaled])
@@ -137,15 +136,12 @@ def closed_layout(case: Case, closed: ClosedForm, at: PoseCoordinates) -> Layout
         holds = np.nanmax(np.abs(found), axis=0, initial=0.0) <= _IDENTITY
         holds &= np.isfinite(found).sum(axis=0) >= _TESTS // 2
         model = replace(model, closure=tuple(each for each, kept in zip(model.closure, ~holds, strict=True) if kept))
-    return posed_layout(replace(case, model=model), at)
+    return posed_layout(replace(case, model=model), workspace)
 
 
-def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
-    """Return the design, a case with a model without unknowns, as symbols of one pose: those of its machines.
-
-    Equations of loops are left out, which hold at every pose by themselves: a bound without one is over more poses.
-    """
-    return posed_layout(replace(case, model=without_loops(model)), at)
+def _bare_layout(case: Case, model: Model, workspace: Workspace) -> Layout:
+    """Return a case as symbols of the pose, without conditions on it."""
+    return posed_layout(replace(case, model=without_loops(model), limits=Limits()), workspace)
 
 
 def without_loops(model: Model) -> Model:

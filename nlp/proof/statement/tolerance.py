@@ -6,7 +6,8 @@ expressions of the errors, and of the pose in the coordinates of a search: three
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -14,21 +15,22 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Model, matrix_from_axis_angle
+from ....models import Dimension, FloatArray, Model, matrix_from_axis_angle
 from ....models.displaced import DisplacedRobot, displaced_legs
 from ....models.joints import RobotError
 from ....models.joints.closedform import Reach, closed_form
 from ...case.case import Case
-from ...case.limits.constraint import LENGTH
+from ...case.limits.constraint import LENGTH, BoundedConstraint, Constraint, Reading
 from ...case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
 from ...case.limits.limit import Limit
 from ...case.limits.limits import Limits
-from ...case.pose import Free
+from ...case.pose import HERE, Free, Pose, Rotation, Value
 from ...case.task import Sense
-from ...program.layout import Layout
+from ...program.layout import Layout, StatedPoseSymbols, lay_out
+from ...program.places import SymbolTable
 from .claims import Claim, claims_of, one_machine_name
 from .machine import joint_centres
-from .posed_layout import PoseCoordinates, posed_layout, reach_claims_on
+from .posed_layout import at_one_pose, reach_claims_on, without_loops
 
 #: Part of a derivative below which its size is smoothed, and place of the pose in its ranges at which it is taken.
 _PART, _PLACE = 0.03, 0.75
@@ -93,6 +95,39 @@ def _displaced(model: Model) -> DisplacedRobot:
         raise RobotError("", f"the robot cannot be put together with errors of its joint centres: {error}") from None
 
 
+class PoseCoordinates(NamedTuple):
+    """Coordinates of the poses of a workspace.
+
+    Attributes:
+        values: three of position, and three of rotation: the range of the tangent of half an angle, or of a component
+            of a Cayley vector, where it varies, and else the angle.
+        rotation: returns the rotation (3, 3) with three coordinates (3, 1).
+        ball: largest squared size of a Cayley vector; infinite where rotations are no ball.
+    """
+
+    values: Sequence[Value]
+    rotation: Callable[[SX], SX]
+    ball: float
+
+
+def coordinate_layout(case: Case, at: PoseCoordinates) -> Layout:
+    """Return a case, whose own poses are not used, as symbols of one pose in the coordinates of a search."""
+    one = at_one_pose(case, tuple(at.values[:3]), Rotation(None, 0.0))
+
+    def add_pose(pose: Pose, prefix: str, table: SymbolTable) -> StatedPoseSymbols:
+        placed, turns = table.add_vector(f"{prefix}p", Dimension.LENGTH, tuple(pose.position)), []
+        for k, value in enumerate(at.values[3:]):
+            kind = Dimension.NUMBER if isinstance(value, Free) else Dimension.ANGLE
+            symbol = table.add(f"{prefix}turn{k + 1}", kind, value).symbols
+            turns.append(symbol if isinstance(value, Free) else ca.tan(symbol / 2))
+        turn = ca.vertcat(*turns)
+        ball = Constraint(f"{prefix}turn", ca.sumsqr(turn), Reading(Dimension.NUMBER))
+        held = [BoundedConstraint(ball, -math.inf, at.ball)] if at.ball < math.inf else []
+        return StatedPoseSymbols(at.rotation(turn), placed.symbols, placed.places, placed.symbols, None, held, (HERE,))
+
+    return lay_out(one, one.tasks, add_pose)
+
+
 class MachineLayout(NamedTuple):
     """Every machine of a case as symbols of one pose.
 
@@ -152,7 +187,7 @@ def machine_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCoor
     # The mounting axes of joints are those of the design.
     limits = Limits(*(_mounted(case, each) for each in case.limits))
     machines = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
-    return MachineLayout(posed_layout(machines, at), built, tolerance)
+    return MachineLayout(coordinate_layout(machines, at), built, tolerance)
 
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
@@ -166,6 +201,14 @@ def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     own = n if isinstance(limit, BaseJointAngle) else n @ R
     return replace(limit, about=tuple((float(x), float(y), float(z)) for x, y, z in own))
+
+
+def design_layout(case: Case, model: Model, at: PoseCoordinates) -> Layout:
+    """Return the design, a case with a model without unknowns, as symbols of one pose: those of its machines.
+
+    Equations of loops are left out, which hold at every pose by themselves: a bound without one is over more poses.
+    """
+    return coordinate_layout(replace(case, model=without_loops(model)), at)
 
 
 def is_smooth(number: SX) -> bool:

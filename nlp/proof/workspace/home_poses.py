@@ -26,7 +26,8 @@ from ...program.layout import Layout
 from ...program.nlp import Nlp
 from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import JointErrors
-from ..statement.posed_layout import extreme_program, posed_layout
+from ..statement.posed_layout import extreme_program
+from ..statement.tolerance import coordinate_layout
 from .numbers.extremes import Extreme, slack_of
 from .numbers.machines import Machines
 from .robot.pose_box import PoseBox, pose_coordinates
@@ -60,7 +61,7 @@ class Homes:
         """The case as symbols of errors of joint centres, and of the numbers of a pose."""
         if self.machines is not None:
             return self.machines.symbols.layout
-        return posed_layout(self.case, pose_coordinates(self.box))
+        return coordinate_layout(self.case, pose_coordinates(self.box))
 
     @cached_property
     def _nlp(self) -> Nlp:

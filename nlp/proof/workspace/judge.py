@@ -25,7 +25,7 @@ from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, searched_extremes
 from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
-from .robot.pose_box import pose_box, pose_coordinates
+from .robot.pose_box import pose_box
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
 from .verdict import Outcome, RankVerdict
 
@@ -224,14 +224,14 @@ class _Numbers:
 
     def _of_design(self) -> Iterator[Extreme]:
         """Yield the extremes of expressions of the design."""
-        case, closed, at = self.case, self.closed, pose_coordinates(self.box)
+        case, closed, workspace = self.case, self.closed, self.workspace
         if closed.reaches:
-            layout, reaches = reach_claims(case, closed, at)
+            layout, reaches = reach_claims(case, closed, workspace)
             yield from self._proved(reaches, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper))
         is_reached = not any(each.fails for each in self.found)
         # Without unknowns there are fewer coordinates. Where a limb does not reach, its loop has to be kept.
         is_closed = closed.reaches and is_reached
-        layout = closed_layout(case, closed, at) if is_closed else posed_layout(case, at)
+        layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
         claims = claims_of(layout, self.names, with_objective=self.with_objective)
         decided = self._in_home(self.meant, is_reached=is_reached) if self.meant and closed.model.unknowns else []
         yield from self._proved(claims, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper), decided)

@@ -29,8 +29,8 @@ from ...statement.claims import (
     searched_claims,
 )
 from ...statement.machine import Legs, legs_of
-from ...statement.posed_layout import PoseCoordinates, closed_layout, design_layout, posed_layout, reach_claims
-from ...statement.tolerance import MachineLayout, built_model, machine_layout
+from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
+from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
 from ..premises import exact
 from ..proof_file import Premises, ProofError, workspace_numbers
 from .motion_matrix import turned_rotation
@@ -61,7 +61,14 @@ class Machines:
     """
 
     def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
-        self._case, self.model, self.root, self._at = case, model, root, _coordinates_of(root)
+        self._case, self.model, self.root = case, model, root
+
+        def rotation(turn: SX) -> SX:
+            """Return the rotation (3, 3) with coordinates (3, 1)."""
+            turned, scale = turned_rotation(root, ca.vertsplit(turn))
+            return turned / scale
+
+        self._at = PoseCoordinates(root.values, rotation, root.ball)
         tolerance = case.joint_centre_tolerance or 0.0
         self.symbols: MachineLayout = machine_layout(case, built_model(case.model), tolerance, self._at)
 
@@ -86,17 +93,6 @@ class Machines:
         first = sum((ca.sqrt(each + size**2) for each, size in zip(squares, small, strict=True)), SX(0))
         whole = claim.expression + sign * (self.symbols.tolerance * first + rest)
         return self.symbols.of(whole, SX.zeros(errors.numel()), pose)
-
-
-def _coordinates_of(root: PoseRoot) -> PoseCoordinates:
-    """Return the coordinates of a box of poses as those of a layout."""
-
-    def rotation(turn: SX) -> SX:
-        """Return the rotation (3, 3) with coordinates (3, 1)."""
-        turned, scale = turned_rotation(root, ca.vertsplit(turn))
-        return turned / scale
-
-    return PoseCoordinates(root.values, rotation, root.ball)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,23 +123,21 @@ class RobotClaims:
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
     """Return the robot of a case with fixed dimensions, and the claims about its reach, of which some are proved."""
     legs, closed, is_open = legs_of(case), closed_form(case.model), bool(case.model.unknowns)
-    root = pose_root(workspace)
     if case.joint_centre_tolerance:
         try:
-            machines = Machines(case, closed.model, root)
+            machines = Machines(case, closed.model, pose_root(workspace))
         except RobotError:
             pass
         else:
             layout, home = machines.symbols.layout, "the assembly of home" if is_open else ""
             reaches, _ = machines.symbols.claims(())
             return RobotClaims(legs, layout, closed.model, layout, tuple(reaches), home, machines)
-    at = _coordinates_of(root)
-    layout = posed_layout(case, at)
-    place, every = reach_claims(case, closed, at) if closed.reaches else (layout, ())
+    layout = posed_layout(case, workspace)
+    place, every = reach_claims(case, closed, workspace) if closed.reaches else (layout, ())
     if every and all(each.name in reached for each in every):
         partly = "every assembly in which limbs in closed form are as at home"
         numbers_at = partly if closed.model.unknowns else "the assembly of home"
-        return RobotClaims(legs, closed_layout(case, closed, at), closed.model, place, every, numbers_at)
+        return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, place, every, numbers_at)
     numbers_at = "every assembly" if is_open else ""
     return RobotClaims(legs, layout, closed.model, place, every, numbers_at)
 

@@ -31,11 +31,11 @@ from ....program.layout import Layout
 from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
 from ...statement.machine import JointErrors
-from ...statement.posed_layout import design_layout
 from ...statement.tolerance import (
     BuiltModel,
     MachineLayout,
     built_model,
+    design_layout,
     is_smooth,
     machine_layout,
     second_order_name,

@@ -23,7 +23,8 @@ from casadi import SX
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
-from ...statement.posed_layout import PoseCoordinates
+from ...statement.posed_layout import turn_about
+from ...statement.tolerance import PoseCoordinates
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -217,20 +218,11 @@ def _tangent(angle: float, outwards: float) -> float:
     return value + outwards * _TANGENT * abs(value)
 
 
-def _turn_about(about: int, cosine: SX, sine: SX, scale: SX | float = 1.0) -> SX:
-    """Return the rotation matrix (3, 3) about a coordinate axis times a scale, by which its cosine and sine are too."""
-    i, j = (about + 1) % 3, (about + 2) % 3
-    matrix = SX.eye(3) * scale
-    matrix[i, i] = matrix[j, j] = cosine
-    matrix[j, i], matrix[i, j] = sine, -sine
-    return matrix
-
-
 def rotation_of(box: PoseBox, turn: SX) -> SX:
     """Return the rotation (3, 3) with coordinates (3, 1) of a box."""
     if box.kind is TurnKind.ROLL_PITCH_YAW:
         factors = [2 / (1 + turn[k] * turn[k]) for k in range(3)]
-        about = [_turn_about(k, factor - 1, factor * turn[k]) for k, factor in enumerate(factors)]
+        about = [turn_about(k, factor - 1, factor * turn[k]) for k, factor in enumerate(factors)]
         return about[2] @ about[1] @ about[0]
     r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
     scaled = 2 / (1 + ca.sumsqr(r)) * r
@@ -243,7 +235,7 @@ def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
         turned, scale = SX.eye(3), SX(1)
         for k in range(3):
             one = 1 + turn[k] ** 2
-            turned, scale = _turn_about(k, 1 - turn[k] ** 2, 2 * turn[k], one) @ turned, one * scale
+            turned, scale = turn_about(k, 1 - turn[k] ** 2, 2 * turn[k], one) @ turned, one * scale
         return turned, scale
     return cayley_rotation(turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist()))
 
