@@ -1,11 +1,11 @@
 """Random mutants of the checker, the rules of searches and the evidence: which of them no test notices.
 
-    python bench/soundness/mutants.py --record [TESTS ...]        # which files each test file executes, and its time
+    python bench/soundness/mutants.py --record [TESTS ...]        # which functions each test calls, and its time
     python bench/soundness/mutants.py COUNT FIRST [JOURNAL]
 
-Mutants are made in a copy of the project below ``build/mutants``. A mutant is tried by the test files that execute a
-function of its file, the fastest first, until one fails or ``SECONDS`` have passed; C by the tests that execute the
-bindings of the kernel. Survivors are printed with their difference.
+Mutants are made in a copy of the project below ``build/mutants``. A mutant is tried by the tests that call the function
+it is in, the fastest first, and where none of these fails by the whole files that have such tests, until ``SECONDS``
+have passed; C by the tests that call the bindings of the kernel. Survivors are printed with their difference.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import subprocess
 import sys
 import sysconfig
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,22 +29,36 @@ from campaign import Row, campaign
 
 ROOT = Path(__file__).parents[2]
 COPY, MAP = ROOT / "build" / "mutants", ROOT / "build" / "mutants.json"
-SECONDS, LONGEST = 240.0, 120.0
+#: Seconds for tests that call a function, and for whole files; number of the first; seconds after which one hangs.
+SECONDS, MORE, FIRST_TESTS, HANGS = 120.0, 240.0, 80, 60
 FOLDERS = ("nlp/proof/checker", "nlp/proof/boxes", "nlp/proof/workspace", "nlp/evidence", "nlp/proof/enclosure/kernel")
-KERNEL = "nlp/proof/enclosure/_bounds"
+KERNEL, BINDINGS = "nlp/proof/enclosure/_bounds", "nlp/proof/enclosure/engine.py"
 RECORDER = """
-import atexit, json, os, sys, threading
-seen = set()
+import json, os, sys, threading, time
+import pytest
+top, seen, known, found = os.environ["MUTANTS_TOP"], set(), {}, {}
 def call(frame, event, argument):
-    code = frame.f_code
-    if code.co_name != "<module>" and code.co_filename not in seen:
-        seen.add(code.co_filename)
+    if event == "call":
+        code = frame.f_code
+        if code not in known:
+            name = os.path.realpath(code.co_filename)
+            known[code] = f"{os.path.relpath(name, top)}:{code.co_firstlineno}" if name.startswith(top) else ""
+        if known[code]:
+            seen.add(known[code])
 sys.setprofile(call)
 threading.setprofile(call)
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item, nextitem):
+    seen.clear()
+    began = time.perf_counter()
+    try:
+        return (yield)
+    finally:
+        found[item.nodeid] = {"seconds": time.perf_counter() - began, "calls": sorted(seen)}
 def pytest_unconfigure():
     sys.setprofile(None)
     with open(os.environ["MUTANTS_SEEN"], "w") as file:
-        json.dump(sorted(seen), file)
+        json.dump(found, file)
 """
 
 
@@ -195,23 +209,12 @@ def copied() -> None:
             (package / name).symlink_to(COPY / name)
 
 
-def tested(test: str, limit: float, *options: str, **more: str) -> tuple[str, float]:
-    """Return how a test file ended, ``passed``, ``failed`` or ``time``, and its seconds."""
+def tested(tests: Sequence[str], limit: float, *options: str, **more: str) -> tuple[str, float]:
+    """Return how tests ended, ``passed``, ``failed`` or ``time``, and their seconds."""
     began = time.perf_counter()
-    words = [
-        sys.executable,
-        "-P",
-        "-m",
-        "pytest",
-        "-q",
-        "-x",
-        "-m",
-        "not slow and not browser",
-        "-p",
-        "no:cacheprovider",
-        *options,
-        test,
-    ]
+    words = [sys.executable, "-P", "-m", "pytest", "-q", "-x", "-m", "not slow and not browser"]
+    words += ["-p", "no:cacheprovider", "-o", f"faulthandler_timeout={HANGS}"]
+    words += ["-o", "faulthandler_exit_on_timeout=true", *options, *tests]
     try:
         done = subprocess.run(
             words, cwd=COPY, env=environment() | more, capture_output=True, timeout=limit, check=False
@@ -223,7 +226,7 @@ def tested(test: str, limit: float, *options: str, **more: str) -> tuple[str, fl
 
 
 def record(tests: list[str]) -> None:
-    """Record which files the functions that each test file calls are in."""
+    """Record which functions each test calls."""
     copied()
     (COPY / "path" / "mutants_recorder.py").write_text(RECORDER, encoding="utf-8")
     known = json.loads(MAP.read_text(encoding="utf-8")) if MAP.exists() else {}
@@ -231,14 +234,47 @@ def record(tests: list[str]) -> None:
     seen = COPY / "seen.json"
     for test in tests or [each for each in every if each not in known]:
         seen.unlink(missing_ok=True)
-        outcome, seconds = tested(test, 900, "-p", "mutants_recorder", MUTANTS_SEEN=str(seen))
-        files = json.loads(seen.read_text(encoding="utf-8")) if seen.exists() else []
-        own = sorted(
-            {str(Path(each).resolve().relative_to(COPY)) for each in files if Path(each).resolve().is_relative_to(COPY)}
-        )
-        known[test] = {"outcome": outcome, "seconds": seconds, "files": own}
+        more = {"MUTANTS_SEEN": str(seen), "MUTANTS_TOP": f"{COPY}/"}
+        outcome, seconds = tested([test], 1800, "-p", "mutants_recorder", **more)
+        rows = json.loads(seen.read_text(encoding="utf-8")) if seen.exists() else {}
+        for row in rows.values():
+            row["calls"] = [each for each in row["calls"] if each.startswith((*FOLDERS, BINDINGS))]
+        known[test] = {"outcome": outcome, "seconds": seconds, "tests": rows}
         MAP.write_text(json.dumps(known), encoding="utf-8")
-        print(f"{test}: {outcome}, {seconds:.0f} s, {len(own)} files", flush=True)
+        print(f"{test}: {outcome}, {seconds:.0f} s, {len(rows)} tests", flush=True)
+
+
+def reached(name: str, source: str, at: int) -> tuple[list[str], list[str]]:
+    """Return the tests that call the function at a place of a file, the fastest first, and the files they are in.
+
+    Where no function is at the place, or no test calls it, any test that calls a function of the file counts.
+    """
+    known = {
+        test: each for test, each in json.loads(MAP.read_text(encoding="utf-8")).items() if each["outcome"] == "passed"
+    }
+    lines = set()
+    if name.endswith(".py"):
+        line = source.count("\n", 0, at) + 1
+        around = [
+            (min([each.lineno, *(above.lineno for above in each.decorator_list)]), each.end_lineno or 0)
+            for each in ast.walk(ast.parse(source))
+            if isinstance(each, ast.FunctionDef)
+        ]
+        inner = [first for first, last in around if first <= line <= last]
+        lines = {f"{name}:{max(inner)}"} if inner else set()
+    name = name if name.endswith(".py") else BINDINGS
+    for wanted in (lambda call: call in lines, lambda call: call.startswith(f"{name}:")):
+        found = sorted(
+            (row["seconds"], test)
+            for each in known.values()
+            for test, row in each["tests"].items()
+            if any(map(wanted, row["calls"]))
+        )
+        if found:
+            break
+    tests = [test for _, test in found]
+    files = {test.partition("::")[0] for test in tests}
+    return tests, sorted(files, key=lambda each: known[each]["seconds"])
 
 
 def compiled() -> bool:
@@ -275,32 +311,22 @@ def examine(seed: int) -> Row:
     mutant = source[: change.start] + change.text + source[change.end :]
     difference = "".join(difflib.unified_diff(source.splitlines(True), mutant.splitlines(True), name, name, n=1))
     room = f"{'C' if is_c else 'Python'}, {next(each for each in FOLDERS if name.startswith(each))}"
-    known = json.loads(MAP.read_text(encoding="utf-8"))
-    reached = "nlp/proof/enclosure/engine.py" if is_c else name
-    tests = sorted(
-        (each["seconds"], test)
-        for test, each in known.items()
-        if reached in each["files"] and each["outcome"] == "passed"
-    )
-    began, outcome = time.perf_counter(), "survived"
+    tests, whole = reached(name, source, change.start)
+    outcome = "no test calls it"
     (COPY / name).write_text(mutant, encoding="utf-8")
     try:
         if is_c and not compiled():
             return {"counts": {f"{room}: does not compile": 1}, "faults": []}
-        for _, test in tests:
-            left = SECONDS - (time.perf_counter() - began)
-            if left <= 0:
-                outcome = "no time left"
-                break
-            ended, _ = tested(test, min(left, LONGEST))
-            if ended != "passed":
-                outcome = "noticed" if ended == "failed" else "hangs or no time left"
+        for some, limit in ((tests[:FIRST_TESTS], SECONDS), (whole, MORE)):
+            ended, _ = tested(some, limit) if some else ("", 0.0)
+            outcome = {"failed": "noticed", "passed": "survived", "time": "no time left"}.get(ended, outcome)
+            if outcome == "noticed":
                 break
     finally:
         (COPY / name).write_text(source, encoding="utf-8")
         if is_c:
             compiled()
-    faults = [f"{outcome} {len(tests)} test files:\n{difference}"] if outcome in ("survived", "no time left") else []
+    faults = [] if outcome == "noticed" else [f"{outcome}; {len(tests)} tests, {len(whole)} files:\n{difference}"]
     return {"counts": {f"{room}: {outcome}": 1}, "faults": faults}
 
 
