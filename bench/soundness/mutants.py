@@ -4,8 +4,8 @@
     python bench/soundness/mutants.py COUNT FIRST [JOURNAL]
 
 Mutants are made in a copy of the project below ``build/mutants``. A mutant is tried by the tests that call the function
-it is in, the fastest first, and where none of these fails by the whole files that have such tests, until ``SECONDS``
-have passed; C by the tests that call the bindings of the kernel. Survivors are printed with their difference.
+it is in, the fastest first, until one fails or ``SECONDS`` have passed; C by the tests that call the bindings of the
+kernel. Survivors are printed with their difference.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from campaign import Row, campaign
 
 ROOT = Path(__file__).parents[2]
 COPY, MAP = ROOT / "build" / "mutants", ROOT / "build" / "mutants.json"
-#: Seconds for tests that call a function, and for whole files; number of the first; seconds after which one hangs.
-SECONDS, MORE, FIRST_TESTS, HANGS = 120.0, 240.0, 80, 60
+#: Seconds for the tests of a mutant, and seconds after which a test hangs.
+SECONDS, HANGS = 150.0, 60
 FOLDERS = ("nlp/proof/checker", "nlp/proof/boxes", "nlp/proof/workspace", "nlp/evidence", "nlp/proof/enclosure/kernel")
 KERNEL, BINDINGS = "nlp/proof/enclosure/_bounds", "nlp/proof/enclosure/engine.py"
 RECORDER = """
@@ -244,8 +244,8 @@ def record(tests: list[str]) -> None:
         print(f"{test}: {outcome}, {seconds:.0f} s, {len(rows)} tests", flush=True)
 
 
-def reached(name: str, source: str, at: int) -> tuple[list[str], list[str]]:
-    """Return the tests that call the function at a place of a file, the fastest first, and the files they are in.
+def reached(name: str, source: str, at: int) -> list[str]:
+    """Return the tests that call the function at a place of a file, the fastest first.
 
     Where no function is at the place, or no test calls it, any test that calls a function of the file counts.
     """
@@ -272,9 +272,7 @@ def reached(name: str, source: str, at: int) -> tuple[list[str], list[str]]:
         )
         if found:
             break
-    tests = [test for _, test in found]
-    files = {test.partition("::")[0] for test in tests}
-    return tests, sorted(files, key=lambda each: known[each]["seconds"])
+    return [test for _, test in found]
 
 
 def compiled() -> bool:
@@ -311,22 +309,20 @@ def examine(seed: int) -> Row:
     mutant = source[: change.start] + change.text + source[change.end :]
     difference = "".join(difflib.unified_diff(source.splitlines(True), mutant.splitlines(True), name, name, n=1))
     room = f"{'C' if is_c else 'Python'}, {next(each for each in FOLDERS if name.startswith(each))}"
-    tests, whole = reached(name, source, change.start)
+    tests = reached(name, source, change.start)
     outcome = "no test calls it"
     (COPY / name).write_text(mutant, encoding="utf-8")
     try:
         if is_c and not compiled():
             return {"counts": {f"{room}: does not compile": 1}, "faults": []}
-        for some, limit in ((tests[:FIRST_TESTS], SECONDS), (whole, MORE)):
-            ended, _ = tested(some, limit) if some else ("", 0.0)
-            outcome = {"failed": "noticed", "passed": "survived", "time": "no time left"}.get(ended, outcome)
-            if outcome == "noticed":
-                break
+        if tests:
+            ended, _ = tested(tests, SECONDS)
+            outcome = {"failed": "noticed", "passed": "survived", "time": "no time left"}[ended]
     finally:
         (COPY / name).write_text(source, encoding="utf-8")
         if is_c:
             compiled()
-    faults = [] if outcome == "noticed" else [f"{outcome}; {len(tests)} tests, {len(whole)} files:\n{difference}"]
+    faults = [] if outcome == "noticed" else [f"{outcome}; {len(tests)} tests:\n{difference}"]
     return {"counts": {f"{room}: {outcome}": 1}, "faults": faults}
 
 
