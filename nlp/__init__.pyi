@@ -3,22 +3,22 @@
 __version__: str
 
 from .case.case import Case as Case
-from .case.limits.actuator_rate import ActuatorRate as ActuatorRate
 from .case.limits.clearance import LegClearance as LegClearance
-from .case.limits.joint_cone import JointCone as JointCone
+from .case.limits.clearance import LinkClearance as LinkClearance
+from .case.limits.joint_motion import JointCone as JointCone
+from .case.limits.joint_motion import JointMotion as JointMotion
 from .case.limits.joints import BaseJointAngle as BaseJointAngle
 from .case.limits.joints import MountingPose as MountingPose
 from .case.limits.joints import PlatformJointAngle as PlatformJointAngle
 from .case.limits.legs import Actuator as Actuator
 from .case.limits.legs import LegLength as LegLength
 from .case.limits.limits import Limits as Limits
-from .case.limits.link_clearance import LinkClearance as LinkClearance
-from .case.limits.motions import JointMotion as JointMotion
 from .case.limits.plates import Footprint as Footprint
 from .case.limits.plates import JointSpacing as JointSpacing
 from .case.limits.plates import RadiusRatio as RadiusRatio
 from .case.limits.quantity import QuantityLimit as QuantityLimit
-from .case.limits.rate_share import RateShare as RateShare
+from .case.limits.rates import ActuatorRate as ActuatorRate
+from .case.limits.rates import RateShare as RateShare
 from .case.limits.relation import Relations as Relations
 from .case.limits.singular_values import ConditionNumber as ConditionNumber
 from .case.limits.singular_values import SmallestSingularValue as SmallestSingularValue

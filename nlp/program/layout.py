@@ -39,8 +39,7 @@ from ...models import (
 )
 from ...models.instance import sizes_at
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, Constraint, Reading, squared
-from ..case.limits.pairs import PairFamily
+from ..case.limits.constraint import BoundedConstraint, Constraint, PairFamily, Reading, squared
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Task
 from ..errors import CaseError

@@ -15,9 +15,8 @@ from casadi import SX
 
 from ...models import RobotInstance
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint
+from ..case.limits.constraint import BoundedConstraint, PairFamily
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
-from ..case.limits.pairs import PairFamily
 from ..case.pose import Free
 from ..errors import CaseError
 from .repeated import without_repeated

@@ -154,11 +154,11 @@ class BoundedConstraint:
     upper: float
 
 
-def bounded(
+def between(
     name: str,
     expression: SX | Call,
     reading: Reading,
-    keys: tuple[str, str],
+    key: str | tuple[str, str],
     *,
     lower: float | None = None,
     upper: float | None = None,
@@ -172,46 +172,38 @@ def bounded(
         name: in the words of a case.
         expression: (1, 1), or the call whose value it is; it grows with the measured number.
         reading: how its bounds read.
-        keys: dotted keys below ``limits`` of the lower and of the upper number; empty where there is none.
+        key: dotted key below ``limits`` of the table whose ``min`` and ``max`` the numbers are; or the dotted keys of
+            the lower and of the upper number, empty where there is none.
         lower: the lower number, radians for an angle; None where there is none.
         upper: likewise.
         exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
         measure: the measured number itself, where the expression only estimates it.
         spectral: the matrix that the expression is made from, where it estimates eigenvalues.
     """
+    if isinstance(key, str):
+        key = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")
     value, call = (expression.value, expression) if isinstance(expression, Call) else (expression, None)
     return BoundedConstraint(
-        Constraint(name, value, reading, keys, exact=exact, measure=measure, spectral=spectral, call=call),
+        Constraint(name, value, reading, key, exact=exact, measure=measure, spectral=spectral, call=call),
         -math.inf if lower is None else float(reading.to_value(SX(lower))),
         math.inf if upper is None else float(reading.to_value(SX(upper))),
     )
 
 
-def between(
-    name: str,
-    expression: SX | Call,
-    reading: Reading,
-    key: str,
-    *,
-    lower: float | None = None,
-    upper: float | None = None,
-    exact: SX | None = None,
-    measure: JacobianMeasure | None = None,
-    spectral: Spectral | None = None,
-) -> BoundedConstraint:
-    """Return a constraint whose numbers are written as ``key.min`` and ``key.max``.
+@dataclass(frozen=True, eq=False)
+class PairFamily:
+    """Constraints of one form on every ordered pair of N values, such as the lengths of a leg at several poses.
 
-    The other arguments are those of :func:`bounded`.
+    There are as many pairs as the square of N, and few of them can bind. A program starts with none of many pairs, and
+    gets a pair where a point would violate it: :mod:`screwsynth.nlp.program.pairs`.
+
+    Attributes:
+        values: (N, 1) the values, N >= 2.
+        pair: the constraints on two values, by their indices. They are the tightest where the first value is the
+            smallest and the second the largest of all.
+        slack: least distance to a limit, as a number, of a first and a second value; negative where it is violated.
     """
-    keys = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")
-    return bounded(
-        name,
-        expression,
-        reading,
-        keys,
-        lower=lower,
-        upper=upper,
-        exact=exact,
-        measure=measure,
-        spectral=spectral,
-    )
+
+    values: SX
+    pair: Callable[[int, int], tuple[BoundedConstraint, ...]]
+    slack: Callable[[float, float], float]

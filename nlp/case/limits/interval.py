@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar
 
 from pydantic import Field, FiniteFloat
 
-from ....models import Dimension, Model
 from ...errors import CaseError
-from ...units import Units
 from ..table import Table
-from ..toml import TomlValue
-from .limit import Limit, LimitedCase, Written
+from .limit import Limit, LimitedCase, NumberRange, Ranges
 
 
 class IntervalTable(Table):
@@ -47,26 +43,12 @@ class LowerLimit(Limit[AtLeast], abc.ABC):
     min: float
 
     table: ClassVar[type[Table]] = AtLeast
-
-    @classmethod
-    def from_table(cls, written: Written[AtLeast]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.min)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse a value that is not positive.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number(f"{self.key}.min", self.min)
+    numbers: ClassVar[Ranges] = {"min": NumberRange()}
 
 
-class Sides(NamedTuple):
-    """The smallest and the largest value of an interval; None where a side is not limited."""
-
-    min: float | None
-    max: float | None
+def two_sided(allowed: NumberRange) -> Ranges:
+    """Return the ranges of the numbers of an interval, both the same."""
+    return {"min": allowed, "max": allowed}
 
 
 @dataclass(frozen=True)
@@ -76,8 +58,6 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
     Attributes:
         min: smallest value; None where there is none.
         max: largest value; None where there is none.
-        measured: dimension of both.
-        above: both must be larger than this.
     """
 
     _: KW_ONLY
@@ -85,23 +65,7 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
     max: float | None = None
 
     table: ClassVar[type[Table]] = IntervalTable
-    measured: ClassVar[Dimension] = Dimension.LENGTH
-    above: ClassVar[float] = 0.0
-
-    @classmethod
-    def from_table(cls, written: Written[IntervalTable]) -> Self:
-        """Return the limit that a case file writes."""
-        smallest, largest = sides(written, cls.measured)
-        return cls(min=smallest, max=largest)
-
-    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:
-        """Return the keys of ``[limits]`` that state this limit."""
-        dimension, ends = self.dimension(model), {"min": self.min, "max": self.max}
-        return {self.name: {name: units.written(value, dimension) for name, value in ends.items() if value is not None}}
-
-    def dimension(self, model: Model) -> Dimension:  # noqa: ARG002 - most limits measure the same on every robot
-        """Return the dimension of the measured quantity."""
-        return self.measured
+    numbers: ClassVar[Ranges] = two_sided(NumberRange())
 
     def check(self, case: LimitedCase) -> None:
         """Refuse an interval without sides, with a side out of its range, or with crossed sides.
@@ -109,19 +73,11 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
         Raises:
             CaseError: in the words of a case file.
         """
-        key, dimension = f"limits.{self.name}", self.dimension(case.model)
-        case.check_number(f"{self.name}.min", self.min, dimension, above=self.above)
-        case.check_number(f"{self.name}.max", self.max, dimension, above=self.above)
+        key = f"limits.{self.name}"
         if self.min is None and self.max is None:
             raise CaseError(key, "must have min, max, or both")
+        super().check(case)
         if self.min is not None and self.max is not None and not self.min < self.max:
+            dimension = self.ranges(case.model)["min"].dimension
             fault = f"must be below max = {case.units.text(self.max, dimension)}"
             raise CaseError(f"{key}.min", fault, case.units.shown(self.min, dimension))
-
-
-def sides(written: Written[IntervalTable], dimension: Dimension) -> Sides:
-    """Return both sides of an interval that a case file writes, as computations use them."""
-    lower, upper = (
-        None if side is None else written.internal(side, dimension) for side in (written.value.min, written.value.max)
-    )
-    return Sides(lower, upper)

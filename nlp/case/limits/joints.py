@@ -32,10 +32,12 @@ from ..table import Table, Vector
 from ..toml import TomlValue
 from .constraint import BoundedConstraint, Reading, between
 from .form import Call, Form
-from .limit import Limit, LimitedCase, Measures, PosedRobot, TableField, Written
+from .limit import Limit, LimitedCase, Measures, NumberRange, PosedRobot, TableField, Written
 
 #: Three numbers.
 Triple: TypeAlias = tuple[float, float, float]
+#: Range of the half angle of a cone.
+HALF_ANGLE = NumberRange(Dimension.ANGLE, most=math.pi)
 #: A direction (3, 1) in another frame, with the platform's rotation (3, 3).
 Turn: TypeAlias = Callable[[SX, SX], SX]
 
@@ -195,7 +197,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         Raises:
             CaseError: in the words of a case file.
         """
-        case.check_number(f"{self.key}.max", self.max, Dimension.ANGLE, most=math.pi)
+        case.check_number(f"{self.key}.max", self.max, HALF_ANGLE)
         if self.about is None:
             return
         key, legs = f"limits.{self.key}.about", len(case.model.legs)

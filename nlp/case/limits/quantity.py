@@ -11,8 +11,8 @@ from ....models import Dimension, Model, Quantity
 from ...units import Units
 from ..table import Table
 from .constraint import BoundedConstraint, Reading, between
-from .interval import IntervalLimit, IntervalTable, sides
-from .limit import PosedRobot, TableField, Written
+from .interval import IntervalLimit, IntervalTable, two_sided
+from .limit import NumberRange, PosedRobot, Ranges, TableField, Written
 
 
 def quantity_named(name: str, model: Model) -> Quantity | None:
@@ -31,7 +31,6 @@ class QuantityLimit(IntervalLimit):
     measure: str
 
     key: ClassVar[str] = ""
-    above: ClassVar[float] = -math.inf
     order: ClassVar[int] = 1
 
     @classmethod
@@ -50,20 +49,17 @@ class QuantityLimit(IntervalLimit):
     @classmethod
     def from_table(cls, written: Written[IntervalTable]) -> Self:
         """Return the limit that a case file writes."""
-        quantity = quantity_named(written.key, written.model)
-        dimension = Dimension.NUMBER if quantity is None else quantity.dimension
-        smallest, largest = sides(written, dimension)
-        return cls(written.key, min=smallest, max=largest)
+        return cls(written.key, **written.numbers(cls(written.key).ranges(written.model)))
 
     @property
     def name(self) -> str:
         """Name of the measure."""
         return self.measure
 
-    def dimension(self, model: Model) -> Dimension:
-        """Return the dimension of the measure; that of a pure number where the robot lacks the measure."""
+    def ranges(self, model: Model) -> Ranges:
+        """Return the range of both numbers; that of pure numbers where the robot lacks the measure."""
         quantity = quantity_named(self.measure, model)
-        return Dimension.NUMBER if quantity is None else quantity.dimension
+        return two_sided(NumberRange(Dimension.NUMBER if quantity is None else quantity.dimension, above=-math.inf))
 
     def exists_for(self, model: Model) -> bool:
         """Return whether the robot has the measure."""

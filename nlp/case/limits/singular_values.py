@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import casadi as ca
 import numpy as np
@@ -21,7 +21,7 @@ from pydantic import Field, FiniteFloat
 from ....models import Dimension, FloatArray, homogenised
 from ..table import Table
 from .constraint import SQUARED_NUMBER, BoundedConstraint, End, Reading, Spectral, between
-from .limit import Limit, LimitedCase, PosedRobot, Written
+from .limit import Limit, NumberRange, PosedRobot, Ranges
 from .spectrum import largest_eigenvalue, smallest_eigenvalue
 
 
@@ -68,20 +68,7 @@ class SmallestSingularValue(Limit[SmallestTable]):
     key: ClassVar[str] = "smallest_singular_value"
     table: ClassVar[type[Table]] = SmallestTable
     description: ClassVar[str] = "of the same J"
-
-    @classmethod
-    def from_table(cls, written: Written[SmallestTable]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.min, written.value.length)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse a value or a length that is not positive.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number("smallest_singular_value.min", self.min, Dimension.NUMBER)
-        case.check_number("smallest_singular_value.length", self.length)
+    numbers: ClassVar[Ranges] = {"min": NumberRange(Dimension.NUMBER), "length": NumberRange()}
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the smallest eigenvalue of ``J'J``."""
@@ -119,21 +106,11 @@ class ConditionNumber(Limit[ConditionTable]):
     key: ClassVar[str] = "condition_number"
     table: ClassVar[type[Table]] = ConditionTable
     description: ClassVar[str] = "of J, made homogeneous by a length"
+    numbers: ClassVar[Ranges] = {
+        "max": NumberRange(Dimension.NUMBER, above=1.0),
+        "length": NumberRange(),
+    }
     order: ClassVar[int] = 1
-
-    @classmethod
-    def from_table(cls, written: Written[ConditionTable]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.max, written.value.length)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse a ratio that is not above 1, or a length that is not positive.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number("condition_number.max", self.max, Dimension.NUMBER, above=1.0)
-        case.check_number("condition_number.length", self.length)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return minus the ratio of the smallest to the largest eigenvalue of ``J'J``."""

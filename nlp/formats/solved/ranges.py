@@ -42,8 +42,8 @@ def joint_range(
     if not case.limits or joint.kind in ("S", "weld") or words.follows:
         return None
     # The classes of limits need pydantic, which a case without limits does not load.
+    from ...case.limits.joint_motion import JointMotion  # noqa: PLC0415
     from ...case.limits.legs import LegLength  # noqa: PLC0415
-    from ...case.limits.motions import JointMotion  # noqa: PLC0415
     from ...case.limits.quantity import QuantityLimit  # noqa: PLC0415
 
     is_slide = joint.kind == "P"
