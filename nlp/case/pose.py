@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ...models import Displacement, axis_from_screw, screw_displacement
+from ...models import Dimension, Displacement, axis_from_screw, screw_displacement
+from ..units import Units
 from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from .schema import Range
+    from .toml import TomlValue
+    from .wholeschema import SpanTable
 
 
 #: Largest angle of a rotation about a free axis. Its variables are a quaternion's vector part, which is a smooth
@@ -45,6 +50,26 @@ class Free:
 
 
 Value: TypeAlias = float | Free
+
+
+def internal_value(written: float | Range | SpanTable, units: Units, dimension: Dimension) -> Value:
+    """Return a fixed or free number of a case file, radians for an angle."""
+    if isinstance(written, float | int):
+        return units.to_internal(written, dimension)
+    start = getattr(written, "start", None)  # which a range of poses does not have
+    return Free(
+        units.to_internal(written.min, dimension),
+        units.to_internal(written.max, dimension),
+        None if start is None else units.to_internal(start, dimension),
+    )
+
+
+def written_value(value: Value, units: Units, dimension: Dimension) -> TomlValue:
+    """Return a fixed or free number in the case's unit, the inverse of :func:`internal_value`."""
+    if not isinstance(value, Free):
+        return units.written(value, dimension)
+    ends = {"min": value.lower, "max": value.upper, "start": value.start}
+    return {key: None if end is None else units.written(end, dimension) for key, end in ends.items()}
 
 
 def ends_of(value: Value) -> tuple[float, float]:

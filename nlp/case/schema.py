@@ -35,7 +35,7 @@ from .task import Task
 
 if TYPE_CHECKING:
     from .limits.registry import LimitsTable
-    from .workspacetable import WorkspaceTable
+    from .wholeschema import WorkspaceTable
 else:
     # A document that states neither has nothing at these keys.
     LimitsTable = WorkspaceTable = NoneType

@@ -17,7 +17,7 @@ from ....models.joints.mechanisms import mechanism_at_home
 from ....models.limbjoints import LimbJoint
 from ....models.mechanism import Mechanism
 from ....models.mechanism.closing import ClosedMechanism, close, closed_near
-from ...case.plain import plain_value
+from ...case.toml import plain_value
 from ...errors import InputError
 from .links import framed, renamed
 from .words import ExportedJoint, RobotMechanism, clean_name, unique_names
