@@ -14,9 +14,17 @@ from .case import Case
 from .csvrows import TableOrigins, insert_rows
 from .displacements import read_displacements
 from .limits.limits import Limits
-from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
 from .overrides import Settings, override_number
-from .pose import OverPoses, Pose, Rotation, Value, internal_value
+from .pose import (
+    OverPoses,
+    Pose,
+    Rotation,
+    Value,
+    internal_value,
+    rotation_from_matrix,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
 from .robots import insert_robot_file, model_of_table
 from .schema import (
     Document,

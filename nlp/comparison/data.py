@@ -10,7 +10,7 @@ from ...models import frozen_array
 from ..case.case import Case
 from ..case.pose import Free
 from ..errors import CaseError
-from ..program.designnumbers import design_names
+from ..program.program import design_names
 from ..results.comparison import (
     ComparedDimensionData,
     ComparedLimitData,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...models import Model, model_names
 from ..case.case import Case
-from ..case.robotfile.reader import model_of_definition, read_definition
+from ..case.robotfile import model_of_definition, read_definition
 from ..case.robots import build_model
 from ..errors import CaseError, InputError, nearest
 

@@ -20,10 +20,9 @@ from ..case.limits.constraint import BoundedConstraint, Constraint, Reading, in_
 from ..case.pose import Free, OverPoses
 from ..case.task import Sense
 from ..errors import InputError, listing
-from ..program.assembly import assemble
 from ..program.epigraph import total_over_poses
 from ..program.formulation import formulate
-from ..program.layout import Layout, lay_out
+from ..program.layout import Layout, assemble, lay_out
 from ..program.nlp import Nlp
 from .goals import Goal
 

@@ -30,8 +30,7 @@ from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
 from ..case.limits.form import Call, Form
 from ..case.pose import Free, OverPoses
 from ..case.task import Sense
-from .assembly import assemble
-from .layout import Layout, lay_out
+from .layout import Layout, assemble, lay_out
 from .nlp import Nlp
 from .places import Epigraph
 from .sampling import starting_points

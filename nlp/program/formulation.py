@@ -22,9 +22,8 @@ from ..case.case import Case
 from ..case.limits.form import Call, Form
 from ..case.pose import OverPoses
 from ..case.task import Sense
-from .assembly import assemble
 from .epigraph import formulate_worst_pose, weighted_total
-from .layout import Layout, lay_out
+from .layout import Layout, assemble, lay_out
 from .nlp import Nlp
 from .places import Scalar
 from .program import Program

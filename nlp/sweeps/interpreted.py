@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ..errors import CaseError, InputError, UncoveredError
 from ..evidence.optimality import Evidence
-from ..program.designnumbers import design_indices
+from ..program.program import design_indices
 from ..solver.certified import Certified, certify
 from ..solver.solution import Solution
 from ..solver.solve import solve

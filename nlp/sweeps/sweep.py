@@ -16,8 +16,8 @@ import numpy as np
 
 from .. import __version__
 from ..interruption import is_interrupted, is_requested, one_call, seconds_left
-from ..program.designnumbers import design_indices
 from ..program.formulation import formulate
+from ..program.program import design_indices
 from .cluster import answer_on_cluster
 from .engines import EngineKind, Job, answer, choose_engine, compiled_engine
 from .journal import ENDING, Journal

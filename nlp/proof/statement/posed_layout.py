@@ -20,8 +20,7 @@ from ...case.limits.limits import Limits
 from ...case.pose import HERE, Pose, Rotation, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Workspace
-from ...program.assembly import assemble
-from ...program.layout import Layout, StatedPoseSymbols, lay_out
+from ...program.layout import Layout, StatedPoseSymbols, assemble, lay_out
 from ...program.nlp import Nlp
 from ...program.places import SymbolTable
 from ...program.sampling import starting_points
