@@ -46,11 +46,11 @@ from .comparison.compare import compare as compare
 from .comparison.data import comparison_result as comparison_result
 from .comparison.entry import Entry as Entry
 from .embedding.codegen import generate_c as generate_c
-from .embedding.folder import CompiledLimit as CompiledLimit
-from .embedding.folder import CompiledNumber as CompiledNumber
 from .embedding.library import CompiledCase as CompiledCase
 from .embedding.library import CompiledSolutions as CompiledSolutions
 from .embedding.library import load_compiled as load_compiled
+from .embedding.manifest import CompiledLimit as CompiledLimit
+from .embedding.manifest import CompiledNumber as CompiledNumber
 from .errors import CaseError as CaseError
 from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError
@@ -74,8 +74,8 @@ from .formats.export import export_robot as export_robot
 from .front.data import front_result as front_result
 from .front.front import Front as Front
 from .front.front import FrontPoint as FrontPoint
+from .front.front import pareto as pareto
 from .front.goals import Goal as Goal
-from .front.pareto import pareto as pareto
 from .output.notebook import Picture as Picture
 from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of
@@ -121,5 +121,5 @@ from .solver.tradeoff import Tradeoff as Tradeoff
 from .solver.tradeoff import TradeoffPoint as TradeoffPoint
 from .solver.tradeoff import tradeoff as tradeoff
 from .sweeps.columns import SweepColumns as SweepColumns
-from .sweeps.data import sweep_result as sweep_result
+from .sweeps.columns import sweep_result as sweep_result
 from .units import Units as Units

@@ -130,8 +130,7 @@ def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> N
     """Write a sweep as JSON and as a page."""
     from ..output.files import write_text
     from ..output.sweeptable import table_rows
-    from ..sweeps.columns import columns_of
-    from ..sweeps.data import sweep_result
+    from ..sweeps.columns import columns_of, sweep_result
 
     case, columns = found.source.case_at(found.points.settings(0)), columns_of(found, table_rows(out, found))
     if json_file is not None:

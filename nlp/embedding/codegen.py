@@ -27,9 +27,9 @@ from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
-from .casaditext import for_controllers
 from .ctext import (
     comment_text,
+    for_controllers,
     identifier,
     index_macros,
     integer_table,
@@ -39,15 +39,12 @@ from .ctext import (
     string_table,
     version_texts,
 )
-from .held import held_by_fixed_numbers, held_texts
 from .loops import find_loops
-from .looptext import casadi_work, loop_texts, loop_work
 from .manifest import MANIFEST, manifest_text
-from .measured import NOT_MEASURED
-from .runtimelimits import limit_texts, run_time_limits
-from .stages import StagedFunctions, stage_functions
-from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words
-from .turns import turning_joints
+from .measure import NOT_MEASURED
+from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
+from .stages import StagedFunctions, casadi_work, loop_texts, loop_work, stage_functions
+from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words, turning_joints
 from .unitdata import UnitData
 from .worstcase import worst_case_texts
 

@@ -33,7 +33,7 @@ class Goal:
     @property
     def sign(self) -> float:
         """Factor that turns the goal into one to be minimised."""
-        return -1.0 if self.sense is Sense.MAX else 1.0
+        return -self.sense.sign
 
 
 def read_goals(texts: Sequence[str], case: Case) -> tuple[Goal, ...]:

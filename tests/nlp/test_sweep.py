@@ -20,7 +20,7 @@ from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.results.sweep import SweepResult
-from screwsynth.nlp.sweeps import cluster
+from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
 from screwsynth.nlp.sweeps.journal import Journal
 from screwsynth.nlp.sweeps.points import Points, grid
@@ -386,7 +386,7 @@ def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Pa
 @pytest.mark.slow
 def test_an_unreachable_cluster(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "_WAIT", 0.2)
+    monkeypatch.setattr(workers, "_WAIT", 0.2)
     out = tmp_path / "out.csv"
     code, _, err = cli("sweep", CASE, *OVER, "--dask", "tcp://127.0.0.1:9", "--out", str(out))
     assert (code, out.exists()) == (2, False)
