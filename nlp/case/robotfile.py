@@ -19,8 +19,7 @@ from ...models.joints import RobotError
 from ...models.joints.words import NESTED_BRANCH
 from ..errors import CaseError, InputError
 from ..system.reading import read_limited
-from .faults import case_error
-from .table import Table, Vector
+from .table import Table, Vector, case_error
 
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Expression = Annotated[

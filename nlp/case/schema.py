@@ -28,9 +28,8 @@ from pydantic_core import PydanticCustomError
 from ..errors import listing
 from ..units import Units
 from .case import Case
-from .faults import case_error
 from .settings import Expectation, Published, Search
-from .table import Table, Vector
+from .table import Table, Vector, case_error
 from .task import Task
 
 if TYPE_CHECKING:

@@ -80,31 +80,18 @@ def _lines(case: Case) -> Iterator[str]:
     yield from toml_table("[tolerance]", {"joint_centre": case.joint_centre_tolerance})
     if case.workspace is not None:
         yield from toml_table("[workspace]", case.workspace.to_keys(case.units))
-    search, default = case.search, Search()
-    settings: dict[str, int] = {"starts": search.starts, "seed": search.seed, "max_iterations": search.max_iterations}
-    settings["screen"] = search.screen
-    yield from toml_table("[solve]", {key: value for key, value in settings.items() if value != getattr(default, key)})
+    settings = {key: getattr(case.search, key) for key in ("starts", "seed", "max_iterations", "screen")}
+    yield from toml_table("[solve]", {key: each for key, each in settings.items() if each != getattr(Search, key)})
     yield from _expectation(case.expect)
     for row in case.published:
-        table: dict[str, TomlValue | None] = {
-            "quantity": row.quantity,
-            "value": row.value[0] if len(row.value) == 1 else row.value,
-            "source": row.source,
-            "reproduced": row.reproduced,
-            "because": row.because or None,
-            "decimals": row.decimals,
-            "over": row.over,
-        }
-        yield from toml_table("[[published]]", table)
+        value = row.value[0] if len(row.value) == 1 else row.value
+        yield from toml_table("[[published]]", {**vars(row), "value": value, "because": row.because or None})
 
 
 def _expectation(expect: Expectation) -> Iterator[str]:
     tolerance = expect.tolerance if expect.tolerance != Expectation.tolerance else None
     yield from toml_table("[expect]", {"F": expect.F, "tolerance": tolerance, "singular": expect.singular})
-    rows: list[dict[str, TomlValue | None]] = [
-        {"quantity": row.quantity, "value": row.value, "within": row.within} for row in expect.values
-    ]
-    yield from toml_tables("[[expect.value]]", rows)
+    yield from toml_tables("[[expect.value]]", map(vars, expect.values))
 
 
 def _direction(unit: FloatArray) -> list[float]:

@@ -14,8 +14,8 @@ from ..evidence.assembly import Assembly, assembly_over_poses
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.workingmode import turned_over_poses
 from ..program.nlp import Nlp
-from .phase import Phase, PhaseProgress
 from .starts import SAME_POINT, Start, StartStatus
+from .status import Phase, PhaseProgress
 
 #: Two optima have the same F when it differs by less than this part of F's scale.
 SAME_VALUE = 1e-9

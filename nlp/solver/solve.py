@@ -18,8 +18,8 @@ from .compromise import combine, solution_of_one_task
 from .interface import Solver
 from .ipopt import ipopt
 from .multistart import ProgramSolution, solve_program
-from .phase import Phase, PhaseProgress, no_phase
 from .solution import Solution
+from .status import Phase, PhaseProgress, no_phase
 
 #: Called after each start with the task or method that is being solved, the number of starts done, the number of all,
 #: and the best objective so far.
