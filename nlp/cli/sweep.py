@@ -78,7 +78,7 @@ def sweep(
     from ..output.files import check_outputs
     from ..output.sweeptable import check_table, is_written, write_table
     from ..sweeps.engines import EngineKind
-    from ..sweeps.source import CaseSource
+    from ..sweeps.points import CaseSource
     from ..sweeps.sweep import Sweep, run_sweep
 
     kinds = {kind.value: kind for kind in EngineKind}

@@ -40,12 +40,11 @@ from .ctext import (
     version_texts,
 )
 from .loops import find_loops
-from .manifest import MANIFEST, manifest_text
+from .manifest import MANIFEST, UnitData, manifest_text
 from .measure import NOT_MEASURED
 from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
 from .stages import StagedFunctions, casadi_work, loop_texts, loop_work, stage_functions
 from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words, turning_joints
-from .unitdata import UnitData
 from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"

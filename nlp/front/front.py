@@ -30,8 +30,7 @@ from ..proof.certificate.certificate import Certificate
 from ..proof.enclosure.engine import kernel
 from ..solver.multistart import ProgramSolution, solve_program
 from .boxes import GoalBox, Region
-from .goals import Goal, read_goals
-from .programs import GoalProgram, loosest_numbers, program_of
+from .goals import Goal, GoalProgram, loosest_numbers, program_of, read_goals
 
 #: Points of a front where no number is asked for.
 POINTS = 16

@@ -26,8 +26,7 @@ from casadi import SX
 
 from ...models import Dimension, FloatArray, frozen_vector
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
-from ..case.limits.form import Call, Form
+from ..case.limits.constraint import BoundedConstraint, Call, Constraint, Form, Reading
 from ..case.pose import Free, OverPoses
 from ..case.task import Sense
 from .layout import Layout, assemble, lay_out

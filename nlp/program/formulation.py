@@ -19,7 +19,7 @@ from casadi import SX
 
 from ...models import Dimension, FloatArray, frozen_vector
 from ..case.case import Case
-from ..case.limits.form import Call, Form
+from ..case.limits.constraint import Call, Form
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from .epigraph import formulate_worst_pose, weighted_total

@@ -41,8 +41,7 @@ from ...models import (
 )
 from ...models.instance import sizes_at
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, Constraint, PairFamily, Reading, squared
-from ..case.limits.form import Call
+from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
 from ..errors import CaseError

@@ -16,8 +16,7 @@ from casadi import SX
 
 from ...models import FloatArray, Model, RobotInstance, Substitution
 from ...models.whole import Whole
-from ..case.limits.constraint import Constraint
-from ..case.limits.form import Call
+from ..case.limits.constraint import Call, Constraint
 from .kernel import Kernel, single_output
 from .places import Places, Scalar
 

@@ -36,9 +36,8 @@ from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
 from ..program.program import Program
 from .multistart import ProgramSolution, state_or_none
-from .optima import same_value
 from .solution import Combination, Solution, TaskOutcome
-from .starts import StartStatus
+from .starts import StartStatus, same_value
 from .status import Status
 
 #: Weights of the distance to the other tasks' points, in parts of F's scale, in descending order, for the search of the

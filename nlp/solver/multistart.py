@@ -36,9 +36,8 @@ from ..program.relaxation import (
 from ..program.sampling import starting_points
 from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
-from .optima import Optimum, distinct_optima
 from .screened import search_each
-from .starts import Start, StartStatus
+from .starts import Optimum, Start, StartStatus, distinct_optima
 from .status import Phase, PhaseProgress, Status, no_phase
 
 #: A point better than the best optimum by more than this part of F's scale is better by more than rounding.

@@ -17,8 +17,7 @@ from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
 from .multistart import ProgramSolution
-from .optima import Optimum
-from .starts import Start
+from .starts import Optimum, Start
 from .status import Status
 
 if TYPE_CHECKING:

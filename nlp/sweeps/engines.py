@@ -33,9 +33,8 @@ from ..solver.solution import Solution
 from ..solver.solve import solve
 from ..solver.status import Status
 from .places import Block, NotPlacedError, Places, place
-from .points import PointBlock, Points
+from .points import CaseSource, PointBlock, Points
 from .rows import REFUSED, Row, finite, with_evidence
-from .source import CaseSource
 
 
 def solve_point(

@@ -25,8 +25,7 @@ from ..program.formulation import formulate
 from ..program.layout import WIDENING
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
-from .points import Points
-from .source import CaseSource
+from .points import CaseSource, Points
 
 #: Largest relative difference of a placed number from one that is read: rounding of a conversion.
 _SAME = 1e-12

@@ -20,9 +20,8 @@ from ..program.formulation import formulate
 from ..program.program import design_indices
 from .engines import EngineKind, Job, answer, choose_engine, compiled_engine
 from .journal import ENDING, Journal
-from .points import PointBlock, Points
+from .points import CaseSource, PointBlock, Points
 from .rows import Row
-from .source import CaseSource
 from .workers import answer_in_processes, answer_on_cluster
 
 #: Points that are solved and judged together: enough for arrays to pay, and about a third of a second of work.

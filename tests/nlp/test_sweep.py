@@ -23,9 +23,8 @@ from screwsynth.nlp.results.sweep import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
 from screwsynth.nlp.sweeps.journal import Journal
-from screwsynth.nlp.sweeps.points import Points, grid
+from screwsynth.nlp.sweeps.points import CaseSource, Points, grid
 from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
-from screwsynth.nlp.sweeps.source import CaseSource
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
 

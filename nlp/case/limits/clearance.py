@@ -26,8 +26,7 @@ import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
-from .constraint import BoundedConstraint, Reading, between
-from .form import Call, Form
+from .constraint import BoundedConstraint, Call, Form, Reading, between
 from .interval import LowerLimit
 from .limit import PosedRobot
 

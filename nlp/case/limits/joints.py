@@ -30,8 +30,7 @@ from ...errors import CaseError
 from ...units import Units
 from ..table import Table, Vector
 from ..toml import TomlValue
-from .constraint import BoundedConstraint, Reading, between
-from .form import Call, Form
+from .constraint import BoundedConstraint, Call, Form, Reading, between
 from .limit import Limit, LimitedCase, Measures, NumberRange, PosedRobot, TableField, Written
 
 #: Three numbers.

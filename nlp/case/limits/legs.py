@@ -19,11 +19,9 @@ from pydantic import Field, FiniteFloat
 
 from ....models import Model
 from ..table import Table
-from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, PairFamily, between
-from .form import Call, Form
-from .interval import IntervalLimit
+from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, Call, Form, PairFamily, between
+from .interval import IntervalLimit, QuantityLimit, quantity_named
 from .limit import Design, Limit, NumberRange, PosedRobot, Ranges
-from .quantity import QuantityLimit, quantity_named
 
 
 @dataclass(frozen=True)

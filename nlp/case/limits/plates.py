@@ -17,8 +17,7 @@ from pydantic import Field, FiniteFloat
 
 from ....models import Dimension
 from ..table import Table
-from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, between
-from .form import Call, Form
+from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, Call, Form, between
 from .interval import IntervalLimit, LowerLimit, two_sided
 from .limit import Design, Limit, NumberRange, Plate, Ranges
 

@@ -17,8 +17,7 @@ from casadi import SX
 from ....models import Dimension, Model, WrenchKind, rates_expression
 from ...errors import CaseError
 from ..table import Table
-from .constraint import SQUARED_NUMBER, BoundedConstraint, Reading, between
-from .form import Call, Form
+from .constraint import SQUARED_NUMBER, BoundedConstraint, Call, Form, Reading, between
 from .interval import AtMost
 from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges
 

@@ -12,13 +12,12 @@ from pydantic import ConfigDict, Field, create_model
 
 from ..table import Table
 from .clearance import LegClearance, LinkClearance
-from .interval import IntervalTable
+from .interval import IntervalTable, QuantityLimit
 from .joint_motion import JointCone, JointMotion
 from .joints import BaseJointAngle, PlatformJointAngle
 from .legs import Actuator, LegLength
 from .limit import Limit
 from .plates import Footprint, JointSpacing, RadiusRatio
-from .quantity import QuantityLimit
 from .rates import ActuatorRate, RateShare
 from .relation import Relations
 from .singular_values import ConditionNumber, SmallestSingularValue

@@ -42,9 +42,9 @@ def joint_range(
     if not case.limits or joint.kind in ("S", "weld") or words.follows:
         return None
     # The classes of limits need pydantic, which a case without limits does not load.
+    from ...case.limits.interval import QuantityLimit  # noqa: PLC0415
     from ...case.limits.joint_motion import JointMotion  # noqa: PLC0415
     from ...case.limits.legs import LegLength  # noqa: PLC0415
-    from ...case.limits.quantity import QuantityLimit  # noqa: PLC0415
 
     is_slide = joint.kind == "P"
     measure = "actuator_angle" if words.lever is None and not is_slide else "actuator_length"
