@@ -198,7 +198,8 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
     if contender.is_own:
         return Placed(case, np.zeros(3), ())
     model = contender.model
-    offset = np.array([_start(value) for value in case.position]) - factor * np.array(model.home)
+    start = np.array([value.first if isinstance(value, Free) else value for value in case.position])
+    offset = start - factor * np.array(model.home)
     parameters = {item.name: _values(item, factor, part) for item in model.parameters}
     first, *further = (_moved_pose(pose, offset) for pose in case.poses)
     workspace = case.workspace
@@ -242,13 +243,6 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
         else:
             kept.append(limit)
     return Limits(*kept), left_out
-
-
-def _start(value: Value) -> float:
-    """Return the number of a case at which the first search begins."""
-    if not isinstance(value, Free):
-        return float(value)
-    return (value.lower + value.upper) / 2 if value.start is None else value.start
 
 
 def _values(item: Parameter, factor: float, part: float) -> tuple[Value, ...]:

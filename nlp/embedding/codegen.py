@@ -13,7 +13,6 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from string import Template
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -242,13 +241,6 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     }
 
 
-class _References(NamedTuple):
-    """Number of the self-test's points, and C tables of the points and of the values there."""
-
-    points: int
-    tables: str
-
-
 def _tables(nlp: Nlp, prefix: str) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
@@ -297,7 +289,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     return "\n".join(blocks) + "\n"
 
 
-def _references(nlp: Nlp) -> _References:
+def _references(nlp: Nlp) -> tuple[int, str]:
     """Return the self-test's points and values.
 
     The values are those of the program itself, and so independent of the functions from which the C is generated.
@@ -329,4 +321,4 @@ def _references(nlp: Nlp) -> _References:
     for name, first in rows[0].items():
         table = name if name == "points" else f"reference_{name}"
         tables.append(matrix_table(f"{table}[{len(rows)}][{first.size + 1}]", [row[name].ravel() for row in rows]))
-    return _References(len(rows), "\n".join(tables))
+    return len(rows), "\n".join(tables)

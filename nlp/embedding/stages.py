@@ -131,8 +131,8 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
         outputs["derivatives"] += [loops.entries, ca.jacobian(loops.entries, x).T.nz[:]]
     if several and loops.has_objective:
         del outputs["F"], outputs["F_gradient"]
-    robots = _robot_expressions(program)
-    outputs |= {"poses": [ca.veccat(*[robot.inputs for robot in program.robots])]} if several else robots.expressions
+    of_robot, robot_inputs = _robot_expressions(program)
+    outputs |= {"poses": [ca.veccat(*[robot.inputs for robot in program.robots])]} if several else of_robot
     dense = {name: ca.cse([ca.densify(each) for each in expressions]) for name, expressions in outputs.items()}
     rest, k, prepared = _extract(program.p, [each for expressions in dense.values() for each in expressions])
     k, prepared = ca.vertcat(k, SX.sym("c", loops.constants.numel())), ca.vertcat(prepared, loops.constants)
@@ -140,27 +140,22 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
     for name, expressions in dense.items():
         own, rest = rest[: len(expressions)], rest[len(expressions) :]
         functions[name] = ca.Function(f"{prefix}_{name}", [x, k, *inputs.get(name, [])], own)
-    of_robot = robots.expressions if several else {}
     return StagedFunctions(
         x,
         ca.Function(f"{prefix}_prepare", [program.p], [prepared]),
         functions,
         tuple(_loop_functions(loop, f"{prefix}_loop{i}") for i, loop in enumerate(loops.all)),
-        {name: ca.Function(f"{prefix}_{name}", [robots.inputs], own) for name, own in of_robot.items()},
+        {name: ca.Function(f"{prefix}_{name}", [robot_inputs], own) for name, own in of_robot.items() if several},
         loops,
         by_direction,
     )
 
 
-class _RobotExpressions(NamedTuple):
-    """Expressions of the robot by function, and the symbols (k, 1) that they depend on with several poses."""
+def _robot_expressions(program: Program) -> tuple[Mapping[str, list[SX]], SX]:
+    """Return the robot's expressions by function, and the symbols (k, 1) that they depend on with several poses.
 
-    expressions: Mapping[str, list[SX]]
-    inputs: SX
-
-
-def _robot_expressions(program: Program) -> _RobotExpressions:
-    """Return the robot's expressions: of the program's symbols, or with several poses of symbols of one pose."""
+    They are of the program's symbols, or with several poses of symbols of one pose.
+    """
     robot, inputs = program.robot, SX.sym("inputs", program.robot.inputs.numel())
     if len(program.robots) > 1:
         robot = RobotValues(program.model, program.robot.reference).robot(inputs)
@@ -177,7 +172,7 @@ def _robot_expressions(program: Program) -> _RobotExpressions:
     if len(program.robots) > 1 or robot.F.numel() > 1:
         expressions["F_of_tasks"] = [robot.F]
     dense = {name: [ca.densify(each) for each in own] for name, own in expressions.items()}
-    return _RobotExpressions(dense, inputs)
+    return dense, inputs
 
 
 def _loop_functions(loop: Loop, name: str) -> LoopFunctions:
@@ -199,16 +194,12 @@ def _loop_functions(loop: Loop, name: str) -> LoopFunctions:
     )
 
 
-class _Extraction(NamedTuple):
-    """Expressions of ``(x, k)``, the symbols ``k``, (count, 1), and their values as expressions of ``p`` alone."""
+def _extract(p: SX, expressions: Sequence[SX]) -> tuple[list[SX], SX, SX]:
+    """Extract the parts of expressions that depend on ``p`` alone, with symbols ``k`` (count, 1) in their place.
 
-    expressions: list[SX]
-    k: SX
-    values: SX
-
-
-def _extract(p: SX, expressions: Sequence[SX]) -> _Extraction:
-    """Extract the parts of expressions that depend on ``p`` alone, with symbols in their place."""
+    Returns:
+        Expressions of ``(x, k)``, the symbols, and their values as expressions of ``p`` alone.
+    """
     joined = ca.vertcat(SX(0, 1), *[ca.vec(each) for each in expressions])
     rest, symbols, parts = ca.extract_parametric(joined, p)
     # An argument that also stands beside variables, such as a component of a twist, is passed on in k as it is.
@@ -218,7 +209,7 @@ def _extract(p: SX, expressions: Sequence[SX]) -> _Extraction:
     for each in expressions:
         replaced.append(ca.reshape(rest[at : at + each.numel()], each.shape))
         at += each.numel()
-    return _Extraction(replaced, k, prepared)
+    return replaced, k, prepared
 
 
 def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:

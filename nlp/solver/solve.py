@@ -65,8 +65,8 @@ def solve(
         def solve_one(nlp: Nlp, first: Sequence[FloatArray]) -> ProgramSolution:
             return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
 
-        found = solve_over_workspace(case, solve_one)
-        solution = replace(solution_of_one_task(case, found.own), workspace=found.proof)
+        own, proof = solve_over_workspace(case, solve_one)
+        solution = replace(solution_of_one_task(case, own), workspace=proof)
     else:
         nlps = formulate_each(case)
         solution = solve_programs(case, nlps, search, jobs=jobs, progress=progress, solver=solver, phase=phase)

@@ -13,7 +13,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from queue import SimpleQueue
-from typing import NamedTuple
 
 import numpy as np
 
@@ -252,15 +251,10 @@ def same_value(nlp: Nlp) -> float:
     return max(SAME_VALUE, nlp.rounding) * nlp.objective_scale
 
 
-class Distinct(NamedTuple):
-    """Starts, with saddles and singular limbs marked by their status, and the distinct optima, best first."""
-
-    starts: list[Start]
-    optima: list[Optimum]
-
-
-def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> Distinct:
+def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> tuple[list[Start], list[Optimum]]:
     """Group converged starts by value and point, and examine one point of each group, once.
+
+    Saddles and singular limbs are marked by the status of their starts; the optima are those left, best first.
 
     Where an optimum is not isolated, all points of its F count as one set; it may have several pieces. Points in
     different working modes of a robot's limbs count as different sets.
@@ -292,7 +286,7 @@ def distinct_optima(nlp: Nlp, done: Sequence[Start], phase: PhaseProgress) -> Di
             optima.append(Optimum(group[0].F, len(group), group[0].x, spread, each, nlp))
         remaining = [start for start in remaining if start not in level]
     starts = [replace(start, status=refused.get(id(start), start.status)) for start in done]
-    return Distinct(starts, optima)
+    return starts, optima
 
 
 def _group_by_point(nlp: Nlp, starts: Sequence[Start]) -> list[list[Start]]:
