@@ -37,6 +37,11 @@ class Table(BaseModel):
 _TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>")
 
 
+def fault_of(key: str, fault: str) -> PydanticCustomError:
+    """Return the error of a validator about a key of its table, which may be missing; an empty key for the whole."""
+    return PydanticCustomError("reason", "{fault}", {"fault": fault, **({"key": key} if key else {})})
+
+
 def case_error(fault: ErrorDetails) -> CaseError:
     """Return a fault as an error with a dotted key and a sentence."""
     context = fault.get("ctx", {})

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
-from pydantic_core import PydanticCustomError
 
 from .limits.registry import LimitsTable
 from .schema import Document
-from .table import Table, Vector
+from .table import Table, Vector, fault_of
 from .workspace import TURNS
 
 
@@ -52,11 +51,9 @@ class WorkspaceRotationTable(Table):
         turns = [name for name in TURNS if getattr(self, name) is not None]
         others = [name for name in ("angle", "axis") if getattr(self, name) is not None]
         if turns and others:
-            fault = {"key": turns[0], "fault": f"cannot stand beside {others[0]}; state the rotation in one way"}
-            raise PydanticCustomError("reason", "{fault}", fault)
+            raise fault_of(turns[0], f"cannot stand beside {others[0]}; state the rotation in one way")
         if not turns and self.angle is None:
-            fault = {"key": "angle", "fault": "is missing: give angle, or one or more of roll, pitch, yaw"}
-            raise PydanticCustomError("reason", "{fault}", fault)
+            raise fault_of("angle", "is missing: give angle, or one or more of roll, pitch, yaw")
         return self
 
 

@@ -23,12 +23,11 @@ from pydantic import (
     ValidatorFunctionWrapHandler,
     WrapValidator,
 )
-from pydantic_core import PydanticCustomError
 
 from ....models import Dimension, FloatArray, Model, RobotInstance, frozen_array, matrix_from_axis_angle
 from ...errors import CaseError
 from ...units import Units
-from ..table import Table, Vector
+from ..table import Table, Vector, fault_of
 from ..toml import TomlValue
 from .constraint import BoundedConstraint, Call, Form, Reading, between
 from .limit import Limit, LimitedCase, Measures, NumberRange, PosedRobot, TableField, Written
@@ -86,8 +85,7 @@ def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
     try:
         return handler(value)
     except ValidationError:
-        fault = "must be 'normal' or 'home', a list of 3 numbers, or a list of such lists"
-        raise PydanticCustomError("reason", "{fault}", {"fault": fault}) from None
+        raise fault_of("", "must be 'normal' or 'home', a list of 3 numbers, or a list of such lists") from None
 
 
 def _kind_of_axes(value: object) -> str:

@@ -33,21 +33,15 @@ _DEEPEST = 40
 #: Largest size of a constant power: with larger ones, numbers of any machine leave the range of doubles.
 _LARGEST_POWER = 100
 
+#: Functions of expressions, and of numbers; operations of either.
 _FUNCTIONS: dict[str, Callable[[SX], SX]] = {"sqrt": ca.sqrt, "sin": ca.sin, "cos": ca.cos, "abs": ca.fabs}
-_OPERATIONS: dict[str, Callable[[SX, SX], SX]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-    "^": lambda a, b: a**b,
-}
 _CONSTANT_FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sqrt": math.sqrt,
     "sin": math.sin,
     "cos": math.cos,
     "abs": abs,
 }
-_CONSTANT_OPERATIONS: dict[str, Callable[[float, float], float]] = {
+_OPERATIONS: dict[str, Callable[..., Any]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
@@ -155,7 +149,7 @@ def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
         case Operation("^", left, Number(power)) if power == int(power):
             return expression(left, values, angle) ** int(power)
         case Operation(sign, left, right):
-            return _OPERATIONS[sign](expression(left, values, angle), expression(right, values, angle))
+            return SX(_OPERATIONS[sign](expression(left, values, angle), expression(right, values, angle)))
 
 
 def _constant(tree: Tree) -> float | None:
@@ -182,7 +176,7 @@ def _constant(tree: Tree) -> float | None:
                 raise SentenceError("divides by zero")
             if first is None or second is None:
                 return None
-            return _finite(lambda: _CONSTANT_OPERATIONS[sign](first, second), sign)
+            return _finite(lambda: _OPERATIONS[sign](first, second), sign)
 
 
 def _finite(compute: Callable[[], float], sign: str) -> float:
