@@ -13,7 +13,7 @@ from .case.limits.joints import MountingPose as MountingPose
 from .case.limits.joints import PlatformJointAngle as PlatformJointAngle
 from .case.limits.legs import Actuator as Actuator
 from .case.limits.legs import LegLength as LegLength
-from .case.limits.limits import Limits as Limits
+from .case.limits.limit import Limits as Limits
 from .case.limits.plates import Footprint as Footprint
 from .case.limits.plates import JointSpacing as JointSpacing
 from .case.limits.plates import RadiusRatio as RadiusRatio

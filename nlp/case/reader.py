@@ -13,7 +13,7 @@ from ..units import Units
 from .case import Case
 from .csvrows import TableOrigins, insert_rows
 from .displacements import read_displacements
-from .limits.limits import Limits
+from .limits.limit import Limits
 from .overrides import Settings, override_number
 from .pose import (
     OverPoses,

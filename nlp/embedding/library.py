@@ -18,7 +18,7 @@ import numpy as np
 from ...models import FloatArray
 from ..case.task import Sense
 from ..errors import InputError, listing, nearest
-from ..solver.compiled import shared_library
+from ..system.programs import shared_library
 from .codegen import budget_files
 from .manifest import CompiledLimit, CompiledNumber, Manifest, read_manifest
 

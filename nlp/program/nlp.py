@@ -15,8 +15,7 @@ from ...models.whole import Whole
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, PairFamily
 from ..case.task import Sense
-from .kernel import Kernel, single_output
-from .program import Program
+from .program import Kernel, Program, single_output
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -15,7 +15,7 @@ from casadi import MX, SX
 from ...models import FloatArray
 from ..case.settings import Search
 from ..program.nlp import Nlp
-from .compiled import shared_library
+from ..system.programs import shared_library
 from .interface import LocalSearch, SolverResult, StopReason
 
 #: Ipopt's tolerance. The Newton correction that follows converges quadratically: tighter would only cost iterations.

@@ -15,7 +15,7 @@ from ..results.jsondata import finite_or_none, vector
 from ..results.point import head_data, stated_pose_notice, versions
 from ..results.sweep import Column, SweepResult
 from ..results.tradeoffwording import unit_of_objective
-from .rows import Row
+from .journal import Row
 from .sweep import Sweep
 
 

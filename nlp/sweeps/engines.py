@@ -32,9 +32,9 @@ from ..solver.certified import Certified, certify
 from ..solver.solution import Solution
 from ..solver.solve import solve
 from ..solver.status import Status
+from .journal import REFUSED, Row, finite, with_evidence
 from .places import Block, NotPlacedError, Places, place
 from .points import CaseSource, PointBlock, Points
-from .rows import REFUSED, Row, finite, with_evidence
 
 
 def solve_point(

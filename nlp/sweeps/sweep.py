@@ -19,9 +19,8 @@ from ..interruption import is_interrupted, is_requested, one_call, seconds_left
 from ..program.formulation import formulate
 from ..program.program import design_indices
 from .engines import EngineKind, Job, answer, choose_engine, compiled_engine
-from .journal import ENDING, Journal
+from .journal import ENDING, Journal, Row
 from .points import CaseSource, PointBlock, Points
-from .rows import Row
 from .workers import answer_in_processes, answer_on_cluster
 
 #: Points that are solved and judged together: enough for arrays to pay, and about a third of a second of work.

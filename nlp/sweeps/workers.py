@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 from ..errors import InputError
 from ..interruption import WRITING
 from .engines import Job, answer
+from .journal import Row
 from .points import PointBlock
-from .rows import Row
 
 #: Number of workers that may die with one block: the block itself is then the cause.
 _DEATHS = 3

@@ -22,9 +22,8 @@ from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.results.sweep import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
-from screwsynth.nlp.sweeps.journal import Journal
+from screwsynth.nlp.sweeps.journal import Journal, Row, line_of, row_of
 from screwsynth.nlp.sweeps.points import CaseSource, Points, grid
-from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
 
@@ -299,7 +298,7 @@ KILLED = """
 import os, signal, sys
 from screwsynth.nlp.cli.main import main
 from screwsynth.nlp.sweeps.journal import Journal
-from screwsynth.nlp.sweeps.rows import line_of
+from screwsynth.nlp.sweeps.journal import line_of
 
 append, left = Journal.append, [int(sys.argv.pop(1))]
 

@@ -37,8 +37,8 @@ from screwsynth.nlp.results.text import Line, TextTable
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacewording import workspace_summary
 from screwsynth.nlp.sweeps.columns import columns_of
+from screwsynth.nlp.sweeps.journal import Row
 from screwsynth.nlp.sweeps.points import CaseSource, Points
-from screwsynth.nlp.sweeps.rows import Row
 from screwsynth.nlp.sweeps.sweep import Sweep
 
 Tables = dict[str, Any]
