@@ -25,9 +25,8 @@ from statistics import median
 from typing import NamedTuple
 
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.embedding.callgraph import stack_bound
 from screwsynth.nlp.embedding.ctext import identifier
-from screwsynth.nlp.embedding.measure import CORTEX_M7
+from screwsynth.nlp.embedding.measure import CORTEX_M7, stack_bound
 
 CASES = ("paper-4.1-helical", "paper-4.3", "drilling-spindle", "hexapod-machining", "flight-simulator", "camera-mount")
 FLAGS = ("-std=gnu99", "-O2")

@@ -16,9 +16,8 @@ import numpy as np
 
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.output.sweeptable import table_points, write_table
-from screwsynth.nlp.sweeps.points import grid
-from screwsynth.nlp.sweeps.rows import Row
-from screwsynth.nlp.sweeps.source import CaseSource
+from screwsynth.nlp.sweeps.journal import Row
+from screwsynth.nlp.sweeps.points import CaseSource, grid
 from screwsynth.nlp.sweeps.sweep import Sweep
 
 CASE = "paper-4.1-helical"

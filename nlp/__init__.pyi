@@ -3,22 +3,22 @@
 __version__: str
 
 from .case.case import Case as Case
-from .case.limits.actuator_rate import ActuatorRate as ActuatorRate
 from .case.limits.clearance import LegClearance as LegClearance
-from .case.limits.joint_cone import JointCone as JointCone
+from .case.limits.clearance import LinkClearance as LinkClearance
+from .case.limits.interval import QuantityLimit as QuantityLimit
+from .case.limits.joint_motion import JointCone as JointCone
+from .case.limits.joint_motion import JointMotion as JointMotion
 from .case.limits.joints import BaseJointAngle as BaseJointAngle
 from .case.limits.joints import MountingPose as MountingPose
 from .case.limits.joints import PlatformJointAngle as PlatformJointAngle
 from .case.limits.legs import Actuator as Actuator
 from .case.limits.legs import LegLength as LegLength
-from .case.limits.limits import Limits as Limits
-from .case.limits.link_clearance import LinkClearance as LinkClearance
-from .case.limits.motions import JointMotion as JointMotion
+from .case.limits.limit import Limits as Limits
 from .case.limits.plates import Footprint as Footprint
 from .case.limits.plates import JointSpacing as JointSpacing
 from .case.limits.plates import RadiusRatio as RadiusRatio
-from .case.limits.quantity import QuantityLimit as QuantityLimit
-from .case.limits.rate_share import RateShare as RateShare
+from .case.limits.rates import ActuatorRate as ActuatorRate
+from .case.limits.rates import RateShare as RateShare
 from .case.limits.relation import Relations as Relations
 from .case.limits.singular_values import ConditionNumber as ConditionNumber
 from .case.limits.singular_values import SmallestSingularValue as SmallestSingularValue
@@ -46,11 +46,11 @@ from .comparison.compare import compare as compare
 from .comparison.data import comparison_result as comparison_result
 from .comparison.entry import Entry as Entry
 from .embedding.codegen import generate_c as generate_c
-from .embedding.folder import CompiledLimit as CompiledLimit
-from .embedding.folder import CompiledNumber as CompiledNumber
 from .embedding.library import CompiledCase as CompiledCase
 from .embedding.library import CompiledSolutions as CompiledSolutions
 from .embedding.library import load_compiled as load_compiled
+from .embedding.manifest import CompiledLimit as CompiledLimit
+from .embedding.manifest import CompiledNumber as CompiledNumber
 from .errors import CaseError as CaseError
 from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError
@@ -74,8 +74,8 @@ from .formats.export import export_robot as export_robot
 from .front.data import front_result as front_result
 from .front.front import Front as Front
 from .front.front import FrontPoint as FrontPoint
+from .front.front import pareto as pareto
 from .front.goals import Goal as Goal
-from .front.pareto import pareto as pareto
 from .output.notebook import Picture as Picture
 from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of
@@ -109,11 +109,11 @@ from .solver.interface import SolverResult as SolverResult
 from .solver.interface import StopReason as StopReason
 from .solver.multistart import ProgramSolution as ProgramSolution
 from .solver.multistart import solve_program as solve_program
-from .solver.optima import Optimum as Optimum
 from .solver.solution import Combination as Combination
 from .solver.solution import Solution as Solution
 from .solver.solution import TaskOutcome as TaskOutcome
 from .solver.solve import solve as solve
+from .solver.starts import Optimum as Optimum
 from .solver.starts import Start as Start
 from .solver.starts import StartStatus as StartStatus
 from .solver.status import Status as Status
@@ -121,5 +121,5 @@ from .solver.tradeoff import Tradeoff as Tradeoff
 from .solver.tradeoff import TradeoffPoint as TradeoffPoint
 from .solver.tradeoff import tradeoff as tradeoff
 from .sweeps.columns import SweepColumns as SweepColumns
-from .sweeps.data import sweep_result as sweep_result
+from .sweeps.columns import sweep_result as sweep_result
 from .units import Units as Units

@@ -22,7 +22,7 @@ from .graphwords import read_robot
 from .linkgraph import home_of
 
 #: Distance of a parallelogram's rods from its middle line, in parts of their length.
-_APART = 0.25
+_APART = 0.1
 #: Returns the numbers of a vector (3, 1) of expressions.
 Values = Callable[[SX], FloatArray]
 
@@ -149,14 +149,15 @@ class Parts:
     ) -> None:
         """Add four hinges and two rods."""
         aside = _APART * np.cross(axis, rod)
-        for number, side in enumerate((aside, -aside)):
-            link = f"{name} rod {number + 1}"
-            self.links.append(link)
-            first = MechanismJoint(
-                f"{name}.{2 * number + 1}", "R", ends[0], link, point + side, axis, actuated=driven and number == 0
+        rods = [(f"{name} rod {k + 1}", 2 * k + 1, side) for k, side in enumerate((aside, -aside))]
+        self.links += [link for link, _, _ in rods]
+        for link, number, side in rods:
+            is_driven = driven and number == 1
+            self.joints.append(
+                MechanismJoint(f"{name}.{number}", "R", ends[0], link, point + side, axis, actuated=is_driven)
             )
-            second = MechanismJoint(f"{name}.{2 * number + 2}", "R", link, ends[1], point + rod + side, axis)
-            self.joints += [first, second]
+        for link, number, side in rods:
+            self.joints.append(MechanismJoint(f"{name}.{number + 1}", "R", link, ends[1], point + rod + side, axis))
 
     def mechanism(self, name: str, home: FloatArray, ends: Sequence[str] = ("base", "platform")) -> Mechanism:
         """Return the mechanism of the parts; the platform's frame is at home, parallel to the world's."""

@@ -99,40 +99,40 @@ def close(
             raise MechanismError("", f"{fault} they stay open by {values[0]:.3g}")
         at, done, step = found, part, 2 * step
         spectra.append(values)
-    placed = motions.placed(at)
-    residual, _ = path.equations(at, placed, 1.0)
-    values = at.values * motions.units
-    coordinates = {
-        joint.name: float(values[motions.columns[k]][0])
-        for k, joint in enumerate(mechanism.joints)
-        if joint.kind in ("R", "P", "H")
-    }
-    largest = float(np.abs(residual).max(initial=0.0))
-    return ClosedMechanism(
-        _placed(mechanism, placed, coordinates), coordinates, largest, _nearness(spectra), len(spectra)
-    )
+    return _closed(path, at, _nearness(spectra), len(spectra))
 
 
-def closed_nearby(mechanism: Mechanism, motions: Motions, step: FloatArray) -> Mechanism | None:
-    """Return a mechanism with its loops closed near coordinates that open them; None where they do not close.
+def closed_near(
+    mechanism: Mechanism,
+    coordinates: Mapping[str, float],
+    position: FloatArray,
+    rotation: FloatArray,
+) -> ClosedMechanism | None:
+    """Return a mechanism with its loops closed near coordinates and a pose of the platform; None where they do not.
+
+    The pose is kept where the loops allow it, and else left as little as closing needs.
 
     Args:
         mechanism: the mechanism.
-        motions: its motions.
-        step: (n,) coordinates of order 1, from the stated configuration.
+        coordinates: known ones of joints by name, radians or length from the stated configuration.
+        position: (3,) origin of the platform's frame in the world, length.
+        rotation: (3, 3) of the platform's frame in the world.
     """
+    motions = Motions(mechanism)
+    values = np.zeros(motions.count)
+    for name, value in coordinates.items():
+        column = motions.column(name)
+        values[column] = value / motions.units[column]
+    posed = _Path(motions, {}, _pose_path(mechanism, position, rotation))
+    near, _, _ = posed.reduced(Coordinates(values, motions.stated.balls), 1.0)
+    return closed_nearby(motions, near)
+
+
+def closed_nearby(motions: Motions, near: Coordinates) -> ClosedMechanism | None:
+    """Return a mechanism with its loops closed near coordinates that open them; None where they do not close."""
     path = _Path(motions, {}, None)
-    start = motions.stepped(motions.stated, step, motions.placed(motions.stated))
-    at, _ = path.closed(start, 1.0)
-    if at is None:
-        return None
-    placed, values = motions.placed(at), at.values * motions.units
-    coordinates = {
-        joint.name: float(values[motions.columns[k]][0])
-        for k, joint in enumerate(mechanism.joints)
-        if joint.kind in ("R", "P", "H")
-    }
-    return _placed(mechanism, placed, coordinates)
+    at, _ = path.closed(near, 1.0)
+    return None if at is None else _closed(path, at, 1.0, 1)
 
 
 class _Path:
@@ -145,7 +145,7 @@ class _Path:
     """
 
     def __init__(self, motions: Motions, held: Mapping[int, float], pose: _Pose | None) -> None:
-        self._motions, self._held, self._pose = motions, dict(held), pose
+        self.motions, self._held, self._pose = motions, dict(held), pose
         self._free = np.array([k for k in range(motions.count) if k not in held], dtype=np.intp)
         couplings = motions.mechanism.couplings
         self._couplings = np.zeros((len(couplings), motions.count))
@@ -157,10 +157,10 @@ class _Path:
 
     def equations(self, at: Coordinates, placed: Placed, part: float) -> Equations:
         """Return the equations at a part of the path."""
-        residual, slopes = self._motions.loops(placed)
+        residual, slopes = self.motions.loops(placed)
         rows, derivatives = [residual, self._couplings @ at.values], [slopes, self._couplings]
         if self._pose is not None:
-            own = self._motions.towards(placed, self._motions.mechanism.platform, self._pose.at(part))
+            own = self.motions.towards(placed, self.motions.mechanism.platform, self._pose.at(part))
             rows.append(own[0])
             derivatives.append(own[1])
         return Equations(np.concatenate(rows), np.vstack(derivatives))
@@ -174,19 +174,19 @@ class _Path:
         values = at.values.copy()
         for column, value in self._held.items():
             values[column] = part * value
-        found, residual, slopes = self._reduced(Coordinates(values, at.balls), part)
+        found, residual, slopes = self.reduced(Coordinates(values, at.balls), part)
         if part < 1.0 and self._pose is not None and not _is_closed(residual):
             # A robot with fewer than six freedoms leaves the straight path: the loops alone close near it.
-            found, residual, slopes = _Path(self._motions, self._held, None)._reduced(found, part)
+            found, residual, slopes = _Path(self.motions, self._held, None).reduced(found, part)
         if not _is_closed(residual):
             return None, np.array([float(np.abs(residual).max())])
-        count = 6 * len(self._motions.tree.chords) + len(self._couplings)
+        count = 6 * len(self.motions.tree.chords) + len(self._couplings)
         singular = np.linalg.svd(slopes[:count, self._free], compute_uv=False)
         return found, np.asarray(singular, dtype=np.float64)
 
-    def _reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
+    def reduced(self, at: Coordinates, part: float) -> tuple[Coordinates, FloatArray, FloatArray]:
         """Return the coordinates of least residual near others, with the residual and its derivatives."""
-        motions, free = self._motions, self._free
+        motions, free = self.motions, self._free
         placed = motions.placed(at)
         residual, slopes = self.equations(at, placed, part)
         error = float(np.linalg.norm(residual))
@@ -251,6 +251,20 @@ def _check_wanted(mechanism: Mechanism, wanted: Mapping[str, float]) -> None:
         if kinds.get(name) not in ("R", "P", "H"):
             known = ", ".join(joint.name for joint in mechanism.joints if joint.actuated)
             raise MechanismError(f"joint {name}", f"has no coordinate that can be given; actuated joints are {known}")
+
+
+def _closed(path: _Path, at: Coordinates, nearness: float, points: int) -> ClosedMechanism:
+    """Return a mechanism whose loops are closed at the end of a path."""
+    motions = path.motions
+    placed, values = motions.placed(at), at.values * motions.units
+    coordinates = {
+        joint.name: float(values[motions.columns[k]][0])
+        for k, joint in enumerate(motions.mechanism.joints)
+        if joint.kind in ("R", "P", "H")
+    }
+    residual, _ = path.equations(at, placed, 1.0)
+    largest = float(np.abs(residual).max(initial=0.0))
+    return ClosedMechanism(_placed(motions.mechanism, placed, coordinates), coordinates, largest, nearness, points)
 
 
 def _placed(mechanism: Mechanism, placed: Placed, coordinates: Mapping[str, float]) -> Mechanism:

@@ -47,16 +47,18 @@ def closed_configurations(mechanism: Mechanism, count: int = _POINTS, seed: int 
         seed: of the random numbers.
     """
     motions = Motions(mechanism)
+    stated = motions.stated
     rng = np.random.default_rng(seed)
     found = 0
     for change in _CHANGES:
         for _ in range(_TRIALS):
             if found == count:
                 return
-            other = closed_nearby(mechanism, motions, change * rng.uniform(-1.0, 1.0, motions.count))
+            step = change * rng.uniform(-1.0, 1.0, motions.count)
+            other = closed_nearby(motions, motions.stepped(stated, step, motions.placed(stated)))
             if other is not None:
                 found += 1
-                yield other
+                yield other.mechanism
 
 
 def generic_ranks(mechanism: Mechanism, seed: int = 0) -> RobotRanks:

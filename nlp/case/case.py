@@ -19,8 +19,7 @@ from ...models.whole import Whole
 from ..errors import CaseError, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_value, check_vector
-from .limits.limit import LimitedCase
-from .limits.limits import Limits
+from .limits.limit import LimitedCase, Limits
 from .names import parameter_name, pose_prefixes
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 from ...models import component_names
 from ..errors import CaseError, nearest
@@ -12,7 +12,8 @@ from .names import parameter_name, pose_prefixes
 
 #: Numbers of a case by name, in its file's units: three numbers for a point, axis or direction.
 Settings: TypeAlias = Mapping[str, float | list[float]]
-
+#: Table or list of a number, and the key or index within it.
+_Place: TypeAlias = tuple[Any, int | str]
 
 #: Stands before the dotted key of a limit.
 _LIMITS = "limits."
@@ -54,14 +55,14 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         table[place][end] = value
         return
     if name not in places:
-        raise CaseError(name, f"cannot be set; {_allowed(name, tables, _Places(places, rotations))}")
+        raise CaseError(name, f"cannot be set; {_allowed(name, tables, places, rotations)}")
     table, place = places[name]
     table[place] = value
 
 
-def _allowed(name: str, tables: Mapping[str, Any], known: _Places) -> str:
+def _allowed(name: str, tables: Mapping[str, Any], places: Mapping[str, _Place], rotations: list[str]) -> str:
     """Return the names that can be set, those of ends, limits and tasks by an example each, as a hint."""
-    free = [each for each, (table, place) in known.places.items() if isinstance(table[place], dict)]
+    free = [each for each, (table, place) in places.items() if isinstance(table[place], dict)]
     ends = [f"{each}.{end}" for each in free for end in _ENDS]
     tasks = sorted(task_numbers(tables), key=len)
     others = [
@@ -69,18 +70,18 @@ def _allowed(name: str, tables: Mapping[str, Any], known: _Places) -> str:
         "limits such as limits.leg_length.max",
         *(f"numbers of tasks such as {each}" for each in [name for name in tasks if name.endswith("pitch")][:1]),
     ]
-    hint = nearest(name, [*known.places, *known.rotations], [*ends, *tasks])
+    hint = nearest(name, [*places, *rotations], [*ends, *tasks])
     return f"{hint}; also {', '.join(others)}"
 
 
-def task_numbers(tables: Mapping[str, Any]) -> dict[str, tuple[Any, int | str]]:
+def task_numbers(tables: Mapping[str, Any]) -> dict[str, _Place]:
     """Return the numbers of a document's tasks that can be set: table or list, and key or index within it, by name.
 
     A vector has its own name and one for each component, such as ``task.point`` and ``task.point_x``. With several
     tasks, those of the first one are called ``task[0].point``.
     """
     tasks = tables.get("task", [])
-    found: dict[str, tuple[Any, int | str]] = {}
+    found: dict[str, _Place] = {}
     for index, task in enumerate(tasks):
         for prefix in (f"task[{index}].", *(("task.",) if len(tasks) == 1 else ())):
             for part, given in task.items():
@@ -102,29 +103,20 @@ def _override_task(tables: dict[str, Any], name: str, value: float | list[float]
     table[place] = value
 
 
-class _Places(NamedTuple):
-    """Where the numbers of a document are, and the names of those that a pose may lack.
-
-    Attributes:
-        places: table or list of each number, and the key or index within it, by the number's name.
-        rotations: names of the axis and the angle of each pose.
-    """
-
-    places: dict[str, tuple[Any, int | str]]
-    rotations: list[str]
-
-
-def _places(tables: dict[str, Any], name: str) -> _Places:
+def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[str]]:
     """Return where the numbers of a document are; a rotation that is to be set, and lacks, is made first.
 
     Args:
         tables: the document.
         name: name of the number to be set.
+
+    Returns:
+        The place of each number by its name, and the names of the axis and the angle of each pose, which it may lack.
     """
     parameters = tables.get("robot", {}).get("parameters", {})
     given = tables.setdefault("pose", {})
     poses = given if isinstance(given, list) else [given]
-    places: dict[str, tuple[Any, int | str]] = {}
+    places: dict[str, _Place] = {}
     for key, written in parameters.items():
         places[parameter_name(key, len(poses))] = (parameters, key)
         if isinstance(written, list):
@@ -144,7 +136,7 @@ def _places(tables: dict[str, Any], name: str) -> _Places:
                     for other in rotation.keys() - {"axis", "angle"}:
                         del rotation[other]
                 places[f"{prefix}{part}"] = (rotation, part)
-    return _Places(places, rotations)
+    return places, rotations
 
 
 def _override_limit(tables: dict[str, Any], name: str, value: float | list[float]) -> None:

@@ -1,4 +1,9 @@
-"""Poses of a case: fixed and free numbers, rotations, displacements. Angles are radians."""
+"""Poses of a case: fixed and free numbers, rotations, displacements. Angles are radians.
+
+Conventions: a rotation matrix turns platform coordinates into world coordinates; its columns are the platform's axes. A
+quaternion is ``(w, x, y, z)``, the scalar part first. Roll, pitch and yaw turn about the world's fixed axes x, then y,
+then z: ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +16,21 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ...models import Displacement, axis_from_screw, screw_displacement
-from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
+from ...models import Dimension, Displacement, FloatArray, axis_from_screw, screw_displacement
+from ...models.rotation import AxisAngle, axis_angle_from_matrix
+from ..errors import CaseError
+from ..units import Units
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from .schema import Range
+    from .toml import TomlValue
+    from .wholeschema import SpanTable
 
+#: Largest distance of a matrix from an orthogonal one, in a component of ``R' R``, and of a quaternion's size from 1:
+#: more than numbers with seven decimals leave, and far less than a slip of the pen.
+_ROUNDING = 1e-6
 #: Largest angle of a rotation about a free axis. Its variables are a quaternion's vector part, which is a smooth
 #: function of the rotation below half a turn only.
 MAX_FREE_ROTATION = math.radians(179)
@@ -45,6 +58,26 @@ class Free:
 
 
 Value: TypeAlias = float | Free
+
+
+def internal_value(written: float | Range | SpanTable, units: Units, dimension: Dimension) -> Value:
+    """Return a fixed or free number of a case file, radians for an angle."""
+    if isinstance(written, float | int):
+        return units.to_internal(written, dimension)
+    start = getattr(written, "start", None)  # which a range of poses does not have
+    return Free(
+        units.to_internal(written.min, dimension),
+        units.to_internal(written.max, dimension),
+        None if start is None else units.to_internal(start, dimension),
+    )
+
+
+def written_value(value: Value, units: Units, dimension: Dimension) -> TomlValue:
+    """Return a fixed or free number in the case's unit, the inverse of :func:`internal_value`."""
+    if not isinstance(value, Free):
+        return units.written(value, dimension)
+    ends = {"min": value.lower, "max": value.upper, "start": value.start}
+    return {key: None if end is None else units.written(end, dimension) for key, end in ends.items()}
 
 
 def ends_of(value: Value) -> tuple[float, float]:
@@ -147,3 +180,86 @@ def along_screw(twist: ArrayLike, amounts: Sequence[float]) -> tuple[Displacemen
 def over_grid(offsets: Sequence[Sequence[float]]) -> tuple[Displacement, ...]:
     """Return displacements without rotation to every combination of offsets along x, y and z."""
     return tuple(Displacement.by(np.eye(3), offset) for offset in itertools.product(*offsets))
+
+
+def rotation_from_matrix(matrix: ArrayLike, key: str) -> AxisAngle:
+    """Return axis and angle of a rotation matrix; what rounding left is removed.
+
+    Args:
+        matrix: (3, 3).
+        key: its dotted key, for messages.
+
+    Raises:
+        CaseError: it is not three rows of three finite numbers, not orthogonal, or a reflection.
+    """
+    rows = _numbers(matrix, (3, 3), key, "three rows of three finite numbers")
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.max(np.abs(rows.T @ rows - np.eye(3))))
+    if not error <= _ROUNDING:
+        fault = "must be orthogonal: its columns must be unit vectors at right angles"
+        raise CaseError(key, f"{fault}, and R' R differs from the unit matrix by {error:.3g}")
+    if np.linalg.det(rows) < 0:
+        raise CaseError(key, "must be a rotation: its determinant is -1, as of a reflection")
+    # The nearest orthogonal matrix.
+    left, _, right = np.linalg.svd(rows)
+    return axis_angle_from_matrix(left @ right)
+
+
+def rotation_from_quaternion(quaternion: ArrayLike, key: str) -> AxisAngle:
+    """Return axis and angle, in [0, pi], of a unit quaternion.
+
+    Args:
+        quaternion: (4,) ``(w, x, y, z)``; its negative is the same rotation.
+        key: its dotted key, for messages.
+
+    Raises:
+        CaseError: it is not four finite numbers, or not unit.
+    """
+    parts = _numbers(quaternion, (4,), key, "four finite numbers: w, x, y, z")
+    size = math.hypot(*parts.tolist())
+    if not abs(size - 1) <= _ROUNDING:
+        raise CaseError(key, f"must be a unit quaternion (w, x, y, z): its size is {size:.7g}", parts.tolist())
+    sign = -1.0 if parts[0] < 0 else 1.0
+    sine = math.hypot(*parts[1:].tolist())
+    if sine == 0:
+        return AxisAngle(np.array([0.0, 0.0, 1.0]), 0.0)
+    return AxisAngle(sign * parts[1:] / sine, 2 * math.atan2(sine, abs(float(parts[0]))))
+
+
+def rotation_from_rpy(rpy: ArrayLike, key: str) -> AxisAngle:
+    """Return axis and angle of roll, pitch and yaw: about the world's x, then y, then z.
+
+    Args:
+        rpy: (3,) radians.
+        key: its dotted key, for messages.
+
+    Raises:
+        CaseError: it is not three finite numbers.
+    """
+    half = _numbers(rpy, (3,), key, "three finite numbers: roll, pitch, yaw") / 2
+    (sr, sp, sy), (cr, cp, cy) = np.sin(half).tolist(), np.cos(half).tolist()
+    # The product of three quaternions.
+    return rotation_from_quaternion(
+        (
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ),
+        key,
+    )
+
+
+def _numbers(values: ArrayLike, shape: tuple[int, ...], key: str, words: str) -> FloatArray:
+    """Return finite numbers as an array.
+
+    Raises:
+        CaseError: they are not finite, or of another shape.
+    """
+    try:
+        numbers: FloatArray = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CaseError(key, f"must be {words}") from None
+    if numbers.shape != shape or not np.isfinite(numbers).all():
+        raise CaseError(key, f"must be {words}")
+    return numbers

@@ -13,10 +13,18 @@ from ..units import Units
 from .case import Case
 from .csvrows import TableOrigins, insert_rows
 from .displacements import read_displacements
-from .limits.limits import Limits
-from .orientation import rotation_from_matrix, rotation_from_quaternion, rotation_from_rpy
+from .limits.limit import Limits
 from .overrides import Settings, override_number
-from .pose import Free, OverPoses, Pose, Rotation, Value
+from .pose import (
+    OverPoses,
+    Pose,
+    Rotation,
+    Value,
+    internal_value,
+    rotation_from_matrix,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
 from .robots import insert_robot_file, model_of_table
 from .schema import (
     Document,
@@ -30,7 +38,7 @@ from .schema import (
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, read_text, tables_of
 from .task import Method, Sense, Task, unit_twist
-from .tomltext import toml_text
+from .toml import toml_document
 from .workspace import workspace_of
 
 
@@ -72,7 +80,7 @@ def read_case(name: str, settings: Settings | None = None) -> CaseFile:
     tables = tables_of(path, text)
     inputs = inputs_of(path, tables)  # the names of files leave the tables when a case is made of these
     case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
-    return CaseFile(case, text if len(inputs) == 1 and not settings else toml_text(tables), inputs)
+    return CaseFile(case, text if len(inputs) == 1 and not settings else toml_document(tables), inputs)
 
 
 def case_from_tables(
@@ -129,7 +137,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
     method, over_poses = _combination(written, sum(map(len, steps)))
     first, *further = [
         Pose(
-            [_value(part, units, Dimension.LENGTH) for part in pose.position],
+            [internal_value(part, units, Dimension.LENGTH) for part in pose.position],
             _rotation(pose.rotation, units, key),
             moves,
         )
@@ -215,18 +223,10 @@ def _parameter_value(
         CaseError: a single number stands in brackets.
     """
     if not isinstance(given, list):
-        return _value(given, units, dimension)
+        return internal_value(given, units, dimension)
     if len(given) == 1:
         raise CaseError(f"robot.parameters.{key}", "must be a number or { min, max }, without brackets")
-    return [_value(part, units, dimension) for part in given]
-
-
-def _value(written: float | Range, units: Units, dimension: Dimension) -> Value:
-    """Return a fixed or free number, radians for an angle."""
-    if not isinstance(written, Range):
-        return units.to_internal(written, dimension)
-    start = None if written.start is None else units.to_internal(written.start, dimension)
-    return Free(units.to_internal(written.min, dimension), units.to_internal(written.max, dimension), start)
+    return [internal_value(part, units, dimension) for part in given]
 
 
 def _rotation(written: RotationTable | None, units: Units, pose: str) -> Rotation:
@@ -253,7 +253,7 @@ def _rotation(written: RotationTable | None, units: Units, pose: str) -> Rotatio
         return Rotation(*rotation_from_quaternion(written.quaternion, f"{key}.quaternion"))
     if written.angle is None:
         raise CaseError(f"{key}.angle", "is missing")
-    return Rotation(written.axis, _value(written.angle, units, Dimension.ANGLE))
+    return Rotation(written.axis, internal_value(written.angle, units, Dimension.ANGLE))
 
 
 def _task(written: TaskTable, index: int) -> Task:

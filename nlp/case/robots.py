@@ -67,7 +67,7 @@ def model_of_table(table: RobotTable, robot_file: str | None = None) -> Model:
     """
     if table.definition is None:
         return build_model(table.model or "", table.options)
-    from .robotfile.reader import model_of_definition  # noqa: PLC0415 - few cases have a robot of their own
+    from .robotfile import model_of_definition  # noqa: PLC0415 - few cases have a robot of their own
 
     for key in table.options:
         raise CaseError(f"robot.{key}", f"no such key; {nearest(key, RobotTable.model_fields)}")
@@ -90,7 +90,7 @@ def insert_robot_file(tables: dict[str, Any], folder: Path) -> str | None:
     table = tables.get("robot")
     if not isinstance(table, dict) or "file" not in table:
         return None
-    from .robotfile.reader import insert_robot  # noqa: PLC0415 - few cases have a robot of their own
+    from .robotfile import insert_robot  # noqa: PLC0415 - few cases have a robot of their own
 
     return insert_robot(tables, folder)
 

@@ -23,19 +23,17 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
 
 from ..errors import listing
 from ..units import Units
 from .case import Case
-from .faults import case_error
 from .settings import Expectation, Published, Search
-from .table import Table, Vector
+from .table import Table, Vector, case_error, fault_of
 from .task import Task
 
 if TYPE_CHECKING:
     from .limits.registry import LimitsTable
-    from .workspacetable import WorkspaceTable
+    from .wholeschema import WorkspaceTable
 else:
     # A document that states neither has nothing at these keys.
     LimitsTable = WorkspaceTable = NoneType
@@ -111,10 +109,9 @@ class RobotTable(Table):
     def _refuse_two_robots(self) -> RobotTable:
         """Return the table, or refuse one that gives no robot, or gives it twice."""
         if self.model is None and self.definition is None:
-            raise PydanticCustomError("reason", "{fault}", {"key": "model", "fault": "is missing"})
+            raise fault_of("model", "is missing")
         if self.model is not None and self.definition is not None:
-            fault = "cannot stand beside model: give the robot in one way"
-            raise PydanticCustomError("reason", "{fault}", {"key": "definition", "fault": fault})
+            raise fault_of("definition", "cannot stand beside model: give the robot in one way")
         return self
 
     @property
@@ -152,11 +149,9 @@ class RotationTable(Table):
         """Return the table, or refuse two forms of a rotation beside each other, and none."""
         given = [form for form in (*_FIXED, "angle", "axis") if getattr(self, form) is not None]
         if given in ([], ["axis"]):
-            fault = {"key": "angle", "fault": f"is missing: give angle, or one of {listing(_FIXED)}"}
-            raise PydanticCustomError("reason", "{fault}", fault)
+            raise fault_of("angle", f"is missing: give angle, or one of {listing(_FIXED)}")
         if len(given) > 1 and given[0] in _FIXED:
-            fault = {"key": given[1], "fault": f"cannot stand beside {given[0]}; state the rotation in one way"}
-            raise PydanticCustomError("reason", "{fault}", fault)
+            raise fault_of(given[1], f"cannot stand beside {given[0]}; state the rotation in one way")
         return self
 
 
@@ -296,12 +291,9 @@ class PublishedTable(Table):
     def _refuse_incomplete(self) -> PublishedTable:
         """Return the table, or refuse a missing reason, and a gain without its other case."""
         if not self.reproduced and not self.because:
-            raise PydanticCustomError(
-                "reason", "{fault}", {"key": "because", "fault": "is missing: say why the number is not reproduced"}
-            )
+            raise fault_of("because", "is missing: say why the number is not reproduced")
         if (self.quantity == "gain") != (self.over is not None):
-            fault = 'belongs to quantity = "gain", and that to it'
-            raise PydanticCustomError("reason", "{fault}", {"key": "over", "fault": fault})
+            raise fault_of("over", 'belongs to quantity = "gain", and that to it')
         return self
 
 
@@ -340,7 +332,7 @@ class Document(Table):
         """Return the document, or refuse one that states no pose or no task."""
         for key in ("pose", "task"):
             if key not in self.model_fields_set:
-                raise PydanticCustomError("reason", "{fault}", {"key": key, "fault": "is missing"})
+                raise fault_of(key, "is missing")
         return self
 
 

@@ -10,9 +10,8 @@ import casadi as ca
 
 from ...models import Dimension, Model, Parameter
 from ..units import Units
-from .plain import plain_value
 from .settings import Search
-from .toml import toml_text
+from .toml import plain_value, toml_text
 
 _UNITS = Units("cm", "deg")
 

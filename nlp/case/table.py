@@ -1,13 +1,14 @@
-"""Base class of the tables of a case file: known keys only, and pydantic's strict types."""
+"""Tables of a case file: known keys only, pydantic's strict types, and sentences about what pydantic refuses."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
-from ..errors import nearest
+from ..errors import CaseError, nearest
 
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
 
@@ -30,3 +31,111 @@ class Table(BaseModel):
                         "unknown_key", "{fault}", {"key": key, "fault": f"no such key; {allowed}"}
                     )
         return table
+
+
+#: Parts of a fault's path that stand for branches of a union, and are no keys of a file.
+_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>")
+
+
+def fault_of(key: str, fault: str) -> PydanticCustomError:
+    """Return the error of a validator about a key of its table, which may be missing; an empty key for the whole."""
+    return PydanticCustomError("reason", "{fault}", {"fault": fault, **({"key": key} if key else {})})
+
+
+def case_error(fault: ErrorDetails) -> CaseError:
+    """Return a fault as an error with a dotted key and a sentence."""
+    context = fault.get("ctx", {})
+    location = [*fault["loc"], *([context["key"]] if "key" in context else [])]
+    value = fault["input"]
+    shown = value if isinstance(value, str | int | float | bool) and "key" not in context else None
+    return CaseError(dotted_key(location), _sentence(fault, context), shown)
+
+
+def dotted_key(location: list[int | str]) -> str:
+    """Return a path into the document as a key, such as ``robot.parameters.x4.min`` or ``pose.position[0]``."""
+
+    def parts() -> Iterator[str]:
+        for part in location:
+            if isinstance(part, int):
+                yield f"[{part}]"
+            elif part not in _TAGS:
+                yield f".{part}"
+
+    return "".join(parts()).lstrip(".") or "the file"
+
+
+#: Sentences for faults of a type, whatever the key.
+_KINDS = {
+    "model_type": "must be a table",
+    "dict_type": "must be a table",
+    "list_type": "must be a list",
+    "string_type": "must be text in quotes",
+    "bool_type": "must be true or false",
+    "int_type": "must be a whole number",
+    "float_type": "must be a number",
+    "finite_number": "must be finite",
+    "string_too_short": "must not be empty",
+}
+#: Sentences for keys whose type alone would say too little.
+_FORMS = {
+    "axis": "must be a list of 3 numbers",
+    "point": "must be a list of 3 numbers",
+    "rpy": "must be a list of 3 numbers: roll, pitch, yaw",
+    "matrix": "must be a list of 3 rows of 3 numbers",
+    "quaternion": "must be a list of 4 numbers: w, x, y, z",
+    "twist": "must be a list of 6 numbers",
+    "position": "must be a list of 3, each a number or { min, max }",
+    "task": "must be a list of tables: write [[task]], with two brackets",
+    "limb": "must be a list of tables: write [[limb]], with two brackets",
+    "published": "must be a list of tables: write [[published]], with two brackets",
+}
+#: Keys that name a file, and those of the tables that its rows become.
+_FILES = {"poses": "pose", "tasks": "task"}
+
+
+def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
+    """Return the second half of a sentence about a fault; its first half is the key.
+
+    Args:
+        fault: the fault.
+        context: its context, as pydantic returns it.
+    """
+    key = str(fault["loc"][-1]) if fault["loc"] else ""
+    match fault["type"]:
+        case "unknown_key" | "reason":
+            sentence = str(context["fault"])
+        case "literal_error":
+            sentence = f"must be one of {context['expected']}"
+        case "string_type" if key in _FILES:
+            sentence = f"must be the name of a CSV file; no such key for tables, did you mean {_FILES[key]!r}?"
+        case "list_type" if key in _FORMS:
+            sentence = _FORMS[key]
+        case "float_type":
+            sentence = _sentence_of_number(fault)
+        case "missing":
+            sentence = _sentence_of_missing_key(key, fault["input"])
+        case "too_short" | "too_long" as kind:
+            limit = context["min_length"] if kind == "too_short" else context["max_length"]
+            few = "at least " if kind == "too_short" and limit == 1 else ""
+            sentence = f"must have {few}{limit} {'entry' if limit == 1 else 'entries'}, got {context['actual_length']}"
+        case kind:
+            sentence = _KINDS.get(kind, fault["msg"].replace("Input should be", "must be"))
+    return sentence
+
+
+def _sentence_of_missing_key(key: str, table: object) -> str:
+    """Return the sentence for a key that is missing, with the key of the table that may be meant."""
+    import difflib  # noqa: PLC0415 - only messages need it
+
+    close = difflib.get_close_matches(key, table if isinstance(table, dict) else (), n=1)
+    return f"is missing; is it what {close[0]!r} was meant to be?" if close else "is missing"
+
+
+def _sentence_of_number(fault: ErrorDetails) -> str:
+    """Return the sentence for a value that is no number."""
+    location = fault["loc"]
+    if location[-1] == "pitch":
+        return "must be a number, or inf without quotes"
+    if location[-1] != "<number>":
+        return "must be a number"
+    return "must be a number or a list of numbers" if location[0] == "published" else "must be a number or { min, max }"

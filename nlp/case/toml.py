@@ -1,11 +1,13 @@
-"""TOML text of plain values."""
+"""TOML of plain values: on a line, as lines of a table, and as a whole document."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TypeAlias
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+from ..errors import CaseError, one_line
 
 #: A value of a TOML document; a None in a table is left out.
 TomlValue: TypeAlias = "bool | int | float | str | Sequence[TomlValue] | Mapping[str, TomlValue | None]"
@@ -15,19 +17,52 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _LARGEST_INTEGER = 2**53
 
 
-def toml_text(value: TomlValue) -> str:
-    """Return a value on one line, from which ``tomllib`` reads the same value; whole floats lose their point."""
+def plain_value(value: object) -> TomlValue:
+    """Return the value of a robot's option as TOML has it; a tuple is a list.
+
+    Raises:
+        CaseError: TOML has no such value.
+    """
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): plain_value(part) for key, part in value.items()}
+    if isinstance(value, Sequence):
+        return [plain_value(part) for part in value]
+    raise CaseError("robot", f"has an option that cannot be written to a case file: {one_line(repr(value))[:60]}")
+
+
+def _short_number(value: float) -> str:
+    """Return a number with all its digits."""
+    number = int(value) if isinstance(value, int) else float(value)
+    whole = isinstance(number, float) and number.is_integer() and abs(number) <= _LARGEST_INTEGER
+    is_minus_zero = number == 0 and str(number).startswith("-")
+    return str(int(number)) if whole and not is_minus_zero else repr(number)
+
+
+def toml_text(value: TomlValue, number_text: Callable[[float], str] = _short_number) -> str:
+    """Return a value on one line, from which ``tomllib`` reads the same value.
+
+    Args:
+        value: the value.
+        number_text: text of a number; whole floats lose their point if left out.
+
+    Raises:
+        TypeError: TOML has no form for a value here.
+    """
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         # JSON escapes all but one of the characters that TOML wants escaped.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, int | float):
-        return _number_text(value)
+        return number_text(value)
     if isinstance(value, Mapping):
-        inner = ", ".join(f"{toml_key(key)} = {toml_text(part)}" for key, part in value.items() if part is not None)
+        inner = ", ".join(toml_lines(value, number_text))
         return f"{{ {inner} }}" if inner else "{}"
-    return f"[{', '.join(map(toml_text, value))}]"
+    if isinstance(value, Sequence):
+        return f"[{', '.join(toml_text(part, number_text) for part in value)}]"
+    raise TypeError(f"TOML has no form for {value!r} here")
 
 
 def toml_key(key: str) -> str:
@@ -35,9 +70,10 @@ def toml_key(key: str) -> str:
     return key if _BARE_KEY.fullmatch(key) else toml_text(key)
 
 
-def toml_lines(table: Mapping[str, TomlValue | None]) -> list[str]:
+def toml_lines(table: Mapping[str, TomlValue | None], number_text: Callable[[float], str] = _short_number) -> list[str]:
     """Return a line for each key of a table."""
-    return [f"{toml_key(key)} = {toml_text(value)}" for key, value in table.items() if value is not None]
+    given = ((key, value) for key, value in table.items() if value is not None)
+    return [f"{toml_key(key)} = {toml_text(value, number_text)}" for key, value in given]
 
 
 def toml_table(header: str, table: Mapping[str, TomlValue | None]) -> list[str]:
@@ -51,9 +87,27 @@ def toml_tables(header: str, tables: Iterable[Mapping[str, TomlValue | None]]) -
     return [line for table in tables for line in toml_table(header, table)]
 
 
-def _number_text(value: float) -> str:
-    """Return a number with all its digits."""
-    number = int(value) if isinstance(value, int) else float(value)
-    whole = isinstance(number, float) and number.is_integer() and abs(number) <= _LARGEST_INTEGER
-    is_minus_zero = number == 0 and str(number).startswith("-")
-    return str(int(number)) if whole and not is_minus_zero else repr(number)
+def toml_document(tables: Mapping[str, Any]) -> str:
+    """Return a document as TOML, which reads as the same tables; every number keeps its type.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it, without dates and times.
+
+    Raises:
+        TypeError: TOML has no form for a value here.
+    """
+    plain = {key: value for key, value in tables.items() if not _is_table(value)}
+    parts = ["\n".join(toml_lines(plain, repr))] if plain else []
+    for key, value in tables.items():
+        if _is_table(value):
+            written = value if isinstance(value, list) else [value]
+            header = f"[[{toml_key(key)}]]" if isinstance(value, list) else f"[{toml_key(key)}]"
+            parts += ["\n".join([header, *toml_lines(each, repr)]) for each in written]
+    return "\n\n".join(parts) + "\n"
+
+
+def _is_table(value: object) -> bool:
+    """Return whether a value gets a header of its own: a table, or a list of nothing but tables."""
+    if isinstance(value, list):
+        return bool(value) and all(isinstance(each, dict) for each in value)
+    return isinstance(value, dict)

@@ -5,24 +5,24 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from ...models import Dimension, unit_vector
 from ..errors import CaseError
 from ..units import Units
 from .checks import check_direction, check_value
-from .pose import Free, Value
+from .pose import Free, Value, internal_value, written_value
 
 if TYPE_CHECKING:
     from .toml import TomlValue
-    from .workspacetable import SpanTable, WorkspaceRotationTable, WorkspaceTable
+    from .wholeschema import WorkspaceRotationTable, WorkspaceTable
 
 #: Largest size of a rotation's angle: the coordinates in which boxes of rotations are covered, tangents of half the
 #: angle, grow without bound towards half a turn.
 LARGEST_TURN = math.radians(150)
 #: The three angles of a rotation by roll, pitch and yaw.
-_TURNS = ("roll", "pitch", "yaw")
+TURNS = ("roll", "pitch", "yaw")
 
 
 class TurnKind(enum.Enum):
@@ -83,7 +83,7 @@ class Workspace:
         for index, value in enumerate(self.position):
             check_value(value, f"workspace.position[{index}]", Dimension.LENGTH, units)
         turns, key = self.turns, "workspace.rotation"
-        names = _TURNS if turns.kind is TurnKind.ROLL_PITCH_YAW else ("angle",)
+        names = TURNS if turns.kind is TurnKind.ROLL_PITCH_YAW else ("angle",)
         domain = (-LARGEST_TURN, LARGEST_TURN)
         for name, value in zip(names, turns.angles, strict=True):
             check_value(value, f"{key}.{name}", Dimension.ANGLE, units, domain)
@@ -115,7 +115,7 @@ class Workspace:
         angles = [_written(value, units, Dimension.ANGLE) for value in turns.angles]
         rotation: dict[str, TomlValue | None] = {"angle": angles[0]}
         if turns.kind is TurnKind.ROLL_PITCH_YAW:
-            rotation = dict(zip(_TURNS, angles, strict=True))
+            rotation = dict(zip(TURNS, angles, strict=True))
         elif turns.kind is TurnKind.AXIS:
             rotation = {"axis": list(turns.axis), "angle": angles[0]}
         return {
@@ -139,7 +139,7 @@ def workspace_of(written: WorkspaceTable | None, units: Units, *, has_limits: bo
         if has_limits:
             raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
         return None
-    position = [_value(value, units, Dimension.LENGTH) for value in written.position]
+    position = [internal_value(value, units, Dimension.LENGTH) for value in written.position]
     return Workspace(position, _turns(written.rotation, units), has_limits)
 
 
@@ -152,24 +152,15 @@ def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:
     if rotation is None:
         return Turns()
     if rotation.angle is None:
-        angles = [_value(getattr(rotation, name) or 0.0, units, Dimension.ANGLE) for name in _TURNS]
+        angles = [internal_value(getattr(rotation, name) or 0.0, units, Dimension.ANGLE) for name in TURNS]
         return Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles))
-    angle = _value(rotation.angle, units, Dimension.ANGLE)
+    angle = internal_value(rotation.angle, units, Dimension.ANGLE)
     if rotation.axis is None:
         return Turns(TurnKind.ANY_AXIS, (angle,))
     x, y, z = unit_vector(check_direction(rotation.axis, "workspace.rotation.axis")).tolist()
     return Turns(TurnKind.AXIS, (angle,), (x, y, z))
 
 
-def _value(written: float | SpanTable, units: Units, dimension: Dimension) -> Value:
-    """Return a fixed or free number, radians for an angle."""
-    if isinstance(written, float | int):
-        return units.to_internal(written, dimension)
-    return Free(units.to_internal(written.min, dimension), units.to_internal(written.max, dimension))
-
-
 def _written(value: Value, units: Units, dimension: Dimension) -> TomlValue:
-    """Return a fixed or free number in the case's unit."""
-    if not isinstance(value, Free):
-        return units.written(value, dimension)
-    return {"min": units.written(value.lower, dimension), "max": units.written(value.upper, dimension)}
+    """Return a fixed or free number in the case's unit; a start means nothing in a box."""
+    return written_value(replace(value, start=None) if isinstance(value, Free) else value, units, dimension)

@@ -16,15 +16,13 @@ import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Substitution, axis_from_screw, unit_vector
 from ..errors import CaseError
-from ..units import Units
 from .case import Case
 from .displacements import written_displacements
-from .plain import plain_value
-from .pose import Free, Pose, Value
+from .pose import Free, Pose, written_value
 from .reader import case_from_tables
 from .settings import Expectation, Search
 from .task import Task, unit_twist
-from .toml import TomlValue, toml_lines, toml_table, toml_tables
+from .toml import TomlValue, plain_value, toml_lines, toml_table, toml_tables
 
 #: Digits to which a ratio of two components is rounded in the search of a short direction, such as [2, 2, 1].
 _DIGITS = 12
@@ -69,7 +67,7 @@ def _lines(case: Case) -> Iterator[str]:
     parameters: dict[str, TomlValue] = {}
     for item in model.parameters:
         values = case.components(item.name)
-        numbers = [_number(value, units, item.dimension) for value in values]
+        numbers = [written_value(value, units, item.dimension) for value in values]
         parameters[item.name] = numbers[0] if len(numbers) == 1 else numbers
         if item.is_direction and not any(isinstance(value, Free) for value in values):
             parameters[item.name] = _direction(np.array(values, dtype=np.float64))
@@ -82,43 +80,18 @@ def _lines(case: Case) -> Iterator[str]:
     yield from toml_table("[tolerance]", {"joint_centre": case.joint_centre_tolerance})
     if case.workspace is not None:
         yield from toml_table("[workspace]", case.workspace.to_keys(case.units))
-    search, default = case.search, Search()
-    settings: dict[str, int] = {"starts": search.starts, "seed": search.seed, "max_iterations": search.max_iterations}
-    settings["screen"] = search.screen
-    yield from toml_table("[solve]", {key: value for key, value in settings.items() if value != getattr(default, key)})
+    settings = {key: getattr(case.search, key) for key in ("starts", "seed", "max_iterations", "screen")}
+    yield from toml_table("[solve]", {key: each for key, each in settings.items() if each != getattr(Search, key)})
     yield from _expectation(case.expect)
     for row in case.published:
-        table: dict[str, TomlValue | None] = {
-            "quantity": row.quantity,
-            "value": row.value[0] if len(row.value) == 1 else row.value,
-            "source": row.source,
-            "reproduced": row.reproduced,
-            "because": row.because or None,
-            "decimals": row.decimals,
-            "over": row.over,
-        }
-        yield from toml_table("[[published]]", table)
+        value = row.value[0] if len(row.value) == 1 else row.value
+        yield from toml_table("[[published]]", {**vars(row), "value": value, "because": row.because or None})
 
 
 def _expectation(expect: Expectation) -> Iterator[str]:
     tolerance = expect.tolerance if expect.tolerance != Expectation.tolerance else None
     yield from toml_table("[expect]", {"F": expect.F, "tolerance": tolerance, "singular": expect.singular})
-    rows: list[dict[str, TomlValue | None]] = [
-        {"quantity": row.quantity, "value": row.value, "within": row.within} for row in expect.values
-    ]
-    yield from toml_tables("[[expect.value]]", rows)
-
-
-def _number(value: Value, units: Units, dimension: Dimension) -> TomlValue:
-    """Return a fixed or free number in the case's unit."""
-    if not isinstance(value, Free):
-        return units.written(value, dimension)
-    start = None if value.start is None else units.written(value.start, dimension)
-    return {
-        "min": units.written(value.lower, dimension),
-        "max": units.written(value.upper, dimension),
-        "start": start,
-    }
+    yield from toml_tables("[[expect.value]]", map(vars, expect.values))
 
 
 def _direction(unit: FloatArray) -> list[float]:
@@ -141,14 +114,14 @@ def _direction(unit: FloatArray) -> list[float]:
 def _pose(case: Case, pose: Pose) -> dict[str, TomlValue | None]:
     """Return the table of a stated pose."""
     axis, angle = pose.rotation.axis, pose.rotation.angle
-    rotation: dict[str, TomlValue] | None = {"angle": _number(angle, case.units, Dimension.ANGLE)}
+    rotation: dict[str, TomlValue] | None = {"angle": written_value(angle, case.units, Dimension.ANGLE)}
     if axis is not None:
         held = np.asarray(axis, dtype=np.float64)
         rotation = {"axis": _direction(held), **(rotation or {})}
         if angle == 0 and np.array_equal(held, (0, 0, 1)):
             rotation = None
     return {
-        "position": [_number(value, case.units, Dimension.LENGTH) for value in pose.position],
+        "position": [written_value(value, case.units, Dimension.LENGTH) for value in pose.position],
         "rotation": rotation,
         **written_displacements(pose.displacements, case.tasks, case.units),
     }

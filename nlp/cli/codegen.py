@@ -44,8 +44,7 @@ def codegen(
 
 def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:
     """Return the files with figures of flash and stack, which are printed; a terminal shows the progress."""
-    from ..embedding.measure import measure
-    from ..embedding.measured import figure_words, with_figures
+    from ..embedding.measure import figure_words, measure, with_figures
 
     if sys.stderr.isatty():
         from rich.console import Console

@@ -59,7 +59,7 @@ def _show_file(file: str, plot: str | None) -> None:
     """Show the robot of a robot file in full, and draw it into a file."""
     from pathlib import Path
 
-    from ..case.robotfile.reader import model_of_definition, read_definition
+    from ..case.robotfile import model_of_definition, read_definition
     from ..errors import CaseError, InputError
     from ..output.files import check_outputs
     from ..output.terminal import show

@@ -22,7 +22,7 @@ def new(
     if not model.endswith(".toml"):
         typer.echo(starter_case(build_model(model)), nl=False)
         return
-    from ..case.robotfile.reader import model_of_definition, read_definition
+    from ..case.robotfile import model_of_definition, read_definition
 
     built = model_of_definition(read_definition(model, Path()), model)
     typer.echo(starter_case(built, Path(model).name), nl=False)

@@ -51,7 +51,7 @@ def pareto(
     """Find the front of two or more goals of a case."""
     from ..case.reader import read_case
     from ..errors import InputError, UncoveredError
-    from ..front.front import find_front
+    from ..front.front import pareto as find_front
     from ..front.goals import read_goals
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..output.files import check_outputs
@@ -64,7 +64,7 @@ def pareto(
 
         check_library("matplotlib", "pages")
     read = read_case(case, read_settings(settings))
-    wanted = read_goals(goals, read.case)
+    read_goals(goals, read.case)  # before the files are looked at
     check_outputs(read.inputs, {"--json": json_file, "--csv": csv_file, "--html": html, "--plot": plot})
     show = sys.stderr.isatty()
 
@@ -76,11 +76,12 @@ def pareto(
     try:
         found = find_front(
             read.case,
-            wanted,
-            points,
-            search=read.case.search.but(starts, seed),
+            goals,
+            points=points,
+            starts=starts,
+            seed=seed,
             jobs=jobs,
-            certify=certify,
+            certified=certify,
             progress=show_progress if show else None,
         )
     except UncoveredError as error:

@@ -48,7 +48,7 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
     from rich.progress import Progress
 
     from ..errors import one_line
-    from ..solver.phase import Phase
+    from ..solver.status import Phase
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task("formulating", total=None)

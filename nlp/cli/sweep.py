@@ -78,7 +78,7 @@ def sweep(
     from ..output.files import check_outputs
     from ..output.sweeptable import check_table, is_written, write_table
     from ..sweeps.engines import EngineKind
-    from ..sweeps.source import CaseSource
+    from ..sweeps.points import CaseSource
     from ..sweeps.sweep import Sweep, run_sweep
 
     kinds = {kind.value: kind for kind in EngineKind}
@@ -130,8 +130,7 @@ def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> N
     """Write a sweep as JSON and as a page."""
     from ..output.files import write_text
     from ..output.sweeptable import table_rows
-    from ..sweeps.columns import columns_of
-    from ..sweeps.data import sweep_result
+    from ..sweeps.columns import columns_of, sweep_result
 
     case, columns = found.source.case_at(found.points.settings(0)), columns_of(found, table_rows(out, found))
     if json_file is not None:

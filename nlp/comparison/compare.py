@@ -21,9 +21,7 @@ from ..solver.certified import certify
 from ..solver.semi_infinite import design_of
 from ..solver.solve import solve
 from .entry import Entry, generic_freedoms, outcome_of, proven_strokes, strokes_over_poses, task_fit
-from .placed import placed
-from .robots import Contender, read_robots
-from .size import size_at, size_at_start, size_of_home
+from .robots import Contender, placed, read_robots, size_at, size_at_start, size_of_home
 
 #: Part of a typical dimension by which a design may differ from it, as for a starter's free numbers.
 RANGE = 0.25

@@ -1,16 +1,18 @@
-"""A comparison as a result."""
+"""A comparison as a result, with sentences about its rules, and about what a robot lacks."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from types import MappingProxyType
 
 import numpy as np
 
-from ...models import frozen_array
+from ...models import Dimension, frozen_array
 from ..case.case import Case
 from ..case.pose import Free
-from ..errors import CaseError
-from ..program.designnumbers import design_names
+from ..errors import CaseError, listing
+from ..program.program import design_names
 from ..results.comparison import (
     ComparedDimensionData,
     ComparedLimitData,
@@ -23,11 +25,166 @@ from ..results.comparison import (
 from ..results.evidence import certificate_data
 from ..results.jsondata import finite_or_none
 from ..results.parts import SCHEMA, UnitsData
-from ..results.point import versions
+from ..results.point import versions, violations
+from ..solver.status import Status
 from ..units import objective_unit, rate_unit
 from .compare import Comparison, part_of
-from .entry import Entry, TaskFit
-from .sentences import comparison_sentences, entry_sentences
+from .entry import Entry, TaskFit, driven_wrenches
+
+#: A part as a percentage.
+_PERCENT = 100
+#: Sizes that differ by more than this part are worth a sentence: F of a rotation then differs by twice as much.
+_SAME_SIZE = 0.02
+
+
+def entry_sentences(entry: Entry) -> list[str]:
+    """Return sentences about what a robot lacks, and what cannot be compared."""
+    found = []
+    if entry.fault:
+        found.append(f"The case contradicts itself with this robot: {entry.fault}.")
+    elif not entry.has_answer:
+        found.append(_no_answer(entry))
+    for fit in entry.tasks:
+        found += _fit_sentences(entry, fit)
+    found += _left_out_sentences(entry)
+    found += [f"Singular: {each}." for each in entry.singularities]
+    found += _proof_sentences(entry)
+    return found
+
+
+def _left_out_sentences(entry: Entry) -> Iterator[str]:
+    """Yield sentences about the limits that a robot is solved without."""
+    model = entry.contender.model
+    left_out = () if entry.placed is None else entry.placed.left_out
+    of_legs = [each.key for each in left_out if each.is_of_legs and model.structure]
+    others = [each.key for each in left_out if each.key not in of_legs]
+    if of_legs:
+        own = listing(each.name for each in model.quantities)
+        measures = f"; its own measures are {own}" if own else ""
+        yield (
+            f"Solved without {', '.join(of_legs)}: they speak of legs between joint centres, and this robot is given "
+            f"joint by joint{measures}."
+        )
+    if others:
+        yield f"Solved without {', '.join(others)}: this robot has nothing that they speak of."
+
+
+def _fit_sentences(entry: Entry, fit: TaskFit) -> list[str]:
+    """Return sentences about the freedom of a robot for a task, and about actuators that drive nothing."""
+    found = []
+    if fit.can_move is False:
+        freedoms = "" if entry.freedoms is None else f", which has {entry.freedoms} freedoms,"
+        found.append(
+            f"The platform{freedoms} cannot make the motion of {fit.name}: constraints carry "
+            f"{_PERCENT * (fit.constraint or 0.0):.3g} % of its F, and no actuator can move with them."
+        )
+    elif fit.can_move is None:
+        found.append(f"Whether the platform can make the motion of {fit.name} is not known for this robot's rows.")
+    largest = fit.largest_rate
+    if largest is not None and math.isnan(largest.value):
+        found.append(f"The motion of the platform does not determine the rate of actuator {largest.actuator}.")
+    elif largest is not None and math.isinf(largest.value):
+        found.append(f"Actuator {largest.actuator} cannot drive the platform at this design.")
+    return found
+
+
+def _proof_sentences(entry: Entry) -> list[str]:
+    """Return sentences about proofs that a robot lacks."""
+    found = []
+    if entry.certificate_fault:
+        found.append(f"No certificate: {entry.certificate_fault}.")
+    if entry.workspace_fault:
+        found.append(f"The workspace is not judged: {entry.workspace_fault}.")
+    return found
+
+
+def _no_answer(entry: Entry) -> str:
+    """Return why a robot has no answer."""
+    solution = entry.solution
+    own = None if solution is None else solution.decided_by
+    if solution is None or own is None:
+        return "No answer."
+    status = solution.status.value
+    if solution.status is Status.INTERRUPTED:
+        return f"No answer ({status})."
+    closure = {equation.name for equation in (*entry.contender.model.closure, *entry.contender.model.loops)}
+    names = [row.name for row in violations(own.nlp, own.x)]
+    if any(name.split(" at ")[0] in closure for name in names):
+        few = entry.freedoms is not None and entry.freedoms < 6
+        reason = f": its platform has {entry.freedoms} freedoms" if few else ""
+        return f"No answer ({status}): its joints cannot be put together at the poses of the case{reason}."
+    keys = ", ".join(f"limits.{each.key}" for each in own.relaxation) or ", ".join(names[:3])
+    return f"No answer ({status}): no design within the ranges keeps {keys or 'the limits'}."
+
+
+def comparison_sentences(found: Comparison) -> list[str]:
+    """Return sentences about a whole comparison."""
+    return [*_rules(found), *_cautions(found), *_conventions(found)]
+
+
+def _rules(found: Comparison) -> list[str]:
+    """Return sentences about sizes and dimensions."""
+    case, lines = found.case, []
+    if found.size is not None:
+        size = case.units.text(found.size, Dimension.LENGTH)
+        lines.append(f"Size: the largest distance between two points of a robot at home is {size}.")
+    else:
+        lines.append("The robots are not scaled: typical lengths count as lengths in the unit of the case.")
+    if found.part:
+        lines.append(
+            f"Dimensions are free within {_PERCENT * found.part:g} % of the typical ones; directions are fixed."
+        )
+    else:
+        lines.append("Dimensions are fixed at the typical ones.")
+    if any(each.contender.is_own for each in found.entries):
+        lines.append("The robot of the case takes part as the case states it, with its own dimensions and ranges.")
+    return lines
+
+
+def _cautions(found: Comparison) -> list[str]:
+    """Return sentences about what makes F of ranked robots differ beside the robots themselves."""
+    case, ranked, lines = found.case, found.ranked, []
+    kept = {len(each.placed.case.limits) for each in ranked if each.placed is not None}
+    if len(kept) > 1:
+        lines.append(
+            "The ranked robots keep different numbers of the limits. Those that keep more come first: fewer limits let "
+            "F be better."
+        )
+    sizes = [each.final_size for each in ranked if each.final_size is not None]
+    turns = any(np.any(np.asarray(task.twist, dtype=np.float64)[:3]) for task in case.tasks)
+    if turns and sizes and max(sizes) > (1 + _SAME_SIZE) * min(sizes):
+        own = any(each.contender.is_own for each in ranked)
+        of_all = "one size of all but the case's robot, which keeps its own ranges" if own else "one size"
+        lines.append(
+            "The designs have different sizes, and F of a rotation grows with the square of the size: see the column "
+            f"size, and --range 0 for {of_all}."
+        )
+    terms = {each.contender.label: driven_wrenches(each.contender) for each in ranked}
+    if len(set(terms.values())) > 1:
+        counts = ", ".join(f"{label} {count}" for label, count in terms.items())
+        lines.append(
+            f"F adds a term for each wrench that actuators work in, and robots have different numbers: {counts}."
+        )
+    kinds = {rate.dimension for each in ranked for fit in each.tasks for rate in fit.rates}
+    if len(kinds) > 1:
+        lines.append("Rates of actuators that turn and of those that slide have different units, and do not compare.")
+    return lines
+
+
+def _conventions(found: Comparison) -> list[str]:
+    """Return sentences about units, and about robots that are not ranked."""
+    case, entries, lines = found.case, found.entries, []
+    if any(each.contender.model.has_couples for each in entries):
+        length = case.units.text(found.characteristic_length, Dimension.LENGTH)
+        lines.append(f"Couples count beside forces by the characteristic length {length}.")
+    if any(part_of(each) == "no freedom" for each in entries):
+        lines.append(
+            "F of a robot without the freedom for a task has a constraint part: it is not ranked, as the motion does "
+            "not happen."
+        )
+    if len(case.tasks) > 1 and all(each.value is None for each in entries):
+        lines.append("The tasks are averaged, so there is no one value to sort by: the order is the one given.")
+    return lines
 
 
 def comparison_result(found: Comparison) -> ComparisonResult:

@@ -19,8 +19,7 @@ from ..proof.workspace.judge import Judgement
 from ..proof.workspace.verdict import Outcome
 from ..solver.certified import Certified
 from ..solver.solution import Solution, TaskOutcome
-from .placed import Placed
-from .robots import Contender
+from .robots import Contender, Placed
 
 
 class Rate(NamedTuple):

@@ -17,7 +17,7 @@ from casadi import SX
 from ...models import Model, RobotInstance, Substitution, WrenchKind, homogenised, instantiate
 from ...models.instance import LegInstance, magnitude, objective, rates
 from ...models.wrench import Wrench, force_along
-from ..case.limits.form import Call, Form
+from ..case.limits.constraint import Call, Form
 from ..program.program import Program
 
 #: Depth to which expressions of joint centres at two poses are compared.

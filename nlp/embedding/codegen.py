@@ -13,7 +13,6 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from string import Template
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -27,9 +26,9 @@ from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
-from .casaditext import for_controllers
 from .ctext import (
     comment_text,
+    for_controllers,
     identifier,
     index_macros,
     integer_table,
@@ -39,16 +38,12 @@ from .ctext import (
     string_table,
     version_texts,
 )
-from .held import held_by_fixed_numbers, held_texts
 from .loops import find_loops
-from .looptext import casadi_work, loop_texts, loop_work
-from .manifest import MANIFEST, manifest_text
-from .measured import NOT_MEASURED
-from .runtimelimits import limit_texts, run_time_limits
-from .stages import StagedFunctions, stage_functions
-from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words
-from .turns import turning_joints
-from .unitdata import UnitData
+from .manifest import MANIFEST, UnitData, manifest_text
+from .measure import NOT_MEASURED
+from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
+from .stages import StagedFunctions, casadi_work, loop_texts, loop_work, stage_functions
+from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words, turning_joints
 from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"
@@ -246,13 +241,6 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     }
 
 
-class _References(NamedTuple):
-    """Number of the self-test's points, and C tables of the points and of the values there."""
-
-    points: int
-    tables: str
-
-
 def _tables(nlp: Nlp, prefix: str) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     case, program = nlp.case, nlp.program
@@ -301,7 +289,7 @@ def _tables(nlp: Nlp, prefix: str) -> str:
     return "\n".join(blocks) + "\n"
 
 
-def _references(nlp: Nlp) -> _References:
+def _references(nlp: Nlp) -> tuple[int, str]:
     """Return the self-test's points and values.
 
     The values are those of the program itself, and so independent of the functions from which the C is generated.
@@ -333,4 +321,4 @@ def _references(nlp: Nlp) -> _References:
     for name, first in rows[0].items():
         table = name if name == "points" else f"reference_{name}"
         tables.append(matrix_table(f"{table}[{len(rows)}][{first.size + 1}]", [row[name].ravel() for row in rows]))
-    return _References(len(rows), "\n".join(tables))
+    return len(rows), "\n".join(tables)

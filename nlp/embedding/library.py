@@ -9,22 +9,58 @@ import queue
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ...models import FloatArray
 from ..case.task import Sense
 from ..errors import InputError, listing, nearest
-from ..solver.compiled import shared_library
-from .arguments import checked_budget, checked_numbers, checked_rows, is_between
+from ..system.programs import shared_library
 from .codegen import budget_files
-from .folder import CompiledLimit, CompiledNumber, Manifest, read_manifest
-from .structures import COUNTS, Batch, Rows
+from .manifest import CompiledLimit, CompiledNumber, Manifest, read_manifest
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+#: Whole numbers among the answers.
+COUNTS = ("status", "runs", "converged", "iterations")
+
+
+class Rows(ctypes.Structure):
+    """Rows of numbers, as the C has them."""
+
+    _fields_: ClassVar = [("values", ctypes.c_void_p), ("length", ctypes.c_int), ("is_shared", ctypes.c_int)]
+
+
+class Options(ctypes.Structure):
+    """A budget, as the C has it; zeros are none."""
+
+    _fields_: ClassVar = [
+        ("max_iterations", ctypes.c_int),
+        ("deadline", ctypes.c_void_p),
+        ("user", ctypes.c_void_p),
+    ]
+
+
+class Batch(ctypes.Structure):
+    """Problems and answers, as the C has them."""
+
+    _fields_: ClassVar = [
+        *((name, Rows) for name in ("p", "x0", "lower", "upper", "g_lower", "g_upper", "limits")),
+        *((name, ctypes.c_int) for name in ("maximise", "seeds")),
+        ("options", Options),
+        *((name, ctypes.c_void_p) for name in COUNTS),
+        *((name, ctypes.c_void_p) for name in ("F", "x", "R", "axis", "angle", "violation", "residual")),
+        *((name, ctypes.c_void_p) for name in ("lower_multipliers", "upper_multipliers")),
+        *((name, ctypes.c_void_p) for name in ("g_lower_multipliers", "g_upper_multipliers", "limit_multipliers")),
+    ]
+    maximise: int
+    seeds: int
+    kept: tuple[Any, ...]
+
 
 #: Largest number of problems in one call of the C: Ctrl-C works between calls, and threads share work evenly.
 _CHUNK = 32
@@ -312,3 +348,65 @@ def load_compiled(folder: str | os.PathLike[str]) -> CompiledCase:
 
 def _address(array: NDArray[Any]) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
+
+
+def checked_rows(name: str, given: ArrayLike | None, length: int) -> FloatArray | None:
+    """Return an array (length,) or (n, length) of finite numbers.
+
+    Raises:
+        InputError: the shape is another one, or a number is not finite.
+    """
+    if given is None:
+        return None
+    array = checked_numbers(name, given)
+    if array.ndim not in (1, 2) or array.shape[-1] != length:
+        raise InputError(f"{name}: must have the shape ({length},) or (n, {length}), got {array.shape}")
+    return array
+
+
+def checked_numbers(name: str, given: ArrayLike) -> FloatArray:
+    """Return an array of finite numbers, contiguous. Texts are no numbers, nor are complex ones.
+
+    Raises:
+        InputError: something in it is no number, or not finite.
+    """
+    try:
+        found = np.array(given)
+        is_real = found.dtype.kind in "biuf" or all(isinstance(each, Real) for each in found.ravel().tolist())
+        array = np.array(found, dtype=np.float64, order="C") if is_real else None
+    except (ValueError, TypeError, OverflowError):
+        array = None
+    if array is None:
+        raise InputError(f"{name}: must be an array of numbers, and no texts or complex ones")
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        place = ", ".join(str(index) for index in wrong[0])
+        where = f"{name}[{place}]" if place else name
+        raise InputError(f"{where} = {array[tuple(wrong[0])]}: must be finite")
+    return array
+
+
+def checked_budget(name: str, given: ArrayLike | None, *, is_whole: bool) -> FloatArray | None:
+    """Return a budget, () or (n,) numbers above 0.
+
+    Raises:
+        InputError: the shape is another one, or a number is not allowed.
+    """
+    if given is None:
+        return None
+    array = checked_numbers(name, given)
+    if array.ndim > 1:
+        raise InputError(f"{name}: must be a number or one for each problem, got {array.shape}")
+    largest = np.iinfo(np.intc).max if is_whole else np.inf
+    is_wrong = ~((array > 0) & (array <= largest)) | (is_whole & (array != np.floor(array)))
+    if is_wrong.any():
+        words = f"a whole number from 1 to {largest}" if is_whole else "above 0"
+        raise InputError(f"{name} = {array[is_wrong].flat[0]:.10g}: must be {words}")
+    return array
+
+
+def is_between(value: object, least: int, most: int | None) -> bool:
+    """Return whether a value is a whole number within bounds."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        return False
+    return bool(least <= value and (most is None or value <= most))

@@ -14,8 +14,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ..case.limits.constraint import Spectral
-from ..case.limits.form import Call
+from ..case.limits.constraint import Call, Spectral
 from ..program.program import Program
 from .calls import Calls, by_form, find_calls
 

@@ -1,4 +1,7 @@
-"""The manifest of a folder of C: names, units, bounds, limits and sizes as JSON, for programs that call the library."""
+"""The manifest of a folder of C: names, units, bounds, limits and sizes as JSON, for programs that call the library.
+
+It is written with the folder, and read again as a typed value.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,92 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import __version__
+from ..errors import InputError
 from ..program.nlp import Nlp
+from ..system.reading import read_limited
+from ..system.strictjson import json_tree, value_of
+from ..units import Units, objective_unit, rate_unit, twist_units
 from .runtimelimits import RunTimeLimit
 from .subject import bounds_in_c
-from .unitdata import UnitData
+
+
+@dataclass(frozen=True)
+class UnitData:
+    """Units of a program's numbers in C, for the case's own tasks; empty for a plain number."""
+
+    nlp: Nlp
+
+    @cached_property
+    def of_case(self) -> Units:
+        """Units of lengths and angles: angles are radians in C."""
+        return replace(self.nlp.case.units, angle="rad")
+
+    @property
+    def _twists(self) -> list[list[float]]:
+        return [np.asarray(task.twist, dtype=np.float64).tolist() for task in self.nlp.case.tasks]
+
+    @property
+    def F(self) -> str:  # noqa: N802 - as everywhere
+        """Unit of F; empty where the tasks do not agree in it."""
+        return objective_unit(self._twists, self.of_case)
+
+    @property
+    def rates(self) -> tuple[str, ...]:
+        """Unit of the rates of each task."""
+        return tuple(rate_unit(twist, self.of_case) for twist in self._twists)
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Unit of each variable; that of a level is F's."""
+        program = self.nlp.program
+        found = [self.of_case.label(each.dimension) for each in program.variables]
+        if program.places.epigraph is not None:
+            found[program.places.epigraph.level] = self.F
+        return tuple(found)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Unit of each fixed number."""
+        program = self.nlp.program
+        found = [self.of_case.label(each.dimension) for each in program.arguments]
+        for twist, places in zip(self._twists, program.places.twists, strict=False):
+            found[places.start : places.stop] = twist_units(twist, self.of_case)
+        epigraph = program.places.epigraph
+        for index in () if epigraph is None else (epigraph.ceiling, *epigraph.best):
+            found[index] = self.F
+        return tuple(found)
+
+    @property
+    def variable_multipliers(self) -> tuple[str, ...]:
+        """Unit of the multipliers of each variable's bounds."""
+        return tuple(self._multiplier(unit) for unit in self.variables)
+
+    @property
+    def constraint_multipliers(self) -> tuple[str, ...]:
+        """Unit of the multipliers of each constraint's bounds."""
+        readings = [each.reading for each in self.nlp.program.constraints]
+        units = [self.of_case.label(each.dimension) if each.power else "" for each in readings]
+        squares = [f"{unit}²" if unit and each.power == 2 else unit for unit, each in zip(units, readings, strict=True)]
+        return tuple(map(self._multiplier, squares))
+
+    def limit_multipliers(self, limits: Sequence[RunTimeLimit]) -> tuple[str, ...]:
+        """Return the unit of each limit's multiplier."""
+        return tuple(self._multiplier(self.of_case.label(each.dimension)) for each in limits)
+
+    def _multiplier(self, unit: str) -> str:
+        """Return the unit of F over another one; empty where F has none."""
+        if unit == self.F:
+            return ""
+        return f"{self.F}/{unit}" if self.F and unit else self.F
+
 
 #: Name of the manifest in the folder.
 MANIFEST = "manifest.json"
@@ -96,3 +177,138 @@ def _plain(value: str | float) -> str | float | None:
     if isinstance(value, str):
         return value
     return float(value) if math.isfinite(value) else None
+
+
+#: Largest manifest, bytes.
+_LARGEST = 2**26
+
+
+class CompiledNumber(NamedTuple):
+    """A free variable of x or a fixed number of p.
+
+    Attributes:
+        name: for people.
+        unit: ``rad`` for angles, empty for a plain number.
+        lower: its bound as a variable; -inf for a fixed number.
+        upper: likewise.
+        default: the case's value of a fixed number; for a variable, where the case's first search starts.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    default: float
+
+
+class CompiledLimit(NamedTuple):
+    """A limit that can be set at run time.
+
+    Attributes:
+        key: dotted key, such as ``leg_length.max``.
+        unit: of its number: ``rad`` for angles, empty for a plain number.
+        default: the case's number.
+        above: the number must be larger than this.
+        most: the number may be at most this.
+    """
+
+    key: str
+    unit: str
+    default: float
+    above: float
+    most: float
+
+
+class Manifest(NamedTuple):
+    """A folder of C: names, units, bounds, limits, statuses and the texts to compile.
+
+    Attributes:
+        name: of the case.
+        prefix: of the names in C.
+        variables: the free variables, in the order of x.
+        parameters: the fixed numbers, in the order of p.
+        limits: the limits that can be set.
+        constraints: names of the constraints.
+        statuses: names of the statuses by code.
+        seeds: largest number of searches from the table of starting points.
+        files: sources and headers of the library by file name.
+    """
+
+    name: str
+    prefix: str
+    variables: tuple[CompiledNumber, ...]
+    parameters: tuple[CompiledNumber, ...]
+    limits: tuple[CompiledLimit, ...]
+    constraints: tuple[str, ...]
+    statuses: tuple[str, ...]
+    seeds: int
+    files: Mapping[str, str]
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Return a folder's manifest, with the texts of the library.
+
+    Raises:
+        InputError: the folder is no folder of generated C, is of another version, or lacks a file.
+    """
+    try:
+        text = read_limited(folder / MANIFEST, _LARGEST)
+    except InputError as error:
+        raise InputError(f"{folder}: is no folder that `screwsynth codegen` wrote: {error}") from None
+    try:
+        data = value_of(Mapping[str, object], json_tree(text))
+        if data["format"] == FORMAT:
+            return _manifest(data, folder)
+        fault = f": format = {data['format']!r} is not the format {FORMAT} of this version: generate the folder again"
+    except OSError as error:
+        raise InputError(f"{folder}: {error.filename} cannot be read: {error.strerror or error}") from None
+    except (ValueError, KeyError) as error:
+        why = f"{error} is missing" if isinstance(error, KeyError) else f"{error}"
+        fault = f" is not as `screwsynth codegen` writes it: {why}"
+    raise InputError(f"{folder}: {MANIFEST}{fault}")
+
+
+def _manifest(data: Mapping[str, object], folder: Path) -> Manifest:
+    """Return the manifest from its data.
+
+    Raises:
+        ValueError: a value is wrong.
+        KeyError: a key is missing.
+        OSError: a file cannot be read.
+    """
+    names = [name for key in ("sources", "headers") for name in value_of(tuple[str, ...], data[key], key)]
+    if any(Path(name).name != name for name in names):
+        raise ValueError("a name in sources or headers is no name of a file")
+    prefix, seeds = value_of(str, data["prefix"], "prefix"), value_of(int, data["seeds"], "seeds")
+    if not prefix.isidentifier() or seeds < 0:
+        raise ValueError("prefix must be a name in C, and seeds not negative")
+
+    def rows(where: str, /, **kinds: object) -> list[list[Any]]:
+        """Return the values of some keys of the objects in a list."""
+        tables = value_of(tuple[Mapping[str, object], ...], data[where], where)
+        return [
+            [value_of(kind, each[name], f"{where}[{index}].{name}") for name, kind in kinds.items()]
+            for index, each in enumerate(tables)
+        ]
+
+    end = float | None
+    return Manifest(
+        name=value_of(str, data["name"], "name"),
+        prefix=prefix,
+        variables=tuple(
+            CompiledNumber(*each)
+            for each in rows("variables", name=str, unit=str, lower=float, upper=float, start=float)
+        ),
+        parameters=tuple(
+            CompiledNumber(name, unit, -math.inf, math.inf, default)
+            for name, unit, default in rows("parameters", name=str, unit=str, default=float)
+        ),
+        limits=tuple(
+            CompiledLimit(key, unit, default, -math.inf if above is None else above, math.inf if most is None else most)
+            for key, unit, default, above, most in rows("limits", key=str, unit=str, default=float, above=end, most=end)
+        ),
+        constraints=tuple(name for (name,) in rows("constraints", name=str)),
+        statuses=tuple(name for (name,) in rows("statuses", name=str)),
+        seeds=seeds,
+        files={name: (folder / name).read_text(encoding="utf-8") for name in names},
+    )

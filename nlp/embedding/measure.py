@@ -1,22 +1,27 @@
-"""Flash and stack of generated C, measured by the compilers of this machine.
+"""Flash and stack of generated C, measured by the compilers of this machine, and written into its files.
 
 Compilers run in a temporary folder and by the names of the files alone, so that the same files and the same compiler
-give the same figures.
+give the same figures. The bound of a solve's stack follows from the call graphs that gcc writes with
+``-fcallgraph-info=su``. The frames are those of the compiler. Functions of the C library have no frame there: their
+stack is not in the bound.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from ..errors import one_line
 from ..system.programs import RunError, first_program, run_program
-from .callgraph import stack_bound
+from .ctext import comment_text
+from .manifest import MANIFEST, json_text
 
 #: Flags of every compiler.
 _FLAGS = ("-std=c99", "-O2")
@@ -181,3 +186,145 @@ def _writes_graphs(words: tuple[str, ...], folder: Path) -> bool:
     except RunError:
         return False
     return (folder / "probe.ci").exists()
+
+
+#: Bytes added for each call: the return address, where a compiler does not count it in the frame.
+_RETURN = 8
+_NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n(\d+) bytes \(([a-z,]+)\)')
+_EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+_INDIRECT = "__indirect_call"
+
+
+def stack_bound(graphs: Mapping[str, str], prefix: str) -> int | None:
+    """Return the bytes of the deepest path of calls from the solver.
+
+    Args:
+        graphs: call graph of each source by its name without an ending.
+        prefix: of the case's names in C.
+
+    Returns:
+        The bound; None where a frame has no constant size, a function may call itself, or the solver is missing.
+    """
+    frames: dict[str, int] = {}
+    calls: dict[str, set[str]] = {}
+    for unit, text in graphs.items():
+        for title, size, kind in _NODE.findall(text):
+            if kind not in ("static", "dynamic,bounded"):
+                return None
+            frames[_name(title, unit)] = int(size)
+        for source, target in _EDGE.findall(text):
+            calls.setdefault(_name(source, unit), set()).add(_name(target, unit))
+    for function, targets in [*calls.items()]:
+        if _INDIRECT in targets:
+            calls[function] = (targets - {_INDIRECT}) | _called_by_pointer(function, frames, prefix)
+    return _deepest(f"{prefix}_solve", frames, calls) if f"{prefix}_solve" in frames else None
+
+
+def _name(title: str, unit: str) -> str:
+    """Return a function's name; that of a static one, which the graph gives with its file, begins with its unit."""
+    own = title.rpartition(":")[2]
+    return f"{unit}:{own}" if ":" in title else own
+
+
+def _called_by_pointer(function: str, frames: Mapping[str, int], prefix: str) -> set[str]:
+    """Return what a function may call by a pointer.
+
+    A search calls its program so: the scaled one, or that of the search for a feasible point, which calls the scaled
+    one. The scaled one calls only the caller's deadline, which is not known here.
+    """
+    if function.startswith((f"{prefix}_SCALED_", f"{prefix}-scaled:")):
+        return set()
+    program = {each for each in frames if re.search(r"_SCALED_(values|hessian|visit)$", each)}
+    if function.startswith(f"{prefix}-restore:"):
+        return program
+    return program | {each for each in frames if re.search(r"-restore:(values|hessian|visit)(\.|$)", each)}
+
+
+def _deepest(function: str, frames: Mapping[str, int], calls: Mapping[str, set[str]]) -> int | None:
+    """Return the deepest sum of frames from a function; None where a function may call itself."""
+    found: dict[str, int] = {}
+    open_calls: set[str] = set()
+
+    def depth(name: str) -> int | None:
+        if name in open_calls:
+            return None
+        if name not in found:
+            open_calls.add(name)
+            below = [depth(each) for each in sorted(calls.get(name, ()))]
+            open_calls.remove(name)
+            if any(each is None for each in below):
+                return None
+            found[name] = frames.get(name, 0) + _RETURN + max((each for each in below if each is not None), default=0)
+        return found[name]
+
+    return depth(function)
+
+
+#: What stands in the place of the figures where no compiler was run.
+NOT_MEASURED = "Flash and stack were not measured when this folder was generated."
+
+
+def with_figures(files: Mapping[str, str], prefix: str, figures: Sequence[Figures]) -> dict[str, str]:
+    """Return the files of a folder with figures in the header, the README and the manifest."""
+    manifest = json.loads(files[MANIFEST])
+    manifest["measured"] = [
+        {
+            "target": each.target.name,
+            "compiler": each.compiler,
+            "flash_bytes": each.flash,
+            "stack_bytes": each.stack,
+            "stack_bytes_with_room": each.with_room,
+            "painted_stack_bytes": each.painted,
+            "fault": each.fault,
+        }
+        for each in figures
+    ]
+    header = f"{prefix}.h"
+    return {
+        **files,
+        header: files[header].replace(f"/* {NOT_MEASURED} */", _macros(prefix.upper(), figures)),
+        "README.md": files["README.md"].replace(NOT_MEASURED, _rows(figures)),
+        MANIFEST: json_text(manifest),
+    }
+
+
+def figure_words(figures: Figures) -> str:
+    """Return the figures of a target in one line."""
+    parts = [
+        "" if figures.flash is None else f"flash {figures.flash / 1000:.1f} kB",
+        "" if figures.stack is None else f"stack at most {figures.stack} bytes",
+        f"not measured: {one_line(figures.fault)}" if figures.fault else "",
+    ]
+    return f"{figures.target.name}: {', '.join(part for part in parts if part)}"
+
+
+def _macros(prefix: str, figures: Sequence[Figures]) -> str:
+    """Return macros of the header; a comment says what is not measured."""
+    lines = []
+    for each in figures:
+        name = each.target.macro
+        if each.compiler:
+            lines.append(f"/* {each.target.name}: {comment_text(each.compiler)} */")
+        if each.flash is not None:
+            lines.append(f"#define {prefix}_FLASH_BYTES_{name} {each.flash} /* code and constants of the library */")
+        if each.stack is not None:
+            painted = "" if each.painted is None else f"; {each.painted} were measured with them, from all seeds"
+            said = f"bound of a solve by that compiler, without functions of math.h{painted}"
+            room = "with room for other compilers, and for functions of math.h"
+            lines.append(f"#define {prefix}_STACK_BYTES_{name}_GCC {each.stack} /* {said} */")
+            lines.append(f"#define {prefix}_STACK_BYTES_{name} {each.with_room} /* {room} */")
+        if each.fault:
+            lines.append(f"/* {each.target.name}: not measured: {comment_text(each.fault)} */")
+    return "\n".join(lines)
+
+
+def _rows(figures: Sequence[Figures]) -> str:
+    """Return a table for the README; a line says what is not measured."""
+    heads = ("flash, bytes", "bound of the stack, bytes", "with room for others", "stack measured, bytes")
+    lines = [f"| machine | {' | '.join(heads)} | compiler and flags |", "|---|---|---|---|---|---|"]
+    for each in figures:
+        numbers = " | ".join("-" if own is None else str(own) for own in each.numbers)
+        lines.append(f"| {each.target.name} | {numbers} | {comment_text(each.compiler) or '-'} |")
+    for each in figures:
+        lines += ["", f"{each.target.name}: not measured: {comment_text(each.fault)}."] if each.fault else []
+    return "\n".join(lines)

@@ -1,7 +1,7 @@
-"""A program's functions in two stages: the numbers that depend on the arguments alone, then the rest at each point.
+"""A program's functions in two stages, and the C text of its loops.
 
-A controller changes the task or a dimension rarely and the point always. Sines of fixed angles and the like must not be
-computed at every point.
+The numbers that depend on the arguments alone come first, then the rest at each point. A controller changes the task or
+a dimension rarely and the point always. Sines of fixed angles and the like must not be computed at every point.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from casadi import SX
 
 from ..program.program import Program
 from .calls import RobotValues
-from .held import Held
+from .ctext import short_table
 from .loops import Loop, Loops, find_loops
+from .runtimelimits import Held
 
 #: Operations of a Hessian, beside loops, above which C has its product with a direction instead: a third of the code.
 _LARGE_HESSIAN = 3000
@@ -130,8 +131,8 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
         outputs["derivatives"] += [loops.entries, ca.jacobian(loops.entries, x).T.nz[:]]
     if several and loops.has_objective:
         del outputs["F"], outputs["F_gradient"]
-    robots = _robot_expressions(program)
-    outputs |= {"poses": [ca.veccat(*[robot.inputs for robot in program.robots])]} if several else robots.expressions
+    of_robot, robot_inputs = _robot_expressions(program)
+    outputs |= {"poses": [ca.veccat(*[robot.inputs for robot in program.robots])]} if several else of_robot
     dense = {name: ca.cse([ca.densify(each) for each in expressions]) for name, expressions in outputs.items()}
     rest, k, prepared = _extract(program.p, [each for expressions in dense.values() for each in expressions])
     k, prepared = ca.vertcat(k, SX.sym("c", loops.constants.numel())), ca.vertcat(prepared, loops.constants)
@@ -139,27 +140,22 @@ def stage_functions(program: Program, size: SX, prefix: str, held: Held) -> Stag
     for name, expressions in dense.items():
         own, rest = rest[: len(expressions)], rest[len(expressions) :]
         functions[name] = ca.Function(f"{prefix}_{name}", [x, k, *inputs.get(name, [])], own)
-    of_robot = robots.expressions if several else {}
     return StagedFunctions(
         x,
         ca.Function(f"{prefix}_prepare", [program.p], [prepared]),
         functions,
         tuple(_loop_functions(loop, f"{prefix}_loop{i}") for i, loop in enumerate(loops.all)),
-        {name: ca.Function(f"{prefix}_{name}", [robots.inputs], own) for name, own in of_robot.items()},
+        {name: ca.Function(f"{prefix}_{name}", [robot_inputs], own) for name, own in of_robot.items() if several},
         loops,
         by_direction,
     )
 
 
-class _RobotExpressions(NamedTuple):
-    """Expressions of the robot by function, and the symbols (k, 1) that they depend on with several poses."""
+def _robot_expressions(program: Program) -> tuple[Mapping[str, list[SX]], SX]:
+    """Return the robot's expressions by function, and the symbols (k, 1) that they depend on with several poses.
 
-    expressions: Mapping[str, list[SX]]
-    inputs: SX
-
-
-def _robot_expressions(program: Program) -> _RobotExpressions:
-    """Return the robot's expressions: of the program's symbols, or with several poses of symbols of one pose."""
+    They are of the program's symbols, or with several poses of symbols of one pose.
+    """
     robot, inputs = program.robot, SX.sym("inputs", program.robot.inputs.numel())
     if len(program.robots) > 1:
         robot = RobotValues(program.model, program.robot.reference).robot(inputs)
@@ -176,7 +172,7 @@ def _robot_expressions(program: Program) -> _RobotExpressions:
     if len(program.robots) > 1 or robot.F.numel() > 1:
         expressions["F_of_tasks"] = [robot.F]
     dense = {name: [ca.densify(each) for each in own] for name, own in expressions.items()}
-    return _RobotExpressions(dense, inputs)
+    return dense, inputs
 
 
 def _loop_functions(loop: Loop, name: str) -> LoopFunctions:
@@ -198,16 +194,12 @@ def _loop_functions(loop: Loop, name: str) -> LoopFunctions:
     )
 
 
-class _Extraction(NamedTuple):
-    """Expressions of ``(x, k)``, the symbols ``k``, (count, 1), and their values as expressions of ``p`` alone."""
+def _extract(p: SX, expressions: Sequence[SX]) -> tuple[list[SX], SX, SX]:
+    """Extract the parts of expressions that depend on ``p`` alone, with symbols ``k`` (count, 1) in their place.
 
-    expressions: list[SX]
-    k: SX
-    values: SX
-
-
-def _extract(p: SX, expressions: Sequence[SX]) -> _Extraction:
-    """Extract the parts of expressions that depend on ``p`` alone, with symbols in their place."""
+    Returns:
+        Expressions of ``(x, k)``, the symbols, and their values as expressions of ``p`` alone.
+    """
     joined = ca.vertcat(SX(0, 1), *[ca.vec(each) for each in expressions])
     rest, symbols, parts = ca.extract_parametric(joined, p)
     # An argument that also stands beside variables, such as a component of a twist, is passed on in k as it is.
@@ -217,4 +209,130 @@ def _extract(p: SX, expressions: Sequence[SX]) -> _Extraction:
     for each in expressions:
         replaced.append(ca.reshape(rest[at : at + each.numel()], each.shape))
         at += each.numel()
-    return _Extraction(replaced, k, prepared)
+    return replaced, k, prepared
+
+
+def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
+    """Return the texts for the placeholders about loops."""
+    loops, most = staged.loops, _largest(staged)
+    rows = ""
+    if loops:
+        what = "limits that repeat, and F over several poses, by loops over functions of `-casadi.c`"
+        rows += f"| `{prefix}-loops.c` | {what} |\n"
+    if loops.spectra:
+        rows += f"| `{prefix}-spectrum.c` | limits on singular values of J, with their derivatives, by loops |\n"
+    return {
+        "has_loops": str(int(bool(loops))),
+        "nspectra": str(len(loops.spectra)),
+        "spectrum_lengths": ", ".join(repr(float(each.spectral.length)) for each in loops.spectra),
+        "spectrum_kinds": ", ".join(str(each.spectral.end.value) for each in loops.spectra),
+        "loop_rows": rows,
+        "nentries": str(loops.entries.numel()),
+        "nslots": str(loops.slot_count),
+        "nplain": str(len(loops.plain)),
+        "ninner": str(len(loops.inner)),
+        "nloops": str(len(loops.all)),
+        "has_objective": str(int(loops.has_objective)),
+        "by_direction": str(int(staged.by_direction)),
+        "constants_at": str(staged.prepare.numel_out(0) - loops.constants.numel()),
+        "loop_tables": _tables(staged),
+        "loop_cases": _cases(staged.of_loops),
+        **{f"most_{name}": str(count) for name, count in most.items()},
+        "ncolumns": str(len(_columns(staged).columns)),
+        "casadi_work": str(casadi_work(staged)),
+        # Eigenvalues by another order of operations, and by inverses, lose two digits more.
+        "limits_close": "1e-10" if loops.spectra else "1e-12",
+    }
+
+
+def casadi_work(staged: StagedFunctions) -> int:
+    """Return the number of doubles in the workspace of CasADi's functions."""
+    return max(1, *(function.sz_w() for function in staged.all))
+
+
+def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
+    """Return the number of doubles that ``loops.c`` divides its workspace into, beside CasADi's own; see there."""
+    loops = staged.loops
+    if not loops:
+        return 0
+    plain, slots = len(loops.plain), loops.slot_count
+    first = slots + len(_columns(staged).columns) + sum(_largest(staged).values()) + plain * (1 + n)
+    second = slots + plain + loops.entries.numel() + n + n * n + n
+    of_j = 6 * rows
+    # The locals of spectrum.c: matrices (6, 6) along the variables, and second derivatives.
+    spectrum = 10 * n * n + 115 * n + 1080 + of_j
+    return first + second + (3 * of_j + 2 * of_j * n + n * n + spectrum if loops.spectra else 0)
+
+
+class _Columns(NamedTuple):
+    """Variables on which slots depend: where those of each slot begin, with the end of the last, and their indices."""
+
+    first: list[int]
+    columns: list[int]
+
+
+def _columns(staged: StagedFunctions) -> _Columns:
+    """Return the variables on which the slots depend by structure."""
+    entries = staged.loops.entries
+    own: list[list[int]] = [[] for _ in range(staged.loops.slot_count)]
+    for row, column in zip(*ca.jacobian(entries, staged.x).sparsity().get_triplet(), strict=True):
+        own[row].append(column)
+    for loop, functions in zip(staged.loops.inner, staged.of_loops, strict=False):
+        for slots, outputs in zip(loop.slots, loop.outputs, strict=True):
+            for value, place in enumerate(outputs):
+                taken = (own[slots[i]] for r, i in functions.slopes if r == value)
+                own[place] = sorted({column for columns in taken for column in columns})
+    first = [0]
+    for columns in own:
+        first.append(first[-1] + len(columns))
+    return _Columns(first, [column for columns in own for column in sorted(columns)])
+
+
+def _largest(staged: StagedFunctions) -> dict[str, int]:
+    """Return the largest numbers of inputs, values, derivatives and so on of a loop, each at least 1."""
+    counts = [
+        {
+            "inputs": loop.inputs.numel(),
+            "constants": loop.constants.numel(),
+            "values": loop.values.numel(),
+            # The place of the slopes in the workspace has derivatives by the inputs too.
+            "slopes": max(len(own.slopes), loop.inputs.numel()),
+            "second": len(own.second),
+        }
+        for loop, own in zip(staged.loops.all, staged.of_loops, strict=True)
+    ]
+    names = ("inputs", "constants", "values", "slopes", "second")
+    return {name: max((each[name] for each in counts), default=0) or 1 for name in names}
+
+
+def _tables(staged: StagedFunctions) -> str:
+    """Return the constant tables of slots, constants and outputs."""
+    loops = staged.loops
+    slots, constants, outputs, slopes, second = tables = [list[int]() for _ in range(5)]
+    lines = []
+    for loop, own in zip(loops.all, staged.of_loops, strict=True):
+        sizes = (len(loop.slots), loop.inputs.numel(), loop.constants.numel(), loop.values.numel())
+        counts = (len(own.slopes), len(own.second))
+        firsts = (len(slots), len(constants), len(outputs), len(slopes) // 2, len(second) // 2)
+        lines.append(", ".join(map(str, (*sizes, *counts, *firsts))))
+        slopes.extend(each for pair in own.slopes for each in pair)
+        second.extend(each for pair in own.second for each in pair)
+        for into, table in ((slots, loop.slots), (constants, loop.constant_places), (outputs, loop.outputs)):
+            into.extend(value for row in table for value in row)
+    rows = ",\n".join(f"    {{{line}}}" for line in (*lines, ", ".join("0" * 11)))
+    names = ("slots", "constant_places", "outputs", "slope_places", "second_places")
+    blocks = [short_table(name, table) for name, table in zip(names, tables, strict=True)]
+    columns = _columns(staged)
+    blocks += [short_table("first_column", columns.first), short_table("columns", columns.columns)]
+    blocks.append(f"static const loop loops[LOOPS + 1] = {{\n{rows}}};")
+    blocks.append(short_table("plain_places", loops.plain))
+    if loops.spectra:
+        blocks.append(short_table("spectral_places", [each.place for each in loops.spectra]))
+        blocks.append(short_table("spectral_slots", [slot for each in loops.spectra for slot in each.slots]))
+    return "\n".join(blocks) + "\n"
+
+
+def _cases(functions: Sequence[LoopFunctions]) -> str:
+    """Return the cases of the switch that calls the loops' functions."""
+    flat = [function for own in functions for function in (own.values, own.curvature)]
+    return "".join(f"    case {i}: return {each.name()}(arg, res, 0, work, 0);\n" for i, each in enumerate(flat))

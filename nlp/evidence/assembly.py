@@ -30,8 +30,8 @@ from ...models import (
     axis_angle_from_matrix,
     matrix_from_axis_angle,
 )
-from ..program.kernel import Kernel, tuple_of
 from ..program.nlp import Nlp
+from ..program.program import Kernel, tuple_of
 from .state import RobotState
 from .workingmode import Posture, names_of, turned_limbs
 

@@ -24,8 +24,8 @@ import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, Model, Substitution, driven
-from ..program.kernel import Kernel, tuple_of
 from ..program.nlp import Nlp
+from ..program.program import Kernel, tuple_of
 
 #: A determinant of unit columns below this has no sign: the limb is singular there.
 _SINGULAR = 1e-9

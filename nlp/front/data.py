@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from ..program.designnumbers import design_indices
 from ..program.places import Scalar
+from ..program.program import design_indices
 from ..results.evidence import certificate_data
 from ..results.front import FrontGoalData, FrontPointData, FrontResult
 from ..results.jsondata import finite_or_none

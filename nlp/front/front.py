@@ -15,7 +15,7 @@ Where this gives no new point, the other goals are optimised in turn; a box wher
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,9 +30,10 @@ from ..proof.certificate.certificate import Certificate
 from ..proof.enclosure.engine import kernel
 from ..solver.multistart import ProgramSolution, solve_program
 from .boxes import GoalBox, Region
-from .goals import Goal
-from .programs import GoalProgram, loosest_numbers, program_of
+from .goals import Goal, GoalProgram, loosest_numbers, program_of, read_goals
 
+#: Points of a front where no number is asked for.
+POINTS = 16
 #: Points whose goals differ by less than this part of the distance of the ends are one point of the front.
 _SAME = 1e-6
 #: A point is dominated where no goal is better than that of another by more than this part: rounding of a bound.
@@ -80,40 +81,50 @@ class Front:
 
 
 @one_call
-def find_front(
+def pareto(
     case: Case,
-    goals: tuple[Goal, ...],
-    count: int,
+    goals: Sequence[str],
     *,
-    search: Search,
+    points: int = POINTS,
+    starts: int | None = None,
+    seed: int | None = None,
     jobs: int | None = None,
-    certify: bool = False,
+    certified: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Front:
-    """Return the front of two or more goals; the errors are those of :func:`.pareto.pareto`.
+    """Find the front of two or more goals of a case.
 
     Args:
-        case: the case.
-        goals: the goals.
-        count: number of points.
-        search: number of starts, seed and the solver's settings.
-        jobs: number of threads.
-        certify: whether the optimum of each point is proved too.
-        progress: called after each solve.
+        case: the case, all of whose limits hold at each point.
+        goals: as on the command line, such as ``["max F:drive", "min limits.leg_length.max"]``.
+        points: number of points, at least 2; fewer where the front has gaps or is one point.
+        starts: number of starting points instead of the case's.
+        seed: seed instead of the case's.
+        jobs: number of threads; the result does not depend on it.
+        certified: whether the optimum of each point is proved too.
+        progress: called after each solve with the numbers of points found and wanted.
+
+    Raises:
+        CaseError: the case contradicts itself.
+        InputError: a goal is none of the case, is given twice, or is a limit that cannot move; or there is one only.
+        EvaluationError: a goal alone has no optimum.
+        UncoveredError: an optimum is to be proved, and an expression has an operation without a rule.
     """
-    began = time.perf_counter()
-    if certify:
+    if points < 2:
+        raise InputError(f"pareto: points = {points}: must be at least 2")
+    began, search, wanted = time.perf_counter(), case.search.but(starts, seed), read_goals(goals, case)
+    if certified:
         kernel()  # before any solve where it is missing
-    loosest = loosest_numbers(case, goals)
-    builder = _Builder(case, goals, search, jobs)
-    nothing = (None,) * len(goals)
+    loosest = loosest_numbers(case, wanted)
+    builder = _Builder(case, wanted, search, jobs)
+    nothing = (None,) * len(wanted)
     ends: list[FrontPoint] = []
-    for k in (1, 0, *range(2, len(goals))):
+    for k in (1, 0, *range(2, len(wanted))):
         end = builder.solve(k, nothing, [])
         if is_requested():
             raise InputError(f"{case.source or case.name}: {why_stopped()} before the ends of the front are found")
         if end is None:
-            fault = f"the goal {goals[k].label} alone has no optimum within the limits"
+            fault = f"the goal {wanted[k].label} alone has no optimum within the limits"
             raise EvaluationError(f"{case.source or case.name}: {fault}")
         ends.append(end)
     size = np.ptp([end.values for end in ends], axis=0)
@@ -121,13 +132,13 @@ def find_front(
     ends = [builder.polished(end, size) for end in ends]
     reached(Milestone.POINT)
     say = progress if progress is not None else _say_nothing
-    if len(goals) == 2:
-        found, gaps = _spread_between(builder, ends, size, count, say)
+    if len(wanted) == 2:
+        found, gaps = _spread_between(builder, ends, size, points, say)
     else:
-        found, gaps = _spread_in_boxes(builder, ends, size, loosest, count, say), []
-    if certify:
+        found, gaps = _spread_in_boxes(builder, ends, size, loosest, points, say), []
+    if certified:
         found = [replace(point, certificate=_certificate(point, jobs, len(found) - k)) for k, point in enumerate(found)]
-    return Front(case, goals, tuple(found), tuple(gaps), builder.failed, time.perf_counter() - began)
+    return Front(case, wanted, tuple(found), tuple(gaps), builder.failed, time.perf_counter() - began)
 
 
 def _say_nothing(_done: int, _total: int) -> None:

@@ -1,13 +1,31 @@
-"""Goals of a front as they are written: ``max F:NAME``, ``min F:NAME``, ``min limits.KEY`` and ``max limits.KEY``."""
+"""Goals of a front, such as ``max F:NAME`` and ``min limits.KEY``, and its programs (epsilon-constraint method).
+
+In each program one goal is optimised while the others keep bounds.
+
+Source of the method: Y. Y. Haimes, L. S. Lasdon and D. A. Wismer, On a bicriterion formulation of the problems of
+integrated system identification and system optimization, IEEE Trans. Syst. Man Cybern. 1 (1971) 296-297.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Dimension, FloatArray
 from ..case.case import Case
+from ..case.limits.constraint import BoundedConstraint, Constraint, Reading, in_parts
+from ..case.pose import Free, OverPoses
 from ..case.task import Sense
 from ..errors import InputError, listing, nearest
+from ..program.epigraph import total_over_poses
+from ..program.formulation import formulate
+from ..program.layout import Layout, assemble, lay_out
+from ..program.nlp import Nlp
 
 _TASK, _LIMIT = "F:", "limits."
 #: Largest number of goals: the boxes of the space of goals become too many, and nobody reads such a front.
@@ -33,7 +51,7 @@ class Goal:
     @property
     def sign(self) -> float:
         """Factor that turns the goal into one to be minimised."""
-        return -1.0 if self.sense is Sense.MAX else 1.0
+        return -self.sense.sign
 
 
 def read_goals(texts: Sequence[str], case: Case) -> tuple[Goal, ...]:
@@ -69,3 +87,161 @@ def _read_goal(text: str, case: Case) -> Goal:
     if names.count(name) > 1:
         raise InputError(f"--goals {text!r}: several tasks have this name; tasks: {listing(names)}")
     return Goal(sense, f"{_TASK}{name}", task=names.index(name))
+
+
+@dataclass(frozen=True, eq=False)
+class GoalProgram:
+    """A program of a front.
+
+    Attributes:
+        nlp: the program; a limit that is optimised is its last variable.
+        optimised: index of the goal that is optimised.
+        values: ``(x, p)`` to the expressions of each goal, (k, 1); for a limit those of its constraints.
+        readings: how these expressions read, for each goal.
+        goals: all goals.
+    """
+
+    nlp: Nlp
+    optimised: int
+    values: ca.Function
+    readings: tuple[tuple[Reading, ...], ...]
+    goals: tuple[Goal, ...]
+
+    def measure(self, x: FloatArray) -> FloatArray:
+        """Return the goals (k,) at a point (n,), lengths in the case's unit and angles in radians."""
+        found = self.values(x, self.nlp.arguments)
+        values = []
+        for goal, raw, readings in zip(self.goals, found, self.readings, strict=True):
+            each = [r.from_value(float(v)) for r, v in zip(readings, raw.full().ravel(), strict=True)]
+            # The limit holds for all of its constraints: its number is the worst of them.
+            values.append(each[0] if goal.task is not None else max(each) if goal.sense is Sense.MIN else min(each))
+        return np.array(values)
+
+
+def loosest_numbers(case: Case, goals: Sequence[Goal]) -> FloatArray:
+    """Return the worst number (k,) that the case allows of each goal: that of a limit; NaN for F.
+
+    Goals that a front of the case cannot have are refused.
+
+    Raises:
+        InputError: a limit is not in the case or cannot move, or the case combines poses by their worst.
+    """
+    if case.over_poses is OverPoses.WORST and case.pose_count > 1:
+        raise InputError("pareto: a case with the worst of several poses has no front here; use sum or mean")
+    layout = lay_out(case, [case.tasks[0]])
+    found = []
+    for goal in goals:
+        least, most = (math.nan, math.nan) if goal.task is not None else _range(layout, goal)
+        found.append(most if goal.sense is Sense.MIN else least)
+    return np.array(found)
+
+
+def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequence[float | None]) -> GoalProgram:
+    """Return the program that optimises one goal.
+
+    Args:
+        case: the case, whose own limits hold too.
+        goals: all goals.
+        optimised: index of the goal to optimise.
+        bounds: number that each goal must reach; None for none, and for the goal that is optimised.
+
+    Raises:
+        CaseError: the case contradicts itself.
+        InputError: a limit is not in the case or cannot move.
+    """
+    best = goals[optimised]
+    # A case without a goal of F still has a task: a layout has the rates of one.
+    tasks = [goal.task for goal in (best, *goals) if goal.task is not None] or [0]
+    tasks = list(dict.fromkeys(tasks))
+    layout = lay_out(case, [case.tasks[task] for task in tasks])
+    added: list[BoundedConstraint] = []
+    for goal, bound in zip(goals, bounds, strict=True):
+        if bound is not None and goal.task is not None:
+            # Of order 1, as the solver takes what is no limit of the case.
+            part = 1 / formulate(case, goal.task).objective_scale
+            F = part * _total(layout, tasks.index(goal.task))
+            sides = (part * bound, math.inf) if goal.sense is Sense.MAX else (-math.inf, part * bound)
+            added.append(BoundedConstraint(Constraint(f"F of {goal.label[2:]}", F, in_parts(part)), *sides))
+        if bound is not None and goal.task is None:
+            layout = replace(layout, constraints=tuple(_moved(item, goal, bound) for item in layout.constraints))
+    raw, readings = zip(*[_raw(layout, goal, tasks) for goal in goals], strict=True)
+    if best.task is not None:
+        objective, size = _total(layout, tasks.index(best.task)), formulate(case, best.task).objective_scale
+    else:
+        least, most = _range(layout, best)
+        dimension = readings[optimised][0].dimension
+        level = layout.table.add(best.label, dimension, Free(least, most)).symbols
+        layout = replace(
+            layout,
+            constraints=tuple(each for item in layout.constraints for each in _below(item, best, level, (least, most))),
+        )
+        objective, size = level, most - least
+    nlp = replace(assemble(layout, objective, best.sense, added), size=size)
+    values = ca.Function("goals", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in raw])
+    return GoalProgram(nlp, optimised, values, readings, goals)
+
+
+def _total(layout: Layout, task: int) -> SX:
+    """Return F of a task of a layout over all poses."""
+    return total_over_poses([robot.F[task] for robot in layout.robots], layout.case.over_poses)
+
+
+def _raw(layout: Layout, goal: Goal, tasks: Sequence[int]) -> tuple[SX, tuple[Reading, ...]]:
+    """Return the expressions of a goal one below the other, and how each reads."""
+    if goal.task is not None:
+        return _total(layout, tasks.index(goal.task)), (Reading(Dimension.NUMBER),)
+    found = [item.constraint for item in layout.constraints if _is_of(item, goal)]
+    return ca.vertcat(*[each.expression for each in found]), tuple(each.reading for each in found)
+
+
+def _is_of(item: BoundedConstraint, goal: Goal) -> bool:
+    """Return whether a constraint is one of a goal's limit: an upper one for a minimum, a lower one for a maximum."""
+    return item.constraint.keys[int(goal.sense is Sense.MIN)] == goal.key
+
+
+def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
+    """Return the smallest and the largest number that a limit can have; the case's own is the loosest.
+
+    Raises:
+        InputError: the case has no such limit, or it has no end in the goal's direction.
+    """
+    found = [item for item in layout.constraints if _is_of(item, goal)]
+    if not found:
+        side = int(goal.sense is Sense.MIN)
+        keys = sorted({item.constraint.keys[side] for item in layout.constraints} - {""})
+        fault = "is no limit of the case that a front can move in this sense"
+        raise InputError(f"--goals {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
+    reading = found[0].constraint.reading
+    if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
+        raise InputError(f"--goals {goal.label}: is a limit on an estimate, which a front cannot move")
+    if goal.sense is Sense.MIN:
+        least, most = reading.above, min(reading.from_value(item.upper) for item in found)
+    else:
+        least, most = max(reading.from_value(item.lower) for item in found), reading.most
+        upper = [reading.from_value(item.upper) for item in found if math.isfinite(item.upper)]
+        most = min([most, *upper])
+    if not (math.isfinite(least) and math.isfinite(most) and least < most):
+        raise InputError(f"--goals {goal.label}: has no end in this direction; give the limit's other number too")
+    return least, most
+
+
+def _moved(item: BoundedConstraint, goal: Goal, bound: float) -> BoundedConstraint:
+    """Return a constraint with a goal's number as its bound, where it is one of the goal's limit."""
+    if not _is_of(item, goal):
+        return item
+    value = float(item.constraint.reading.to_value(SX(bound)))
+    return replace(item, upper=value) if goal.sense is Sense.MIN else replace(item, lower=value)
+
+
+def _below(item: BoundedConstraint, goal: Goal, level: SX, ends: tuple[float, float]) -> tuple[BoundedConstraint, ...]:
+    """Return a constraint of a goal's limit against a level that is a variable, and its other side."""
+    if not _is_of(item, goal):
+        return (item,)
+    constraint, is_upper = item.constraint, goal.sense is Sense.MIN
+    least, most = (float(constraint.reading.to_value(SX(end))) for end in ends)
+    # Of order 1, as a bound of 0 says nothing about the size of an expression such as a squared length.
+    expression = (constraint.expression - constraint.reading.to_value(level)) / (most - least)
+    plain = Constraint(constraint.name, expression, Reading(Dimension.NUMBER), pose=constraint.pose)
+    moved = BoundedConstraint(plain, -math.inf, 0.0) if is_upper else BoundedConstraint(plain, 0.0, math.inf)
+    rest = replace(item, upper=math.inf) if is_upper else replace(item, lower=-math.inf)
+    return (moved, rest) if math.isfinite(rest.lower) or math.isfinite(rest.upper) else (moved,)

@@ -9,7 +9,7 @@ from collections import Counter
 from ..front.data import design_places, goal_bounds, goal_units, goal_values
 from ..front.front import Front, FrontPoint
 from ..front.goals import Goal
-from ..program.designnumbers import design_names
+from ..program.program import design_names
 from ..proof.certificate.certificate import CertificateStatus
 from ..results.point import stated_pose_notice
 from ..results.text import TextTable

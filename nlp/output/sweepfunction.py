@@ -15,8 +15,7 @@ from ..errors import InputError, check_seconds
 from ..interruption import one_call, within
 from ..sweeps.columns import SweepColumns, columns_of
 from ..sweeps.engines import EngineKind
-from ..sweeps.points import Points, grid_of
-from ..sweeps.source import CaseSource
+from ..sweeps.points import CaseSource, Points, grid_of
 from ..sweeps.sweep import Sweep, SweepProgress, run_sweep
 from .sweeptable import check_table, is_written, table_rows, write_table
 

@@ -12,7 +12,7 @@ from sys import intern
 from typing import Any, NamedTuple
 
 from ..errors import InputError
-from ..sweeps.rows import Row
+from ..sweeps.journal import Row
 from ..sweeps.sweep import Sweep
 from .files import check_target, write_whole
 

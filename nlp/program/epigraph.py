@@ -26,12 +26,10 @@ from casadi import SX
 
 from ...models import Dimension, FloatArray, frozen_vector
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, Constraint, Reading
-from ..case.limits.form import Call, Form
+from ..case.limits.constraint import BoundedConstraint, Call, Constraint, Form, Reading
 from ..case.pose import Free, OverPoses
 from ..case.task import Sense
-from .assembly import assemble
-from .layout import Layout, lay_out
+from .layout import Layout, assemble, lay_out
 from .nlp import Nlp
 from .places import Epigraph
 from .sampling import starting_points

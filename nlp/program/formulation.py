@@ -19,12 +19,11 @@ from casadi import SX
 
 from ...models import Dimension, FloatArray, frozen_vector
 from ..case.case import Case
-from ..case.limits.form import Call, Form
+from ..case.limits.constraint import Call, Form
 from ..case.pose import OverPoses
 from ..case.task import Sense
-from .assembly import assemble
 from .epigraph import formulate_worst_pose, weighted_total
-from .layout import Layout, lay_out
+from .layout import Layout, assemble, lay_out
 from .nlp import Nlp
 from .places import Scalar
 from .program import Program

@@ -15,9 +15,8 @@ from casadi import SX
 
 from ...models import RobotInstance
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint
+from ..case.limits.constraint import BoundedConstraint, PairFamily
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
-from ..case.limits.pairs import PairFamily
 from ..case.pose import Free
 from ..errors import CaseError
 from .repeated import without_repeated
@@ -90,16 +89,13 @@ def limit_constraints(
     return LimitConstraints(tuple(varying), tuple(constant), deferred, fixed)
 
 
-class _SortedFamilies(NamedTuple):
-    """Pairs that are constraints from the start, families whose pairs come when needed, and fixed families."""
+def _sorted_families(
+    families: Sequence[PairFamily], numbers: ProgramNumbers
+) -> tuple[list[tuple[BoundedConstraint, ...]], tuple[PairFamily, ...], tuple[PairFamily, ...]]:
+    """Return pairs that are constraints from the start, families whose pairs come when needed, and fixed families.
 
-    pairs: list[tuple[BoundedConstraint, ...]]
-    deferred: tuple[PairFamily, ...]
-    fixed: tuple[PairFamily, ...]
-
-
-def _sorted_families(families: Sequence[PairFamily], numbers: ProgramNumbers) -> _SortedFamilies:
-    """Return all pairs of few values, the tightest pair of fixed values, and the families of many values."""
+    The pairs are all those of few values, and the tightest one of fixed values.
+    """
     pairs: list[tuple[BoundedConstraint, ...]] = []
     deferred: list[PairFamily] = []
     fixed: list[PairFamily] = []
@@ -114,7 +110,7 @@ def _sorted_families(families: Sequence[PairFamily], numbers: ProgramNumbers) ->
             order = np.argsort(function(0, numbers.values).full().ravel(), kind="stable")
             pairs.append(family.pair(int(order[0]), int(order[-1])))
             fixed.append(family)
-    return _SortedFamilies(pairs, tuple(deferred), tuple(fixed))
+    return pairs, tuple(deferred), tuple(fixed)
 
 
 def _families(case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX]) -> Iterator[PairFamily]:

@@ -13,11 +13,9 @@ import numpy as np
 from ...models import FloatArray, frozen_vector
 from ...models.whole import Whole
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint
-from ..case.limits.pairs import PairFamily
+from ..case.limits.constraint import BoundedConstraint, PairFamily
 from ..case.task import Sense
-from .kernel import Kernel, single_output
-from .program import Program
+from .program import Kernel, Program, single_output
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

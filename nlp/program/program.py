@@ -3,23 +3,83 @@
 A program belongs to a *structure*: a robot with a choice of free numbers. Every number that a case fixes (dimensions,
 pose, twist) is an argument, so one program serves every start, every task and every point of a sweep. Variables are in
 the units of the case (radians for angles); division by :attr:`~.nlp.Nlp.scale` makes them of order 1.
+
+CasADi's functions are evaluated on NumPy arrays in place. A call through CasADi's general interface converts every
+argument and result, which takes twenty times as long as evaluating the functions of a parallel robot. A kernel keeps
+the memory that the function reads and writes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from threading import Lock
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, Model, RobotInstance, Substitution
 from ...models.whole import Whole
-from ..case.limits.constraint import Constraint
-from ..case.limits.form import Call
-from .kernel import Kernel, single_output
+from ..case.limits.constraint import Call, Constraint
 from .places import Places, Scalar
+
+T = TypeVar("T")
+
+
+def tuple_of(*outputs: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the outputs of a function unchanged, as a tuple."""
+    return outputs
+
+
+def single_output(output: FloatArray) -> FloatArray:
+    """Return the output of a function with a single output, unchanged."""
+    return output
+
+
+class Kernel(Generic[T]):
+    """A CasADi function with NumPy arrays as arguments and results; calls from several threads are safe.
+
+    Args:
+        function: any number of dense inputs and outputs.
+        result: makes the value of a call from new arrays (rows, columns), one for each output.
+    """
+
+    def __init__(self, function: ca.Function, result: Callable[..., T]) -> None:
+        self._result = result
+        self._inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+        self._outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        self._shapes = [function.size_out(i) for i in range(function.n_out())]
+        # The buffer must outlive the evaluation handle that belongs to it, and the function must outlive both.
+        self._function = function
+        self._buffer: Any
+        self._buffer, self._evaluate = function.buffer()
+        for index, array in enumerate(self._inputs):
+            if array.size:
+                self._buffer.set_arg(index, array.data)
+        for index, array in enumerate(self._outputs):
+            if array.size:
+                self._buffer.set_res(index, array.data)
+        self._lock = Lock()
+
+    def __call__(self, *arguments: FloatArray | float) -> T:
+        """Return the function's value.
+
+        Args:
+            arguments: one for each input: a number, or a vector with as many numbers as the input has.
+
+        Raises:
+            ValueError: the number or a size of the arguments is wrong.
+        """
+        with self._lock:
+            for memory, argument in zip(self._inputs, arguments, strict=True):
+                memory[:] = argument
+            self._evaluate()
+            results = zip(self._outputs, self._shapes, strict=True)
+            arrays = [memory.reshape(shape, order="F").copy() for memory, shape in results]
+        return self._result(*arrays)
 
 
 class Values(NamedTuple):
@@ -211,3 +271,21 @@ class Kernels:
         model = self._program.model
         outputs = [ca.densify(part) for each in model.joint_screws for part in (each.all, each.loops)]
         return ca.Function("joint_screws", Substitution.identity(model).all, outputs)
+
+
+def design_indices(program: Program) -> tuple[int, ...]:
+    """Return the indices in ``x`` of dimensions and poses: of all variables but joints, and an epigraph's level."""
+    places = program.places
+    others = set(places.inner)
+    if places.epigraph is not None:
+        others.add(places.epigraph.level)
+    return tuple(k for k in range(len(program.variables)) if k not in others)
+
+
+def design_names(program: Program) -> frozenset[str]:
+    """Return the names of the variables of a design, with those of its limits: all but joints and closed loops."""
+    model = program.model
+    inner = {program.variables[index].name for index in program.places.inner}
+    names = {each.name for each in program.variables} | {each.name for each in program.constraints}
+    closed = tuple(equation.name for equation in (*model.closure, *model.loops))
+    return frozenset(name for name in names - inner if name.split(" at ")[0] not in closed)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
-from ..solver.optima import Optimum
-from ..solver.starts import StartStatus
+from ..solver.starts import Optimum, StartStatus
 from .data import OptimumData, ReachedData, SolveResult, StartsData
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data

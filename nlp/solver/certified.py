@@ -21,10 +21,9 @@ from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses
 from ..proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
-from .answer import Answer
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
-from .solution import Solution
+from .solution import Answer, Solution
 from .solve import solve_programs
 
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -36,9 +36,8 @@ from ..program.pairs import with_pairs_at
 from ..program.places import FreeRotation
 from ..program.program import Program
 from .multistart import ProgramSolution, state_or_none
-from .optima import same_value
 from .solution import Combination, Solution, TaskOutcome
-from .starts import StartStatus
+from .starts import StartStatus, same_value
 from .status import Status
 
 #: Weights of the distance to the other tasks' points, in parts of F's scale, in descending order, for the search of the
@@ -160,16 +159,14 @@ def _solve_combined(
     return solve_one(case.method.value, nlp, starts)
 
 
-class _Members(NamedTuple):
-    """A point of each task's optimal set, whether the set has no other, and notices about sets of several points."""
+def _choose_members(
+    nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish: Polish
+) -> tuple[list[FloatArray], list[bool], list[str]]:
+    """Choose the point of each task's optimal set that is nearest to the other tasks' points.
 
-    points: list[FloatArray]
-    unique: list[bool]
-    notices: list[str]
-
-
-def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish: Polish) -> _Members:
-    """Choose the point of each task's optimal set that is nearest to the other tasks' points."""
+    Returns:
+        The points, whether each set has no other, and notices about sets of several points.
+    """
     points = [np.array(solution.x) for solution in own]
     members = [_known_members(solution) for solution in own]
     unique = [_is_unique(solution) for solution in own]
@@ -190,7 +187,7 @@ def _choose_members(nlps: Sequence[Nlp], own: Sequence[ProgramSolution], polish:
         points = following
         if moved <= _STILL:
             break
-    return _Members(points, unique, notices)
+    return points, unique, notices
 
 
 def _may_be_connected(solution: ProgramSolution) -> bool:

@@ -6,7 +6,7 @@ No other module knows Ipopt's strings.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -15,7 +15,7 @@ from casadi import MX, SX
 from ...models import FloatArray
 from ..case.settings import Search
 from ..program.nlp import Nlp
-from .compiled import shared_library
+from ..system.programs import shared_library
 from .interface import LocalSearch, SolverResult, StopReason
 
 #: Ipopt's tolerance. The Newton correction that follows converges quadratically: tighter would only cost iterations.
@@ -77,9 +77,9 @@ class Confirmation:
         if search.compiled:
             self._problem = _Problem(nlp, search, sizes)
         else:
-            given = _given_derivatives(nlp)
-            self._problem = _Problem(nlp, search, sizes, given.problem)
-            options |= given.options
+            problem, derivatives = _given_derivatives(nlp)
+            self._problem = _Problem(nlp, search, sizes, problem)
+            options |= derivatives
         self._function = self._problem.function(options)
 
     def __call__(self, optimum: SolverResult) -> SolverResult:
@@ -131,15 +131,11 @@ class _Problem:
         )
 
 
-class _Given(NamedTuple):
-    """A problem by CasADi's keys, and options with its derivatives."""
+def _given_derivatives(nlp: Nlp) -> tuple[dict[str, MX], dict[str, Any]]:
+    """Return the problem of :func:`_scaled_problem` as calls of the program's functions, and options with derivatives.
 
-    problem: dict[str, MX]
-    options: dict[str, Any]
-
-
-def _given_derivatives(nlp: Nlp) -> _Given:
-    """Return the problem of :func:`_scaled_problem` as calls of the program's functions, with those of derivatives."""
+    The problem is by CasADi's keys.
+    """
     program, n, c = nlp.program, nlp.n, len(nlp.program.constraints)
     counts = [len(program.arguments), n, n, 1, c]
     s, parameters, factor, multipliers = MX.sym("s", n), MX.sym("p", sum(counts)), MX.sym("factor"), MX.sym("m", c)
@@ -165,7 +161,7 @@ def _given_derivatives(nlp: Nlp) -> _Given:
     options["no_nlp_grad"] = True
     options["jac_g"] = ca.Function("nlp_jac_g", [s, parameters], [g / sizes, rows], names, ["g", "jac_g_x"])
     values = program.values(x, p)
-    return _Given({"x": s, "p": parameters, "f": weight * values[0], "g": values[1] / sizes}, options)
+    return {"x": s, "p": parameters, "f": weight * values[0], "g": values[1] / sizes}, options
 
 
 def constraint_sizes(nlp: Nlp, points: FloatArray) -> FloatArray:

@@ -18,8 +18,7 @@ from ..program.nlp import Nlp
 from ..screening.screening import Screened, can_screen, screen
 from .interface import Solver, SolverResult, StopReason
 from .ipopt import Confirmation, constraint_sizes, ipopt
-from .optima import same_value
-from .starts import SAME_F, Start, StartStatus, judge, known_optimum, search_from
+from .starts import SAME_F, Start, StartStatus, judge, known_optimum, same_value, search_from
 
 #: Name of the search in C as the solver that ended a start.
 SCREEN = "sqp"

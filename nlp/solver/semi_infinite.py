@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -74,16 +73,11 @@ class WorkspaceProof:
         return not _faults(self.judgement)
 
 
-class Exchanged(NamedTuple):
-    """The last program's solution, and the judgement of its design; None where the program has no answer."""
-
-    own: ProgramSolution
-    proof: WorkspaceProof | None
-
-
 @one_call
-def solve_over_workspace(case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None) -> Exchanged:
-    """Return the solution of a case whose limits hold over its workspace, and the proof.
+def solve_over_workspace(
+    case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None
+) -> tuple[ProgramSolution, WorkspaceProof | None]:
+    """Return the solution of a case whose limits hold over its workspace, and the proof; None without an answer.
 
     Args:
         case: a case with one task and one stated pose.
@@ -112,11 +106,11 @@ def solve_over_workspace(case: Case, solve_one: SolveOne, *, progress: ExchangeP
         fresh = [each for each in faults if each is not None and not any(map(each.is_same, binding))]
         fresh = constraints.added(design, fresh, found.x)
         if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
-            return Exchanged(found, WorkspaceProof(judged, tuple(binding), tuple(history), first))
+            return found, WorkspaceProof(judged, tuple(binding), tuple(history), first)
         binding += fresh
         nlp = constraints.program
         found = solve_one(nlp, [np.concatenate([found.x, nlp.start[len(found.x) :]])])
-    return Exchanged(found, None)
+    return found, None
 
 
 def _judged(case: Case) -> Judgement:

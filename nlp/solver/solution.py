@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from ...models import FloatArray
 from ...models.shown import Shown
@@ -15,14 +16,69 @@ from ..evidence.optimality import Evidence
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
-from .answer import Answer
 from .multistart import ProgramSolution
-from .optima import Optimum
-from .starts import Start
+from .starts import Optimum, Start
 from .status import Status
 
 if TYPE_CHECKING:
+    from .. import Picture
+    from .certified import Certified
     from .semi_infinite import WorkspaceProof
+
+
+class Answer:
+    """An answer to a case that can show itself: a solution, alone or with its certificates."""
+
+    def table(self, width: int = 120) -> str:
+        """Return the tables of the answer as text, as ``solve`` prints them.
+
+        Args:
+            width: number of columns.
+        """
+        from .. import text_of  # noqa: PLC0415 - the index finds the function when it is needed
+
+        return text_of(self._found(), width)
+
+    def plot(self, file: str | Path | None = None) -> Picture:
+        """Return the drawing of the robot with its tasks, which a notebook shows.
+
+        Args:
+            file: file that the drawing is written to, by the name's ending as PNG, SVG or PDF; None for none.
+
+        Raises:
+            InputError: the ending is another one, Matplotlib is not installed, or the file cannot be written.
+            EvaluationError: the robot does not exist at the point reached.
+        """
+        from .. import picture_of, plot  # noqa: PLC0415 - the index finds the functions when they are needed
+
+        found = self._found()
+        solution = cast("Solution", getattr(found, "solution", found))
+        if file is not None:
+            plot(solution, file)
+        return picture_of(solution)
+
+    def report(self, file: str | Path | None = None) -> str:
+        """Return the page about the answer as HTML, which opens without a network.
+
+        Args:
+            file: file that the page is written to; None for none.
+
+        Raises:
+            InputError: Plotly is not installed, or the file cannot be written.
+        """
+        from .. import report  # noqa: PLC0415 - the index finds the function when it is needed
+
+        return report(self._found(), file=file)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the result as JSON's own types, as ``--json`` writes it."""
+        from .. import json_data, result_of  # noqa: PLC0415 - the index finds the functions when they are needed
+
+        return {**json_data(result_of(self._found()))}
+
+    def _found(self) -> Solution | Certified:
+        """Return the answer itself, whose classes are the two kinds of answers."""
+        return cast("Solution | Certified", self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,8 @@ from .compromise import combine, solution_of_one_task
 from .interface import Solver
 from .ipopt import ipopt
 from .multistart import ProgramSolution, solve_program
-from .phase import Phase, PhaseProgress, no_phase
 from .solution import Solution
+from .status import Phase, PhaseProgress, no_phase
 
 #: Called after each start with the task or method that is being solved, the number of starts done, the number of all,
 #: and the best objective so far.
@@ -65,8 +65,8 @@ def solve(
         def solve_one(nlp: Nlp, first: Sequence[FloatArray]) -> ProgramSolution:
             return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
 
-        found = solve_over_workspace(case, solve_one)
-        solution = replace(solution_of_one_task(case, found.own), workspace=found.proof)
+        own, proof = solve_over_workspace(case, solve_one)
+        solution = replace(solution_of_one_task(case, own), workspace=proof)
     else:
         nlps = formulate_each(case)
         solution = solve_programs(case, nlps, search, jobs=jobs, progress=progress, solver=solver, phase=phase)

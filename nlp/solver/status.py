@@ -1,8 +1,10 @@
-"""Status of a solve: a module of its own, so that results are shown without loading a solver."""
+"""Status and phases of a solve: a module of its own, so that results are shown without loading a solver."""
 
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
+from typing import TypeAlias
 
 
 class Status(enum.Enum):
@@ -21,3 +23,21 @@ class Status(enum.Enum):
     def is_answer(self) -> bool:
         """Whether the point is an answer: optimal, averaged, or evaluated."""
         return self in (Status.OPTIMAL, Status.AVERAGED, Status.EVALUATED)
+
+
+class Phase(enum.Enum):
+    """What a solve is busy with; each value is a word for people."""
+
+    FORMULATING = "formulating"
+    STARTS = "starts"
+    RELAXATION = "relaxation"
+    EVIDENCE = "evidence"
+
+
+#: Called at the beginning of a phase, and during it, with the phase, and how many of how many of its parts are done:
+#: programs, starts, starts, and optima.
+PhaseProgress: TypeAlias = Callable[[Phase, int, int], None]
+
+
+def no_phase(phase: Phase, done: int, total: int) -> None:
+    """Report nothing."""

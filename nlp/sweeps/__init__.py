@@ -1,5 +1,5 @@
 """Sweeps: one case solved at thousands of values of its fixed numbers.
 
-The modules import each other in this order: ``points``, ``source``, ``rows``, ``places``, ``interpreted``,
-``compiled``, ``engines``, ``journal``, ``workers``, ``cluster``, ``sweep``, ``columns``, ``data``.
+The modules import each other in this order: ``points``, ``journal``, ``places``, ``engines``, ``workers``, ``sweep``,
+``columns``.
 """

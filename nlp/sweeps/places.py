@@ -25,8 +25,7 @@ from ..program.formulation import formulate
 from ..program.layout import WIDENING
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
-from .points import Points
-from .source import CaseSource
+from .points import CaseSource, Points
 
 #: Largest relative difference of a placed number from one that is read: rounding of a conversion.
 _SAME = 1e-12
@@ -40,13 +39,6 @@ _ENDS = ("min", "max")
 
 class NotPlacedError(Exception):
     """Reason why one program does not serve every point of a sweep, in words."""
-
-
-class _Limit(NamedTuple):
-    """A limit that changes: its index among those that C sets, and by what its values are multiplied."""
-
-    place: int
-    factor: float
 
 
 class Block(NamedTuple):
@@ -72,7 +64,7 @@ class Places:
         limits: the limits that C sets.
         arguments: index of an argument, and by what the value is multiplied, by column of the points.
         bounds: index of a variable, whether the bound is the upper one, and the factor, by column.
-        limited: the limit by column.
+        limited: index among the limits that C sets, and by what the value is multiplied, by column.
         task: part of the task by column: its key, and the index in it, None for a single number.
         written: the task's table in the case.
     """
@@ -81,7 +73,7 @@ class Places:
     limits: RunTimeLimits
     arguments: Mapping[int, tuple[int, float]]
     bounds: Mapping[int, tuple[int, bool, float]]
-    limited: Mapping[int, _Limit]
+    limited: Mapping[int, tuple[int, float]]
     task: Mapping[int, tuple[str, int | None]]
     written: Mapping[str, Any]
 
@@ -114,8 +106,8 @@ class Places:
                     is_placed[k] = False
         limits: dict[str, FloatArray] = {}
         if self.limited:
-            for column, limit in self.limited.items():
-                limits[self.limits.limits[limit.place].key] = values[:, column] * limit.factor
+            for column, (index, factor) in self.limited.items():
+                limits[self.limits.limits[index].key] = values[:, column] * factor
             for key, column_values in limits.items():
                 each = next(item for item in self.limits.limits if item.key == key)
                 allowed = (each.above < column_values) & (column_values <= each.most)
@@ -176,7 +168,7 @@ def place(source: CaseSource, chosen: Points) -> Places:
     limits = run_time_limits(nlp, "sweep")
     arguments: dict[int, tuple[int, float]] = {}
     bounds: dict[int, tuple[int, bool, float]] = {}
-    limited: dict[int, _Limit] = {}
+    limited: dict[int, tuple[int, float]] = {}
     task: dict[int, tuple[str, int | None]] = {}
     of_task = {f"task.{name.partition('.')[2]}": found for name, found in task_numbers(tables).items()}
     written = tables["task"][0]
@@ -201,7 +193,7 @@ def place(source: CaseSource, chosen: Points) -> Places:
             bounds[column] = (index, end == "max", factor)
         elif key in keys or f"{key}.max" in keys:
             k = keys.index(key) if key in keys else keys.index(f"{key}.max")
-            limited[column] = _Limit(k, nlp.case.units.to_internal(1.0, limits.limits[k].dimension))
+            limited[column] = (k, nlp.case.units.to_internal(1.0, limits.limits[k].dimension))
         else:
             raise NotPlacedError(f"{name} changes the program itself")
     found = Places(nlp, limits, arguments, bounds, limited, task, written)

@@ -1,10 +1,11 @@
-"""Points of a sweep: a grid of lists and ranges, or the rows of a CSV file."""
+"""Points of a sweep: a grid of lists and ranges, or the rows of a CSV file; and the case that is read at each."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,6 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import FloatArray, frozen_array
+from ..case.case import Case
+from ..case.overrides import Settings
+from ..case.reader import CaseFile, case_from_tables
 from ..errors import InputError
 
 #: Largest number of points: their numbers and places in the journal then take less than a gigabyte.
@@ -168,3 +172,30 @@ def _number(text: str, where: str) -> float:
     if not math.isfinite(value):
         raise InputError(f"{where} = {text.strip()!r}: must be a finite number")
     return value
+
+
+class CaseSource(NamedTuple):
+    """A case as text that needs no other file.
+
+    Attributes:
+        text: TOML.
+        name: name of the case in results.
+        source: name of its file in messages.
+    """
+
+    text: str
+    name: str
+    source: str
+
+    @classmethod
+    def from_file(cls, read: CaseFile) -> CaseSource:
+        """Return the source of a case that was read from a file."""
+        return cls(read.text, read.case.name, read.case.source or read.case.name)
+
+    def case_at(self, settings: Settings) -> Case:
+        """Return the case with numbers replaced by name.
+
+        Raises:
+            CaseError: the case has no such number, or a value is not allowed.
+        """
+        return case_from_tables(tomllib.loads(self.text), name=self.name, source=self.source, settings=settings)

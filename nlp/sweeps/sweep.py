@@ -16,15 +16,12 @@ import numpy as np
 
 from .. import __version__
 from ..interruption import is_interrupted, is_requested, one_call, seconds_left
-from ..program.designnumbers import design_indices
 from ..program.formulation import formulate
-from .cluster import answer_on_cluster
+from ..program.program import design_indices
 from .engines import EngineKind, Job, answer, choose_engine, compiled_engine
-from .journal import ENDING, Journal
-from .points import PointBlock, Points
-from .rows import Row
-from .source import CaseSource
-from .workers import answer_in_processes
+from .journal import ENDING, Journal, Row
+from .points import CaseSource, PointBlock, Points
+from .workers import answer_in_processes, answer_on_cluster
 
 #: Points that are solved and judged together: enough for arrays to pay, and about a third of a second of work.
 _BLOCK = 512

@@ -16,11 +16,9 @@ from generated import COMPILERS, STRICT, made, needs_compiler, run, written
 
 from screwsynth.nlp import load_case, solve
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.embedding.callgraph import stack_bound
 from screwsynth.nlp.embedding.codegen import generate_c, size_words
 from screwsynth.nlp.embedding.ctext import identifier
-from screwsynth.nlp.embedding.measure import CORTEX_M7, X86_64, measure
-from screwsynth.nlp.embedding.measured import NOT_MEASURED, with_figures
+from screwsynth.nlp.embedding.measure import CORTEX_M7, NOT_MEASURED, X86_64, measure, stack_bound, with_figures
 
 
 def test_the_command_line_writes_the_folder_and_its_size(

@@ -27,8 +27,7 @@ from screwsynth.nlp import (
     evaluate,
     load_result,
 )
-from screwsynth.nlp.comparison.placed import placed
-from screwsynth.nlp.comparison.robots import read_robots
+from screwsynth.nlp.comparison.robots import placed, read_robots
 from screwsynth.nlp.results.schema import result_schema
 
 # The twist is about an axis far from the origin, so that a frame that is moved wrongly shows.

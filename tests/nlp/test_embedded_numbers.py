@@ -16,7 +16,7 @@ from builders import case_from, starter_tables
 from generated import COMPILERS, INFEASIBLE, OK, written
 
 from screwsynth.nlp import CompiledCase, formulate, load_compiled
-from screwsynth.nlp.embedding.held import held_by_fixed_numbers
+from screwsynth.nlp.embedding.runtimelimits import held_by_fixed_numbers
 
 BENCH = Path(__file__).parents[2] / "bench" / "soak"
 

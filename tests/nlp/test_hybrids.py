@@ -10,7 +10,7 @@ import pytest
 
 from screwsynth.models import Model, robot
 from screwsynth.nlp import Case, Free, Limits, Task, evaluate, formulate, solve
-from screwsynth.nlp.case.limits.actuator_rate import ActuatorRate
+from screwsynth.nlp.case.limits.rates import ActuatorRate
 from screwsynth.nlp.case.workspace import Workspace
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.margins import margins_of

@@ -14,7 +14,7 @@ import screwsynth.cases
 from screwsynth.models import model_names
 from screwsynth.nlp import CaseError, InputError, Rotation, load_case, shipped_cases
 from screwsynth.nlp.case.reader import read_case
-from screwsynth.nlp.case.tomltext import toml_text
+from screwsynth.nlp.case.toml import toml_document
 
 CASES = Path(screwsynth.cases.__file__).parent
 
@@ -125,7 +125,7 @@ def test_the_text_of_tables_reads_as_the_same_tables(cli: Run) -> None:
     )
     for text in texts:
         tables = tomllib.loads(text)
-        assert tomllib.loads(toml_text(tables)) == tables
+        assert tomllib.loads(toml_document(tables)) == tables
 
 
 # CSV files

@@ -18,8 +18,7 @@ import screwsynth.nlp
 from screwsynth.nlp import interruption
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.cli.app import SUMMARIES
-from screwsynth.nlp.front.front import find_front
-from screwsynth.nlp.front.goals import read_goals
+from screwsynth.nlp.front.front import pareto
 
 Run = Callable[..., tuple[int, str, str]]
 ROOT = str(Path(screwsynth.nlp.__file__).parent)
@@ -205,8 +204,7 @@ def test_an_interrupted_front_has_no_gap(monkeypatch: pytest.MonkeyPatch) -> Non
     requested = Event()
     monkeypatch.setattr(interruption, "_requested", requested)
     case = case_from_tables(tomllib.loads(SMALL), name="small", source="small.toml")
-    goals = read_goals(["max F", "min limits.leg_length.max"], case)
-    found = find_front(case, goals, 6, search=case.search, progress=lambda *_: requested.set())
+    found = pareto(case, ["max F", "min limits.leg_length.max"], points=6, progress=lambda *_: requested.set())
     assert len(found.points) == 2
     assert found.gaps == ()
 

@@ -39,8 +39,8 @@ from screwsynth.nlp import (
     json_data,
     result_of,
 )
-from screwsynth.nlp.case.limits.segments import squared_distance
-from screwsynth.nlp.case.limits.spectrum import largest_eigenvalue, smallest_eigenvalue
+from screwsynth.nlp.case.limits.clearance import squared_distance
+from screwsynth.nlp.case.limits.singular_values import largest_eigenvalue, smallest_eigenvalue
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.program.formulation import formulate

@@ -14,7 +14,7 @@ from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.program import limits as program_limits
 from screwsynth.nlp.program.pairs import with_all_pairs, with_pairs_at
 from screwsynth.nlp.proof.statement.standard_form import standard_form
-from screwsynth.nlp.solver.phase import Phase
+from screwsynth.nlp.solver.status import Phase
 
 
 def case_of(

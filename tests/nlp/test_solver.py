@@ -31,7 +31,7 @@ from screwsynth.nlp import (
 from screwsynth.nlp.program import formulation
 from screwsynth.nlp.program.layout import Layout, lay_out
 from screwsynth.nlp.program.sampling import starting_points
-from screwsynth.nlp.solver import multistart, optima
+from screwsynth.nlp.solver import multistart, starts
 from screwsynth.nlp.solver.interface import LocalSearch
 
 
@@ -207,7 +207,7 @@ def test_the_winner_is_examined_once(monkeypatch: pytest.MonkeyPatch) -> None:
         return examine(nlp, x)
 
     monkeypatch.setattr(multistart, "examine", counted)
-    monkeypatch.setattr(optima, "examine", counted)
+    monkeypatch.setattr(starts, "examine", counted)
     solution = solve(load_case("paper-4.1-helical"), starts=6)
     assert solution.evidence is solution.optima[0].evidence
     assert len(seen) == len(set(seen)) == len(solution.optima)

@@ -13,8 +13,7 @@ from screwsynth.nlp import Case, Free, Nlp, Sense, Task, load_case
 from screwsynth.nlp.case.limits.constraint import BoundedConstraint, Constraint, Reading
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
-from screwsynth.nlp.program.assembly import assemble
-from screwsynth.nlp.program.layout import lay_out
+from screwsynth.nlp.program.layout import assemble, lay_out
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus

@@ -12,10 +12,10 @@ import pytest
 from builders import Run, case_from
 
 from screwsynth.nlp import InputError, certify, load_result
-from screwsynth.nlp.embedding.folder import read_manifest
+from screwsynth.nlp.embedding.manifest import read_manifest
 from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, Unproved, read_proof
 from screwsynth.nlp.solver.certified import proof_of
-from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
+from screwsynth.nlp.sweeps.journal import Row, line_of, row_of
 from screwsynth.nlp.system.strictjson import WrongValueError, json_tree, object_of, value_of
 
 #: What is put into files byte by byte.

@@ -7,7 +7,7 @@ import pytest
 from builders import Run, output_of, saved
 
 from screwsynth.nlp import InputError, load_case
-from screwsynth.nlp.case.robotfile.reader import model_of_definition, read_definition
+from screwsynth.nlp.case.robotfile import model_of_definition, read_definition
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.output.files import check_origin
 from screwsynth.nlp.output.pictures.sweeps import sweep_figure

@@ -20,12 +20,10 @@ from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.results.sweep import SweepResult
-from screwsynth.nlp.sweeps import cluster
+from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
-from screwsynth.nlp.sweeps.journal import Journal
-from screwsynth.nlp.sweeps.points import Points, grid
-from screwsynth.nlp.sweeps.rows import Row, line_of, row_of
-from screwsynth.nlp.sweeps.source import CaseSource
+from screwsynth.nlp.sweeps.journal import Journal, Row, line_of, row_of
+from screwsynth.nlp.sweeps.points import CaseSource, Points, grid
 from screwsynth.nlp.sweeps.sweep import Sweep, run_sweep
 from screwsynth.nlp.sweeps.workers import PointBlock, answer_in_processes
 
@@ -300,7 +298,7 @@ KILLED = """
 import os, signal, sys
 from screwsynth.nlp.cli.main import main
 from screwsynth.nlp.sweeps.journal import Journal
-from screwsynth.nlp.sweeps.rows import line_of
+from screwsynth.nlp.sweeps.journal import line_of
 
 append, left = Journal.append, [int(sys.argv.pop(1))]
 
@@ -386,7 +384,7 @@ def test_a_cluster_that_loses_a_worker(sweep: Callable[..., Sweep], tmp_path: Pa
 @pytest.mark.slow
 def test_an_unreachable_cluster(tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "_WAIT", 0.2)
+    monkeypatch.setattr(workers, "_WAIT", 0.2)
     out = tmp_path / "out.csv"
     code, _, err = cli("sweep", CASE, *OVER, "--dask", "tcp://127.0.0.1:9", "--out", str(out))
     assert (code, out.exists()) == (2, False)

@@ -23,8 +23,7 @@ from screwsynth.nlp import Case, certify, json_data, pareto, result_of, solve
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
-from screwsynth.nlp.front.goals import read_goals
-from screwsynth.nlp.front.programs import program_of
+from screwsynth.nlp.front.goals import program_of, read_goals
 from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
@@ -38,9 +37,8 @@ from screwsynth.nlp.results.text import Line, TextTable
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacewording import workspace_summary
 from screwsynth.nlp.sweeps.columns import columns_of
-from screwsynth.nlp.sweeps.points import Points
-from screwsynth.nlp.sweeps.rows import Row
-from screwsynth.nlp.sweeps.source import CaseSource
+from screwsynth.nlp.sweeps.journal import Row
+from screwsynth.nlp.sweeps.points import CaseSource, Points
 from screwsynth.nlp.sweeps.sweep import Sweep
 
 Tables = dict[str, Any]

@@ -1,19 +1,59 @@
-"""Named smooth constraints, and how their bounds read in the words of a case."""
+"""Named smooth constraints, and how their bounds read in the words of a case; forms of expressions that repeat.
+
+A form is one function of a few numbers, called for every leg, pair of legs, joint, task or pose. A program needs the
+expressions alone. Generated C also uses that they are calls of one function: it has the function once, and calls it in
+a loop.
+"""
 
 from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from operator import mul
 from typing import TypeAlias, TypeVar
 
 from casadi import SX
 
 from ....models import Dimension, FloatArray
-from .form import Call
+
+
+@dataclass(frozen=True)
+class Form:
+    """A function of a vector; two forms are equal where they are the same function with the same numbers.
+
+    Attributes:
+        build: function at the top of a module, from a vector (k, 1) and the numbers to the value (r, 1).
+        numbers: further arguments of the function, the same in each of its calls.
+    """
+
+    build: Callable[..., SX]
+    numbers: tuple[Hashable, ...] = ()
+
+    def __call__(self, inputs: SX) -> SX:
+        """Return the value (r, 1) at a vector (k, 1)."""
+        return self.build(inputs, *self.numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """A call of a form.
+
+    Attributes:
+        form: the function.
+        inputs: (k, 1) expressions.
+    """
+
+    form: Form
+    inputs: SX
+
+    @cached_property
+    def value(self) -> SX:
+        """(r, 1) value."""
+        return self.form(self.inputs)
+
 
 _T = TypeVar("_T")
 
@@ -154,11 +194,11 @@ class BoundedConstraint:
     upper: float
 
 
-def bounded(
+def between(
     name: str,
     expression: SX | Call,
     reading: Reading,
-    keys: tuple[str, str],
+    key: str | tuple[str, str],
     *,
     lower: float | None = None,
     upper: float | None = None,
@@ -172,46 +212,38 @@ def bounded(
         name: in the words of a case.
         expression: (1, 1), or the call whose value it is; it grows with the measured number.
         reading: how its bounds read.
-        keys: dotted keys below ``limits`` of the lower and of the upper number; empty where there is none.
+        key: dotted key below ``limits`` of the table whose ``min`` and ``max`` the numbers are; or the dotted keys of
+            the lower and of the upper number, empty where there is none.
         lower: the lower number, radians for an angle; None where there is none.
         upper: likewise.
         exact: (1, 1) the measured number itself, where the expression gives it near the limit only.
         measure: the measured number itself, where the expression only estimates it.
         spectral: the matrix that the expression is made from, where it estimates eigenvalues.
     """
+    if isinstance(key, str):
+        key = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")
     value, call = (expression.value, expression) if isinstance(expression, Call) else (expression, None)
     return BoundedConstraint(
-        Constraint(name, value, reading, keys, exact=exact, measure=measure, spectral=spectral, call=call),
+        Constraint(name, value, reading, key, exact=exact, measure=measure, spectral=spectral, call=call),
         -math.inf if lower is None else float(reading.to_value(SX(lower))),
         math.inf if upper is None else float(reading.to_value(SX(upper))),
     )
 
 
-def between(
-    name: str,
-    expression: SX | Call,
-    reading: Reading,
-    key: str,
-    *,
-    lower: float | None = None,
-    upper: float | None = None,
-    exact: SX | None = None,
-    measure: JacobianMeasure | None = None,
-    spectral: Spectral | None = None,
-) -> BoundedConstraint:
-    """Return a constraint whose numbers are written as ``key.min`` and ``key.max``.
+@dataclass(frozen=True, eq=False)
+class PairFamily:
+    """Constraints of one form on every ordered pair of N values, such as the lengths of a leg at several poses.
 
-    The other arguments are those of :func:`bounded`.
+    There are as many pairs as the square of N, and few of them can bind. A program starts with none of many pairs, and
+    gets a pair where a point would violate it: :mod:`screwsynth.nlp.program.pairs`.
+
+    Attributes:
+        values: (N, 1) the values, N >= 2.
+        pair: the constraints on two values, by their indices. They are the tightest where the first value is the
+            smallest and the second the largest of all.
+        slack: least distance to a limit, as a number, of a first and a second value; negative where it is violated.
     """
-    keys = ("" if lower is None else f"{key}.min", "" if upper is None else f"{key}.max")
-    return bounded(
-        name,
-        expression,
-        reading,
-        keys,
-        lower=lower,
-        upper=upper,
-        exact=exact,
-        measure=measure,
-        spectral=spectral,
-    )
+
+    values: SX
+    pair: Callable[[int, int], tuple[BoundedConstraint, ...]]
+    slack: Callable[[float, float], float]

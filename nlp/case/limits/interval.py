@@ -1,20 +1,21 @@
-"""Limits with one side or two: their tables in a case file, and their checks."""
+"""Limits with one side or two: their tables in a case file, their checks, and those on a measure of the robot's own."""
 
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, Self
 
 from pydantic import Field, FiniteFloat
 
-from ....models import Dimension, Model
+from ....models import Dimension, Model, Quantity
 from ...errors import CaseError
 from ...units import Units
 from ..table import Table
-from ..toml import TomlValue
-from .limit import Limit, LimitedCase, Written
+from .constraint import BoundedConstraint, Reading, between
+from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, TableField, Written
 
 
 class IntervalTable(Table):
@@ -47,26 +48,12 @@ class LowerLimit(Limit[AtLeast], abc.ABC):
     min: float
 
     table: ClassVar[type[Table]] = AtLeast
-
-    @classmethod
-    def from_table(cls, written: Written[AtLeast]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.min)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse a value that is not positive.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number(f"{self.key}.min", self.min)
+    numbers: ClassVar[Ranges] = {"min": NumberRange()}
 
 
-class Sides(NamedTuple):
-    """The smallest and the largest value of an interval; None where a side is not limited."""
-
-    min: float | None
-    max: float | None
+def two_sided(allowed: NumberRange) -> Ranges:
+    """Return the ranges of the numbers of an interval, both the same."""
+    return {"min": allowed, "max": allowed}
 
 
 @dataclass(frozen=True)
@@ -76,8 +63,6 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
     Attributes:
         min: smallest value; None where there is none.
         max: largest value; None where there is none.
-        measured: dimension of both.
-        above: both must be larger than this.
     """
 
     _: KW_ONLY
@@ -85,23 +70,7 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
     max: float | None = None
 
     table: ClassVar[type[Table]] = IntervalTable
-    measured: ClassVar[Dimension] = Dimension.LENGTH
-    above: ClassVar[float] = 0.0
-
-    @classmethod
-    def from_table(cls, written: Written[IntervalTable]) -> Self:
-        """Return the limit that a case file writes."""
-        smallest, largest = sides(written, cls.measured)
-        return cls(min=smallest, max=largest)
-
-    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:
-        """Return the keys of ``[limits]`` that state this limit."""
-        dimension, ends = self.dimension(model), {"min": self.min, "max": self.max}
-        return {self.name: {name: units.written(value, dimension) for name, value in ends.items() if value is not None}}
-
-    def dimension(self, model: Model) -> Dimension:  # noqa: ARG002 - most limits measure the same on every robot
-        """Return the dimension of the measured quantity."""
-        return self.measured
+    numbers: ClassVar[Ranges] = two_sided(NumberRange())
 
     def check(self, case: LimitedCase) -> None:
         """Refuse an interval without sides, with a side out of its range, or with crossed sides.
@@ -109,19 +78,70 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
         Raises:
             CaseError: in the words of a case file.
         """
-        key, dimension = f"limits.{self.name}", self.dimension(case.model)
-        case.check_number(f"{self.name}.min", self.min, dimension, above=self.above)
-        case.check_number(f"{self.name}.max", self.max, dimension, above=self.above)
+        key = f"limits.{self.name}"
         if self.min is None and self.max is None:
             raise CaseError(key, "must have min, max, or both")
+        super().check(case)
         if self.min is not None and self.max is not None and not self.min < self.max:
+            dimension = self.ranges(case.model)["min"].dimension
             fault = f"must be below max = {case.units.text(self.max, dimension)}"
             raise CaseError(f"{key}.min", fault, case.units.shown(self.min, dimension))
 
 
-def sides(written: Written[IntervalTable], dimension: Dimension) -> Sides:
-    """Return both sides of an interval that a case file writes, as computations use them."""
-    lower, upper = (
-        None if side is None else written.internal(side, dimension) for side in (written.value.min, written.value.max)
-    )
-    return Sides(lower, upper)
+def quantity_named(name: str, model: Model) -> Quantity | None:
+    """Return the measure of a robot that has a name, or None where there is none."""
+    return next((quantity for quantity in model.quantities if quantity.name == name), None)
+
+
+@dataclass(frozen=True)
+class QuantityLimit(IntervalLimit):
+    """Smallest and largest value of one of the robot's own measures, at every owner and every pose.
+
+    Attributes:
+        measure: name of the measure.
+    """
+
+    measure: str
+
+    key: ClassVar[str] = ""
+    order: ClassVar[int] = 1
+
+    @classmethod
+    def fields(cls) -> dict[str, TableField]:
+        """Return nothing: every key of ``[limits]`` that belongs to no type is the name of a measure."""
+        return {}
+
+    @classmethod
+    def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
+        """Yield a limit for each key of ``[limits]`` that belongs to no type, in the order of the robot's measures."""
+        stated = limits.__pydantic_extra__ or {}
+        names = [quantity.name for quantity in model.quantities if quantity.name in stated]
+        for key in dict.fromkeys([*names, *stated]):
+            yield cls.from_table(Written(key, stated[key], limits, model, units))
+
+    @classmethod
+    def from_table(cls, written: Written[IntervalTable]) -> Self:
+        """Return the limit that a case file writes."""
+        return cls(written.key, **written.numbers(cls(written.key).ranges(written.model)))
+
+    @property
+    def name(self) -> str:
+        """Name of the measure."""
+        return self.measure
+
+    def ranges(self, model: Model) -> Ranges:
+        """Return the range of both numbers; that of pure numbers where the robot lacks the measure."""
+        quantity = quantity_named(self.measure, model)
+        return two_sided(NumberRange(Dimension.NUMBER if quantity is None else quantity.dimension, above=-math.inf))
+
+    def exists_for(self, model: Model) -> bool:
+        """Return whether the robot has the measure."""
+        return quantity_named(self.measure, model) is not None
+
+    def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
+        """Return the measure of each of its owners."""
+        for quantity, values in zip(pose.model.quantities, pose.robot.quantities, strict=True):
+            if quantity.name == self.measure:
+                for i, owner in enumerate(quantity.owners):
+                    name, reading = f"{quantity.name} limb {owner}{pose.where}", Reading(quantity.dimension)
+                    yield between(name, values[i], reading, quantity.name, lower=self.min, upper=self.max)

@@ -23,19 +23,19 @@ from pydantic import (
     ValidatorFunctionWrapHandler,
     WrapValidator,
 )
-from pydantic_core import PydanticCustomError
 
 from ....models import Dimension, FloatArray, Model, RobotInstance, frozen_array, matrix_from_axis_angle
 from ...errors import CaseError
 from ...units import Units
-from ..table import Table, Vector
+from ..table import Table, Vector, fault_of
 from ..toml import TomlValue
-from .constraint import BoundedConstraint, Reading, between
-from .form import Call, Form
-from .limit import Limit, LimitedCase, Measures, PosedRobot, TableField, Written
+from .constraint import BoundedConstraint, Call, Form, Reading, between
+from .limit import Limit, LimitedCase, Measures, NumberRange, PosedRobot, TableField, Written
 
 #: Three numbers.
 Triple: TypeAlias = tuple[float, float, float]
+#: Range of the half angle of a cone.
+HALF_ANGLE = NumberRange(Dimension.ANGLE, most=math.pi)
 #: A direction (3, 1) in another frame, with the platform's rotation (3, 3).
 Turn: TypeAlias = Callable[[SX, SX], SX]
 
@@ -85,8 +85,7 @@ def _word(value: object, handler: ValidatorFunctionWrapHandler) -> object:
     try:
         return handler(value)
     except ValidationError:
-        fault = "must be 'normal' or 'home', a list of 3 numbers, or a list of such lists"
-        raise PydanticCustomError("reason", "{fault}", {"fault": fault}) from None
+        raise fault_of("", "must be 'normal' or 'home', a list of 3 numbers, or a list of such lists") from None
 
 
 def _kind_of_axes(value: object) -> str:
@@ -195,7 +194,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         Raises:
             CaseError: in the words of a case file.
         """
-        case.check_number(f"{self.key}.max", self.max, Dimension.ANGLE, most=math.pi)
+        case.check_number(f"{self.key}.max", self.max, HALF_ANGLE)
         if self.about is None:
             return
         key, legs = f"limits.{self.key}.about", len(case.model.legs)

@@ -11,21 +11,17 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import casadi as ca
 from casadi import SX
 from pydantic import Field, FiniteFloat
 
 from ....models import Model
-from ...errors import CaseError
 from ..table import Table
-from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, between, bounded
-from .form import Call, Form
-from .interval import IntervalLimit
-from .limit import Design, Limit, LimitedCase, PosedRobot, Written
-from .pairs import PairFamily
-from .quantity import QuantityLimit, quantity_named
+from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, Call, Form, PairFamily, between
+from .interval import IntervalLimit, QuantityLimit, quantity_named
+from .limit import Design, Limit, NumberRange, PosedRobot, Ranges
 
 
 @dataclass(frozen=True)
@@ -85,24 +81,9 @@ class Actuator(Limit[ActuatorTable]):
     key: ClassVar[str] = "actuator"
     table: ClassVar[type[Table]] = ActuatorTable
     description: ClassVar[str] = "of every leg over all poses"
+    numbers: ClassVar[Ranges] = {"stroke_max": NumberRange(), "dead_length": NumberRange()}
     needs_legs: ClassVar[bool] = True
     order: ClassVar[int] = 1
-
-    @classmethod
-    def from_table(cls, written: Written[ActuatorTable]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.stroke_max, written.value.dead_length)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse an actuator without numbers, or with a number out of its range.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number("actuator.stroke_max", self.stroke_max)
-        case.check_number("actuator.dead_length", self.dead_length)
-        if self.stroke_max is None and self.dead_length is None:
-            raise CaseError("limits.actuator", "must have stroke_max or dead_length")
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
         """Return the dead length of each leg at a single pose, where it has no stroke."""
@@ -110,7 +91,7 @@ class Actuator(Limit[ActuatorTable]):
             key = "actuator.dead_length"
             for leg in design.robots[0].legs:
                 length = ca.norm_2(leg.span)
-                yield bounded(f"{key} limb {leg.name}", length, POSITIVE_LENGTH, (key, ""), lower=self.dead_length)
+                yield between(f"{key} limb {leg.name}", length, POSITIVE_LENGTH, (key, ""), lower=self.dead_length)
 
     def on_pairs(self, design: Design) -> Iterator[PairFamily]:
         """Return the stroke and the dead length of each leg, for all pairs of poses."""
@@ -128,10 +109,10 @@ class Actuator(Limit[ActuatorTable]):
         if self.stroke_max is not None:
             key = "actuator.stroke_max"
             stroke = Call(Form(_stroke), both)
-            limits.append(bounded(f"{key}{where}", stroke, POSITIVE_LENGTH, ("", key), upper=self.stroke_max))
+            limits.append(between(f"{key}{where}", stroke, POSITIVE_LENGTH, ("", key), upper=self.stroke_max))
         if self.dead_length is not None:
             key, dead = "actuator.dead_length", Call(Form(_dead_length), both)
-            limits.append(bounded(f"{key}{where}", dead, POSITIVE_LENGTH, (key, ""), lower=self.dead_length))
+            limits.append(between(f"{key}{where}", dead, POSITIVE_LENGTH, (key, ""), lower=self.dead_length))
         return tuple(limits)
 
     def _slack(self, shorter: float, longer: float) -> float:

@@ -1,4 +1,6 @@
-"""A limit of a case: its table in the file, its check against the robot, and its constraints.
+"""Limits of a case: each with its table in the file, its check against the robot, and its constraints.
+
+Everything is optional: no limit is no restriction. A limit is checked against the robot once, when its case is made.
 
 A limit type is one class in one file of this package, and one row of the registry in
 :mod:`screwsynth.nlp.case.limits.registry`. Lengths are in the case's unit and angles in radians. Every constraint's
@@ -11,21 +13,21 @@ from __future__ import annotations
 import abc
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
 from casadi import SX
 
 from ....models import Dimension, Model, RobotInstance
-from ...errors import CaseError
+from ...errors import CaseError, listing
 from ...units import Units
 from ..checks import check_real
-from .constraint import BoundedConstraint
-from .pairs import PairFamily
+from .constraint import BoundedConstraint, PairFamily
 
 if TYPE_CHECKING:
     from ..table import Table
     from ..toml import TomlValue
+    from .registry import LimitsTable
 
 #: The value that a case file has at a limit's key: a table, mostly.
 TableT = TypeVar("TableT")
@@ -36,6 +38,18 @@ class TableField(NamedTuple):
 
     annotation: Any
     info: Any
+
+
+class NumberRange(NamedTuple):
+    """Range of a number of a limit, radians for an angle: above one number, and at most another."""
+
+    dimension: Dimension = Dimension.LENGTH
+    above: float = 0.0
+    most: float = math.inf
+
+
+#: Numbers of a limit by name.
+Ranges: TypeAlias = Mapping[str, NumberRange]
 
 
 class Written(NamedTuple, Generic[TableT]):
@@ -59,6 +73,19 @@ class Written(NamedTuple, Generic[TableT]):
         """Return a number of the file as computations use it."""
         return self.units.to_internal(number, dimension)
 
+    def numbers(self, ranges: Ranges, table: Table | None = None) -> dict[str, float | None]:
+        """Return numbers of the limit's table, or of a table in it, as computations use them; None where there is none.
+
+        Args:
+            ranges: the numbers.
+            table: the table; the limit's own if left out.
+        """
+        given = {name: getattr(table or self.value, name) for name in ranges}
+        return {
+            name: None if number is None else self.internal(number, ranges[name].dimension)
+            for name, number in given.items()
+        }
+
 
 class LimitedCase(NamedTuple):
     """A case as far as its limits read it.
@@ -73,36 +100,26 @@ class LimitedCase(NamedTuple):
     units: Units
     scalars: Mapping[str, Dimension]
 
-    def check_number(
-        self,
-        key: str,
-        value: float | None,
-        dimension: Dimension = Dimension.LENGTH,
-        *,
-        above: float = 0.0,
-        most: float = math.inf,
-    ) -> None:
+    def check_number(self, key: str, value: float | None, allowed: NumberRange) -> None:
         """Refuse a number of a limit that is out of its range.
 
         Args:
             key: its dotted key below ``limits``.
             value: the number, radians for an angle; None where it is not given.
-            dimension: of the number.
-            above: the number must be larger than this.
-            most: the number may be at most this.
+            allowed: its range.
 
         Raises:
-            CaseError: the number is not finite, not above ``above``, or larger than ``most``.
+            CaseError: the number is not finite, or out of its range.
         """
+        dimension, above, most = allowed
         if value is not None:
             value = check_real(value, f"limits.{key}")
         if value is None or (math.isfinite(value) and above < value <= most):
             return
-        allowed = f"above {self.units.text(above, dimension)}" if math.isfinite(above) else "finite"
-        if math.isfinite(most):
-            allowed += f" and at most {self.units.text(most, dimension)}"
+        least = f"above {self.units.text(above, dimension)}" if math.isfinite(above) else "finite"
+        largest = f" and at most {self.units.text(most, dimension)}" if math.isfinite(most) else ""
         shown = self.units.shown(value, dimension) if math.isfinite(value) else value
-        raise CaseError(f"limits.{key}", f"must be {allowed}", shown)
+        raise CaseError(f"limits.{key}", f"must be {least}{largest}", shown)
 
 
 class PlateJoint(NamedTuple):
@@ -167,14 +184,16 @@ class Measures(NamedTuple):
 class Limit(abc.ABC, Generic[TableT]):
     """A limit that a design must keep.
 
-    A subclass is a frozen dataclass whose fields are the limit's numbers. It states the class attributes below, builds
-    itself from its table, checks its numbers, and yields its constraints from those of :meth:`on_plate`,
-    :meth:`of_design`, :meth:`on_pairs` and :meth:`at_pose` that concern it.
+    A subclass is a frozen dataclass whose fields are the limit's numbers. It states the class attributes below, and
+    yields its constraints from those of :meth:`on_plate`, :meth:`of_design`, :meth:`on_pairs` and :meth:`at_pose` that
+    concern it. Its table in a file, both ways, and its check follow from its numbers; a limit that is more than numbers
+    has methods of its own for them.
 
     Attributes:
         key: its key in ``[limits]``; empty for a type whose limits have keys of their own.
         table: type of the value at the key.
         description: a few words for the JSON Schema of case files.
+        numbers: the range of each of its numbers, which have the same names in its table.
         needs_legs: whether only a robot with legs between joint centres can have it.
         needs_joints: whether only a robot given joint by joint can have it.
         order: place of its constraints among those of other limits on the same plate, design or pose: lower first, and
@@ -184,6 +203,7 @@ class Limit(abc.ABC, Generic[TableT]):
     key: ClassVar[str]
     table: ClassVar[Any]
     description: ClassVar[str]
+    numbers: ClassVar[Ranges] = {}
     needs_legs: ClassVar[bool] = False
     needs_joints: ClassVar[bool] = False
     order: ClassVar[int] = 0
@@ -212,26 +232,33 @@ class Limit(abc.ABC, Generic[TableT]):
             yield cls.from_table(Written(cls.key, value, limits, model, units))
 
     @classmethod
-    @abc.abstractmethod
     def from_table(cls, written: Written[TableT]) -> Self:
         """Return the limit that a case file writes.
 
         Raises:
             CaseError: the table contradicts itself.
         """
+        return cls(**written.numbers(cls.numbers))
 
-    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - most limits need neither
+    def ranges(self, model: Model) -> Ranges:  # noqa: ARG002 - most measures are the same everywhere
+        """Return the range of each number of this limit on a robot."""
+        return self.numbers
+
+    def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:
         """Return the keys of ``[limits]`` that state this limit, the inverse of :meth:`from_table`.
-
-        This is a table of the limit's own numbers. A limit on angles, which a file has in its own unit, or with another
-        table, has a method of its own.
 
         Args:
             model: the robot.
             units: the file's units.
         """
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return {self.key: {name: value for name, value in values.items() if value is not None}}
+        given = {name: (getattr(self, name), allowed) for name, allowed in self.ranges(model).items()}
+        return {
+            self.name: {
+                name: units.written(value, allowed.dimension)
+                for name, (value, allowed) in given.items()
+                if value is not None
+            }
+        }
 
     @property
     def name(self) -> str:
@@ -247,13 +274,17 @@ class Limit(abc.ABC, Generic[TableT]):
         """Return whether a robot has the measure that is limited."""
         return self.is_for(model)
 
-    @abc.abstractmethod
     def check(self, case: LimitedCase) -> None:
-        """Refuse this limit where a number of it is out of its range, or where its numbers contradict each other.
+        """Refuse a limit without a number, one with a number out of its range, and one that contradicts itself.
 
         Raises:
             CaseError: in the words of a case file.
         """
+        ranges = self.ranges(case.model)
+        for name, allowed in ranges.items():
+            case.check_number(f"{self.name}.{name}", getattr(self, name), allowed)
+        if ranges and all(getattr(self, name) is None for name in ranges):
+            raise CaseError(f"limits.{self.name}", f"must have {' or '.join(ranges)}")
 
     @property
     def reference(self) -> str:
@@ -279,3 +310,85 @@ class Limit(abc.ABC, Generic[TableT]):
     def at_pose(self, pose: PosedRobot) -> Iterable[BoundedConstraint]:  # noqa: ARG002 - some limits have none
         """Return this limit's constraints at one pose."""
         return ()
+
+
+LimitT = TypeVar("LimitT", bound=Limit[Any])
+
+
+@dataclass(frozen=True, init=False)
+class Limits:
+    """The limits of a case, such as ``Limits(LegLength(min=28, max=40), LegClearance(min=2))``.
+
+    Attributes:
+        items: the limits, in the order of the registry.
+
+    Raises:
+        CaseError: one limit is given twice.
+    """
+
+    items: tuple[Limit[Any], ...]
+
+    def __init__(self, *limits: Limit[Any]) -> None:
+        names = [limit.name for limit in limits]
+        for name in names:
+            if names.count(name) > 1:
+                raise CaseError(f"limits.{name}", "is given more than once")
+        object.__setattr__(self, "items", tuple(sorted(limits, key=_rank)))
+
+    @classmethod
+    def from_table(cls, written: LimitsTable | None, model: Model, units: Units) -> Limits:
+        """Return the limits that a case file states.
+
+        Args:
+            written: the table ``[limits]``; None where there is none.
+            model: the robot.
+            units: the file's units.
+
+        Raises:
+            CaseError: the table contradicts itself.
+        """
+        if written is None:
+            return cls()
+        from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
+
+        return cls(*(limit for kind in LIMIT_TYPES for limit in kind.read(written, model, units)))
+
+    def __iter__(self) -> Iterator[Limit[Any]]:
+        return iter(self.items)
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def of(self, kind: type[LimitT]) -> LimitT | None:
+        """Return the limit of a type, the first where there are several, or None where there is none."""
+        return next((limit for limit in self.items if isinstance(limit, kind)), None)
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse limits that the robot they are for cannot have, or whose numbers mean nothing.
+
+        Raises:
+            CaseError: a number is out of its range, two sides are crossed, or the robot has no such measure.
+        """
+        for limit in self.items:
+            if not limit.exists_for(case.model):
+                fault = f"is nothing that {case.model.name!r} has; it has {listing(_measures(case.model))}"
+                raise CaseError(f"limits.{limit.name}", fault)
+        for limit in self.items:
+            limit.check(case)
+
+
+def _rank(limit: Limit[Any]) -> int:
+    """Return the place of a limit's type in the registry; types of the user's own come last."""
+    from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
+
+    return LIMIT_TYPES.index(type(limit)) if type(limit) in LIMIT_TYPES else len(LIMIT_TYPES)
+
+
+def _measures(model: Model) -> list[str]:
+    """Return the keys of ``[limits]`` that mean something for a robot."""
+    from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
+
+    of_legs = [kind.key for kind in LIMIT_TYPES if kind.needs_legs] if model.legs else []
+    own = [quantity.name for quantity in model.quantities]
+    always = [kind.key for kind in LIMIT_TYPES if not kind.needs_legs and kind.fields() and kind.is_for(model)]
+    return list(dict.fromkeys([*of_legs, *own, *always]))

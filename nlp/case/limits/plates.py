@@ -9,19 +9,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import casadi as ca
 from casadi import SX
 from pydantic import Field, FiniteFloat
 
 from ....models import Dimension
-from ...errors import CaseError
 from ..table import Table
-from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, between, bounded
-from .form import Call, Form
-from .interval import IntervalLimit, LowerLimit
-from .limit import Design, Limit, LimitedCase, Plate, Written
+from .constraint import SQUARED_LENGTH, SQUARED_NUMBER, BoundedConstraint, Call, Form, between
+from .interval import IntervalLimit, LowerLimit, two_sided
+from .limit import Design, Limit, NumberRange, Plate, Ranges
 
 
 def _squared_distance(points: SX) -> SX:
@@ -62,23 +60,8 @@ class Footprint(Limit[FootprintTable]):
     key: ClassVar[str] = "footprint"
     table: ClassVar[type[Table]] = FootprintTable
     description: ClassVar[str] = "largest radii"
+    numbers: ClassVar[Ranges] = {"base": NumberRange(), "platform": NumberRange()}
     needs_legs: ClassVar[bool] = True
-
-    @classmethod
-    def from_table(cls, written: Written[FootprintTable]) -> Self:
-        """Return the limit that a case file writes."""
-        return cls(written.value.base, written.value.platform)
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse a footprint without radii, or with one that is not positive.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        case.check_number("footprint.base", self.base)
-        case.check_number("footprint.platform", self.platform)
-        if self.base is None and self.platform is None:
-            raise CaseError("limits.footprint", "must have base or platform")
 
     def on_plate(self, plate: Plate) -> Iterator[BoundedConstraint]:
         """Return the squared radius of each joint."""
@@ -87,7 +70,7 @@ class Footprint(Limit[FootprintTable]):
             return
         for joint in plate.joints:
             radius, keys = Call(Form(ca.sumsqr), joint.centre[:2]), ("", f"footprint.{plate.name}")
-            yield bounded(f"footprint {plate.name} joint {joint.name}", radius, SQUARED_LENGTH, keys, upper=largest)
+            yield between(f"footprint {plate.name} joint {joint.name}", radius, SQUARED_LENGTH, keys, upper=largest)
 
 
 @dataclass(frozen=True)
@@ -96,8 +79,8 @@ class RadiusRatio(IntervalLimit):
 
     key: ClassVar[str] = "radius_ratio"
     description: ClassVar[str] = "platform's radius over base's"
+    numbers: ClassVar[Ranges] = two_sided(NumberRange(Dimension.NUMBER))
     needs_legs: ClassVar[bool] = True
-    measured: ClassVar[Dimension] = Dimension.NUMBER
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:
         """Return the squared ratio."""

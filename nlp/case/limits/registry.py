@@ -11,18 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from pydantic import ConfigDict, Field, create_model
 
 from ..table import Table
-from .actuator_rate import ActuatorRate
-from .clearance import LegClearance
-from .interval import IntervalTable
-from .joint_cone import JointCone
+from .clearance import LegClearance, LinkClearance
+from .interval import IntervalTable, QuantityLimit
+from .joint_motion import JointCone, JointMotion
 from .joints import BaseJointAngle, PlatformJointAngle
 from .legs import Actuator, LegLength
 from .limit import Limit
-from .link_clearance import LinkClearance
-from .motions import JointMotion
 from .plates import Footprint, JointSpacing, RadiusRatio
-from .quantity import QuantityLimit
-from .rate_share import RateShare
+from .rates import ActuatorRate, RateShare
 from .relation import Relations
 from .singular_values import ConditionNumber, SmallestSingularValue
 

@@ -1,25 +1,307 @@
 """A limit in words of the user's own: relations between the case's numbers, such as ``x1 - 1.5*x2 >= 0``.
 
-Numbers are in the case's units in a relation; :mod:`screwsynth.nlp.case.limits.grammar` has the language.
+Numbers are in the case's units in a relation. The language is small: numbers, names, ``+ - * / ^``, brackets, the
+functions ``sqrt``, ``sin``, ``cos`` and ``abs``, and one relation ``>=``, ``<=`` or ``==``. A name may have a dot in
+it, as ``robot.p_x`` has. ``^`` binds tighter than a sign and to the right, as in mathematics. Nothing is ever handed to
+Python's own interpreter: a text becomes a tree, and a tree a CasADi expression.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import operator
+import re
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias
 
+import casadi as ca
+from casadi import SX
 from pydantic import Field
 
 from ....models import Dimension, Model
-from ...errors import CaseError
+from ...errors import CaseError, nearest
 from ...units import Units
 from ..table import Table
 from ..toml import TomlValue
 from .constraint import NUMBER, BoundedConstraint, Constraint
-from .grammar import SentenceError, expression, parse
 from .limit import Design, Limit, LimitedCase, TableField, Written
+
+#: A text is refused beyond this many characters, and beyond this many brackets, signs and powers in each other.
+LONGEST = 400
+_DEEPEST = 40
+#: Largest size of a constant power: with larger ones, numbers of any machine leave the range of doubles.
+_LARGEST_POWER = 100
+
+#: Functions of expressions, and of numbers; operations of either.
+_FUNCTIONS: dict[str, Callable[[SX], SX]] = {"sqrt": ca.sqrt, "sin": ca.sin, "cos": ca.cos, "abs": ca.fabs}
+_CONSTANT_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "abs": abs,
+}
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "^": operator.pow,
+}
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d]\w*(?:\.[^\W\d]\w*)*)|(?P<sign>>=|<=|==|[-+*/^()]))"
+)
+
+
+class SentenceError(ValueError):
+    """A text that is no relation; the message shows where."""
+
+
+class Number(NamedTuple):
+    """A number as it stands."""
+
+    value: float
+
+
+class Name(NamedTuple):
+    """A number of the case, by name."""
+
+    name: str
+
+
+class Call(NamedTuple):
+    """A function of one argument; ``-`` is the change of sign."""
+
+    function: str
+    argument: Tree
+
+
+class Operation(NamedTuple):
+    """An arithmetic operation on two trees."""
+
+    sign: str
+    left: Tree
+    right: Tree
+
+
+Tree: TypeAlias = Number | Name | Call | Operation
+
+
+class Relation(NamedTuple):
+    """``left >= right`` and the like."""
+
+    left: Tree
+    sign: Literal[">=", "<=", "=="]
+    right: Tree
+
+
+class _Token(NamedTuple):
+    kind: str
+    text: str
+    place: int
+
+
+def parse(text: str, names: Collection[str]) -> Relation:
+    """Return the relation that a text states.
+
+    Args:
+        text: the relation as it is written.
+        names: names that may stand in it.
+
+    Raises:
+        SentenceError: the text is no relation; the message has the offending token and its place.
+    """
+    if len(text) > LONGEST:
+        raise SentenceError(f"is longer than {LONGEST} characters")
+    reader = _Reader(text, names)
+    left = reader.sum()
+    token = reader.next()
+    if token.text not in (">=", "<=", "=="):
+        raise reader.wrong(token, "expected an operator or one of >=, <=, ==")
+    right = reader.sum()
+    last = reader.next()
+    if last.kind != "end":
+        raise reader.wrong(last, "expected an operator or the end")
+    for side in (left, right):
+        _constant(side)
+    sign: Literal[">=", "<=", "=="] = ">=" if token.text == ">=" else "<=" if token.text == "<=" else "=="
+    return Relation(left, sign, right)
+
+
+def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
+    """Return a tree as an expression of the values of its names.
+
+    Args:
+        tree: the tree.
+        values: an expression (1, 1) for each name.
+        angle: unit of the angles that ``sin`` and ``cos`` take, radians.
+    """
+    match tree:
+        case Number(value):
+            return SX(value)
+        case Name(name):
+            return values[name]
+        case Call("-", argument):
+            return -expression(argument, values, angle)
+        case Call(function, argument):
+            inner = expression(argument, values, angle)
+            return _FUNCTIONS[function](inner * angle if function in ("sin", "cos") else inner)
+        case Operation("^", left, Number(power)) if power == int(power):
+            return expression(left, values, angle) ** int(power)
+        case Operation(sign, left, right):
+            return SX(_OPERATIONS[sign](expression(left, values, angle), expression(right, values, angle)))
+
+
+def _constant(tree: Tree) -> float | None:
+    """Return the value of a tree without names; None for a tree with names.
+
+    Raises:
+        SentenceError: a part without names has no finite value, or a constant power is too large.
+    """
+    match tree:
+        case Number(value):
+            return value
+        case Name():
+            return None
+        case Call(function, argument):
+            inner = _constant(argument)
+            if inner is None:
+                return None
+            return _finite(lambda: -inner if function == "-" else _CONSTANT_FUNCTIONS[function](inner), function)
+        case Operation(sign, left, right):
+            first, second = _constant(left), _constant(right)
+            if sign == "^" and second is not None and abs(second) > _LARGEST_POWER:
+                raise SentenceError(f"has the power {second:g}, which must be at most {_LARGEST_POWER} in size")
+            if sign == "/" and second == 0:
+                raise SentenceError("divides by zero")
+            if first is None or second is None:
+                return None
+            return _finite(lambda: _OPERATIONS[sign](first, second), sign)
+
+
+def _finite(compute: Callable[[], float], sign: str) -> float:
+    """Return a computed constant.
+
+    Args:
+        compute: computes it.
+        sign: function or operation, for the message.
+
+    Raises:
+        SentenceError: it is not a finite number.
+    """
+    try:
+        value = compute()
+    except (ArithmeticError, ValueError):
+        value = math.nan
+    if isinstance(value, complex) or not math.isfinite(value):
+        raise SentenceError(f"has a constant part, of {sign!r}, without a finite value")
+    return value
+
+
+class _Reader:
+    """Recursive descent over the tokens of a text."""
+
+    def __init__(self, text: str, names: Collection[str]) -> None:
+        self._text, self._names = text, names
+        self._heads = {head for head, dot, _ in (name.partition(".") for name in names) if dot}
+        self._tokens = list(self._split())
+        self._at = self._depth = 0
+
+    def wrong(self, token: _Token, expected: str) -> SentenceError:
+        """Return the fault at a token, which shows the text with the token marked."""
+        found = "the sentence ends" if token.kind == "end" else f"{token.text!r} stands"
+        return SentenceError(f"{expected}, but {found} at position {token.place + 1}: {self._pointed(token.place)}")
+
+    def next(self) -> _Token:
+        """Return the next token, and go on; the end stays the next one."""
+        token = self._tokens[self._at]
+        self._at = min(self._at + 1, len(self._tokens) - 1)
+        return token
+
+    def sum(self) -> Tree:
+        """Read ``product (+|- product)*``."""
+        tree = self._product()
+        while self._tokens[self._at].text in ("+", "-"):
+            tree = Operation(self.next().text, tree, self._product())
+        return tree
+
+    def _product(self) -> Tree:
+        """Read ``signed (*|/ signed)*``."""
+        tree = self._signed()
+        while self._tokens[self._at].text in ("*", "/"):
+            tree = Operation(self.next().text, tree, self._signed())
+        return tree
+
+    def _signed(self) -> Tree:
+        """Read ``(+|-)* power``."""
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise SentenceError(f"has more than {_DEEPEST} brackets, signs and powers in each other")
+        if self._tokens[self._at].text in ("+", "-"):
+            sign = self.next().text
+            tree = self._signed()
+            tree = Call("-", tree) if sign == "-" else tree
+        else:
+            tree = self._power()
+        self._depth -= 1
+        return tree
+
+    def _power(self) -> Tree:
+        """Read ``atom (^ signed)?``."""
+        base = self._atom()
+        if self._tokens[self._at].text != "^":
+            return base
+        self.next()
+        return Operation("^", base, self._signed())
+
+    def _atom(self) -> Tree:
+        """Read a number, a name, a function with its argument, or a sum in brackets."""
+        token = self.next()
+        if token.kind == "number":
+            value = float(token.text)
+            if math.isinf(value):
+                raise self.wrong(token, "expected a finite number")
+            return Number(value)
+        if token.text == "(":
+            return self._closed(token)
+        if token.kind != "name":
+            raise self.wrong(token, "expected a number, a name or a bracket")
+        if token.text in self._names:
+            return Name(token.text)
+        if token.text in _FUNCTIONS:
+            bracket = self.next()
+            if bracket.text != "(":
+                raise self.wrong(bracket, f"expected a bracket after {token.text}")
+            return Call(token.text, self._closed(bracket))
+        hint = nearest(token.text, [*self._names, *_FUNCTIONS])
+        raise SentenceError(f"{token.text!r} at position {token.place + 1} is no number of this case; {hint}")
+
+    def _closed(self, opened: _Token) -> Tree:
+        tree = self.sum()
+        token = self.next()
+        if token.text != ")":
+            raise self.wrong(token, f"expected an operator or the bracket that closes position {opened.place + 1}")
+        return tree
+
+    def _split(self) -> Iterator[_Token]:
+        at = 0
+        while at < len(self._text.rstrip()):
+            found = _TOKEN.match(self._text, at)
+            if found is None:
+                at += len(self._text[at:]) - len(self._text[at:].lstrip())
+                raise SentenceError(f"{self._text[at]!r} at position {at + 1} means nothing here: {self._pointed(at)}")
+            kind = str(found.lastgroup)
+            text, start = found[kind], found.start(kind)
+            head = text.partition(".")[0]
+            # A dot belongs to a name only behind a word that begins names with a dot.
+            text = head if kind == "name" and head not in self._heads else text
+            yield _Token(kind, text, start)
+            at = start + len(text)
+        yield _Token("end", "", len(self._text.rstrip()))
+
+    def _pointed(self, place: int) -> str:
+        """Return the text with a place marked."""
+        return f"{self._text[:place]}»{self._text[place:]}"
 
 
 @dataclass(frozen=True, init=False)

@@ -9,8 +9,7 @@ import numpy as np
 from ....models.arrays import FloatArray
 from ....models.joints import RobotError
 from ....models.mechanism import Mechanism, MechanismError, mechanism_of, wrenches_of
-from ...case.robotfile.reader import model_of_definition
-from ...case.robotfile.schema import check_form
+from ...case.robotfile import check_form, model_of_definition
 from ...errors import CaseError, InputError
 
 #: Largest difference of the work rates of two equal robots, in parts of the largest: numbers are written with all

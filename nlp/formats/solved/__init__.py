@@ -1,7 +1,6 @@
 """A solved case as a mechanism: links and joints at their places, at one pose of the platform.
 
-The modules in order, each of which imports only those before it: ``chains`` (limbs as chains of elementary joints),
-``jointchains`` (limbs of a robot given joint by joint), ``legchains`` (straight legs), ``placing`` (chains closed at a
-pose), ``linkframes`` (frames of links), ``assembled`` (links and joints at a configuration), ``ranges`` (ranges of
-joints from limits), ``mechanism_of`` (the mechanism).
+The modules in order, each of which imports only those before it: ``words`` (the mechanism in the words of the case),
+``links`` (names and frames of links), ``legs`` (straight legs), ``given`` (robots given joint by joint), ``ranges``
+(ranges of joints from limits), ``mechanism_of`` (the mechanism).
 """

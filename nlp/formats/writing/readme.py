@@ -12,7 +12,8 @@ from ....models import Dimension
 from ....models.mechanism import MechanismJoint
 from ... import __version__
 from ...errors import one_line
-from ..solved.mechanism_of import Exported, ExportedJoint
+from ..solved.mechanism_of import Exported
+from ..solved.words import ExportedJoint
 from .plates import Plate
 
 _FILES: Mapping[str, str] = {

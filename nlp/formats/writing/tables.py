@@ -11,7 +11,7 @@ import numpy as np
 from ....models import Dimension, FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
 from ...units import Units
-from ..solved.mechanism_of import ExportedJoint
+from ..solved.words import ExportedJoint
 from .numbers import number
 
 _COORDINATES = ("x", "y", "z")

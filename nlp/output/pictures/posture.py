@@ -22,7 +22,7 @@ from ....models import (
     reporting_matrix,
 )
 from ....models.actuation import with_loops
-from ...program.kernel import Kernel, tuple_of
+from ...program.program import Kernel, tuple_of
 
 #: Newton's steps on the loops after a small motion, and the residual that ends them: rounding leaves about as much.
 _STEPS = 20

@@ -22,8 +22,8 @@ from casadi import SX
 
 from ....models import FloatArray
 from ...errors import UncoveredError
-from ...program.kernel import Kernel, single_output
 from ...program.nlp import Nlp
+from ...program.program import Kernel, single_output
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

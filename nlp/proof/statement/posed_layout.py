@@ -16,12 +16,11 @@ from ....models import Dimension, Model, Substitution
 from ....models.joints.closedform import ClosedForm, Reach
 from ...case.case import Case
 from ...case.limits.constraint import Reading
-from ...case.limits.limits import Limits
+from ...case.limits.limit import Limits
 from ...case.pose import HERE, Pose, Rotation, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Workspace
-from ...program.assembly import assemble
-from ...program.layout import Layout, StatedPoseSymbols, lay_out
+from ...program.layout import Layout, StatedPoseSymbols, assemble, lay_out
 from ...program.nlp import Nlp
 from ...program.places import SymbolTable
 from ...program.sampling import starting_points

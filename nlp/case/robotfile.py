@@ -1,20 +1,25 @@
-"""Schema of robot files: tables and keys, as :func:`screwsynth.models.robot` takes them.
+"""Robot files, which a case names by ``[robot] file = "my-robot.toml"``, beside its own file: their schema and reader.
 
-The classes check keys and types. Everything else is checked where the robot is built.
+The classes check keys and types, of tables and keys as :func:`screwsynth.models.robot` takes them. Everything else is
+checked where the robot is built.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, FiniteFloat, StringConstraints, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
-from ....models.joints.words import NESTED_BRANCH
-from ...errors import CaseError
-from ..faults import case_error
-from ..table import Table, Vector
+from ...models import Model, ModelError, robot
+from ...models.joints import RobotError
+from ...models.joints.words import NESTED_BRANCH
+from ..errors import CaseError, InputError
+from ..system.reading import read_limited
+from .table import Table, Vector, case_error
 
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Expression = Annotated[
@@ -224,3 +229,78 @@ def _place(location: Sequence[int | str]) -> str:
         elif not part.startswith("<"):
             parts.append(part if len(part) <= _LONGEST_KEY else f"{part[: _LONGEST_KEY - 3]}...")
     return ", ".join(parts) or "the file"
+
+
+#: Largest robot file, bytes: a hundred times the largest that a person writes.
+_LARGEST_FILE = 2**20
+
+
+def insert_robot(tables: dict[str, Any], folder: Path) -> str:
+    """Put the robot file that a case names in the place of its name, and return this name.
+
+    Args:
+        tables: the case, as ``tomllib`` returns it; ``file`` of its table ``robot`` becomes ``definition``.
+        folder: folder of the case, beside which the file is.
+
+    Raises:
+        CaseError: the file cannot be read, holds a fault, or stands beside a robot that is given in another way.
+    """
+    table = tables["robot"]
+    name = table["file"]
+    if not isinstance(name, str) or not name:
+        raise CaseError("robot.file", "must be the name of a robot file")
+    for other in ("model", "definition"):
+        if other in table:
+            raise CaseError(f"robot.{other}", "cannot stand beside file: give the robot in one way")
+    definition = read_definition(name, folder)
+    tables["robot"] = {"definition": definition, **{key: value for key, value in table.items() if key != "file"}}
+    return name
+
+
+def read_definition(name: str, folder: Path) -> dict[str, Any]:
+    """Return the tables of a robot file, with their form checked.
+
+    Args:
+        name: path of the file.
+        folder: folder from which a relative path begins.
+
+    Raises:
+        CaseError: the file cannot be read, or holds a fault.
+    """
+    path = folder / name
+    try:
+        content = read_limited(path, _LARGEST_FILE)
+    except InputError as error:
+        raise CaseError("robot.file", str(error).removeprefix(f"{path}: "), name) from None
+    try:
+        tables = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
+    except (ValueError, RecursionError) as error:
+        raise CaseError("the file", f"is not valid TOML: {error}", source=name) from None
+    try:
+        check_form(tables)
+    except CaseError as error:
+        raise error.within(name) from None
+    return tables
+
+
+def model_of_definition(definition: Mapping[str, Any], source: str | None = None) -> Model:
+    """Return the robot of a definition.
+
+    Args:
+        definition: tables of a robot file.
+        source: name of the file, for messages; None for a definition within a case.
+
+    Raises:
+        CaseError: the definition holds a fault.
+    """
+    prefix = "" if source else "robot.definition: "
+    try:
+        if source is None:
+            check_form(dict(definition))
+        return robot(**definition)
+    except CaseError as error:
+        raise CaseError(f"{prefix}{error.key}", error.fault, error.value) from None
+    except RobotError as error:
+        raise CaseError(f"{prefix}{error.place or 'the robot'}", error.fault, source=source) from None
+    except ModelError as error:
+        raise CaseError(f"{prefix}the robot", str(error), source=source) from None

@@ -1,4 +1,4 @@
-"""Straight legs as chains of elementary joints at a pose.
+"""Straight legs as a mechanism at a pose.
 
 A leg with a force alone is a universal joint at the base, a slide along the leg and a spherical joint at the platform.
 Its row does not depend on the axes of the universal joint. Our choice: the first axis is fixed to the base, normal to
@@ -12,13 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ....models import Body, FloatArray, Model, WrenchKind
+from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
+from ....models.mechanism.graph import ElementaryKind
 from ...errors import InputError
-from .chains import Chain, Chains, Step
-from .jointchains import clean_name
+from .links import framed
+from .words import ExportedJoint, RobotMechanism, clean_name, unique_names
 
 #: Sine of the angle between a leg and the z axis below which they are parallel.
 _PARALLEL = 1e-9
@@ -72,10 +75,11 @@ def axes_of(model: Model, limb: str) -> list[int]:
     return [k for k, each in enumerate(model.scene.directions) if each.limb == limb and each.body is Body.PLATFORM]
 
 
-def leg_chains(legs: Sequence[PosedLeg], rotation: FloatArray, position: FloatArray) -> Chains:
-    """Return the chains of legs at a pose, which is the pose in which they are stated.
+def leg_mechanism(name: str, legs: Sequence[PosedLeg], rotation: FloatArray, position: FloatArray) -> RobotMechanism:
+    """Return legs at a pose as a mechanism.
 
     Args:
+        name: of the robot.
         legs: the legs at the pose.
         rotation: (3, 3) ``R`` of the pose, platform to world coordinates.
         position: (3,) ``p`` of the pose, length.
@@ -83,34 +87,48 @@ def leg_chains(legs: Sequence[PosedLeg], rotation: FloatArray, position: FloatAr
     Raises:
         InputError: a leg has no length.
     """
-    chains = tuple(Chain(leg.name, leg.name, _steps(leg)) for leg in legs)
+    points = np.array([position, *(leg.base for leg in legs), *(leg.platform for leg in legs)])
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    steps = [step for leg in legs for step in _steps(leg)]
+    names = unique_names(
+        f"joint_{clean_name(step.label.replace(':', '_'))}{f'_{step.part}' if step.part else ''}" for step in steps
+    )
+    words, joints, links, inner = [], [], [], "base"
+    for k, (step, called) in enumerate(zip(steps, names, strict=True)):
+        is_last = k + 1 == len(steps) or steps[k + 1].leg != step.leg
+        outer = "platform" if is_last else called.replace("joint_", "link_", 1)
+        links += [] if is_last else [MechanismLink(outer)]
+        is_slide = step.kind == "P"
+        joints.append(MechanismJoint(called, step.kind, inner, outer, step.point, step.axis, actuated=is_slide))
+        words.append(ExportedJoint(called, step.label, step.part, step.leg if is_slide else ""))
+        inner = "base" if is_last else outer
+    platform = MechanismLink("platform", position, rotation)
+    mechanism = Mechanism(name, (MechanismLink("base"), *links, platform), tuple(joints), "base", "platform")
     note = _UPU if any(leg.axes for leg in legs) else _UPS
-    return Chains(chains, position, rotation, (note,))
+    return RobotMechanism(framed(mechanism, {}, size), tuple(words), size, (note,))
 
 
-def _steps(leg: PosedLeg) -> tuple[Step, ...]:
-    """Return the joints of a leg, from the base on, with coordinates 0."""
+class _Step(NamedTuple):
+    """A joint of a leg: names of the leg, of the joint, and of its part; its kind, centre and axis."""
+
+    leg: str
+    label: str
+    part: str
+    kind: ElementaryKind
+    point: FloatArray
+    axis: FloatArray
+
+
+def _steps(leg: PosedLeg) -> tuple[_Step, ...]:
+    """Return the joints of a leg, from the base on."""
     span = leg.platform - leg.base
     length = float(np.linalg.norm(span))
     if not length > 0:
         raise InputError(f"limb {leg.name!r} cannot be exported: it has zero length")
     along = span / length
 
-    def step(number: int, part: str, kind: str, point: FloatArray, axis: FloatArray) -> Step:
-        name = f"joint_{clean_name(leg.name)}_{number}{f'_{part}' if part else ''}"
-        is_slide = kind == "P"
-        return Step(
-            name,
-            f"{leg.name}:{number}",
-            "",
-            part,
-            "P" if is_slide else "S" if kind == "S" else "R",
-            point,
-            axis,
-            actuated=is_slide,
-            actuator=leg.name if is_slide else "",
-            coordinate=None if kind == "S" else 0.0,
-        )
+    def step(number: int, part: str, kind: ElementaryKind, point: FloatArray, axis: FloatArray) -> _Step:
+        return _Step(leg.name, f"{leg.name}:{number}", part, kind, point, axis)
 
     slide = step(2, "", "P", leg.base, along)
     if leg.axes:

@@ -1,0 +1,193 @@
+"""A robot given joint by joint as a mechanism at a pose: its loops are closed near the coordinates of the program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ....models import Dimension, FloatArray, Model
+from ....models.catalog import gallery_names, gallery_tables
+from ....models.joints.graphwords import read_robot
+from ....models.joints.linkgraph import home_of
+from ....models.joints.mechanisms import mechanism_at_home
+from ....models.limbjoints import LimbJoint
+from ....models.mechanism import Mechanism
+from ....models.mechanism.closing import ClosedMechanism, close, closed_near
+from ...case.toml import plain_value
+from ...errors import InputError
+from .links import framed, renamed
+from .words import ExportedJoint, RobotMechanism, clean_name, unique_names
+
+#: Parts of a joint by its type, one for each elementary joint: names of coordinates, and ends of joints' names.
+_PARTS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "U": (("first", "_first"), ("second", "_second")),
+    "C": (("angle", "_angle"), ("stroke", "_stroke")),
+    "Pa": (("", "_a"), ("back", "_back_a"), ("", "_b"), ("back", "_back_b")),
+}
+#: Largest difference of the platform's pose and of joint coordinates from those of the program, radians and parts of
+#: the robot's size: results are closed to the solver's accuracy, and another assembly differs by parts of 1.
+_SAME = 1e-6
+
+_RODS = (
+    "A parallelogram is two rods with a hinge at each end. Their distance, a fifth of a rod, is our choice: the"
+    " robot has no such number, and the motion of its platform does not depend on it."
+)
+_DRIVEN_ROD = (
+    "The rate of a driven one in results is a length; that of its hinge is an angle, the length over the rod's."
+)
+
+
+class GivenRobot(NamedTuple):
+    """A robot given joint by joint, as the program has it at a pose.
+
+    Attributes:
+        model: the robot.
+        parameters: values (1,) of its dimensions by name, radians for angles.
+        joints: as limits read them.
+        coordinates: known coordinates from home by label and part of a joint, such as ``("2:3", "first")``.
+        rotation: (3, 3) ``R`` of the pose.
+        position: (3,) ``p`` of the pose, length.
+    """
+
+    model: Model
+    parameters: Mapping[str, FloatArray]
+    joints: tuple[LimbJoint, ...]
+    coordinates: Mapping[tuple[str, str], float]
+    rotation: FloatArray
+    position: FloatArray
+
+
+def tables_of(model: Model) -> Mapping[str, object]:
+    """Return the tables of a robot's file; none of a robot that is given by its rows."""
+    definition = model.options.get("definition")
+    if definition is None and model.structure and model.name in gallery_names():
+        return gallery_tables(model.name)
+    tables = plain_value(definition or {})
+    return tables if isinstance(tables, Mapping) else {}
+
+
+def given_mechanism(robot: GivenRobot) -> RobotMechanism:
+    """Return a robot given joint by joint as a mechanism at its pose.
+
+    Raises:
+        InputError: the actuators do not lead from home to the pose and to the program's coordinates.
+        MechanismError: the loops do not close there.
+    """
+    home = home_of(read_robot(tables_of(robot.model)))
+    has_networks = home.graph is not None and bool(home.graph.networks)
+    angles = {name for name, each in home.words.dimensions.items() if each.kind is Dimension.ANGLE}
+    numbers = {name: float(value.item()) for name, value in robot.parameters.items()}
+    values = {name: math.degrees(value) if name in angles else value for name, value in numbers.items()}
+    # Limbs are named alike, whether they are written limb by limb or link by link.
+    at_home = mechanism_at_home(home if has_networks else replace(home, graph=None), values)
+    size = _size(at_home)
+    words = _words(robot, at_home, by_name=has_networks)
+    closed = _closed(robot, at_home, words, size)
+    found = closed.mechanism if has_networks else framed(closed.mechanism, closed.coordinates, size)
+    names = [joint.name if has_networks else each.name for joint, each in zip(at_home.joints, words, strict=True)]
+    links = {} if has_networks else _link_names(at_home, names)
+    found = renamed(found, links)
+    joints = tuple(replace(joint, name=name) for joint, name in zip(found.joints, names, strict=True))
+    said = tuple(
+        replace(each, name=name, coordinate=closed.coordinates.get(joint.name))
+        for each, name, joint in zip(words, names, at_home.joints, strict=True)
+    )
+    mechanism = replace(found, name=robot.model.name, joints=joints)
+    return RobotMechanism(mechanism, said, size, _notes(robot, said))
+
+
+def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint], size: float) -> ClosedMechanism:
+    """Return a mechanism closed at the program's pose and coordinates: near these, or along its actuators from home."""
+    wanted = {}
+    for joint, each in zip(at_home.joints, words, strict=True):
+        value = robot.coordinates.get((each.label, each.part))
+        if value is not None and joint.kind != "S":
+            wanted[joint.name] = value / (each.lever or 1.0)
+    near = closed_near(at_home, wanted, robot.position, robot.rotation)
+    if near is not None and _apart(robot, near, wanted, size) <= _SAME:
+        return near
+    driven = {joint.name: wanted[joint.name] for joint in at_home.joints if joint.actuated and joint.name in wanted}
+    found = close(at_home, actuators=driven)
+    if not _apart(robot, found, wanted, size) <= _SAME:
+        fault = "moving its actuators from home leads to another assembly or pose than the answer's"
+        raise InputError(f"robot {robot.model.name!r} cannot be exported: {fault}")
+    return found
+
+
+def _apart(robot: GivenRobot, closed: ClosedMechanism, wanted: Mapping[str, float], size: float) -> float:
+    """Return how far a mechanism is from the program's pose and coordinates: radians, or parts of the robot's size."""
+    found = closed.mechanism
+    platform = next(link for link in found.links if link.name == found.platform)
+    apart = [np.abs(platform.rotation - robot.rotation).max(), np.abs(platform.position - robot.position).max() / size]
+    for joint in found.joints:
+        if joint.name in wanted:
+            difference = closed.coordinates[joint.name] - wanted[joint.name]
+            apart.append(abs(math.remainder(difference, math.tau) if joint.kind == "R" else difference / size))
+    return float(max(apart))
+
+
+def _words(robot: GivenRobot, at_home: Mechanism, *, by_name: bool) -> list[ExportedJoint]:
+    """Return the elementary joints of a mechanism in the words of the robot file, without coordinates.
+
+    Args:
+        robot: the robot.
+        at_home: its mechanism at home.
+        by_name: whether the mechanism calls joints by the names that the robot file gives them, not by their labels.
+    """
+    places = {joint.name: joint.point for joint in at_home.joints}
+    known: dict[str, ExportedJoint] = {}
+    driven: dict[str, list[str]] = {}
+    for each in robot.joints:
+        key = each.name if by_name else each.label
+        parts = _PARTS.get(each.type, (("", ""),))
+        names = [f"{key}.{k + 1}" for k in range(len(parts))] if len(parts) > 1 else [key]
+        is_way = each.type == "Pa" and any(one.dimension is Dimension.LENGTH for one in each.coordinates)
+        lever = float(np.linalg.norm(places[names[1]] - places[names[0]])) if is_way else None
+        for k, (name, (part, end)) in enumerate(zip(names, parts, strict=True)):
+            new = f"joint_{clean_name(each.label.replace(':', '_'))}{end}"
+            known[name] = ExportedJoint(new, each.label, part, lever=lever, follows=each.type == "Pa" and k > 0)
+        driven.setdefault(each.limb, []).extend(names)
+    found = [known.get(joint.name, ExportedJoint(joint.name, joint.name)) for joint in at_home.joints]
+    found = [
+        replace(each, name=name) for each, name in zip(found, unique_names(each.name for each in found), strict=True)
+    ]
+    actuators = _actuators(robot, at_home, driven)
+    return [
+        replace(each, actuator=actuators.get(joint.name, "")) for joint, each in zip(at_home.joints, found, strict=True)
+    ]
+
+
+def _actuators(robot: GivenRobot, at_home: Mechanism, limbs: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return the name of the actuator of each driven joint; both are in one order in a limb."""
+    driven = {joint.name for joint in at_home.joints if joint.actuated}
+    found: dict[str, str] = {}
+    for limb, joints in limbs.items():
+        names = [each.name for each in robot.model.actuators if each.limb == limb]
+        found |= dict(zip((joint for joint in joints if joint in driven), names, strict=True))
+    return found
+
+
+def _link_names(at_home: Mechanism, joints: Sequence[str]) -> dict[str, str]:
+    """Return a name of each link after the first joint behind which it is; rods of a parallelogram keep their end."""
+    found: dict[str, str] = {}
+    for joint, name in zip(at_home.joints, joints, strict=True):
+        whole = name.removesuffix("_a") if name.endswith("_back_a") else name
+        found.setdefault(joint.outer, whole.replace("joint_", "link_", 1))
+    return found
+
+
+def _size(at_home: Mechanism) -> float:
+    """Return the largest extent of the joints' centres and of the platform's origin; 1 where all are at one place."""
+    platform = next(link for link in at_home.links if link.name == at_home.platform)
+    points = np.array([platform.position, *(joint.point for joint in at_home.joints)])
+    return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+
+
+def _notes(robot: GivenRobot, words: Sequence[ExportedJoint]) -> tuple[str, ...]:
+    """Return notes on parallelograms."""
+    notes = [_RODS] if any(each.type == "Pa" for each in robot.joints) else []
+    return (*notes, *([_DRIVEN_ROD] if any(each.actuator and each.lever for each in words) else []))
