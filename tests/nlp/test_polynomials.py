@@ -177,3 +177,18 @@ def test_squared_quotients_stay_in_their_polynomials() -> None:
         counts += violations(function, centre - width, centre + width, rng)
     assert counts[:3].tolist() == [0, 0, 0]
     assert counts[3] > 500
+
+
+def test_a_norm_that_may_be_zero_has_a_polynomial() -> None:
+    """Where a vector may vanish, the sum of its squares is 0 at least: no rounding leaves its root undefined."""
+    rng, counts = np.random.default_rng(7), np.zeros(4, dtype=int)
+    for _ in range(12):
+        x = ca.SX.sym("x", N)
+        vector = ca.mtimes(ca.DM(rng.normal(size=(3, N))), x)
+        function = ca.Function("f", [x], [ca.norm_2(vector), ca.norm_2(ca.vertcat(vector, ca.sin(x[0]))) + x[1]])
+        width = 10.0 ** rng.uniform(-9, 0, size=(1, 30)) * np.ones((N, 30))
+        centre = width * rng.uniform(-0.9, 0.9, size=(N, 30))
+        assert all(np.isfinite(each.s).all() for each in PolynomialArithmetic(function)(centre - width, centre + width))
+        counts += violations(function, centre - width, centre + width, rng)
+    assert counts[:3].tolist() == [0, 0, 0]
+    assert counts[3] > 500

@@ -63,7 +63,7 @@ class FormRule:
         form: of the functions and conditions that count.
     """
 
-    most_pieces = 5_000
+    most_pieces = 20_000
 
     def __init__(self, claims: Claims, form: StandardForm) -> None:
         self._claims, self._form, self._J, self._equation = claims, form, len(form.functions), form.is_equation

@@ -150,7 +150,10 @@ class Polynomial:
     def __add__(self, other: Polynomial) -> Polynomial:
         """Return the sum."""
         on, X, Y = _together(self, other)
-        return settled(on, X + Y, self.s + other.s, _out(self.V + other.V))
+        V = _out(self.V + other.V)
+        # Rounding makes no sum of squares negative: its root exists where all of them may be 0.
+        V[0] = np.where((self.V[0] >= 0) & (other.V[0] >= 0), np.maximum(V[0], 0.0), V[0])
+        return settled(on, X + Y, self.s + other.s, V)
 
     def __sub__(self, other: Polynomial) -> Polynomial:
         """Return the difference."""
