@@ -58,7 +58,7 @@ class ActuatorRate(Limit[AtMost]):
         names = () if case.model.generic is None else case.model.generic.undetermined
         if names:
             fault = "is not for this robot: its actuators can move while its platform stands still, so that its motion"
-            raise CaseError("limits.rates", f"{fault} does not determine the rates of {', '.join(names)}")
+            raise CaseError("limits.actuator_rate", f"{fault} does not determine the rates of {', '.join(names)}")
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the squared rate of each actuator for each task."""
