@@ -155,8 +155,10 @@ def test_what_is_no_tree_is_rejected(proof: ProofClaim, tree: bytes) -> None:
 
 
 def test_a_face_that_is_not_the_cases_is_rejected(proof: ProofClaim) -> None:
-    tree = bytes([Node.HALF, 0, Node.FACE_UPPER, 0]) + proof.tree
-    assert rejected(replace(proof, tree=tree + proof.tree), load_case(NAME))
+    # Of the lower half the upper face, of the upper half the lower one; the trees are whole otherwise.
+    for halves in ((Node.FACE_UPPER, 0, Node.BOUNDED, Node.BOUNDED), (Node.BOUNDED, Node.FACE_LOWER, 0, Node.BOUNDED)):
+        message = rejected(replace(proof, tree=bytes([Node.HALF, 0, *halves])), load_case(NAME))
+        assert "collapsed on a face" in message
 
 
 def test_a_proof_is_for_its_case_only(proof: ProofClaim) -> None:
