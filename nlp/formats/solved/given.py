@@ -19,14 +19,14 @@ from ....models.mechanism import Mechanism
 from ....models.mechanism.closing import ClosedMechanism, close, closed_near
 from ...case.toml import plain_value
 from ...errors import InputError
-from .links import framed, renamed
-from .words import ExportedJoint, RobotMechanism, clean_name, unique_names
+from .links import extent_of, framed, renamed
+from .words import ExportedJoint, RobotMechanism, joint_name, link_name, unique_names
 
 #: Parts of a joint by its type, one for each elementary joint: names of coordinates, and ends of joints' names.
 _PARTS: Mapping[str, tuple[tuple[str, str], ...]] = {
-    "U": (("first", "_first"), ("second", "_second")),
-    "C": (("angle", "_angle"), ("stroke", "_stroke")),
-    "Pa": (("", "_a"), ("back", "_back_a"), ("", "_b"), ("back", "_back_b")),
+    "U": (("first", "first"), ("second", "second")),
+    "C": (("angle", "angle"), ("stroke", "stroke")),
+    "Pa": (("", "a"), ("back", "back_a"), ("", "b"), ("back", "back_b")),
 }
 #: Largest difference of the platform's pose and of joint coordinates from those of the program, radians and parts of
 #: the robot's size: results are closed to the solver's accuracy, and another assembly differs by parts of 1.
@@ -84,17 +84,15 @@ def given_mechanism(robot: GivenRobot) -> RobotMechanism:
     values = {name: math.degrees(value) if name in angles else value for name, value in numbers.items()}
     # Limbs are named alike, whether they are written limb by limb or link by link.
     at_home = mechanism_at_home(home if has_networks else replace(home, graph=None), values)
-    size = _size(at_home)
+    size = extent_of(at_home)
     words = _words(robot, at_home, by_name=has_networks)
     closed = _closed(robot, at_home, words, size)
     found = closed.mechanism if has_networks else framed(closed.mechanism, closed.coordinates, size)
-    names = [joint.name if has_networks else each.name for joint, each in zip(at_home.joints, words, strict=True)]
-    links = {} if has_networks else _link_names(at_home, names)
-    found = renamed(found, links)
-    joints = tuple(replace(joint, name=name) for joint, name in zip(found.joints, names, strict=True))
+    found = renamed(found, {} if has_networks else _link_names(at_home, words))
+    joints = tuple(replace(joint, name=each.name) for joint, each in zip(found.joints, words, strict=True))
     said = tuple(
-        replace(each, name=name, coordinate=closed.coordinates.get(joint.name))
-        for each, name, joint in zip(words, names, at_home.joints, strict=True)
+        replace(each, coordinate=closed.coordinates.get(joint.name))
+        for each, joint in zip(words, at_home.joints, strict=True)
     )
     mechanism = replace(found, name=robot.model.name, joints=joints)
     return RobotMechanism(mechanism, said, size, _notes(robot, said))
@@ -148,16 +146,15 @@ def _words(robot: GivenRobot, at_home: Mechanism, *, by_name: bool) -> list[Expo
         is_way = each.type == "Pa" and any(one.dimension is Dimension.LENGTH for one in each.coordinates)
         lever = float(np.linalg.norm(places[names[1]] - places[names[0]])) if is_way else None
         for k, (name, (part, end)) in enumerate(zip(names, parts, strict=True)):
-            new = f"joint_{clean_name(each.label.replace(':', '_'))}{end}"
+            new = name if by_name else joint_name(each.label, end)
             known[name] = ExportedJoint(new, each.label, part, lever=lever, follows=each.type == "Pa" and k > 0)
         driven.setdefault(each.limb, []).extend(names)
-    found = [known.get(joint.name, ExportedJoint(joint.name, joint.name)) for joint in at_home.joints]
-    found = [
-        replace(each, name=name) for each, name in zip(found, unique_names(each.name for each in found), strict=True)
-    ]
     actuators = _actuators(robot, at_home, driven)
+    found = [known.get(joint.name, ExportedJoint(joint.name, joint.name)) for joint in at_home.joints]
+    names = unique_names(each.name for each in found)
     return [
-        replace(each, actuator=actuators.get(joint.name, "")) for joint, each in zip(at_home.joints, found, strict=True)
+        replace(each, name=name, actuator=actuators.get(joint.name, ""))
+        for each, name, joint in zip(found, names, at_home.joints, strict=True)
     ]
 
 
@@ -171,20 +168,13 @@ def _actuators(robot: GivenRobot, at_home: Mechanism, limbs: Mapping[str, Sequen
     return found
 
 
-def _link_names(at_home: Mechanism, joints: Sequence[str]) -> dict[str, str]:
+def _link_names(at_home: Mechanism, words: Sequence[ExportedJoint]) -> dict[str, str]:
     """Return a name of each link after the first joint behind which it is; rods of a parallelogram keep their end."""
     found: dict[str, str] = {}
-    for joint, name in zip(at_home.joints, joints, strict=True):
-        whole = name.removesuffix("_a") if name.endswith("_back_a") else name
-        found.setdefault(joint.outer, whole.replace("joint_", "link_", 1))
+    for joint, each in zip(at_home.joints, words, strict=True):
+        is_shared = each.name.endswith("_back_a")
+        found.setdefault(joint.outer, link_name(each.name.removesuffix("_a") if is_shared else each.name))
     return found
-
-
-def _size(at_home: Mechanism) -> float:
-    """Return the largest extent of the joints' centres and of the platform's origin; 1 where all are at one place."""
-    platform = next(link for link in at_home.links if link.name == at_home.platform)
-    points = np.array([platform.position, *(joint.point for joint in at_home.joints)])
-    return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
 
 def _notes(robot: GivenRobot, words: Sequence[ExportedJoint]) -> tuple[str, ...]:

@@ -20,8 +20,8 @@ from ....models import Body, FloatArray, Model, WrenchKind
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
 from ....models.mechanism.graph import ElementaryKind
 from ...errors import InputError
-from .links import framed
-from .words import ExportedJoint, RobotMechanism, clean_name, unique_names
+from .links import extent_of, framed
+from .words import ExportedJoint, RobotMechanism, joint_name, link_name, unique_names
 
 #: Sine of the angle between a leg and the z axis below which they are parallel.
 _PARALLEL = 1e-9
@@ -87,16 +87,12 @@ def leg_mechanism(name: str, legs: Sequence[PosedLeg], rotation: FloatArray, pos
     Raises:
         InputError: a leg has no length.
     """
-    points = np.array([position, *(leg.base for leg in legs), *(leg.platform for leg in legs)])
-    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     steps = [step for leg in legs for step in _steps(leg)]
-    names = unique_names(
-        f"joint_{clean_name(step.label.replace(':', '_'))}{f'_{step.part}' if step.part else ''}" for step in steps
-    )
+    names = unique_names(joint_name(step.label, step.part) for step in steps)
     words, joints, links, inner = [], [], [], "base"
     for k, (step, called) in enumerate(zip(steps, names, strict=True)):
         is_last = k + 1 == len(steps) or steps[k + 1].leg != step.leg
-        outer = "platform" if is_last else called.replace("joint_", "link_", 1)
+        outer = "platform" if is_last else link_name(called)
         links += [] if is_last else [MechanismLink(outer)]
         is_slide = step.kind == "P"
         joints.append(MechanismJoint(called, step.kind, inner, outer, step.point, step.axis, actuated=is_slide))
@@ -104,7 +100,7 @@ def leg_mechanism(name: str, legs: Sequence[PosedLeg], rotation: FloatArray, pos
         inner = "base" if is_last else outer
     platform = MechanismLink("platform", position, rotation)
     mechanism = Mechanism(name, (MechanismLink("base"), *links, platform), tuple(joints), "base", "platform")
-    note = _UPU if any(leg.axes for leg in legs) else _UPS
+    size, note = extent_of(mechanism), _UPU if any(leg.axes for leg in legs) else _UPS
     return RobotMechanism(framed(mechanism, {}, size), tuple(words), size, (note,))
 
 

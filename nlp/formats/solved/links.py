@@ -22,6 +22,13 @@ _NEAR = 1e-9
 _PARALLEL = 1e-3
 
 
+def extent_of(mechanism: Mechanism) -> float:
+    """Return the largest extent of the joints' centres and of the platform's origin; 1 where all are at one place."""
+    platform = next(link for link in mechanism.links if link.name == mechanism.platform)
+    points = np.array([platform.position, *(joint.point for joint in mechanism.joints)])
+    return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+
+
 def framed(mechanism: Mechanism, coordinates: Mapping[str, float], size: float) -> Mechanism:
     """Return a mechanism whose links have frames at their joints; slides and screws state their points on inner links.
 

@@ -49,6 +49,16 @@ class RobotMechanism(NamedTuple):
     notes: tuple[str, ...]
 
 
+def joint_name(label: str, part: str = "") -> str:
+    """Return the name of an elementary joint: of the label of its joint, and of its part of that."""
+    return f"joint_{clean_name(label.replace(':', '_'))}{f'_{part}' if part else ''}"
+
+
+def link_name(joint: str) -> str:
+    """Return the name of the link behind a joint with a name of :func:`joint_name`."""
+    return joint.replace("joint_", "link_", 1)
+
+
 def clean_name(text: str) -> str:
     """Return a text as a name that every format takes: letters, digits, dots, minus and plus signs, underscores."""
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", text)
