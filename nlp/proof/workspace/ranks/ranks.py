@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..proof_writer import PaperRecord
 
 #: Number of boxes examined at once.
-_BLOCK = 512
+_BLOCK = 1024
 #: Callback with seconds, number of boxes examined, and number of boxes open.
 RankProgress = Callable[[float, int, int], None]
 #: Search for a singular pose from the boxes that were examined last, and the number of all.
