@@ -350,6 +350,9 @@ def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
     for huge in (np.finfo(float).max, np.inf, np.nan):
         limb = struct.pack("<d", huge) + bytes([Node.BOUNDED])
         assert "together" in rejected(replace(proof, tree=bytes([Node.LIMBS]) + 2 * limb), case)
+    # Bounds that cancel: their rounding is far more than the proven bound.
+    cancelling = b"".join(struct.pack("<d", each) + bytes([Node.BOUNDED]) for each in (1e16, -1e16))
+    assert "together" in rejected(replace(proof, tree=bytes([Node.LIMBS]) + cancelling), case)
 
 
 def test_leg_clearance_is_covered_and_its_proof_holds() -> None:

@@ -266,6 +266,18 @@ def test_lengths_of_legs_agree_with_samples(case: Case) -> None:
         assert stroke.bound == pytest.approx(long.bound - short.bound)
 
 
+@pytest.mark.parametrize(("away", "outcome"), [(1e-6, Outcome.PROVED), (-1e-6, Outcome.REFUTED)])
+def test_limits_nearer_than_the_gap_are_decided(case: Case, away: float, outcome: Outcome) -> None:
+    lengths = [each for each in judge_workspace(case, with_objective=False).extremes if each.key[:4] == "leg_"]
+    short, long = (of([each.reached for each in lengths if each.sense.value == of.__name__]) for of in (min, max))
+    limits = f"min = {short * (1 - away)}, max = {long * (1 + away)}"
+    near = tomllib.loads(TEXT.replace("min = 17, max = 44", limits))
+    judged = judge_workspace(case_from_tables(near, name="", source=""), with_objective=False).extremes
+    worst = [each.outcome for each in judged if each.key[:4] == "leg_" and each.reached in (short, long)]
+    assert set(worst) == {outcome}
+    assert len(worst) > 1
+
+
 def test_roll_pitch_and_yaw_have_the_same_poses_in_both_searches(case: Case) -> None:
     angles = (Free(-0.3, 0.1), Free(0.0, 0.25), Free(-0.1, 0.4))
     workspace = Workspace((0.5, Free(-1.0, 1.0), 20.0), Turns(TurnKind.ROLL_PITCH_YAW, angles))

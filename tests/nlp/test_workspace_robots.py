@@ -258,6 +258,9 @@ def test_slices_and_limits_of_a_robot_with_loops_hold_at_every_point() -> None:
     lengths, _ = tripod(case, points[:, 0], points[:, 1], np.full(len(points), 1.1))
     is_regular = np.array([region is Region.REGULAR for region in regions])
     assert (np.abs(lengths) <= 0.2)[is_regular & (limit == KEPT)].all()
+    # Boxes that touch are of one assembly.
+    size = np.prod(found.boxes[:, 2:] - found.boxes[:, :2], axis=1)
+    assert size[[region is Region.REGULAR for region in found.regions]].sum() > 0.9 * size.sum()
     for k, each in enumerate(found.limits):
         own = lengths[limit == k]
         beyond = own > each.limit if each.key.endswith("max") else own < each.limit
