@@ -252,6 +252,13 @@ def test_a_proof_over_a_narrow_range_of_poses_is_accepted() -> None:
     assert len(check_workspace_proof(proof, case).claims) == 2
 
 
+def test_a_proof_of_loops_that_are_closed_box_by_box_is_accepted() -> None:
+    case = about_home("3-rps", 0.1, 20)
+    judged, proof = judged_on_paper(case, with_limits=False)
+    assert judged.ranks[0].boxes > 10
+    assert len(check_workspace_proof(proof, case).claims) == 2
+
+
 def test_the_check_begins_in_the_working_mode_of_home() -> None:
     """Far from home the loops of a 4-RUU close with a limb bent the other way alone."""
     size = size_of("4-ruu")
