@@ -32,6 +32,10 @@ def test_an_elbow_on_the_other_side_is_another_assembly() -> None:
     assert here.is_home
     assert here.nearness == pytest.approx(1)
     assert here.sentences == ()
+    state = evaluate(nlp, x)
+    away = assembly_of(nlp, x, replace(state, position=state.position + 100))
+    assert away is not None
+    assert not away.is_home
     (own,) = nlp.program.places.unknowns
     other = x.copy()
     other[own[2]] += math.radians(110)  # beyond the crank's other position

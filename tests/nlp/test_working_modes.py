@@ -16,6 +16,7 @@ from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, certify, formulate, 
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.evidence.workingmode import _about
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.proof_file import ProofError
@@ -108,6 +109,12 @@ def test_signs_are_positive_from_home_on_and_negative_in_other_modes(names: tupl
         assert np.abs(found[2]).min(initial=1.0) > 1e-6, name  # where the loops are open
         if name in ("6-rus", "6-pus", "6-rss"):
             assert is_in_home_mode(nlp, in_another_mode(nlp, 2)) is False
+
+
+def test_screws_are_compared_in_any_unit_of_length() -> None:
+    screws, centre = np.random.default_rng(0).normal(size=(6, 5)), np.array([0.2, -0.5, 0.4])
+    in_microns = np.vstack([screws[:3], 1e6 * screws[3:]])
+    assert _about(in_microns, 1e6 * centre) == pytest.approx(_about(screws, centre), abs=1e-12)
 
 
 def test_a_hinge_whose_axes_point_against_each_other_is_no_assembly() -> None:

@@ -158,6 +158,16 @@ def test_a_proof_with_every_kind_of_claim_holds(proof: Proof, judged: tuple[Judg
         assert sign * bound >= sign * each.reached - 1e-9 * abs(each.reached)
 
 
+def test_an_error_without_the_other_one_is_not_on_paper(judged: tuple[Judgement, PaperRecord]) -> None:
+    found, record = judged
+    names = ["position error", "rotation error"]
+    for name in names:
+        opened = [replace(each, outcome=Outcome.OPEN) if each.name == name else each for each in found.extremes]
+        proof = paper_of(replace(found, extremes=tuple(opened)), record, TEXT, leg_error=LEG_ERROR)
+        assert sorted(each.name for each in proof.unproved) == names
+        assert not any(each.name in names for each in proof.claims)
+
+
 @pytest.mark.parametrize(
     ("name", "sense", "factor"),
     [
