@@ -85,6 +85,13 @@ def test_a_proof_by_limbs_that_share_variables_holds(proof: ProofClaim, nlp: Nlp
     assert checked.bound == proof.bound
 
 
+def test_boxes_outside_of_the_ball_of_rotations_are_shown_by_it(best: ProgramSolution) -> None:
+    """Beyond the ball the sum of the limbs is above the bound, which needs small boxes."""
+    proof = proof_of(best.nlp, 5e-4, best.x)
+    assert bytes([Node.INFEASIBLE]) in proof.tree
+    assert check_proof(proof, best.nlp).bound == proof.bound
+
+
 def changed(proof: ProofClaim, nlp: Nlp, change: Callable[[np.ndarray, np.ndarray, np.ndarray], object]) -> ProofClaim:
     """The proof with other numbers (K,), (K, m), (K, m, m) in one leaf, which ``change`` writes in place."""
     leaf = middle_leaf(proof, nlp)
