@@ -12,6 +12,7 @@ the error of a centre, a vector, changes it by at most the vector's length times
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -56,7 +57,7 @@ class Problem:
         start: (n,) closed loops of the design at the middle of the workspace, or near it.
         locked: rows and members with the actuators locked.
         unactuated: the same with free actuators; None for a robot without constraints.
-        scaled: J, moments divided by the length that is chosen.
+        posed: all of its limbs.
         chosen: what is kept of the model.
         names: of the m joint centres whose errors are coordinates.
         tolerance: largest size of each error, length.
@@ -71,7 +72,7 @@ class Problem:
     start: FloatArray
     locked: RankMatrix
     unactuated: RankMatrix | None
-    scaled: ScaledRows
+    posed: PosedModel = field(repr=False)
     chosen: Chosen
     names: tuple[str, ...] = ()
     tolerance: float = 0.0
@@ -81,6 +82,11 @@ class Problem:
     def problem(self) -> Problem:
         """The design alone."""
         return self.design or self
+
+    @cached_property
+    def scaled(self) -> ScaledRows:
+        """J, moments divided by the length that is chosen."""
+        return self.posed.scaled
 
     @property
     def length(self) -> float:
@@ -180,7 +186,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
         start=frozen_array(start, start.shape),
         locked=posed.locked,
         unactuated=_unactuated(model, posed, start),
-        scaled=posed.scaled,
+        posed=posed,
         chosen=chosen,
     )
 
@@ -207,7 +213,7 @@ def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) 
         start=np.concatenate([design.start, np.zeros(errors.numel())]),
         locked=posed.locked,
         unactuated=None if free is None else RankMatrix(posed.unlocked, free.nullity),
-        scaled=posed.scaled,
+        posed=posed,
         names=built.names,
         tolerance=tolerance,
         design=design,
