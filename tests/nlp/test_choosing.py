@@ -236,27 +236,10 @@ def test_the_characteristic_length_is_the_root_of_the_ratio_of_stiffnesses() -> 
     assert energy_rate == pytest.approx(k * F, rel=1e-6)
 
 
-def started(name: str, **values: float) -> Legs:
-    """The robot of a case's starting values, with some replaced; angles in radians."""
-    case = load_case(name)
-    x = dict(
-        zip(
-            ("x1", "x2", "x3", "x4"),
-            (start_of(each) for each in tables_of(name)["robot"]["parameters"].values()),
-            strict=True,
-        )
-    )
-    x |= {"x3": math.radians(x["x3"]), "x4": math.radians(x["x4"])}
-    pose = tables_of(name)["pose"]
-    pose = pose[0] if isinstance(pose, list) else pose
-    p = np.array([start_of(each) for each in pose["position"]])
-    turned = pose.get("rotation")
-    R = turn_about(turned["axis"], math.radians(turned["angle"])) if turned else np.eye(3)
-    return legs_of(x | values, str(case.model.options["layout"]), R, p)
-
-
-def start_of(number: Any) -> float:  # noqa: ANN401 - what TOML holds
-    return float(number if not isinstance(number, dict) else number.get("start", (number["min"] + number["max"]) / 2))
+def started(name: str) -> Legs:
+    """The robot of a case's starting values."""
+    nlp = formulate(load_case(name))
+    return placed(nlp.case, evaluate(nlp, nlp.start))
 
 
 def objective(legs: Legs, twist: Array) -> float:
@@ -314,13 +297,9 @@ def numbers_of_the_camera() -> Iterator[tuple[str, str]]:
     yield "F of the two swings at the answer, m^2", f"{F:.5f} and {F_above:.5f}"
     yield "natural frequencies at the start, legs of 1 N/um, 5 kg", f"{first[0]:.1f} and {first[1]:.1f} Hz"
     yield "natural frequencies at the answer", f"{now[0]:.1f} and {now[1]:.1f} Hz"
-    alone = [
-        math.sqrt(each @ stiffness(legs, k) @ each / part) for each, part in zip(swings, np.diag(kinetic), strict=True)
-    ]
-    yield (
-        "of tilt and sway by themselves, at the answer",
-        " and ".join(f"{each / (2 * math.pi):.1f}" for each in alone) + " Hz",
-    )
+    alone = [each @ stiffness(legs, k) @ each / part for each, part in zip(swings, np.diag(kinetic), strict=True)]
+    tilt, sway = (math.sqrt(square) / (2 * math.pi) for square in alone)
+    yield "of tilt and sway by themselves, at the answer", f"{tilt:.1f} and {sway:.1f} Hz"
     azimuths = np.radians([20.0, 55.0, 130.0])
     others = [objective(legs, turn(np.array([math.cos(a), math.sin(a), 0]), np.array([0, 0, 0.22]))) for a in azimuths]
     yield "F of the lower swing for winds from 20, 55 and 130 degrees", ", ".join(f"{each:.5f}" for each in others)
@@ -337,11 +316,8 @@ def numbers_of_the_wrist() -> Iterator[tuple[str, str]]:
     yield "speed of the tool, legs of 50 mm/s", f"{50 / max(q):.1f} rad/s"
     yield "torque about the tool, legs of 100 N", f"{100 * sum(q) / 1000:.2f} N m"
     yield "play of the tool, legs with a play of 0.01 mm", f"{math.degrees(0.01 / max(q)):.2f} deg"
-    speed, force, play = (
-        50 / math.sqrt(stiffest / 6),
-        600 * math.sqrt(stiffest / 6) / 1000,
-        0.01 / math.sqrt(stiffest / 6),
-    )
+    mean = math.sqrt(stiffest / 6)
+    speed, force, play = 50 / mean, 600 * mean / 1000, 0.01 / mean
     yield "the same three for the largest F", f"{speed:.1f} rad/s, {force:.2f} N m, {math.degrees(play):.2f} deg"
 
 

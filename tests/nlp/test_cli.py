@@ -25,14 +25,23 @@ CASES = Path(screwsynth.cases.__file__).parent
 HELICAL = (CASES / "paper-4.1-helical.toml").read_text(encoding="utf-8")
 POSITION = "position = [{ min = -10, max = 10 }, { min = -10, max = 10 }, { min = 20, max = 50 }]"
 ROTATION = "rotation = { angle = { min = -30, max = 30 } }"
+#: Edits by which the joints of every leg coincide in the middle of x1, where the first search begins.
+COINCIDING = (
+    ("x1 = 12", "x1 = { min = 4, max = 12 }"),
+    ("x3 = 30", "x3 = 8"),
+    (POSITION, "position = [0, 0, 0]"),
+    (ROTATION, ""),
+)
 MOTION = "axis = [2, 2, 1]\npoint = [2, 3, 6]\npitch = 1\n"
 
 
-def process(
-    *arguments: str, folder: Path, environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
+#: The process of a solve, and the result that it wrote.
+Solved = tuple[subprocess.CompletedProcess[str], Path]
+
+
+def process(*arguments: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
-    env = {**os.environ, **(environment or {})}
+    env = {**os.environ, **environment}
     return subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
 
 
@@ -41,30 +50,16 @@ def case_file(folder: Path, *edits: tuple[str, str], search: str = "starts = 3")
 
 
 def strict(text: str) -> dict[str, Any]:
-    def refuse(constant: str) -> float:
-        raise AssertionError(f"{constant} is not JSON")
-
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         keys = [key for key, _ in pairs]
         assert len(set(keys)) == len(keys)
         return dict(pairs)
 
-    found = json.loads(text, parse_constant=refuse, object_pairs_hook=once)
+    found = json.loads(text, object_pairs_hook=once)
     assert isinstance(found, dict)
-    check_finite(found)
+    # NaN is no JSON, and 1e999 reads as infinity: neither can be written again.
+    json.dumps(found, allow_nan=False)
     return found
-
-
-def check_finite(value: object) -> None:
-    # 1e999 is valid JSON and reads as infinity.
-    if isinstance(value, dict):
-        for part in value.values():
-            check_finite(part)
-    elif isinstance(value, list):
-        for part in value:
-            check_finite(part)
-    elif isinstance(value, float):
-        assert math.isfinite(value)
 
 
 def check_state(result: dict[str, Any], *, rows: int = 6) -> None:
@@ -98,7 +93,7 @@ def check_state(result: dict[str, Any], *, rows: int = 6) -> None:
 
 
 @pytest.fixture(scope="module")
-def solved(tmp_path_factory: pytest.TempPathFactory) -> tuple[subprocess.CompletedProcess[str], Path]:
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Solved:
     folder = tmp_path_factory.mktemp("solved")
     ended = process("solve", "paper-4.1-helical", "--starts", "4", "--json", "result.json", folder=folder)
     return ended, folder / "result.json"
@@ -111,7 +106,7 @@ def test_help_lists_each_command_by_the_first_line_of_its_own_help(name: str) ->
     assert command.help.partition("\n\n")[0].split() == SUMMARIES[name].split()
 
 
-def test_a_solve_as_a_process_prints_only_its_table(solved: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     ended, _ = solved
     assert ended.returncode == 0
     assert ended.stderr == ""
@@ -127,22 +122,10 @@ def test_a_solve_as_a_process_prints_only_its_table(solved: tuple[subprocess.Com
     assert "\x1b" not in ended.stdout
 
 
-def test_the_result_has_the_documented_keys(solved: tuple[subprocess.CompletedProcess[str], Path]) -> None:
+def test_the_result_has_the_documented_keys(solved: Solved) -> None:
     result = strict(solved[1].read_text(encoding="utf-8"))
     check_state(result)
-    documented = {"schema", "case", "title", "units", "sense", "status", "F", "parameters", "pose", "task", "jacobian"}
-    documented |= {
-        "rates",
-        "rank",
-        "singular_values",
-        "optimality",
-        "starts",
-        "certificate",
-        "seed",
-        "versions",
-        "seconds",
-    }
-    assert documented <= set(result)
+    assert result["title"] == "Pose of a given 6-6 platform for a screw motion of pitch 1"
     assert (result["case"], result["units"]) == ("paper-4.1-helical", {"length": "cm", "angle": "deg"})
     assert (result["sense"], result["status"], result["certificate"], result["seed"]) == ("max", "optimal", None, 0)
     assert result["F"] == pytest.approx(407.2107, rel=1e-6)
@@ -154,11 +137,8 @@ def test_the_result_has_the_documented_keys(solved: tuple[subprocess.CompletedPr
     evidence = result["optimality"]
     assert evidence["kind"] == "strict local maximum"
     assert max(evidence[key] for key in ("stationarity", "feasibility", "complementarity")) < 1e-6
-    assert [(side["name"], side["bound"]) for side in evidence["active"]] == [
-        ("p_x", "min"),
-        ("p_y", "min"),
-        ("p_z", "max"),
-    ]
+    sides = [(side["name"], side["bound"]) for side in evidence["active"]]
+    assert sides == [("p_x", "min"), ("p_y", "min"), ("p_z", "max")]
     for side in evidence["active"]:
         assert set(side) == {"name", "bound", "value", "unit", "multiplier"}
     assert all(isinstance(number, float) for number in evidence["reduced_hessian_eigenvalues"])
@@ -169,15 +149,10 @@ def test_the_result_has_the_documented_keys(solved: tuple[subprocess.CompletedPr
     assert result["seconds"] > 0
 
 
-def test_json_to_standard_output_is_alone_there(
-    tmp_path: Path, cli: Run, solved: tuple[subprocess.CompletedProcess[str], Path]
-) -> None:
-    here, there = (
-        strict(
-            output_of(cli("solve", "paper-4.1-helical", "--starts", "4", "--seed", "0", "--jobs", "1", "--json", "-"))
-        ),
-        strict(solved[1].read_text(encoding="utf-8")),
-    )
+def test_json_to_standard_output_is_alone_there(tmp_path: Path, cli: Run, solved: Solved) -> None:
+    options = ("--starts", "4", "--seed", "0", "--jobs", "1", "--json", "-")
+    here = strict(output_of(cli("solve", "paper-4.1-helical", *options)))
+    there = strict(solved[1].read_text(encoding="utf-8"))
     del here["seconds"], there["seconds"]
     # The number of threads changes nothing, nor does the process.
     assert here == there
@@ -189,23 +164,9 @@ def test_json_to_standard_output_is_alone_there(
 
 def test_seed_and_starts_replace_those_of_the_case(tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path, search="starts = 7\nseed = 5")
-    code, out, _ = cli("solve", path, "--json", "-", "--starts", "2", "--seed", "11")
-    result = strict(out)
-    assert (code, result["seed"], result["starts"]["run"]) == (0, 11, 2)
-    code, out, _ = cli("solve", path, "--json", "-", "--starts", "1")
-    result = strict(out)
-    assert (code, result["seed"], result["starts"]["run"]) == (0, 5, 1)
-
-
-@pytest.mark.parametrize(
-    "option",
-    ["--starts=0", "--starts=two", "--starts=1.5", "--seed=-1", "--jobs=0", "--no-such-option", "--starts=100001"],
-)
-def test_options_that_are_not_allowed(option: str, cli: Run) -> None:
-    code, out, err = cli("solve", "paper-4.1-helical", option)
-    assert (code, out) == (2, "")
-    assert option.partition("=")[0] in err
-    assert "Traceback" not in err
+    for options, seed, starts in ((("--starts", "2", "--seed", "11"), 11, 2), (("--starts", "1"), 5, 1)):
+        result = strict(output_of(cli("solve", path, "--json", "-", *options)))
+        assert (result["seed"], result["starts"]["run"]) == (seed, starts)
 
 
 def test_radians_stay_radians(tmp_path: Path, cli: Run) -> None:
@@ -216,10 +177,9 @@ def test_radians_stay_radians(tmp_path: Path, cli: Run) -> None:
         ("x4 = 8", f"x4 = {math.radians(8)!r}"),
         (ROTATION, f"rotation = {{ angle = {{ min = {-math.radians(30)!r}, max = {math.radians(30)!r} }} }}"),
     )
-    code, out, _ = cli("solve", path, "--json", "-")
-    result = strict(out)
+    result = strict(output_of(cli("solve", path, "--json", "-")))
     check_state(result)
-    assert (code, result["units"]) == (0, {"length": "mm", "angle": "rad"})
+    assert result["units"] == {"length": "mm", "angle": "rad"}
     assert result["F"] == pytest.approx(407.2107, rel=1e-6)
     assert result["parameters"]["x4"] == pytest.approx(math.radians(8), rel=1e-15)
     assert abs(result["pose"]["angle"]) <= math.radians(30) + 1e-12
@@ -238,10 +198,9 @@ def test_an_infinite_pitch_is_a_string(tmp_path: Path, cli: Run) -> None:
 
 def test_a_case_with_nothing_free(tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path, (POSITION, "position = [1, 2, 35]"), (ROTATION, ""))
-    code, out, _ = cli("solve", path, "--json", "-")
-    result = strict(out)
+    result = strict(output_of(cli("solve", path, "--json", "-")))
     check_state(result)
-    assert (code, result["status"], result["starts"]["run"]) == (0, "evaluated", 0)
+    assert (result["status"], result["starts"]["run"]) == ("evaluated", 0)
     out = output_of(cli("solve", path))
     assert "evaluated" in out
 
@@ -266,15 +225,7 @@ def test_a_solve_that_stops_early_is_no_answer(tmp_path: Path, cli: Run) -> None
 
 
 def test_a_search_that_meets_no_finite_number_prints_nothing_foreign(tmp_path: Path) -> None:
-    # The middle of x1, where the first search begins, makes every leg's joints coincide.
-    path = case_file(
-        tmp_path,
-        ("x1 = 12", "x1 = { min = 4, max = 12 }"),
-        ("x3 = 30", "x3 = 8"),
-        (POSITION, "position = [0, 0, 0]"),
-        (ROTATION, ""),
-        search="starts = 2",
-    )
+    path = case_file(tmp_path, *COINCIDING, search="starts = 2")
     ended = process("solve", path, "--json", "-", folder=tmp_path)
     assert ended.returncode in (0, 1)
     assert ended.stderr == ""
@@ -330,10 +281,9 @@ def test_output_through_a_link_reaches_its_target(tmp_path: Path, cli: Run) -> N
 
 
 def test_evaluate_stands_in_the_middle_or_at_the_start(tmp_path: Path, cli: Run) -> None:
-    code, out, _ = cli("evaluate", "paper-4.1-helical", "--json", "-")
-    result = strict(out)
+    result = strict(output_of(cli("evaluate", "paper-4.1-helical", "--json", "-")))
     check_state(result)
-    assert (code, result["pose"]["position"], result["pose"]["angle"]) == (0, [0, 0, 35], 0)
+    assert (result["pose"]["position"], result["pose"]["angle"]) == ([0, 0, 35], 0)
     path = case_file(
         tmp_path,
         ("x2 = 8", "x2 = { min = 4, max = 9, start = 5 }"),
@@ -396,15 +346,11 @@ def test_evaluate_with_one_coordinate_of_a_joint(tmp_path: Path, cli: Run) -> No
         ("angel=3", ("angel", "cannot be set", "did you mean 'angle'?")),
         ("axs=0,0,1", ("axs", "cannot be set", "did you mean 'axis'?")),
         ("pz=3", ("pz", "cannot be set", "did you mean 'p_z'?")),
-        ("model=3", ("model", "cannot be set")),
         ("seed=3", ("seed", "cannot be set")),
         ("x1", ("--set x1", "NAME=NUMBER")),
-        ("x1=", ("--set x1=", "NAME=NUMBER")),
         ("=3", ("--set =3", "NAME=NUMBER")),
-        (" =3", ("--set", "NAME=NUMBER")),
         ("", ("--set", "NAME=NUMBER")),
         ("x1=abc", ("--set x1=abc", "NAME=NUMBER")),
-        ("x1=3cm", ("--set x1=3cm", "NAME=NUMBER")),
         ("x1=3,", ("--set x1=3,", "NAME=NUMBER")),
         ("x1==3", ("--set x1==3", "NAME=NUMBER")),
         ("axis=0 0 1", ("--set axis=0 0 1", "axis=X,Y,Z")),
@@ -412,14 +358,12 @@ def test_evaluate_with_one_coordinate_of_a_joint(tmp_path: Path, cli: Run) -> No
         ("p_x=inf", ("pose.position[0]", "finite")),
         ("x1=1,2", ("robot.parameters.x1", "must be a number")),
         ("x3=40", ("robot.parameters.x3", "between 0 deg and 30 deg")),
-        ("x1=-1", ("robot.parameters.x1", "at least 0 cm")),
         ("p_y=1,2,3", ("pose.position[1]", "must be a number")),
         ("axis=0,0,0", ("pose.rotation.axis", "zero")),
         ("axis=1", ("pose.rotation.axis", "list")),
         ("axis=1,2", ("pose.rotation.axis", "3 entries")),
         ("angle=180", ("pose.rotation.angle", "at most 179 deg")),
         ("angle=1,2,3", ("pose.rotation.angle", "must be a number")),
-        ("angle=nan", ("pose.rotation.angle", "finite")),
     ],
 )
 def test_settings_that_are_not_allowed(setting: str, words: tuple[str, ...], cli: Run) -> None:
@@ -427,13 +371,7 @@ def test_settings_that_are_not_allowed(setting: str, words: tuple[str, ...], cli
 
 
 def test_evaluate_where_a_leg_has_no_length(tmp_path: Path, cli: Run) -> None:
-    path = case_file(
-        tmp_path,
-        ("x1 = 12", "x1 = { min = 4, max = 12 }"),
-        ("x3 = 30", "x3 = 8"),
-        (POSITION, "position = [0, 0, 0]"),
-        (ROTATION, ""),
-    )
+    path = case_file(tmp_path, *COINCIDING)
     for setting in ((), ("--set", "x1=8")):
         refusal_of(cli("evaluate", path, *setting), "case.toml", "zero length")
 
@@ -494,7 +432,7 @@ def test_a_length_label_is_shown_as_it_is(label: str, tmp_path: Path, cli: Run) 
 @pytest.mark.parametrize("json_options", [("--json", "-"), ()], ids=["json", "table"])
 def test_a_title_in_any_script_on_a_terminal_without_it(json_options: tuple[str, ...], tmp_path: Path) -> None:
     path = case_file(tmp_path, ("Pose of a", "Größe of a"), search="starts = 1")
-    ended = process("evaluate", path, *json_options, folder=tmp_path, environment={"PYTHONIOENCODING": "ascii"})
+    ended = process("evaluate", path, *json_options, folder=tmp_path, PYTHONIOENCODING="ascii")
     assert "Traceback" not in ended.stderr
     assert ended.returncode == 0
     if json_options:
@@ -537,15 +475,11 @@ def test_the_schema_accepts_every_good_case(schema: jsonschema.Draft202012Valida
     [
         ("title =", "titel ="),
         ("x1 = 12", 'x1 = "12"'),
-        ("x1 = 12", "x1 = true"),
         ("x1 = 12", "x1 = { min = 2 }"),
         ("x1 = 12", "x1 = { min = 2, max = 3, strat = 2 }"),
         (POSITION, ""),
         (POSITION, "position = [0, 0]"),
-        (POSITION, "position = 3"),
         (ROTATION, "rotation = { axis = [0, 0, 1] }"),
-        (ROTATION, "rotation = { axis = [0, 1], angle = 3 }"),
-        ('sense = "max"', ""),
         ('sense = "max"', 'sense = "maximum"'),
         (MOTION, "twist = [0, 0, 1]\n"),
         ("pitch = 1", 'pitch = "inf"'),
@@ -553,7 +487,6 @@ def test_the_schema_accepts_every_good_case(schema: jsonschema.Draft202012Valida
         ("[expect]", "[solve]\nstarts = 0\n[expect]"),
         ("[expect]", "[solve]\nstarts = 2.5\n[expect]"),
         ('length = "cm"', 'length = ""'),
-        ('length = "cm"', 'angle = "grad"'),
         ('model = "stewart-gough"', ""),
     ],
 )
@@ -586,19 +519,13 @@ def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
         assert cli("evaluate", str(path))[0] == 0
 
 
-def test_models_lists_the_shipped_robots(cli: Run) -> None:
-    out = output_of(cli("models"))
-    rows = [line.split()[0] for line in out.splitlines()]
+def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
+    rows = [line.split()[0] for line in output_of(cli("models")).splitlines()]
     assert rows[1:3] == ["stewart-gough", "hexapod"]
-
-
-def test_models_shows_one_robot(cli: Run) -> None:
-    out = output_of(cli("models", "stewart-gough"))
-    for word in ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+"):
-        assert word in out
-    out = output_of(cli("models", "hexapod"))
-    for word in ("base_1_x", "platform_6_z", "leg_length", "any"):
-        assert word in out
+    words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+")
+    for name, shown in (("stewart-gough", words), ("hexapod", ("base_1_x", "platform_6_z", "leg_length", "any"))):
+        out = output_of(cli("models", name))
+        assert all(word in out for word in shown)
 
 
 @pytest.mark.parametrize("arguments", [("models", "hexapode"), ("new", "hexapode")])
@@ -606,7 +533,9 @@ def test_a_robot_that_does_not_exist(arguments: tuple[str, ...], cli: Run) -> No
     refusal_of(cli(*arguments), "did you mean 'hexapod'?")
 
 
-@pytest.mark.parametrize("arguments", [("frobnicate",), ("solve",), ("evaluate",), ("new",), ("solve", "a", "b"), ()])
+@pytest.mark.parametrize(
+    "arguments", [("frobnicate",), ("solve",), ("evaluate",), ("new",), ("solve", "a", "--no"), ("solve", "a", "b"), ()]
+)
 def test_commands_that_do_not_exist_or_lack_something(arguments: tuple[str, ...], cli: Run) -> None:
     code, out, err = cli(*arguments)
     assert code == 2
@@ -618,6 +547,9 @@ def test_commands_that_do_not_exist_or_lack_something(arguments: tuple[str, ...]
     ("arguments", "words"),
     [
         (("solve", "--starts", "0"), "--starts 0: must be a whole number from 1 to 100000"),
+        (("solve", "--starts=100001"), "--starts 100001: must be a whole number from 1 to 100000"),
+        (("solve", "--starts=1.5"), "--starts 1.5: must be a whole number from 1 to 100000"),
+        (("solve", "--jobs=0"), "--jobs 0: must be a whole number from 1 to 256"),
         (("report", "--out", "x.html", "--starts", "1e3"), "--starts 1e3: must be a whole number from 1 to 100000"),
         (("tradeoff", "--over", "x1=1:2:2", "--jobs", "257"), "--jobs 257: must be a whole number from 1 to 256"),
         (("solve", "--seed=-1"), "--seed -1: must be a whole number of at least 0"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import itertools
 import json
 import math
 import re
@@ -15,11 +14,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, saved
+from builders import Array, Run, case_from, saved, turn_about
 from casadi import SX
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from measures import placed_joints, segment_distance
+from measures import leg_measures, placed_joints, segment_distance
 
 from screwsynth.models import Model, hexapod, robot_function, stewart_gough, three_upu
 from screwsynth.nlp import (
@@ -101,41 +100,26 @@ def solved(case: Case, *first: Array, starts: int = 4) -> Solution:
     return solution_of_one_task(case, solve_program(formulate(case), search, first=first))
 
 
-def degrees_between(u: Array, v: Array) -> float:
-    return math.degrees(math.acos(u @ v / np.linalg.norm(u) / np.linalg.norm(v)))
-
-
 def measured(result: dict[str, Any], limits: dict[str, Any], home: dict[str, Any] | None = None) -> dict[str, float]:
     """What each limit measures at its worst place, by NumPy alone."""
-    b, a, ends = placed_joints(result)
-    R, p, spans = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"]), ends - b
-    lengths = np.linalg.norm(spans, axis=1)
+    b, a, _ = placed_joints(result)
+    R, p = np.array(result["pose"]["rotation_matrix"]), np.array(result["pose"]["position"])
     J = np.array(result["jacobian"])
     J = np.hstack([J[:, :3], (J[:, 3:] - np.cross(p, J[:, :3])) / 8])
     values = np.linalg.svd(J, compute_uv=False)
     rates = np.array(result["rates"])
-    pairs = list(itertools.combinations(range(6), 2))
-    normals = {"base_joint_angle": np.tile([0.0, 0, 1], (6, 1)), "platform_joint_angle": np.tile(R[:, 2], (6, 1))}
+    axes = {"base_joint_angle": np.tile([0.0, 0, 1], (6, 1)), "platform_joint_angle": np.tile(R[:, 2], (6, 1))}
     about = limits.get("base_joint_angle")
     if isinstance(about, dict) and isinstance(about["about"], list):
-        normals["base_joint_angle"] = np.tile(about["about"], (6, 1))
+        axes["base_joint_angle"] = np.tile(about["about"], (6, 1))
     if home is not None:
-        c, s = math.cos(math.radians(home["angle"])), math.sin(math.radians(home["angle"]))
-        R0 = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-        at_home = np.array(home["position"]) + a @ R0.T - b
-        normals["platform_joint_angle"] = at_home @ R0 @ R.T
-    x = result["parameters"]
-    return {
-        "leg_length.min": lengths.min(),
-        "leg_length.max": lengths.max(),
-        "actuator.dead_length": lengths.min(),
-        "base_joint_angle.max": max(map(degrees_between, normals["base_joint_angle"], spans)),
-        "platform_joint_angle.max": max(map(degrees_between, normals["platform_joint_angle"], spans)),
-        "joint_spacing.min": min(np.linalg.norm(each[i] - each[j]) for each in (a, b) for i, j in pairs),
-        "footprint.base": np.linalg.norm(b[:, :2], axis=1).max(),
-        "footprint.platform": np.linalg.norm(a[:, :2], axis=1).max(),
+        R0 = turn_about([0, 0, 1], math.radians(home["angle"]))
+        axes["platform_joint_angle"] = (np.array(home["position"]) + a @ R0.T - b) @ R0 @ R.T
+    x, legs = result["parameters"], leg_measures(b, a, R, p, *axes.values())
+    return legs | {
+        **{key: math.degrees(legs[key]) for key in ("base_joint_angle.max", "platform_joint_angle.max")},
+        "actuator.dead_length": legs["leg_length.min"],
         "radius_ratio.max": math.sqrt((a[:, :2] ** 2).sum() / (b[:, :2] ** 2).sum()),
-        "leg_clearance.min": min(segment_distance(b[i], ends[i], b[j], ends[j]) for i, j in pairs),
         "condition_number.max": values[0] / values[-1],
         "smallest_singular_value.min": values[-1],
         "rate_share.max": (rates**2).max() / (rates**2).sum(),
@@ -189,25 +173,23 @@ def with_number(limits: dict[str, Any], key: str, number: float) -> dict[str, An
     return changed
 
 
-def test_a_custom_limit_costs_what_moving_its_right_hand_side_does() -> None:
-    solution = solved(case_with({"custom": ["x1 - 2*x2 >= 0"]}))
-    (row,) = json_data(result_of(solution))["limits"]
-    assert row["active"]
-    ends = [solved(case_with({"custom": [f"x1 - 2*x2 >= {h}"]}), solution.x).F for h in (-1e-3, 1e-3)]
-    assert row["cost"] == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.01)
-    assert row["cost"] < 0
+@pytest.mark.parametrize(
+    ("relation", "limits"), [("x1 - 2*x2 >= {}", {}), ("x1 - 2*x2 == {}", {"leg_length": {"max": 45}})]
+)
+def test_a_custom_relation_costs_what_moving_its_right_hand_side_does(relation: str, limits: dict[str, Any]) -> None:
+    def case_at(value: float) -> Case:
+        return case_with({"custom": [relation.format(value)], **limits})
 
-
-def test_a_custom_equation_costs_what_moving_its_right_hand_side_does() -> None:
-    solution = solved(case_with({"custom": ["x1 == 2*x2"], "leg_length": {"max": 45}}))
+    solution = solved(case_at(0))
     row = next(row for row in json_data(result_of(solution))["margins"] if row["key"] == "custom[0]")
-    assert row["bound"] == "equal"
+    assert row["bound"] == ("equal" if "==" in relation else "min")
     assert row["active"]
-    ends = [
-        solved(case_with({"custom": [f"x1 == 2*x2 + {h}"], "leg_length": {"max": 45}}), solution.x).F
-        for h in (-1e-3, 1e-3)
-    ]
+    ends = [solved(case_at(value), solution.x).F for value in (-1e-3, 1e-3)]
     assert row["cost"] == pytest.approx((ends[1] - ends[0]) / 2e-3, rel=0.01)
+    assert "==" in relation or row["cost"] < 0
+
+
+def test_an_equation_that_cannot_hold_says_by_how_much() -> None:
     apart = solved(case_with({"custom": ["x1 == 5*x2"]}))
     assert apart.status is Status.INFEASIBLE
     # x1 is at most 16 and x2 at least 4: 4 short.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import pairwise
 
@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from builders import Array
 from casadi import SX
+from numpy.typing import ArrayLike
 
 from screwsynth.models import (
     Closure,
@@ -25,7 +26,7 @@ from screwsynth.models import (
     hexapod,
     stewart_gough,
 )
-from screwsynth.nlp import Case, Free, Nlp, PointKind, Rotation, Task, examine, formulate, load_case
+from screwsynth.nlp import Case, Evidence, Free, Nlp, PointKind, Rotation, Task, examine, formulate, load_case
 from screwsynth.nlp.case.limits.constraint import Constraint, Reading
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.evidence.linalg import echelon_basis, nonnegative_least_squares
@@ -33,44 +34,44 @@ from screwsynth.nlp.program.places import Places, Scalar
 from screwsynth.nlp.program.program import Program
 
 
-def program_of(
-    x: SX,
-    objective: SX,
+def examined(
+    objective: Callable[[SX], SX],
     sense: Sense,
     bounds: list[tuple[float, float]],
-    constraints: list[tuple[str, SX, float, float]] | None = None,
-) -> Nlp:
+    at: ArrayLike,
+    constraints: Sequence[tuple[str, Callable[[SX], SX], float, float]] = (),
+) -> Evidence:
+    """The evidence at a point of a program in the variables v0, v1, ..., with these bounds and constraints."""
     donor = formulate(load_case("paper-4.1-helical"))
-    rows = constraints or []
+    x, ends = SX.sym("x", len(bounds)), np.array(bounds, dtype=float)
     program = Program(
-        variables=tuple(Scalar(f"v{i}", Dimension.LENGTH) for i in range(x.numel())),
+        variables=tuple(Scalar(f"v{i}", Dimension.LENGTH) for i in range(len(bounds))),
         arguments=(Scalar("unused", Dimension.NUMBER),),
         x=x,
         p=SX.sym("unused"),
-        objective=objective,
-        constraints=tuple(Constraint(name, g, Reading(Dimension.NUMBER)) for name, g, _, _ in rows),
+        objective=objective(x),
+        constraints=tuple(Constraint(name, g(x), Reading(Dimension.NUMBER)) for name, g, _, _ in constraints),
         robots=donor.program.robots,
         model=donor.program.model,
         places=Places(numbers=(), rotations=(), unknowns=(), twists=()),
     )
-    return Nlp(
+    nlp = Nlp(
         program=program,
         case=donor.case,
         sense=sense,
         arguments=np.zeros(1),
-        lower=np.array([lower for lower, _ in bounds], dtype=float),
-        upper=np.array([upper for _, upper in bounds], dtype=float),
-        start=np.array([(lower + upper) / 2 for lower, upper in bounds], dtype=float),
-        g_lower=np.array([lower for _, _, lower, _ in rows], dtype=float),
-        g_upper=np.array([upper for _, _, _, upper in rows], dtype=float),
+        lower=ends[:, 0],
+        upper=ends[:, 1],
+        start=ends.mean(axis=1),
+        g_lower=np.array([lower for _, _, lower, _ in constraints], dtype=float),
+        g_upper=np.array([upper for _, _, _, upper in constraints], dtype=float),
         size=1.0,  # the donor robot's size means nothing here
     )
+    return examine(nlp, np.array(at, dtype=float))
 
 
 def test_strict_minimum_inside() -> None:
-    x = SX.sym("x", 2)
-    nlp = program_of(x, (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MIN, [(-2, 2), (-2, 2)])
-    evidence = examine(nlp, np.array([1.0, 0.0]))
+    evidence = examined(lambda x: (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MIN, [(-2, 2), (-2, 2)], [1.0, 0.0])
     assert evidence.kind is PointKind.STRICT_MINIMUM
     # Half ranges are 2: second derivatives 2 and 8 in scaled variables are 8 and 32.
     np.testing.assert_allclose(evidence.eigenvalues, [8, 32])
@@ -79,30 +80,23 @@ def test_strict_minimum_inside() -> None:
 
 
 def test_the_same_point_is_no_maximum() -> None:
-    x = SX.sym("x", 2)
-    nlp = program_of(x, (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MAX, [(-2, 2), (-2, 2)])
-    assert examine(nlp, np.array([1.0, 0.0])).kind is PointKind.SADDLE
+    evidence = examined(lambda x: (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MAX, [(-2, 2), (-2, 2)], [1.0, 0.0])
+    assert evidence.kind is PointKind.SADDLE
 
 
 def test_not_stationary_away_from_the_optimum() -> None:
-    x = SX.sym("x", 1)
-    nlp = program_of(x, x**2, Sense.MIN, [(-1, 3)])
-    evidence = examine(nlp, np.array([0.5]))
+    evidence = examined(lambda x: x**2, Sense.MIN, [(-1, 3)], [0.5])
     assert evidence.kind is PointKind.NOT_STATIONARY
     assert evidence.stationarity == pytest.approx(2 * 0.5 * 2)
 
 
 def test_a_bound_that_pushes_the_wrong_way_holds_nothing() -> None:
-    x = SX.sym("x", 1)
-    nlp = program_of(x, x**2, Sense.MIN, [(1, 3)])
-    assert examine(nlp, np.array([1.0])).kind is PointKind.STRICT_MINIMUM
-    assert examine(nlp, np.array([3.0])).kind is PointKind.NOT_STATIONARY
+    for at, kind in ((1, PointKind.STRICT_MINIMUM), (3, PointKind.NOT_STATIONARY)):
+        assert examined(lambda x: x**2, Sense.MIN, [(1, 3)], [at]).kind is kind
 
 
 def test_multiplier_is_the_gain_per_unit_of_room() -> None:
-    x = SX.sym("x", 2)
-    nlp = program_of(x, 3 * x[0] - x[1] ** 2, Sense.MAX, [(0, 5), (-1, 1)])
-    evidence = examine(nlp, np.array([5.0, 0.0]))
+    evidence = examined(lambda x: 3 * x[0] - x[1] ** 2, Sense.MAX, [(0, 5), (-1, 1)], [5.0, 0.0])
     assert evidence.kind is PointKind.STRICT_MAXIMUM
     (side,) = evidence.active
     assert (side.name, side.bound, side.value) == ("v0", "max", 5.0)
@@ -112,10 +106,9 @@ def test_multiplier_is_the_gain_per_unit_of_room() -> None:
 @pytest.mark.parametrize("sense", list(Sense))
 def test_multiplier_of_a_constraint_matches_the_optimal_value_function(sense: Sense) -> None:
     # On the disc |x|^2 <= c the linear function a.x ranges over +-|a| sqrt(c): d/dc = |a| / (2 sqrt(c)).
-    x, a, c = SX.sym("x", 2), np.array([3.0, 4.0]), 4.0
-    nlp = program_of(x, ca.dot(ca.DM(a), x), sense, [(-9, 9), (-7, 7)], [("disc", ca.sumsqr(x), -np.inf, c)])
+    a, disc = np.array([3.0, 4.0]), ("disc", ca.sumsqr, -np.inf, 4.0)
     point = a / 5 * 2 * (1 if sense is Sense.MAX else -1)
-    evidence = examine(nlp, point)
+    evidence = examined(lambda x: ca.dot(ca.DM(a), x), sense, [(-9, 9), (-7, 7)], point, [disc])
     assert evidence.kind in (PointKind.STRICT_MAXIMUM, PointKind.STRICT_MINIMUM)
     (side,) = evidence.active
     assert side.multiplier == pytest.approx(5 / (2 * 2))
@@ -124,9 +117,8 @@ def test_multiplier_of_a_constraint_matches_the_optimal_value_function(sense: Se
 
 def test_an_equation_is_active_and_its_multiplier_may_be_negative() -> None:
     # min |x|^2 on x0 + x1 = 2 is 2 at (1, 1); with right-hand side r it is r^2 / 2, which grows by 2 per unit.
-    x = SX.sym("x", 2)
-    nlp = program_of(x, ca.sumsqr(x), Sense.MIN, [(-5, 5), (-4, 4)], [("sum", x[0] + x[1], 2.0, 2.0)])
-    evidence = examine(nlp, np.array([1.0, 1.0]))
+    total = ("sum", lambda x: x[0] + x[1], 2.0, 2.0)
+    evidence = examined(ca.sumsqr, Sense.MIN, [(-5, 5), (-4, 4)], [1.0, 1.0], [total])
     assert evidence.kind is PointKind.STRICT_MINIMUM
     (side,) = evidence.active
     assert side.bound == "equal"
@@ -134,17 +126,13 @@ def test_an_equation_is_active_and_its_multiplier_may_be_negative() -> None:
 
 
 def test_outside_a_limit_is_infeasible_and_names_it() -> None:
-    x = SX.sym("x", 2)
-    nlp = program_of(x, x[0], Sense.MAX, [(-9, 9), (-9, 9)], [("disc", ca.sumsqr(x), -np.inf, 1.0)])
-    evidence = examine(nlp, np.array([1.5, 0.0]))
+    evidence = examined(lambda x: x[0], Sense.MAX, [(-9, 9), (-9, 9)], [1.5, 0.0], [("disc", ca.sumsqr, -np.inf, 1.0)])
     assert evidence.kind is PointKind.INFEASIBLE
     assert evidence.violated == ("disc",)
 
 
 def test_a_manifold_of_minima_is_not_isolated_and_its_direction_is_named() -> None:
-    x = SX.sym("x", 3)
-    nlp = program_of(x, (x[0] * x[1] - 1) ** 2, Sense.MIN, [(0.1, 4), (0.1, 4), (-1, 1)])
-    evidence = examine(nlp, np.array([1.0, 1.0, 0.3]))
+    evidence = examined(lambda x: (x[0] * x[1] - 1) ** 2, Sense.MIN, [(0.1, 4), (0.1, 4), (-1, 1)], [1.0, 1.0, 0.3])
     assert evidence.kind is PointKind.NOT_ISOLATED
     directions = [dict(direction) for direction in evidence.flat]
     assert {frozenset(direction) for direction in directions} == {frozenset({"v2"}), frozenset({"v0", "v1"})}
@@ -152,18 +140,21 @@ def test_a_manifold_of_minima_is_not_isolated_and_its_direction_is_named() -> No
     assert tangent["v0"] == pytest.approx(-tangent["v1"])
 
 
+def test_a_direction_along_active_bounds_is_named() -> None:
+    bounds = [(0, 4), (-1, 1), (-1, 1), (-2, 3)]
+    evidence = examined(lambda x: x[0] + x[1] ** 2 - x[3], Sense.MIN, bounds, [0.0, 0.0, 0.3, 3.0])
+    assert evidence.kind is PointKind.NOT_ISOLATED
+    assert [set(direction) for direction in evidence.flat] == [{"v2"}]
+
+
 def test_a_quartic_minimum_is_not_called_flat() -> None:
-    x = SX.sym("x", 1)
-    nlp = program_of(x, x**4, Sense.MIN, [(-1, 1)])
-    evidence = examine(nlp, np.array([0.0]))
+    evidence = examined(lambda x: x**4, Sense.MIN, [(-1, 1)], [0.0])
     assert evidence.kind is PointKind.UNDECIDED
     assert evidence.flat == ()
 
 
 def test_flat_directions_of_a_quartic_valley_are_the_valley_s() -> None:
-    x = SX.sym("x", 3)
-    nlp = program_of(x, (x[0] - x[1]) ** 4, Sense.MIN, [(-1, 1), (-1, 1), (-1, 1)])
-    evidence = examine(nlp, np.array([0.1, 0.1, 0.2]))
+    evidence = examined(lambda x: (x[0] - x[1]) ** 4, Sense.MIN, [(-1, 1), (-1, 1), (-1, 1)], [0.1, 0.1, 0.2])
     assert evidence.kind is PointKind.NOT_ISOLATED
     directions = [dict(direction) for direction in evidence.flat]
     assert {frozenset(direction) for direction in directions} == {frozenset({"v2"}), frozenset({"v0", "v1"})}
@@ -172,25 +163,20 @@ def test_flat_directions_of_a_quartic_valley_are_the_valley_s() -> None:
 
 
 def test_a_minimum_of_a_quartic_on_a_bound_is_no_maximum() -> None:
-    x = SX.sym("x", 1)
-    nlp = program_of(x, (1 + x**2) ** 2, Sense.MAX, [(0, 1)])
-    assert examine(nlp, np.array([0.0])).kind is PointKind.SADDLE
+    assert examined(lambda x: (1 + x**2) ** 2, Sense.MAX, [(0, 1)], [0.0]).kind is PointKind.SADDLE
 
 
 def test_dependent_active_normals_lose_licq_and_still_certify() -> None:
     # x0 <= 1 stands twice: as a bound and as a constraint.
-    x = SX.sym("x", 2)
-    nlp = program_of(x, x[0] - x[1] ** 2, Sense.MAX, [(-1, 1), (-1, 1)], [("again", x[0], -np.inf, 1.0)])
-    evidence = examine(nlp, np.array([1.0, 0.0]))
+    again = ("again", lambda x: x[0], -np.inf, 1.0)
+    evidence = examined(lambda x: x[0] - x[1] ** 2, Sense.MAX, [(-1, 1), (-1, 1)], [1.0, 0.0], [again])
     assert not evidence.licq
     assert evidence.kind is PointKind.STRICT_MAXIMUM
     assert sum(side.multiplier for side in evidence.active) == pytest.approx(1)
 
 
 def test_at_a_vertex_there_is_no_direction_left() -> None:
-    x = SX.sym("x", 2)
-    nlp = program_of(x, x[0] + 2 * x[1], Sense.MAX, [(0, 1), (0, 1)])
-    evidence = examine(nlp, np.array([1.0, 1.0]))
+    evidence = examined(lambda x: x[0] + 2 * x[1], Sense.MAX, [(0, 1), (0, 1)], [1.0, 1.0])
     assert evidence.kind is PointKind.STRICT_MAXIMUM
     assert evidence.eigenvalues.size == 0
 
