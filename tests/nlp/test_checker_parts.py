@@ -1,6 +1,7 @@
 """Parts of the checkers by themselves: rounding, steps, signs and orders of boxes, on which few whole proofs depend."""
 
 from fractions import Fraction
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -100,6 +101,16 @@ def test_no_points_are_closed() -> None:
     robot = PosedRobot(case, case.model, pose_root(workspace_of_case(case)))
     points = LoopPoints(robot, robot.z[:2])
     assert points.closed(np.zeros((0, 6)), [0, 1], to=np.zeros((0, 4)), steps=2).shape == (0, 6)
+
+
+def test_ways_to_closed_points_stay_between_their_ends() -> None:
+    """On a unit circle, from the top or the bottom to the side: beyond it there are no points."""
+    z = SX.sym("z", 2)
+    points = LoopPoints(SimpleNamespace(size=np.ones(2), z=z), ca.sumsqr(z) - 1)  # type: ignore[arg-type]
+    angle = np.random.default_rng(0).uniform(-0.5, 0.5, 40)
+    begin = np.stack([np.sin(angle), np.repeat([1.0, -1.0], 20) * np.cos(angle)], axis=1)
+    found = points.closed(begin, [1], np.full((40, 1), 0.8), steps=4)
+    assert found == pytest.approx(np.stack([np.full(40, 0.8), np.repeat([0.6, -0.6], 20)], axis=1))
 
 
 @pytest.mark.parametrize("size", [2.0**-40, 1.0, 2.0**40])

@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import re
 import struct
 import tomllib
 import zlib
@@ -276,10 +277,10 @@ def test_above_on_the_command_line(cli: Run) -> None:
     assert load_case(NAME).tasks[0].sense.value == "max"
 
 
-@pytest.mark.parametrize("method", ["weighted-sum", "worst-case"])
-def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, method: str) -> None:
+@pytest.mark.parametrize(("method", "sense"), [("weighted-sum", "max"), ("worst-case", "max"), ("worst-case", "min")])
+def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, method: str, sense: str) -> None:
     text = find_case(NAME).read_text(encoding="utf-8").split("[expect]")[0]
-    text += '[[task]]\nname = "other"\nsense = "max"\naxis = [0, 1, 1]\npoint = [1, 0, 3]\npitch = 2\n'
+    text += f'[[task]]\nname = "other"\nsense = "{sense}"\naxis = [0, 1, 1]\npoint = [1, 0, 3]\npitch = 2\n'
     text += f'[combine]\nmethod = "{method}"\n'
     case, target = tmp_path / "two.toml", tmp_path / "proof.json"
     case.write_text(text, encoding="utf-8")
@@ -291,15 +292,21 @@ def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, meth
     code, out, err = cli("verify-proof", str(target))
     assert code == 0, err
     bound = result["certificate"]["bound"]
-    assert bound <= float(out.split("F is at most ")[1].split(" ")[0]) <= bound * (1 + 1e-9)
-    whole = {
-        "weighted-sum": "F being 1 F('drive the screw') + 1 F('other')\n",
-        "worst-case": "F being the least of F('drive the screw') / 1 and F('other') / 1\n",
-    }
-    assert whole[method] in out
+    stated = float(out.split(f"F is at {'most' if sense == 'max' else 'least'} ")[1].split(" ")[0])
+    first, second = ("F('drive the screw')", "F('other')")
+    best = [f"{each['certificate']['incumbent']:.6f}" for each in result["tasks"]]
+    words, outwards = {
+        ("weighted-sum", "max"): (f"F being 1 {first} + 1 {second}\n", 1),
+        ("worst-case", "max"): (f"F being the least of {first} / 1 and {second} / 1\n", 1),
+        # The worst loss: how far each task is from its own optimum.
+        ("worst-case", "min"): (f"F being the largest of 1 ({best[0]} - {first}) and 1 ({second} - {best[1]})\n", -1),
+    }[method, sense]
+    assert words in re.sub(r"\d+\.\d{9,}", lambda found: f"{float(found[0]):.6f}", out)
+    assert 0 <= outwards * (stated - bound) <= 1e-9 * bound
     code, out, _ = cli("solve", str(case), "--certify", "--starts", "4", "--json", "-")
     assert code == 0
-    assert json.loads(out)["combined"]["certificate"]["bound"] >= json.loads(out)["combined"]["value"]
+    combined = json.loads(out)["combined"]
+    assert outwards * (combined["certificate"]["bound"] - combined["value"]) >= 0
     code, out, _ = cli("solve", str(case), "--certify", "--starts", "4")
     assert code == 0
     assert out.count("proved:") == 3
