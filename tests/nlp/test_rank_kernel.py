@@ -105,6 +105,15 @@ def test_a_matrix_may_have_many_columns() -> None:
     assert test.examine(forms, 1, 0).is_regular.tolist() == [True, False]
 
 
+def test_a_large_entry_beside_a_constant_row_hides_no_singular_matrix() -> None:
+    """The spectral radius of ``[[0, 0], [1e9, r]]`` is r, as a positive vector shows and no other may."""
+    x = ca.SX.sym("x", 2)
+    test = RankTest(RankMatrix(ca.vertcat(ca.SX([[1, 0]]), x.T), 0), x, np.array([0.0, 1.0]))
+    rest = np.array([[1e9, 0.5], [1e9, 1.5]])
+    found = test.examine(Forms(np.array([[0.0, 1.0]] * 2), np.zeros((2, 2, 1)), rest), 1, 0)
+    assert found.is_regular.tolist() == [True, False]
+
+
 def test_the_errors_of_a_centre_are_a_vector_of_unit_length() -> None:
     x = ca.SX.sym("x", 1)
     test = RankTest(RankMatrix(x, 0), x, np.ones(1))
