@@ -117,6 +117,15 @@ def test_constraint_singularities_gain_motions_that_are_known() -> None:
     assert_same_span(locked.gained, [turn, x, y])
 
 
+def test_similar_plates_are_singular_by_their_architecture() -> None:
+    leg = {"repeat": {"count": 3}, "joints": LEG}
+    limbs = [leg | {"points": {"B": [1, side, 0], "A": [0.5, side / 2, 1]}} for side in (-0.3, 0.3)]
+    *_, architecture = found_at_home(robot(name="similar plates", home=[0, 0, 1], limb=limbs))
+    assert architecture.kind is SingularityKind.ARCHITECTURE
+    # The power of the leg from b, along z - b/2, is v_z - b.v/2 + b.(z x w).
+    assert_same_span(architecture.gained, [[0, 0, 1, 0, 0, 0], [0, -1, 0, 2, 0, 0], [1, 0, 0, 0, 2, 0]])
+
+
 def test_a_five_bar_with_links_in_line_turns_about_an_elbow() -> None:
     (each,) = found_at_home(robot(**tomllib.loads(FIVE_BAR)))
     assert each.kind is SingularityKind.ACTUATION
