@@ -72,6 +72,12 @@ def test_a_hexapod_takes_as_many_boxes_as_its_exact_expansion(kind: TurnKind, de
     assert found.boxes <= 1.02 * most
 
 
+def test_a_search_that_ends_at_once_leaves_the_whole_box_open() -> None:
+    problem = hexapod(TURNS, 20)
+    found = prove_rank(problem, problem.locked, most_boxes=1)
+    assert (found.outcome, found.share) == (Outcome.OPEN, 1.0)
+
+
 @pytest.mark.parametrize(
     ("name", "part", "degrees", "most"), [("6-rss", 0.02, 5, 103), ("6-rus", 0.05, 10, 87), ("6-ups", 0.1, 20, 39)]
 )
