@@ -18,15 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .. import Closure, Dimension, Model, Substitution, Unknown, Wrench
+from .. import Closure, Dimension, Model, Substitution, Unknown
 from ..drawing import Scene
-from ..limbjoints import expressions_of
+from ..whole import expressions_of, with_expressions
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
@@ -38,6 +38,11 @@ _EDGE = 1e-9
 _SEED = 0
 #: Part of the squared sine or cosine of a reach below which an extended square root is continued by its tangent.
 _EXTENDED = 1e-4
+#: Fields of a model whose expressions may depend on its unknowns, but the drawing.
+_REWRITTEN = (
+    "wrenches", "members", "closure", "loops", "distances", "signs", "quantities", "actuators", "joint_screws",
+    "joints", "links",
+)  # fmt: skip
 
 
 class Reach(NamedTuple):
@@ -200,46 +205,10 @@ def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, 
         solved: by the index of the unknown.
         closure: equations that are left.
     """
-    outputs = [
-        *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
-        *[each.expression for each in (*closure, *model.loops, *model.distances)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *[each.value for each in model.signs],
-        *[quantity.values for quantity in model.quantities],
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.joint_screws for part in (each.all, each.loops)],
-        *expressions_of((*model.joints, *model.links)),
-    ]
-    following = iter(with_replaced(_symbols(model), outputs, 1, solved))
-
-    def equations(given: Sequence[Closure]) -> tuple[Closure, ...]:
-        return tuple(replace(each, expression=next(following)) for each in given)
-
-    def row(each: Wrench) -> Wrench:
-        force, moment, square = (next(following) for _ in range(3))
-        return replace(each, force=force, moment=moment, square=square)
-
-    # The order of the calls is that of the expressions.
-    wrenches = tuple(row(each) for each in model.wrenches)
-    kept, loops, distances = equations(closure), equations(model.loops), equations(model.distances)
-    actuators = tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators)
-    signs = tuple(replace(each, value=next(following)) for each in model.signs)
-    quantities = tuple(replace(each, values=next(following)) for each in model.quantities)
-    members = tuple(replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members)
-    screws = tuple(replace(each, all=next(following), loops=next(following)) for each in model.joint_screws)
-    return replace(
-        model,
-        wrenches=wrenches,
-        closure=kept,
-        loops=loops,
-        distances=distances,
-        actuators=actuators,
-        signs=signs,
-        quantities=quantities,
-        members=members,
-        joint_screws=screws,
-        joints=tuple(each.replaced(following) for each in model.joints),
-        links=tuple(each.replaced(following) for each in model.links),
-        unknowns=tuple(each for k, each in enumerate(model.unknowns) if k not in solved),
-        scene=Scene(),
-    )
+    given: dict[str, Any] = {name: getattr(model, name) for name in _REWRITTEN} | {
+        "closure": closure,
+        "members": tuple(replace(each, slide=None) for each in model.members),
+    }
+    expressions = with_replaced(_symbols(model), expressions_of(given), 1, solved)
+    unknowns = tuple(each for k, each in enumerate(model.unknowns) if k not in solved)
+    return replace(model, **with_expressions(given, iter(expressions)), unknowns=unknowns, scene=Scene())
