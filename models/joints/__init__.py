@@ -9,7 +9,7 @@ which a limb's loop is opened), ``opened`` (the opened limb: current screws and 
 that follow), ``modes`` (signs of home's assembly), ``resistance`` (rows and members of a limb), ``angles`` and
 ``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop equations), ``network``
 (nested loops at any pose), ``nested`` (their members), ``nestedlimb`` (their unknowns, rows and actuators), ``outline``
-(corners of a plate), ``placed`` (joints at any pose), ``networkpictures`` and ``pictures`` (the drawing), ``structure``
+(corners of a plate), ``placed`` (joints at any pose), ``pictures`` (the drawing), ``structure``
 (its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model), ``centres`` (the model
 with errors of joint centres), ``closedform`` (a model without unknowns that follow from the pose in closed form),
 ``limbequations``, ``elimination`` and ``replacing`` (unknowns that follow one after the other, of any dimensions).

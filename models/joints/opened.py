@@ -66,6 +66,16 @@ class OpenedPath:
     equations: list[LoopEquation] = field(default_factory=list)
     checks: list[SX] = field(default_factory=list)
 
+    def body_before(self, j: int) -> Motion | None:
+        """Return the displacement of the body on the base's side of a joint; None for a rod."""
+        if j in (self.cut.first, self.cut.last + 1):
+            return self.sides[0 if j <= self.cut.last else 1]
+        return self.behind[j - 1] if j else Motion.none()
+
+    def body_behind(self, j: int) -> Motion | None:
+        """Return the displacement of the body on the platform's side of a joint; None for a rod."""
+        return self.behind[j] or (self.sides[1] if j == self.cut.last else None)
+
 
 class PathFrame:
     """Values that all paths of a robot share: its size, the platform's displacement, and numbers of its dimensions.
@@ -198,7 +208,8 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
         offset = square - ca.dot(home, joints[slide].axes[0].axis) ** 2
         is_straight = all(float(each) <= _STRAIGHT for each in frame.sampled(offset / square))
     if joints[far].type == "U" and is_straight:
-        path.screws[far] = _universal_screws(path, sides[0], home, frame)
+        directions = directions_at_rod(path, sides[0], frame)
+        path.screws[far] = [ca.vertcat(each, ca.cross(path.points[far], each)) for each in directions]
     if slide is None:
         path.equations += loop_equations(ca.sumsqr(path.rod) - square, 2 * square)
         return
@@ -209,8 +220,8 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     path.points[slide] = (path.points[j] + path.points[far]) / 2
 
 
-def _universal_screws(path: OpenedPath, side: Motion, home: SX, frame: PathFrame) -> list[SX]:
-    """Return the current screws of the universal joint at the far end of a rod, whose direction it follows.
+def directions_at_rod(path: OpenedPath, side: Motion, frame: PathFrame, *, is_bounded: bool = False) -> tuple[SX, SX]:
+    """Return the current axes (3, 1) of the universal joint at the far end of a rod, whose direction it follows.
 
     One axis moves with the known body. The other keeps its angles against the first axis and against the rod. With the
     first axis ``u`` and the rod's direction ``d`` it is ``a u + b d + g u x d``, where ``g`` has the sign of home. The
@@ -219,23 +230,23 @@ def _universal_screws(path: OpenedPath, side: Motion, home: SX, frame: PathFrame
     Args:
         path: the path, with its rod.
         side: displacement of the body that the first axis moves with.
-        home: (3, 1) the rod at home, length.
         frame: values that all paths of the robot share.
+        is_bounded: whether the axes have a value beyond the reach too.
     """
-    far = path.cut.far
-    if far is None or path.rod is None:
-        return []
-    axes = path.joints[far].axes if far < path.cut.joint else path.joints[far].axes[::-1]
+    j, far, rod = path.cut.joint, path.cut.far, path.rod
+    if far is None or rod is None:
+        raise ValueError("the path has no rod")
+    home = path.joints[j].point - path.joints[far].point
+    axes = path.joints[far].axes if far < j else path.joints[far].axes[::-1]
     first, second = (axis.axis for axis in axes)
-    u, d, d_home = side.rotation @ first, path.rod / ca.norm_2(path.rod), home / ca.norm_2(home)
+    u, d, d_home = side.rotation @ first, rod / ca.norm_2(rod), home / ca.norm_2(home)
     across, along, w = ca.dot(first, second), ca.dot(second, d_home), ca.dot(u, d)
     a, b = (across - along * w) / (1 - w**2), (along - across * w) / (1 - w**2)
     within = a * u + b * d
     sign = -1.0 if frame.typical_value(ca.dot(second, ca.cross(first, d_home))).item() < 0 else 1.0
-    g = sign * ca.sqrt((1 - ca.sumsqr(within)) / (1 - w**2))
-    directions = [u, within + g * ca.cross(u, d)]
-    place = path.points[far]
-    return [ca.vertcat(each, ca.cross(place, each)) for each in directions]
+    square = 1 - ca.sumsqr(within)
+    g = sign * ca.sqrt((ca.fmax(square, 0) if is_bounded else square) / (1 - w**2))
+    return u, within + g * ca.cross(u, d)
 
 
 def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:

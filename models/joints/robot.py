@@ -38,7 +38,6 @@ from .modelparts import actuator_name, generic_ranks, parameters, quantities, wi
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
 from .nestedlimb import NestedLimb, nested_joints, nested_limb, resisting
-from .networkpictures import network_drawing
 from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
@@ -313,7 +312,7 @@ def model_of_home(
     members = [with_kinds(member, actuators, at_home.size, numbers, loops.points) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
     everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
-    drawings = [network_drawing(e.name, e.network, carries=e.name in builder.carrying) for e in builder.networks]
+    networks = [(each.name, each.network) for each in builder.networks]
     model = Model(
         name=words.name,
         description=words.description,
@@ -325,7 +324,7 @@ def model_of_home(
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
         quantities=quantities(builder.actuators, builder.positions),
-        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, drawings),
+        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, networks),
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),

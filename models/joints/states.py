@@ -167,17 +167,11 @@ class PathJoints:
 
     def _before(self, j: int) -> Motion:
         """Return the displacement of the body on the base's side of a joint, which is no rod."""
-        path = self._path
-        if j == path.cut.first and path.cut.last >= path.cut.first:
-            return path.sides[0]
-        if j == path.cut.last + 1:
-            return path.sides[1]
-        behind = path.behind[j - 1] if j > 0 else None
-        return behind or Motion.none()
+        return self._path.body_before(j) or Motion.none()
 
     def _behind(self, j: int) -> Motion:
         """Return the displacement of the body on the platform's side of a joint, which is no rod."""
-        return self._path.behind[j] or self._path.sides[1]
+        return self._path.body_behind(j) or self._path.sides[1]
 
 
 def is_zero(vector: SX, frame: PathFrame) -> bool:
