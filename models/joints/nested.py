@@ -21,7 +21,7 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from ..mechanism.centre import CentreRule, centre_rule
-from ..mechanism.members import robot_graph
+from ..mechanism.decomposition import robot_graph
 from ..mechanism.topology import spanning_tree
 from ..member import Member, pseudo_inverse
 from .chain import HomeRobot

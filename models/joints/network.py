@@ -96,10 +96,7 @@ def open_network(robot: HomeRobot, joints: Sequence[int], variables: Variables, 
     graph = robot.graph
     if graph is None:
         raise ValueError("the robot has no graph")
-    welded = Classes(graph.links)
-    for each in graph.joints:
-        if each.joint is None:
-            welded.merge(each.inner, each.outer)
+    welded = Classes(graph.links, [(each.inner, each.outer) for each in graph.joints if each.joint is None])
     bodies = {link: welded.find(link) for link in graph.links}
     found = OpenNetwork(graph, tuple(joints), bodies, {})
     found.motions = {found.base: Motion.none(), found.platform: frame.platform}

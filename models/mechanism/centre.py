@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray
+from .decomposition import MemberGraph
 from .graph import Mechanism, MechanismJoint
-from .members import MemberGraph
 from .motions import size_of
 from .topology import Classes, bridges_between
 
@@ -73,10 +73,8 @@ def centre_rule(mechanism: Mechanism, member: MemberGraph) -> CentreRule:
 
 def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
     """Return the passive joints that every path from base to platform has, in rows that follow each other directly."""
-    classes = Classes([link.name for link in mechanism.links])
-    for joint in mechanism.joints:
-        if joint.kind == "weld":
-            classes.merge(joint.inner, joint.outer)
+    welds = [(joint.inner, joint.outer) for joint in mechanism.joints if joint.kind == "weld"]
+    classes = Classes([link.name for link in mechanism.links], welds)
     own = [mechanism.joints[k] for k in member.joints]
     edges = [(classes.find(joint.inner), classes.find(joint.outer)) for joint in own]
     path = bridges_between(classes.find(mechanism.base), classes.find(mechanism.platform), edges)

@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray
-from .checks import check_mechanism
 from .decomposition import GraphJoint, LimbPaths, Network, Step, decompose
-from .graph import Mechanism, MechanismError, MechanismJoint
+from .graph import Mechanism, MechanismError, MechanismJoint, check_mechanism
 
 #: Entries of an axis, and distances and differences of directions that show a parallelogram, in parts of its rods: only
 #: rounding is less, as a robot file states an exact one.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
 Node = TypeVar("Node", bound=Hashable)
@@ -10,10 +10,17 @@ Edge = tuple[Node, Node]
 
 
 class Classes:
-    """Links that move as one: the sets of a partition, by a name that stands for each (union and find)."""
+    """Links that move as one: the sets of a partition, by a name that stands for each (union and find).
 
-    def __init__(self, names: Iterable[str]) -> None:
+    Args:
+        names: of all links.
+        pairs: of those that move as one.
+    """
+
+    def __init__(self, names: Iterable[str], pairs: Iterable[tuple[str, str]] = ()) -> None:
         self._parents = {name: name for name in names}
+        for pair in pairs:
+            self.merge(*pair)
 
     def find(self, name: str) -> str:
         """Return the name that stands for the set of a name."""
@@ -154,8 +161,3 @@ def spanning_tree(
     used = {branch.edge for branch in branches}
     chords = [k for k, edge in enumerate(edges) if k not in used and edge[0] in known]
     return SpanningTree(branches, chords)
-
-
-def renamed(edges: Iterable[Edge[str]], names: Mapping[str, str]) -> list[Edge[str]]:
-    """Return edges with other names of their nodes."""
-    return [(names.get(one, one), names.get(other, other)) for one, other in edges]
