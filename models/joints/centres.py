@@ -20,13 +20,12 @@ from ..arrays import FloatArray
 from ..catalog import gallery_names, gallery_tables
 from ..displaced import Centre, DisplacedRobot, error_parameter
 from ..model import Model
-from .chain import HomeRobot, Joint, Limb
+from .chain import HomeRobot, Joint, Limb, home_of
 from .forms import RobotError
 from .generic import INCIDENT, are_parallel, sampled_dimensions
-from .graphwords import read_robot
-from .linkgraph import home_of
 from .motion import AxisKind
 from .robot import joint_labels, model_of_home
+from .words import read_robot
 
 #: Part of the robot's size by which joint centres are off where ranks are measured: small enough for loops to close.
 _OFF = 0.01

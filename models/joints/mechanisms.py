@@ -17,9 +17,8 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..mechanism.graph import Coupling, ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
 from ..parts import Dimension
-from .chain import HomeGraph, HomeRobot, Joint
-from .graphwords import read_robot
-from .linkgraph import home_of
+from .chain import HomeGraph, HomeRobot, Joint, home_of
+from .words import read_robot
 
 #: Distance of a parallelogram's rods from its middle line, in parts of their length.
 _APART = 0.1

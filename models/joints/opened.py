@@ -10,6 +10,11 @@ it. The two sides meet at the cut, where equations say that the joint there hold
 * no joint: the two bodies coincide (6).
 
 Each equation has a size, by which it becomes a number of order 1: for lengths the robot's.
+
+Distances follow from these equations, each without the variables of one joint: a hinge or universal joint and the joint
+at the cut are at a distance that the joint's own rotation does not change. The two places, one on each side of the cut,
+have the distance that the joints between give them. Such an equation lacks one or two of the unknowns, so that a search
+of a whole box finds where the others cannot be.
 """
 
 from __future__ import annotations
@@ -25,7 +30,8 @@ from casadi import SX
 from ..arrays import FloatArray
 from .chain import Joint
 from .cut import Cut
-from .motion import Motion
+from .generic import INCIDENT
+from .motion import AxisKind, Motion
 
 #: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
 _STRAIGHT = 1e-14
@@ -281,3 +287,33 @@ def normals_of(axis: SX, frame: PathFrame) -> list[SX]:
     order = np.argsort(np.abs(frame.typical_value(axis)).ravel(), kind="stable")
     first = ca.cross(axis, SX(np.eye(3)[int(order[0])].tolist()))
     return [first, ca.cross(axis, first)]
+
+
+def distance_equations(path: OpenedPath, variables: Variables, frame: PathFrame) -> list[LoopEquation]:
+    """Return the equations of a path that is opened at a joint; none of a path with a rod, or opened at no joint.
+
+    Args:
+        path: the path.
+        variables: of the axes of its joints that are not between the two sides.
+        frame: values that all paths of the robot share.
+    """
+    cut = path.cut
+    if cut.far is not None or not cut.type:
+        return []
+    joints, j, size = path.joints, cut.joint, frame.size
+    centre, found = joints[j].point, []
+    for i, joint in enumerate(joints):
+        if i == j or not all(axis.kind is AxisKind.ROTATION and axis.pitch.is_zero() for axis in joint.axes):
+            continue
+        apart = ca.norm_2(centre - joint.point) / size
+        if frame.typical_value(apart).item() <= INCIDENT:
+            continue
+        between, side = Motion.none(), path.sides[1 if i < j else 0]
+        steps = range(i + 1, j) if i < j else range(i - 1, j, -1)
+        for k in steps:
+            motions = [axis.motion(variables(joints[k], a)) for a, axis in enumerate(joints[k].axes)]
+            for motion in motions if i < j else [each.inverse() for each in reversed(motions)]:
+                between = between.after(motion)
+        own = ca.sumsqr(between.point(centre) - joint.point)
+        found.append(LoopEquation(ca.sumsqr(side.point(centre) - path.points[i]) - own, size**2))
+    return found

@@ -25,25 +25,22 @@ from ..parts import (
     Unknown,
 )
 from ..wrench import Wrench
-from .chain import HomeRobot, Joint, Limb
+from .chain import HomeRobot, Joint, Limb, home_of
 from .cut import choose_cut, simplified
-from .distances import distance_equations
 from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression, plain
 from .generic import sampled_dimensions
-from .graphwords import read_robot
-from .linkgraph import home_of
 from .loops import PoseOf, examine_loops
 from .modelparts import actuator_name, generic_ranks, parameters, quantities, with_all_relations, with_kinds
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
-from .nestedlimb import NestedLimb, nested_joints, nested_limb, resisting
-from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
+from .nested import NestedLimb, nested_joints, nested_limb, resisting
+from .opened import OpenedPath, PathFrame, Variables, distance_equations, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
-from .segments import limb_links, with_shared_places
-from .states import PathJoints
+from .states import PathJoints, limb_links, with_shared_places
 from .structure import joint_screws, member_remarks, structure_of, with_kept
+from .words import read_robot
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
 _TURN = float(np.pi)
@@ -292,7 +289,7 @@ def model_of_home(
     builder = _Builder(at_home, frame, samples)
     for limb in at_home.limbs:
         builder.add_limb(limb)
-    for joints, _ in () if at_home.graph is None else at_home.graph.networks:
+    for joints in () if at_home.graph is None else at_home.graph.networks:
         builder.add_network(joints)
     if not builder.networks:
         _check_carrying(builder)
