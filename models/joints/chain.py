@@ -81,6 +81,10 @@ class Limb:
         """Return the name of a path, by its index: that of the limb, with a number where there are several."""
         return f"{self.name}.{path + 1}" if len(self.branches) > 1 else self.name
 
+    def label(self, path: int, joint: int) -> str:
+        """Return the label of a joint of a path, such as ``2:3``, or ``2.1:3`` on a branch, by their indices."""
+        return f"{self.name if joint < len(self.stem) else self.member(path)}:{joint + 1}"
+
     @property
     def paths(self) -> list[tuple[Joint, ...]]:
         """Joints of each path from base to platform."""

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from .chain import HomeRobot, Joint
-from .generic import are_parallel, meeting_point
+from .chain import Joint
+from .generic import PathFrame, meeting_point
 from .motion import AxisKind, JointAxis
 
 
@@ -39,7 +38,7 @@ class Cut(NamedTuple):
     slide: int | None = None
 
 
-def simplified(robot: HomeRobot, joints: Sequence[Joint], samples: FloatArray) -> list[Joint]:
+def simplified(frame: PathFrame, joints: Sequence[Joint]) -> list[Joint]:
     """Return joints with three passive rotations through one point as a spherical joint, and two as a universal one.
 
     Rotations count where they follow each other, and where no two that follow each other are parallel.
@@ -50,7 +49,7 @@ def simplified(robot: HomeRobot, joints: Sequence[Joint], samples: FloatArray) -
         while end > 0:
             start = _window(found, end, count)
             if start is not None and end - start > 1:
-                point = _common_point(robot, [axis for each in found[start:end] for axis in each.axes], samples)
+                point = _common_point(frame, [axis for each in found[start:end] for axis in each.axes])
                 if point is not None:
                     found[start:end] = [_merged(found[start:end], kind, point)]
                     end = start
@@ -70,11 +69,10 @@ def _window(joints: Sequence[Joint], end: int, count: int) -> int | None:
     return start if left == 0 else None
 
 
-def _common_point(robot: HomeRobot, axes: Sequence[JointAxis], samples: FloatArray) -> SX | None:
-    pairs = itertools.pairwise(axes)
-    if any(are_parallel(robot, one.axis, other.axis, samples) for one, other in pairs):
+def _common_point(frame: PathFrame, axes: Sequence[JointAxis]) -> SX | None:
+    if any(frame.are_parallel(one.axis, other.axis) for one, other in itertools.pairwise(axes)):
         return None
-    return meeting_point(robot, [(axis.point, axis.axis) for axis in axes], samples)
+    return meeting_point(frame, [(axis.point, axis.axis) for axis in axes])
 
 
 def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:

@@ -208,7 +208,7 @@ def _from_gap(work: _Elimination, k: int, gap: Equation) -> bool:
     if not work.is_zero(same) or not _is_positive(work, ca.sumsqr(a)):
         return False
     cosine, sine = -ca.dot(a, c) / ca.sumsqr(a), -ca.dot(b, c) / ca.sumsqr(b)
-    work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)))
+    work.add(k, Solved.angle(sine, cosine, SX(0)))
     return True
 
 
@@ -242,7 +242,7 @@ def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple
     reach = square - C * C
     root = sign * ca.sqrt(ca.fmax(reach, 0))
     cosine, sine = (B * root - A * C) / square, (-B * C - A * root) / square
-    return Solved(_angle(sine, cosine), sine, cosine, SX(0)), reach
+    return Solved.angle(sine, cosine, SX(0)), reach
 
 
 def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
@@ -288,11 +288,6 @@ def _harmonics(work: _Elimination, e: SX, q: SX) -> tuple[SX, SX, SX]:
     if not work.is_zero(a * ca.cos(q) + b * ca.sin(q) + c - e):
         c = at_turn(e, q, 0.0, 1.0) - a
     return a, b, c
-
-
-def _angle(sine: SX, cosine: SX) -> SX:
-    """Return the angle (1, 1) of a sine and cosine, without a value at half a turn."""
-    return 2 * ca.atan(sine / (1 + cosine))
 
 
 def _is_positive(work: _Elimination, value: SX) -> bool:

@@ -55,8 +55,7 @@ def mechanism_at_home(robot: HomeRobot, dimensions: Mapping[str, float] | None =
         for number, path in enumerate(limb.paths):
             at = "base"
             for j, joint in enumerate(path):
-                branch = f".{number + 1}" if j >= len(limb.stem) and len(limb.branches) > 1 else ""
-                label = f"{limb.name}{branch}:{j + 1}"
+                label = limb.label(number, j)
                 is_last = j == len(path) - 1
                 target = "platform" if is_last else known.get(id(joint), f"link {label}")
                 if id(joint) not in known:

@@ -32,7 +32,7 @@ def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint])
     ranks, idle = [], []
     for point in points:
         reach = float(size(point.dimensions))
-        values = function(point.dimensions, point.unknowns, point.rotation, point.position, reach)
+        values = function(*point, reach)
         velocities = Velocities(*[each.full() for each in values])
         if all(np.isfinite(each).all() for each in velocities):
             constraints = constraint_rows(model, velocities, point.position)
@@ -75,14 +75,13 @@ def with_kinds(
     columns = scaled_twists(member.screws, member.centre, size, member.size)
     if member.rank < columns.shape[1]:
         measured = ca.Function("screws", list(numbers), [ca.densify(columns / size)])
-        values = [measured(each.dimensions, each.unknowns, each.rotation, each.position).full() for each in points]
+        values = [measured(*each).full() for each in points]
         groups = column_groups([each for each in values if np.isfinite(each).all()], member.rank)
         member = replace(member, groups=groups)
     driving = [screw for each in actuators if (screw := each.screw_in(member.label)) is not None]
     actuated = scaled_twists(ca.horzcat(SX(6, 0), *driving), member.centre, size, member.size)
     vectors = resisted_parts(columns, member.rank, ca.horzcat(SX.eye(member.size), actuated), member.groups)
-    function, point = ca.Function("kinds", list(numbers), [ca.densify(vectors)]), points[0]
-    found = function(point.dimensions, point.unknowns, point.rotation, point.position).full()
+    found = ca.Function("kinds", list(numbers), [ca.densify(vectors)])(*points[0]).full()
     basis = basis_of_member(found[:, : member.size], found[:, member.size :], member.size - member.rank)
     return replace(member, kinds=basis.kinds)
 

@@ -13,6 +13,8 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
+from ..parts import Dimension
+
 
 class Motion(NamedTuple):
     """A displacement of a body in the world frame: a point ``x`` goes to ``R (x - origin) + image``.
@@ -78,6 +80,11 @@ class JointAxis:
     actuated: bool
     pitch: SX
     rod: SX
+
+    @property
+    def dimension(self) -> Dimension:
+        """Dimension of its way from home: angle, or length of a slide or a parallelogram."""
+        return Dimension.ANGLE if self.kind is AxisKind.ROTATION else Dimension.LENGTH
 
     def motion(self, value: SX) -> Motion:
         """Return the displacement at a value of the variable: an angle in radians, or a length."""

@@ -28,12 +28,12 @@ from ..member import Member, pseudo_inverse
 from ..parts import Actuator, Closure, Dimension, JointScrews, PathStructure
 from ..rows import independent_rows
 from .chain import HomeRobot, Joint
-from .generic import RANK_TOLERANCE
+from .generic import RANK_TOLERANCE, PathFrame
 from .loops import ClosedPoint
 from .mechanisms import mechanism_at_home
 from .motion import AxisKind
 from .network import OpenNetwork, open_network
-from .opened import PathFrame, Variables
+from .opened import Variables
 from .states import COORDINATE_PARTS, rotation_angle
 
 _CUT = "it is part of nested loops, which give it no coordinate of its own"
@@ -165,7 +165,7 @@ def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[Clo
     function = ca.Function("nested", list(symbols), outputs)
     found: Counter[MotionRanks] = Counter()
     for point in points:
-        values = function(point.dimensions, point.unknowns, point.rotation, point.position)
+        values = function(*point)
         platform, length, *loops = (np.asarray(each.full(), dtype=np.float64) for each in values)
         if not all(np.isfinite(each).all() for each in (platform, *loops)):
             continue
@@ -322,14 +322,11 @@ class ResistingNetwork:
     structure: list[PathStructure]
 
 
-def nested_limb(
-    name: str, robot: HomeRobot, joints: Sequence[int], variables: Variables, frame: PathFrame
-) -> NestedLimb:
+def nested_limb(name: str, joints: Sequence[int], variables: Variables, frame: PathFrame) -> NestedLimb:
     """Return a network as a limb with opened loops.
 
     Args:
         name: of the limb.
-        robot: at home.
         joints: indices of the network's joints in the robot's graph.
         variables: of the axes of joints.
         frame: values that all parts of the robot share.
@@ -340,23 +337,22 @@ def nested_limb(
         made.add((joint, axis))
         return variables(joint, axis)
 
-    network = open_network(robot, joints, counted, frame)
+    network = open_network(joints, counted, frame)
     return NestedLimb(name, network, len(made))
 
 
 def resisting(
-    limb: NestedLimb, robot: HomeRobot, frame: PathFrame, symbols: Sequence[SX], points: Sequence[ClosedPoint]
+    limb: NestedLimb, frame: PathFrame, symbols: Sequence[SX], points: Sequence[ClosedPoint]
 ) -> ResistingNetwork:
     """Return members and actuators of a network, with ranks measured at closed configurations.
 
     Args:
         limb: the network.
-        robot: at home.
         frame: values that all parts of the robot share.
         symbols: of dimensions, unknowns, rotation and position.
         points: closed configurations.
     """
-    network, found = limb.network, ResistingNetwork([], [], [], [], [])
+    robot, network, found = frame.robot, limb.network, ResistingNetwork([], [], [], [], [])
     actuated = [k for k in network.joints if network.joint(k).actuated]
     screws: dict[int, dict[str, SX]] = {k: {} for k in actuated}
     rate_sizes = {k: robot.size if is_slide(network, k) else SX(1) for k in actuated}
@@ -391,9 +387,8 @@ def resisting(
     for column, k in enumerate(actuated):
         name = network.graph.joints[k].name
         (axis,) = network.joint(k).axes
-        dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
         twists, factors = ca.horzcat(SX(6, 0), *screws[k].values()), relations[:, column] / rate_sizes[k]
-        found.actuators.append(Actuator(name, limb.name, tuple(screws[k]), twists, dimension, factors))
+        found.actuators.append(Actuator(name, limb.name, tuple(screws[k]), twists, axis.dimension, factors))
         found.positions.append(axis.way(network.values[k, 0]))
     return found
 
@@ -404,7 +399,7 @@ def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoi
     Rows that are zero at almost all configurations say nothing, and are left out.
     """
     function = ca.Function("relations", list(symbols), [ca.densify(open_loops)])
-    values = [function(each.dimensions, each.unknowns, each.rotation, each.position).full() for each in points]
+    values = [function(*each).full() for each in points]
     values = [np.where(np.abs(each) > RANK_TOLERANCE, each, 0.0) for each in values]
     known = [each for each in values if np.isfinite(each).all() and each.any()]
     if 2 * len(known) <= len(points):
@@ -449,8 +444,7 @@ def nested_joints(limb: NestedLimb) -> list[LimbJoint]:
         coordinates: list[JointCoordinate] = []
         if own:
             for value, axis, part in zip(own, joint.axes, COORDINATE_PARTS.get(joint.type, ("",)), strict=True):
-                dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
-                coordinates.append(JointCoordinate(part, dimension, axis.way(value)))
+                coordinates.append(JointCoordinate(part, axis.dimension, axis.way(value)))
         elif joint.type == "R":
             base, other = (network.motions[body] for body in network.ends(k))
             angle = rotation_angle(joint.axes[0].axis, base.rotation.T @ other.rotation)

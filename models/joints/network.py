@@ -15,13 +15,13 @@ import casadi as ca
 from casadi import SX
 
 from ..mechanism.topology import Classes, spanning_tree
-from .chain import HomeGraph, HomeRobot, Joint
+from .chain import HomeGraph, Joint
 from .cut import Cut
+from .generic import PathFrame
 from .motion import AxisKind, JointAxis, Motion
 from .opened import (
     LoopEquation,
     OpenedPath,
-    PathFrame,
     Variables,
     join_joint,
     loop_equations,
@@ -84,16 +84,15 @@ class OpenNetwork:
         return self.bodies[self.graph.platform]
 
 
-def open_network(robot: HomeRobot, joints: Sequence[int], variables: Variables, frame: PathFrame) -> OpenNetwork:
+def open_network(joints: Sequence[int], variables: Variables, frame: PathFrame) -> OpenNetwork:
     """Return a network at any pose.
 
     Args:
-        robot: at home.
         joints: indices of the network's joints in the robot's graph.
         variables: of the axes of joints in the spanning tree.
         frame: values that all parts of the robot share.
     """
-    graph = robot.graph
+    graph = frame.robot.graph
     if graph is None:
         raise ValueError("the robot has no graph")
     welded = Classes(graph.links, [(each.inner, each.outer) for each in graph.joints if each.joint is None])
@@ -114,7 +113,7 @@ def open_network(robot: HomeRobot, joints: Sequence[int], variables: Variables, 
         _close(found, joints[i], variables, frame, has_variable=joints[i] in coupled)
     for coupling in graph.couplings:
         if all(k in joints for k, _ in coupling):
-            found.equations.append(_coupling_equation(found, coupling, robot))
+            found.equations.append(_coupling_equation(found, coupling, frame))
     return found
 
 
@@ -192,9 +191,9 @@ def _close(network: OpenNetwork, k: int, variables: Variables, frame: PathFrame,
     network.checks.append(3 - ca.trace(turn))
 
 
-def _coupling_equation(network: OpenNetwork, coupling: Sequence[tuple[int, SX]], robot: HomeRobot) -> LoopEquation:
+def _coupling_equation(network: OpenNetwork, coupling: Sequence[tuple[int, SX]], frame: PathFrame) -> LoopEquation:
     """Return the equation of a coupling, in parts of its first term's factor."""
     first, factor = coupling[0]
     slides = network.joint(first).axes[0].kind is AxisKind.TRANSLATION
     total = sum((each * network.values[k, 0] for k, each in coupling), SX(0))
-    return LoopEquation(total / factor, robot.size if slides else SX(1))
+    return LoopEquation(total / factor, frame.size if slides else SX(1))

@@ -27,10 +27,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
 from .chain import Joint
 from .cut import Cut
-from .generic import INCIDENT
+from .generic import INCIDENT, PathFrame
 from .motion import AxisKind, Motion
 
 #: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
@@ -81,43 +80,6 @@ class OpenedPath:
     def body_behind(self, j: int) -> Motion | None:
         """Return the displacement of the body on the platform's side of a joint; None for a rod."""
         return self.behind[j] or (self.sides[1] if j == self.cut.last else None)
-
-
-class PathFrame:
-    """Values that all paths of a robot share: its size, the platform's displacement, and numbers of its dimensions.
-
-    Args:
-        size: (1, 1) the robot's size, length.
-        platform: displacement of the platform from home.
-        symbols: (d, 1) of the dimensions.
-        typical: (d,) their typical values.
-        samples: (s, d) other values of them.
-    """
-
-    def __init__(self, size: SX, platform: Motion, symbols: SX, typical: FloatArray, samples: FloatArray) -> None:
-        self.size, self.platform = size, platform
-        self._symbols, self._typical, self._samples = symbols, typical, samples
-
-    def typical_value(self, expression: SX) -> FloatArray:
-        """Return the typical value of an expression of the dimensions, as an array of its shape."""
-        found = ca.Function("typical", [self._symbols], [ca.densify(expression)])(self._typical)
-        return np.asarray(found.full(), dtype=np.float64)
-
-    def typical_triple(self, vector: SX) -> tuple[float, float, float]:
-        """Return the typical value of a vector (3, 1)."""
-        x, y, z = (float(value) for value in self.typical_value(vector).ravel())
-        return x, y, z
-
-    def value_at_home(self, expression: SX, unknowns: SX) -> float:
-        """Return the value of a scalar expression at home with typical dimensions, where the unknowns (u, 1) are 0."""
-        place = self.platform
-        function = ca.Function("home", [self._symbols, unknowns, place.rotation, place.image], [ca.densify(expression)])
-        return float(function(self._typical, 0, np.eye(3), self.typical_value(place.origin)))
-
-    def sampled(self, expression: SX) -> list[float]:
-        """Return the values of a scalar expression of the dimensions at all samples."""
-        function = ca.Function("sampled", [self._symbols], [ca.densify(expression)])
-        return [float(function(each)) for each in self._samples]
 
 
 def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: PathFrame) -> OpenedPath:
@@ -212,7 +174,7 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     is_straight = True
     if slide is not None:
         offset = square - ca.dot(home, joints[slide].axes[0].axis) ** 2
-        is_straight = all(float(each) <= _STRAIGHT for each in frame.sampled(offset / square))
+        is_straight = bool(np.all(frame.sampled(offset / square) <= _STRAIGHT))
     if joints[far].type == "U" and is_straight:
         directions = directions_at_rod(path, sides[0], frame)
         path.screws[far] = [ca.vertcat(each, ca.cross(path.points[far], each)) for each in directions]

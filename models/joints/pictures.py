@@ -17,8 +17,9 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene
 from ..parts import PoseSymbols
+from .generic import PathFrame
 from .network import OpenNetwork
-from .opened import OpenedPath, PathFrame
+from .opened import OpenedPath
 from .outline import outline
 from .placed import SLIDING, Place, PlacedJoint, arc_between, placed_joints
 

@@ -11,8 +11,9 @@ from casadi import SX
 
 from ..drawing import JointKind
 from .chain import Joint
+from .generic import PathFrame
 from .motion import Motion
-from .opened import OpenedPath, PathFrame, directions_at_rod
+from .opened import OpenedPath, directions_at_rod
 
 #: Distance of a parallelogram's rods from its middle, in parts of the rod: it is no dimension of the robot.
 _APART = 0.05

@@ -9,12 +9,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
 from ..member import Member
 from ..wrench import Wrench, force_along
-from .chain import HomeRobot, Joint
+from .chain import Joint
 from .cut import Cut
-from .generic import free_screws, generic_rank
+from .generic import PathFrame, free_screws, generic_rank
 from .motion import AxisKind, Motion
 from .opened import OpenedPath
 
@@ -42,14 +41,14 @@ class Centre(NamedTuple):
     slides: bool = False
 
 
-def path_ranks(robot: HomeRobot, joints: Sequence[Joint], cut: Cut, samples: FloatArray) -> Ranks:
+def path_ranks(frame: PathFrame, joints: Sequence[Joint], cut: Cut) -> Ranks:
     """Return the ranks of a path of joints."""
     values = SX.sym("q", sum(len(joint.axes) for joint in joints))
     screws = free_screws(joints, values)
     passive = [j for j, joint in enumerate(joints) if not joint.actuated]
 
     def rank(columns: list[SX], rows: int = 6) -> int:
-        return generic_rank(robot, joints, ca.horzcat(SX(rows, 0), *columns), values, samples)
+        return generic_rank(frame, joints, ca.horzcat(SX(rows, 0), *columns), values)
 
     pinned = None
     if cut.type == "S":

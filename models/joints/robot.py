@@ -29,13 +29,13 @@ from .chain import HomeRobot, Joint, Limb, home_of
 from .cut import choose_cut, simplified
 from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression, plain
-from .generic import sampled_dimensions
-from .loops import PoseOf, examine_loops
+from .generic import PathFrame, sampled_dimensions
+from .loops import examine_loops
 from .modelparts import actuator_name, generic_ranks, parameters, quantities, with_all_relations, with_kinds
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
 from .nested import NestedLimb, nested_joints, nested_limb, resisting
-from .opened import OpenedPath, PathFrame, Variables, distance_equations, open_path, slide_length
+from .opened import OpenedPath, Variables, distance_equations, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .states import PathJoints, limb_links, with_shared_places
@@ -110,9 +110,7 @@ def robot(
 class _Builder:
     """The parts of a robot's model while its limbs are added one after the other."""
 
-    robot: HomeRobot
     frame: PathFrame
-    samples: FloatArray
     wrenches: list[Wrench] = field(default_factory=list)
     members: list[Member] = field(default_factory=list)
     unknowns: list[Unknown] = field(default_factory=list)
@@ -131,10 +129,15 @@ class _Builder:
     structure: list[PathStructure] = field(default_factory=list)
     networks: list[NestedLimb] = field(default_factory=list)
 
+    @property
+    def robot(self) -> HomeRobot:
+        """The robot at home."""
+        return self.frame.robot
+
     def add_network(self, joints: Sequence[int]) -> None:
         """Add joints that are no limb with branches: their unknowns and equations; members follow from closed loops."""
         name = str(len(self.robot.limbs) + len(self.networks) + 1)
-        found = nested_limb(name, self.robot, joints, self._variables(name, {}), self.frame)
+        found = nested_limb(name, joints, self._variables(name, {}), self.frame)
         self.networks.append(found)
         self.closure += found.closure
         self.checks += found.checks
@@ -182,9 +185,8 @@ class _Builder:
             name = actuator_name(self.robot, limb, joint, k + 1) if len(driven) > 1 else limb.name
             members = tuple(member for *_, member in places)
             (axis,) = joint.axes
-            dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
             screws = ca.repmat(path.screws[j][0], 1, len(members))
-            self.actuators.append(Actuator(name, limb.name, members, screws, dimension))
+            self.actuators.append(Actuator(name, limb.name, members, screws, axis.dimension))
             way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[joint, 0])
             self.positions.append(SX(0) if way is None else way)
 
@@ -203,12 +205,11 @@ class _Builder:
         self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables, labels: Mapping[int, str]
     ) -> OpenedPath | None:
         """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
-        robot = self.robot
-        joints = simplified(robot, joints, self.samples)
+        joints = simplified(self.frame, joints)
         cut = choose_cut(joints, len(limb.stem) if len(limb.branches) > 1 else 0, with_rods=limb.centre is None)
         key = limb.group, index
         if key not in self.ranks:
-            self.ranks[key] = path_ranks(robot, joints, cut, self.samples)
+            self.ranks[key] = path_ranks(self.frame, joints, cut)
         ranks = self.ranks[key]
         if ranks.passive == 6 and not any(joint.actuated for joint in joints):
             return None
@@ -259,12 +260,7 @@ def joint_labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping
         joints: of the path.
         known: labels of joints of other paths, which share the joints of the stem.
     """
-    found = {}
-    for j, joint in enumerate(joints):
-        branch = f".{index + 1}" if j >= len(limb.stem) and len(limb.branches) > 1 else ""
-        if id(joint) not in known:
-            found[id(joint)] = f"{limb.name}{branch}:{j + 1}"
-    return found
+    return {id(joint): limb.label(index, j) for j, joint in enumerate(joints) if id(joint) not in known}
 
 
 def model_of_home(
@@ -282,23 +278,23 @@ def model_of_home(
         RobotError: the robot cannot be put together near home.
     """
     words = at_home.words
-    remarks = examine_geometry(at_home, samples)
     pose = PoseSymbols()
-    platform = Motion(pose.rotation, at_home.home, pose.position)
-    frame = PathFrame(at_home.size, platform, at_home.symbols, at_home.typical, samples)
-    builder = _Builder(at_home, frame, samples)
+    frame = PathFrame(at_home, samples, Motion(pose.rotation, at_home.home, pose.position))
+    remarks = examine_geometry(frame)
+    builder = _Builder(frame)
     for limb in at_home.limbs:
         builder.add_limb(limb)
     for joints in () if at_home.graph is None else at_home.graph.networks:
         builder.add_network(joints)
     if not builder.networks:
         _check_carrying(builder)
+    x, y, z = map(float, frame.typical_value(at_home.home).ravel())
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
-    loops = examine_loops(at_home, closure, PoseOf(pose.rotation, pose.position), builder.unknowns, samples)
+    loops = examine_loops(frame, closure, builder.unknowns)
     numbers = [at_home.symbols, unknowns, pose.rotation, pose.position]
     for network in builder.networks:
-        found = resisting(network, at_home, frame, numbers, loops.points)
+        found = resisting(network, frame, numbers, loops.points)
         builder.members += found.members
         builder.actuators += found.actuators
         builder.positions += found.positions
@@ -317,7 +313,7 @@ def model_of_home(
         options={"definition": definition},
         parameters=(*parameters(at_home), *more),
         pose=pose,
-        home=frame.typical_triple(at_home.home),
+        home=(x, y, z),
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
         quantities=quantities(builder.actuators, builder.positions),

@@ -20,9 +20,9 @@ from ..arrays import FloatArray
 from ..limbjoints import JointCone, JointCoordinate, LimbJoint, LimbLink
 from ..parts import Dimension
 from .chain import Joint, Limb
-from .generic import INCIDENT
+from .generic import PathFrame
 from .motion import AxisKind, JointAxis, Motion
-from .opened import OpenedPath, PathFrame, slide_length
+from .opened import OpenedPath, slide_length
 
 #: Names of the coordinates of a joint that has two.
 COORDINATE_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
@@ -214,7 +214,7 @@ class PathJoints:
         ):
             for k in others:
                 home = sign * (path.joints[k].point - place)
-                if not is_zero(home, self._frame):
+                if not self._frame.is_zero(ca.norm_2(home) / self._frame.size):
                     return _cone(link(j).rotation @ home, home, opposite(j), turn)
         # All joints have one centre at home: a slide next to the joint has the direction of its link.
         for k, link, opposite in ((j + 1, self._behind, self._before), (j - 1, self._before, self._behind)):
@@ -230,11 +230,6 @@ class PathJoints:
     def _behind(self, j: int) -> Motion:
         """Return the displacement of the body on the platform's side of a joint, which is no rod."""
         return self._path.body_behind(j) or self._path.sides[1]
-
-
-def is_zero(vector: SX, frame: PathFrame) -> bool:
-    """Return whether a vector (3, 1) at home, length, is zero for all dimensions."""
-    return all(value < INCIDENT for value in frame.sampled(ca.norm_2(vector) / frame.size))
 
 
 def _cone(link: SX, home: SX, other: Motion, turn: FloatArray) -> JointCone:
@@ -267,7 +262,7 @@ def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) ->
     """
     ends: list[int] = []
     for j, joint in enumerate(path.joints):
-        if not any(is_zero(joint.point - path.joints[k].point, frame) for k in ends[-1:]):
+        if not any(frame.coincide(joint.point, path.joints[k].point) for k in ends[-1:]):
             ends.append(j)
     ends = [
         j for i, j in enumerate(ends) if not (0 < i < len(ends) - 1 and _is_along(path, ends[i - 1 : i + 2], frame))
@@ -293,7 +288,7 @@ def _is_along(path: OpenedPath, joints: Sequence[int], frame: PathFrame) -> bool
         return False
     axis = slide.axes[0].axis
     off = ca.vertcat(ca.cross(slide.point - before.point, axis), ca.cross(behind.point - slide.point, axis))
-    return all(value < INCIDENT for value in frame.sampled(ca.norm_2(off) / frame.size))
+    return frame.is_zero(ca.norm_2(off) / frame.size)
 
 
 def with_shared_places(paths: Sequence[tuple[OpenedPath, list[LimbLink]]], frame: PathFrame) -> tuple[LimbLink, ...]:
@@ -312,7 +307,7 @@ def with_shared_places(paths: Sequence[tuple[OpenedPath, list[LimbLink]]], frame
                 continue
             label = links[side].name.split(" to ")[side]
             point = path.joints[side].point
-            same = next((name for name, other in known if is_zero(point - other, frame)), None)
+            same = next((name for name, other in known if frame.coincide(point, other)), None)
             known += [] if same else [(label, point)]
             names.setdefault(label, same or label)
     unique = {link.name: link for link in found}
