@@ -7,10 +7,10 @@ numbers), ``motion`` (displacements and screws as symbols), ``forms`` (forms of 
 ``cut`` (the joint at which a limb's loop is opened), ``opened`` (the opened limb: current screws and equations),
 ``modes`` (signs of home's assembly), ``resistance`` (rows and members of a limb), ``states`` (joints' coordinates from
 home, and links), ``loops`` (independent loop equations), ``network`` (nested loops at any pose), ``nested`` (their
-members and actuators), ``outline`` (corners of a plate), ``placed`` (joints at any pose), ``pictures`` (the drawing),
-``structure`` (its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model), ``centres``
-(the model with errors of joint centres), ``closedform`` (a model without unknowns that follow from the pose in closed
-form), ``elimination`` and ``replacing`` (unknowns that follow one after the other, of any dimensions).
+members and actuators), ``placed`` (joints at any pose), ``pictures`` (the drawing), ``modelparts`` (measured and listed
+parts of the model), ``robot`` (the model), ``centres`` (the model with errors of joint centres), ``replacing`` and
+``elimination`` (unknowns that follow one after the other, of any dimensions), ``closedform`` (a model without unknowns
+that follow from the pose in closed form).
 
 The model is imported from ``robot`` itself, or as :func:`screwsynth.models.robot`: what asks for one module here, or
 for the kinds of faults, does not load them all.

@@ -22,7 +22,7 @@ from ..parts import Dimension
 from ..screws import Displacement, Screw, screw_displacement, unit_vector
 from .expression import ExpressionError, UnknownNameError, evaluate
 from .forms import RobotError, VectorExpression
-from .motion import AxisKind, JointAxis
+from .motion import UNIT_VECTORS, AxisKind, JointAxis
 from .words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords
 
 #: Entries of a rotation of repetition this near to -1, -1/2, 0, 1/2 or 1 are these numbers: a turn by 120 degrees then
@@ -254,24 +254,24 @@ def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
 def _joint_at_home(words: JointWords, names: Mapping[str, SX]) -> Joint:
     """Return a joint at home."""
     point = _vector(f"{words.place}, at", words.at, names)
-    none = SX.zeros(3)
-
-    def axis(kind: AxisKind, direction: SX, pitch: SX | None = None, rod: SX = none) -> JointAxis:
-        return JointAxis(kind, direction, point, words.actuated, SX(0) if pitch is None else pitch, rod)
-
     given = [_direction(f"{words.place}, axis", each, names) for each in words.axes]
+
+    def axis(kind: AxisKind, direction: SX) -> JointAxis:
+        return JointAxis(kind, direction, point, words.actuated)
+
     match words.type:
         case "S":
-            axes = [axis(AxisKind.ROTATION, SX(np.eye(3)[k].tolist())) for k in range(3)]
+            axes = [axis(AxisKind.ROTATION, each) for each in UNIT_VECTORS]
         case "P":
             axes = [axis(AxisKind.TRANSLATION, given[0])]
         case "C":
             axes = [axis(AxisKind.ROTATION, given[0]), axis(AxisKind.TRANSLATION, given[0])]
         case "H":
-            axes = [axis(AxisKind.ROTATION, given[0], scalar_value(f"{words.place}, pitch", words.pitch, names))]
+            pitch = scalar_value(f"{words.place}, pitch", words.pitch, names)
+            axes = [replace(axis(AxisKind.ROTATION, given[0]), pitch=pitch)]
         case "Pa":
             to = _vector(f"{words.place}, to", words.to if words.to is not None else words.at, names)
-            axes = [axis(AxisKind.PARALLELOGRAM, given[0], rod=to - point)]
+            axes = [replace(axis(AxisKind.PARALLELOGRAM, given[0]), rod=to - point)]
         case _:
             axes = [axis(AxisKind.ROTATION, each) for each in given]
     return Joint(words.place, words.type, point, tuple(axes), words.actuated, words.name)

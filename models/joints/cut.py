@@ -11,12 +11,11 @@ import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
 from casadi import SX
 
 from .chain import Joint
 from .generic import PathFrame, meeting_point
-from .motion import AxisKind, JointAxis
+from .motion import UNIT_VECTORS, AxisKind, JointAxis
 
 
 class Cut(NamedTuple):
@@ -78,10 +77,7 @@ def _common_point(frame: PathFrame, axes: Sequence[JointAxis]) -> SX | None:
 def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
     axes = tuple(axis for joint in joints for axis in joint.axes)
     if kind == "S":
-        basis = (SX(np.eye(3)[k].tolist()) for k in range(3))
-        axes = tuple(
-            JointAxis(AxisKind.ROTATION, each, point, actuated=False, pitch=SX(0), rod=SX.zeros(3)) for each in basis
-        )
+        axes = tuple(JointAxis(AxisKind.ROTATION, each, point) for each in UNIT_VECTORS)
     parts = tuple(part for joint in joints for part in joint.parts or (joint,))
     return Joint(joints[0].place, kind, point, axes, actuated=False, parts=parts)
 

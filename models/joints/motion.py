@@ -7,13 +7,16 @@ the robot is described.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
 from ..parts import Dimension
+
+#: Unit vectors (3, 1) along x, y and z.
+UNIT_VECTORS = (SX([1, 0, 0]), SX([0, 1, 0]), SX([0, 0, 1]))
 
 
 class Motion(NamedTuple):
@@ -77,9 +80,9 @@ class JointAxis:
     kind: AxisKind
     axis: SX
     point: SX
-    actuated: bool
-    pitch: SX
-    rod: SX
+    actuated: bool = False
+    pitch: SX = field(default_factory=lambda: SX(0))
+    rod: SX = field(default_factory=lambda: SX.zeros(3))
 
     @property
     def dimension(self) -> Dimension:

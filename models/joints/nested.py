@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
@@ -25,15 +25,14 @@ from ..mechanism.centre import CentreRule, centre_rule
 from ..mechanism.decomposition import robot_graph
 from ..mechanism.topology import spanning_tree
 from ..member import Member, pseudo_inverse
-from ..parts import Actuator, Closure, Dimension, JointScrews, PathStructure
+from ..parts import Actuator, Dimension, JointScrews, PathStructure
 from ..rows import independent_rows
-from .chain import HomeRobot, Joint
+from .chain import HomeRobot
 from .generic import RANK_TOLERANCE, PathFrame
 from .loops import ClosedPoint
 from .mechanisms import mechanism_at_home
 from .motion import AxisKind
-from .network import OpenNetwork, open_network
-from .opened import Variables
+from .network import OpenNetwork
 from .states import COORDINATE_PARTS, rotation_angle
 
 _CUT = "it is part of nested loops, which give it no coordinate of its own"
@@ -185,18 +184,6 @@ def _rank(values: FloatArray) -> int:
     return int(np.count_nonzero(values > RANK_TOLERANCE))
 
 
-class DrivenMotion(NamedTuple):
-    """Motion of a member for a unit rate of an actuator.
-
-    Attributes:
-        screw: (6, 1) twist of the platform, up to those that the member allows.
-        open_loops: (m, 1) what passive joints cannot close of all its loops; 0 where the actuator can move alone.
-    """
-
-    screw: SX
-    open_loops: SX
-
-
 @dataclass(frozen=True, eq=False)
 class NullSpace:
     """The null space of a member's loops, loop after loop: a loop with the rates that all before it leave free.
@@ -218,12 +205,16 @@ class NullSpace:
         """Twists (6, n) of the platform that free joints allow, as many as there are rates."""
         return self.platform @ self.projector
 
-    def driven(self, screw: SX, loops: SX) -> DrivenMotion:
+    def driven(self, screw: SX, loops: SX) -> tuple[SX, SX]:
         """Return the motion for a unit rate of an actuated joint, the other actuators at rest.
 
         Args:
             screw: (6, 1) of the joint in the platform's twist.
             loops: (m, 1) of the joint in all loops, one below the other.
+
+        Returns:
+            The platform's twist (6, 1), up to those that the member allows, and what passive joints cannot close of all
+            loops (m, 1): 0 where the actuator can move alone.
         """
         rates = SX(self.projector.shape[0], 1)
         open_loops = [SX(0, 1)]
@@ -231,7 +222,7 @@ class NullSpace:
             own, loops = loops[: loop.shape[0], :], loops[loop.shape[0] :, :]
             rates -= inverse @ (own + loop @ rates)
             open_loops.append(own + loop @ rates)
-        return DrivenMotion(screw + self.platform @ rates, ca.vertcat(*open_loops))
+        return screw + self.platform @ rates, ca.vertcat(*open_loops)
 
 
 def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
@@ -247,11 +238,6 @@ def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
             inverses.append(inverse)
             projector -= inverse @ left
     return NullSpace(projector, tuple(equations), tuple(inverses), motions.platform)
-
-
-def member_of(limb: str, network: OpenNetwork, each: NestedMember, screws: SX, rank: int) -> Member:
-    """Return a member of a network, with the kinds of its wrenches still to be measured."""
-    return Member(limb, _centre(network, each), screws, rank, (), slide=_slide(network, each))
 
 
 def _slide(network: OpenNetwork, member: NestedMember) -> SX | None:
@@ -278,31 +264,6 @@ def _centre(network: OpenNetwork, member: NestedMember) -> SX:
     return sum(places, SX.zeros(3)) * (1 / len(places))
 
 
-@dataclass(eq=False)
-class NestedLimb:
-    """A network as a limb, with its loops opened.
-
-    Attributes:
-        name: of the limb.
-        network: its links and joints at any pose.
-        unknowns: number of its joint variables that are unknowns.
-    """
-
-    name: str
-    network: OpenNetwork
-    unknowns: int
-
-    @property
-    def closure(self) -> list[Closure]:
-        """Loop equations."""
-        return [Closure(f"loop {self.name} ({k + 1})", *each) for k, each in enumerate(self.network.equations)]
-
-    @property
-    def checks(self) -> list[Closure]:
-        """Signs that the loop equations leave open."""
-        return [Closure(f"sign {self.name} ({k + 1})", each) for k, each in enumerate(self.network.checks)]
-
-
 @dataclass(frozen=True, eq=False)
 class ResistingNetwork:
     """Members and actuators of a network.
@@ -322,44 +283,25 @@ class ResistingNetwork:
     structure: list[PathStructure]
 
 
-def nested_limb(name: str, joints: Sequence[int], variables: Variables, frame: PathFrame) -> NestedLimb:
-    """Return a network as a limb with opened loops.
-
-    Args:
-        name: of the limb.
-        joints: indices of the network's joints in the robot's graph.
-        variables: of the axes of joints.
-        frame: values that all parts of the robot share.
-    """
-    made: set[tuple[Joint, int]] = set()
-
-    def counted(joint: Joint, axis: int) -> SX:
-        made.add((joint, axis))
-        return variables(joint, axis)
-
-    network = open_network(joints, counted, frame)
-    return NestedLimb(name, network, len(made))
-
-
 def resisting(
-    limb: NestedLimb, frame: PathFrame, symbols: Sequence[SX], points: Sequence[ClosedPoint]
+    network: OpenNetwork, frame: PathFrame, symbols: Sequence[SX], points: Sequence[ClosedPoint]
 ) -> ResistingNetwork:
     """Return members and actuators of a network, with ranks measured at closed configurations.
 
     Args:
-        limb: the network.
+        network: at any pose.
         frame: values that all parts of the robot share.
         symbols: of dimensions, unknowns, rotation and position.
         points: closed configurations.
     """
-    robot, network, found = frame.robot, limb.network, ResistingNetwork([], [], [], [], [])
+    robot, limb, found = frame.robot, network.name, ResistingNetwork([], [], [], [], [])
     actuated = [k for k in network.joints if network.joint(k).actuated]
     screws: dict[int, dict[str, SX]] = {k: {} for k in actuated}
     rate_sizes = {k: robot.size if is_slide(network, k) else SX(1) for k in actuated}
     open_loops = [SX(0, len(actuated))]
     members = nested_members(robot, network)
     for number, each in enumerate(members):
-        label = _member_name(limb, number) if len(members) > 1 else ""
+        label = _member_name(network, number) if len(members) > 1 else ""
         locked = motions_of(network, frame, each.joints, [k for k in each.joints if k not in actuated])
         ranks = measured_ranks(locked, symbols, points, robot.size)
         free = motions_of(network, frame, each.joints, each.joints)
@@ -368,27 +310,28 @@ def resisting(
         free_loops, open_columns = ca.vertcat(SX(0, len(free.columns)), *free.loops), []
         for k in actuated:
             column = free.columns.index(k)
-            driven = null.driven(free.platform[:, column], free_loops[:, column])
-            open_columns.append(driven.open_loops)
-            if not ca.sparsify(driven.screw).is_zero():
-                screws[k][label or limb.name] = driven.screw / rate_sizes[k]
+            screw, left_open = null.driven(free.platform[:, column], free_loops[:, column])
+            open_columns.append(left_open)
+            if not ca.sparsify(screw).is_zero():
+                screws[k][label or limb] = screw / rate_sizes[k]
         open_loops.append(ca.horzcat(*open_columns))
         if ranks.twists < 6:
-            found.members.append(replace(member_of(limb.name, network, each, null.screws, ranks.twists), name=label))
-        labels = tuple(f"{limb.name}:{network.graph.joints[k].name}" for k in free.columns)
+            place, slide = _centre(network, each), _slide(network, each)
+            found.members.append(Member(limb, place, null.screws, ranks.twists, (), slide=slide, name=label))
+        labels = tuple(f"{limb}:{network.graph.joints[k].name}" for k in free.columns)
         driving = tuple(i for i, k in enumerate(free.columns) if k in actuated)
         sizes = ca.horzcat(*[rate_sizes.get(k, SX(1)) for k in free.columns])
         motions, loops = (part / ca.repmat(sizes, part.shape[0], 1) for part in (free.platform, free_loops))
         ends = ranks.twists, free_ranks.twists
-        names = limb.name, labels, motions, driving, *ends, label or limb.name
+        names = limb, labels, motions, driving, *ends, label or limb
         found.screws.append(JointScrews(*names, loops, sum(ranks.loops)))
-        found.structure.append(_structure(limb, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
+        found.structure.append(_structure(network, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
     relations = _relations(ca.vertcat(*open_loops), symbols, points)
     for column, k in enumerate(actuated):
         name = network.graph.joints[k].name
         (axis,) = network.joint(k).axes
         twists, factors = ca.horzcat(SX(6, 0), *screws[k].values()), relations[:, column] / rate_sizes[k]
-        found.actuators.append(Actuator(name, limb.name, tuple(screws[k]), twists, axis.dimension, factors))
+        found.actuators.append(Actuator(name, limb, tuple(screws[k]), twists, axis.dimension, factors))
         found.positions.append(axis.way(network.values[k, 0]))
     return found
 
@@ -407,37 +350,37 @@ def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoi
     return open_loops[list(independent_rows(known)), :]
 
 
-def _member_name(limb: NestedLimb, number: int) -> str:
+def _member_name(network: OpenNetwork, number: int) -> str:
     """Return the name of a member: the first one has the limb's."""
-    return limb.name if number == 0 else f"{limb.name}.{number + 1}"
+    return network.name if number == 0 else f"{network.name}.{number + 1}"
 
 
-def _structure(limb: NestedLimb, member: NestedMember, number: int, wrenches: int, constraints: int) -> PathStructure:
+def _structure(
+    network: OpenNetwork, member: NestedMember, number: int, wrenches: int, constraints: int
+) -> PathStructure:
     """Return the structure of a member; the first one has the loops of all."""
-    network = limb.network
     letters = (
         f"{network.joint(k).type}*" if network.joint(k).actuated else network.joint(k).type for k in member.joints
     )
     names = ", ".join(network.graph.joints[k].name for k in network.opened)
     count = len(network.equations) if number == 0 else 0
     return PathStructure(
-        limb=limb.name,
-        name=_member_name(limb, number),
+        limb=network.name,
+        name=_member_name(network, number),
         joints=" ".join(letters),
         opened=f"nested: {names}" if number == 0 else "as before",
         wrenches=wrenches,
         constraints=constraints,
-        unknowns=limb.unknowns if number == 0 else 0,
+        unknowns=network.unknowns if number == 0 else 0,
         equations=count,
         kept=count,
         nested=tuple(network.graph.joints[k].name for k in member.joints),
     )
 
 
-def nested_joints(limb: NestedLimb) -> list[LimbJoint]:
+def nested_joints(network: OpenNetwork) -> list[LimbJoint]:
     """Return the joints of a network as limits read them; a joint at which a loop is opened may have no coordinate."""
-    network = limb.network
-    found = []
+    limb, found = network.name, []
     for k in network.joints:
         joint, name = network.joint(k), network.graph.joints[k].name
         own = [network.values[k, a] for a in range(len(joint.axes)) if (k, a) in network.values]
@@ -450,5 +393,5 @@ def nested_joints(limb: NestedLimb) -> list[LimbJoint]:
             angle = rotation_angle(joint.axes[0].axis, base.rotation.T @ other.rotation)
             coordinates.append(JointCoordinate("", Dimension.ANGLE, ca.densify(angle.sine), ca.densify(angle.cosine)))
         unknown = "" if coordinates else _CUT
-        found.append(LimbJoint(f"{limb.name}:{name}", name, limb.name, joint.type, tuple(coordinates), unknown=unknown))
+        found.append(LimbJoint(f"{limb}:{name}", name, limb, joint.type, tuple(coordinates), unknown=unknown))
     return found

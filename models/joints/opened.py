@@ -19,7 +19,7 @@ of a whole box finds where the others cannot be.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -27,10 +27,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from ..parts import Closure
 from .chain import Joint
 from .cut import Cut
 from .generic import INCIDENT, PathFrame
-from .motion import AxisKind, Motion
+from .motion import UNIT_VECTORS, AxisKind, Motion
 
 #: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
 _STRAIGHT = 1e-14
@@ -45,8 +46,21 @@ class LoopEquation(NamedTuple):
     size: SX
 
 
+@dataclass(eq=False, kw_only=True)
+class Opened:
+    """What is opened, a path or a network.
+
+    Attributes:
+        equations: that hold where its loops are closed.
+        checks: further expressions that are zero there: signs that the equations leave open.
+    """
+
+    equations: list[LoopEquation] = field(default_factory=list)
+    checks: list[SX] = field(default_factory=list)
+
+
 @dataclass(eq=False)
-class OpenedPath:
+class OpenedPath(Opened):
     """A path of joints at any pose.
 
     Attributes:
@@ -57,8 +71,6 @@ class OpenedPath:
         points: (3, 1) current place of each joint on the body before it, on the base's side, length.
         sides: displacement of the bodies on the base's and on the platform's side of the cut.
         rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.
-        equations: that hold where the path is closed.
-        checks: further expressions that are zero there: signs that the equations leave open.
     """
 
     joints: Sequence[Joint]
@@ -68,8 +80,6 @@ class OpenedPath:
     points: list[SX]
     sides: tuple[Motion, Motion]
     rod: SX | None = None
-    equations: list[LoopEquation] = field(default_factory=list)
-    checks: list[SX] = field(default_factory=list)
 
     def body_before(self, j: int) -> Motion | None:
         """Return the displacement of the body on the base's side of a joint; None for a rod."""
@@ -116,17 +126,32 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
     elif cut.type:
         join_joint(path, base, platform, frame)
     else:
-        turn = base.rotation.T @ platform.rotation
-        place = joints[min(cut.first, count - 1)].point
-        apart = base.rotation.T @ (platform.point(place) - base.point(place))
-        path.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)
-        path.checks.append(3 - ca.trace(turn))
+        join_rigidly(path, base, platform, joints[min(cut.first, count - 1)].point, frame)
     return path
+
+
+def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Closure]:
+    """Return equations with the name of their limb or path, such as ``loop 1.2 (3)``.
+
+    Args:
+        kind: first word of the names.
+        name: of the limb or path.
+        sides: left side of each, and its size where it is not 1.
+    """
+    return [Closure(f"{kind} {name} ({k + 1})", *each) for k, each in enumerate(sides)]
 
 
 def loop_equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
     """Return equations from their left sides (k, 1) and a common size; without one they are of order 1."""
     return [LoopEquation(each, SX(1) if size is None else size) for each in ca.vertsplit(expressions)]
+
+
+def join_rigidly(path: Opened, one: Motion, other: Motion, place: SX, frame: PathFrame) -> None:
+    """Add the equations by which two bodies coincide: their rotations, and a place (3, 1) at home on both, length."""
+    turn = one.rotation.T @ other.rotation
+    apart = one.rotation.T @ (other.point(place) - one.point(place))
+    path.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)
+    path.checks.append(3 - ca.trace(turn))
 
 
 def join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
@@ -240,14 +265,13 @@ def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
 
 def rotations_about(point: SX) -> list[SX]:
     """Return three rotations (6, 1) about a point."""
-    directions = (SX(np.eye(3)[k].tolist()) for k in range(3))
-    return [ca.vertcat(each, ca.cross(point, each)) for each in directions]
+    return [ca.vertcat(each, ca.cross(point, each)) for each in UNIT_VECTORS]
 
 
 def normals_of(axis: SX, frame: PathFrame) -> list[SX]:
     """Return two vectors (3, 1) across an axis, along those coordinates that are farthest from it typically."""
     order = np.argsort(np.abs(frame.typical_value(axis)).ravel(), kind="stable")
-    first = ca.cross(axis, SX(np.eye(3)[int(order[0])].tolist()))
+    first = ca.cross(axis, UNIT_VECTORS[int(order[0])])
     return [first, ca.cross(axis, first)]
 
 

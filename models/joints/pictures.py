@@ -15,12 +15,11 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene
+from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene, outline
 from ..parts import PoseSymbols
 from .generic import PathFrame
 from .network import OpenNetwork
 from .opened import OpenedPath
-from .outline import outline
 from .placed import SLIDING, Place, PlacedJoint, arc_between, placed_joints
 
 #: Half of the length of a rail, in parts of the robot's size: it is no dimension of the robot.
@@ -115,7 +114,7 @@ def scene_of(
     origin: SX,
     frame: PathFrame,
     carrying: Collection[str],
-    networks: Sequence[tuple[str, OpenNetwork]] = (),
+    networks: Sequence[OpenNetwork] = (),
 ) -> Scene:
     """Return the drawing of paths and networks at a pose.
 
@@ -125,13 +124,13 @@ def scene_of(
         origin: (3, 1) origin of the platform frame at home, length.
         frame: values that all paths share.
         carrying: names of the limbs that have a wrench.
-        networks: the names of the limbs that are networks, and these.
+        networks: limbs that are networks.
     """
     sketch = _Sketch(frame, float(frame.typical_value(frame.size).item()), origin, carrying)
     for drawn in paths:
         _add_path(sketch, drawn, [each for each in paths if each.limb == drawn.limb])
-    for name, network in networks:
-        _add_network(sketch, name, network)
+    for network in networks:
+        _add_network(sketch, network)
     centre = sketch.node("P", Place(pose.position, origin), Body.PLATFORM)
     for body, nodes in sketch.outlines.items():
         _add_outline(sketch, body, nodes, centre if body is Body.PLATFORM else None)
@@ -305,14 +304,9 @@ def _add_outline(sketch: _Sketch, body: Body, nodes: Sequence[_Node], centre: _N
             sketch.link(nearest, centre, None, LinkKind.BAR, body)
 
 
-def _add_network(sketch: _Sketch, name: str, network: OpenNetwork) -> None:
-    """Add a network, with its joints on base and platform among their outlines.
-
-    Args:
-        sketch: the drawing.
-        name: of the limb that the network is.
-        network: at any pose.
-    """
+def _add_network(sketch: _Sketch, network: OpenNetwork) -> None:
+    """Add a network, with its joints on base and platform among their outlines."""
+    name = network.name
     limb = name if name in sketch.carrying else None
     plates = {network.base: Body.BASE, network.platform: Body.PLATFORM}
     ends: dict[str, list[tuple[str, JointKind]]] = {}

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
-import numpy as np
 from casadi import SX
 
 from ..member import Member
@@ -14,7 +13,7 @@ from ..wrench import Wrench, force_along
 from .chain import Joint
 from .cut import Cut
 from .generic import PathFrame, free_screws, generic_rank
-from .motion import AxisKind, Motion
+from .motion import UNIT_VECTORS, AxisKind, Motion
 from .opened import OpenedPath
 
 
@@ -118,7 +117,7 @@ def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Membe
     ]
     velocities = [_velocity(screw, centre) for _, screw in others]
     if rank == 0:
-        return [force_along(limb, centre, SX(np.eye(3)[k].tolist())) for k in range(3)], None
+        return [force_along(limb, centre, each) for each in UNIT_VECTORS], None
     if rank == 2 and len(others) == 2:
         return [force_along(limb, centre, ca.cross(velocities[0], velocities[1]))], None
     if rank == 1 and len(others) == 1 and others[0][0]:

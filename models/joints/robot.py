@@ -31,15 +31,26 @@ from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression, plain
 from .generic import PathFrame, sampled_dimensions
 from .loops import examine_loops
-from .modelparts import actuator_name, generic_ranks, parameters, quantities, with_all_relations, with_kinds
+from .modelparts import (
+    actuator_name,
+    generic_ranks,
+    joint_screws,
+    member_remarks,
+    parameters,
+    quantities,
+    structure_of,
+    with_all_relations,
+    with_kept,
+    with_kinds,
+)
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
-from .nested import NestedLimb, nested_joints, nested_limb, resisting
-from .opened import OpenedPath, Variables, distance_equations, open_path, slide_length
+from .nested import nested_joints, resisting
+from .network import OpenNetwork, open_network
+from .opened import OpenedPath, Variables, closures, distance_equations, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .states import PathJoints, limb_links, with_shared_places
-from .structure import joint_screws, member_remarks, structure_of, with_kept
 from .words import read_robot
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -127,7 +138,7 @@ class _Builder:
     remarks: list[str] = field(default_factory=list)
     ranks: dict[tuple[int, int], Ranks] = field(default_factory=dict)
     structure: list[PathStructure] = field(default_factory=list)
-    networks: list[NestedLimb] = field(default_factory=list)
+    networks: list[OpenNetwork] = field(default_factory=list)
 
     @property
     def robot(self) -> HomeRobot:
@@ -137,11 +148,13 @@ class _Builder:
     def add_network(self, joints: Sequence[int]) -> None:
         """Add joints that are no limb with branches: their unknowns and equations; members follow from closed loops."""
         name = str(len(self.robot.limbs) + len(self.networks) + 1)
-        found = nested_limb(name, joints, self._variables(name, {}), self.frame)
-        self.networks.append(found)
-        self.closure += found.closure
-        self.checks += found.checks
-        self.joints += nested_joints(found)
+        count = len(self.unknowns)
+        network = open_network(name, joints, self._variables(name, {}), self.frame)
+        network.unknowns = len(self.unknowns) - count
+        self.networks.append(network)
+        self.closure += closures("loop", name, network.equations)
+        self.checks += closures("sign", name, zip(network.checks, strict=True))
+        self.joints += nested_joints(network)
 
     def add_limb(self, limb: Limb) -> None:
         """Add a limb: its unknowns, equations, rows, members and actuators."""
@@ -222,10 +235,9 @@ class _Builder:
         several, name = len(limb.branches) > 1, limb.member(index)
         self.wrenches += [replace(each, member=name) for each in rows] if several else rows
         self.members += [] if member is None else [replace(member, name=name if several else "")]
-        self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
-        self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
-        own = distance_equations(path, variables, self.frame)
-        self.distances += [Closure(f"distance {name} ({k + 1})", *each) for k, each in enumerate(own)]
+        self.closure += closures("loop", name, path.equations)
+        self.checks += closures("sign", name, zip(path.checks, strict=True))
+        self.distances += closures("distance", name, distance_equations(path, variables, self.frame))
         self.signs += joint_signs(limb.name, name, path)
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         screws = joint_screws(limb.name, path, ranks, labels)
@@ -305,7 +317,6 @@ def model_of_home(
     members = [with_kinds(member, actuators, at_home.size, numbers, loops.points) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
     everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
-    networks = [(each.name, each.network) for each in builder.networks]
     model = Model(
         name=words.name,
         description=words.description,
@@ -317,7 +328,7 @@ def model_of_home(
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
         quantities=quantities(builder.actuators, builder.positions),
-        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, networks),
+        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, builder.networks),
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),
