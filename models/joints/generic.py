@@ -12,6 +12,7 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
+from ..rows import rank_of
 from .chain import HomeRobot, Joint
 from .forms import RobotError
 from .motion import AxisKind, Motion
@@ -21,9 +22,6 @@ SAMPLES = 6
 #: Part of a typical dimension by which the samples vary; halved while a sample has no finite value.
 _SPREAD = 0.2
 _HALVINGS = 8
-#: Singular values below this part of the largest, of columns of unit length, are zero: rounding leaves 1e-15, and a
-#: limb that is this near to a lower rank at every one of several random points has it.
-RANK_TOLERANCE = 1e-7
 #: Columns shorter than this part of the longest are zero, as the velocity of a rod's end by its spin is: rounding
 #: leaves 1e-16, and a slide's column is as short as the robot is large.
 _ZERO_COLUMN = 1e-12
@@ -38,13 +36,14 @@ def sampled_dimensions(robot: HomeRobot) -> FloatArray:
         RobotError: the home has no finite value at the typical dimensions.
     """
     joints = robot.joints
-    parts = [part for joint in joints for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)]
-    outputs = ca.densify(ca.veccat(robot.home, *parts))
-    function = ca.Function("home", [robot.symbols], [outputs])
-    for joint in joints:
-        own = ca.veccat(*[part for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)])
+    parts = [
+        ca.veccat(*[part for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)])
+        for joint in joints
+    ]
+    for joint, own in zip(joints, parts, strict=True):
         if not np.isfinite(ca.Function("joint", [robot.symbols], [ca.densify(own)])(robot.typical).full()).all():
             raise RobotError(joint.place, "has no finite place or axis at the typical dimensions")
+    function = ca.Function("home", [robot.symbols], [ca.densify(ca.veccat(robot.home, *parts))])
     if not np.isfinite(function(robot.typical).full()).all():
         raise RobotError("home", "has no finite value at the typical dimensions")
     rng = np.random.default_rng(0)
@@ -123,15 +122,14 @@ def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
     return found
 
 
-def rank_of(columns: FloatArray) -> int:
-    """Return the rank of columns, each taken with unit length."""
+def _rank(columns: FloatArray) -> int:
+    """Return the rank of columns, each taken with unit length.
+
+    Rounding leaves 1e-15, and a limb that is near to a lower rank at every one of several random points has it.
+    """
     lengths = np.linalg.norm(columns, axis=0)
     nonzero = lengths > _ZERO_COLUMN * lengths.max(initial=0.0)
-    unit = columns[:, nonzero] / lengths[nonzero]
-    if not unit.size:
-        return 0
-    values = np.linalg.svd(unit, compute_uv=False)
-    return int(np.count_nonzero(values > RANK_TOLERANCE * values[0]))
+    return rank_of(np.linalg.svd(columns[:, nonzero] / lengths[nonzero], compute_uv=False))
 
 
 def random_values(joints: Sequence[Joint], size: float, seed: int) -> FloatArray:
@@ -160,7 +158,7 @@ def generic_rank(frame: PathFrame, joints: Sequence[Joint], columns: SX, values:
         found = function(sample, random_values(joints, reach, k)).full()
         if found.shape[0] == 6:
             found[3:] /= reach
-        ranks.append(rank_of(found))
+        ranks.append(_rank(found))
     return max(ranks)
 
 

@@ -122,6 +122,15 @@ class JointAxis:
         direction = at.rotation @ self.axis
         return ca.vertcat(direction, ca.cross(at.point(self.point), direction) + self.pitch * direction)
 
+    def direction(self, screw: SX) -> SX:
+        """Return its current direction (3, 1) from its current screw (6, 1): that of the motion for a parallelogram."""
+        return screw[:3] if self.kind is AxisKind.ROTATION else screw[3:]
+
+    @property
+    def is_hinge(self) -> bool:
+        """Whether it is a rotation without a pitch."""
+        return self.kind is AxisKind.ROTATION and bool(self.pitch.is_zero())
+
 
 def rotation_about(axis: SX, angle: SX) -> SX:
     """Return the rotation matrix (3, 3) about a unit axis (3, 1): ``I + sin q [a] + (1 - cos q)(a a' - I)``."""

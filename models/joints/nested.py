@@ -19,16 +19,15 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
 from ..limbjoints import JointCoordinate, LimbJoint
 from ..mechanism.centre import CentreRule, centre_rule
 from ..mechanism.decomposition import robot_graph
 from ..mechanism.topology import spanning_tree
 from ..member import Member, pseudo_inverse
 from ..parts import Actuator, Dimension, JointScrews, PathStructure
-from ..rows import independent_rows
+from ..rows import RANK_TOLERANCE, independent_rows, rank_of
 from .chain import HomeRobot
-from .generic import RANK_TOLERANCE, PathFrame
+from .generic import PathFrame
 from .loops import ClosedPoint
 from .mechanisms import mechanism_at_home
 from .motion import AxisKind
@@ -172,16 +171,12 @@ def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[Clo
         ranks, null = [], np.eye(platform.shape[1])
         for loop in loops:
             _, singular, right = np.linalg.svd(loop @ null)
-            ranks.append(_rank(singular))
+            # A loop that others close already leaves rounding errors alone.
+            ranks.append(rank_of(singular, 1.0))
             null = null @ right[ranks[-1] :].T
-        twists = _rank(np.linalg.svd(about @ null)[1]) if null.size else 0
+        twists = rank_of(np.linalg.svd(about @ null)[1], 1.0) if null.size else 0
         found[MotionRanks(tuple(ranks), twists)] += 1
     return max(found, key=lambda ranks: (found[ranks], ranks))
-
-
-def _rank(values: FloatArray) -> int:
-    """Return the rank of screws of order 1: a loop that others close already leaves rounding errors alone."""
-    return int(np.count_nonzero(values > RANK_TOLERANCE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,8 +240,7 @@ def _slide(network: OpenNetwork, member: NestedMember) -> SX | None:
     if member.is_meeting or len(member.centre) != 1 or network.joint(member.centre[0]).type in ("S", "U", "Pa"):
         return None
     (k,) = member.centre
-    screw = network.screws[k][-1]
-    return screw[3:] if network.joint(k).axes[-1].kind is AxisKind.TRANSLATION else screw[:3]
+    return network.joint(k).axes[-1].direction(network.screws[k][-1])
 
 
 def _centre(network: OpenNetwork, member: NestedMember) -> SX:

@@ -31,7 +31,7 @@ from ..parts import Closure
 from .chain import Joint
 from .cut import Cut
 from .generic import INCIDENT, PathFrame
-from .motion import UNIT_VECTORS, AxisKind, Motion
+from .motion import UNIT_VECTORS, Motion
 
 #: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
 _STRAIGHT = 1e-14
@@ -289,7 +289,7 @@ def distance_equations(path: OpenedPath, variables: Variables, frame: PathFrame)
     joints, j, size = path.joints, cut.joint, frame.size
     centre, found = joints[j].point, []
     for i, joint in enumerate(joints):
-        if i == j or not all(axis.kind is AxisKind.ROTATION and axis.pitch.is_zero() for axis in joint.axes):
+        if i == j or not all(axis.is_hinge for axis in joint.axes):
             continue
         apart = ca.norm_2(centre - joint.point) / size
         if frame.typical_value(apart).item() <= INCIDENT:

@@ -86,20 +86,10 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
     is_cut = centre.behind == path.cut.joint and centre.point is joint.point and joint.type in ("R", "U")
     # The point of the joint at the cut is the same on both sides where the loop is closed: one is shorter.
     place = path.points[centre.behind] if body is None or is_cut else body.point(centre.point)
-    slide = _axis(path, centre.behind) if centre.slides else None
+    axis = joint.axes[-1]
+    slides = centre.slides and axis.kind is not AxisKind.PARALLELOGRAM  # whose point is that of its rods
+    slide = axis.direction(path.screws[centre.behind][-1]) if slides else None
     return [], Member(limb, place, ca.horzcat(SX(6, 0), *screws), ranks.passive, (), slide=slide)
-
-
-def _axis(path: OpenedPath, j: int) -> SX | None:
-    """Return the current unit axis (3, 1) of a joint; None for a parallelogram, whose point is that of its rods."""
-    axis, screw = path.joints[j].axes[-1], path.screws[j][-1]
-    match axis.kind:
-        case AxisKind.ROTATION:
-            return screw[:3]
-        case AxisKind.TRANSLATION:
-            return screw[3:]
-        case _:
-            return None
 
 
 def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Member | None]:
@@ -110,7 +100,7 @@ def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Membe
     if path.rod is not None:
         return [force_along(limb, centre, path.rod)], None
     others = [
-        (axis.kind is AxisKind.ROTATION and bool(axis.pitch.is_zero()), screw)
+        (axis.is_hinge, screw)
         for j, (joint, own) in enumerate(zip(path.joints, path.screws, strict=True))
         if not joint.actuated and j != path.cut.joint
         for axis, screw in zip(joint.axes, own, strict=True)

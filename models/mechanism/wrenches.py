@@ -16,10 +16,11 @@ import numpy as np
 from ..actuation import drive_of
 from ..arrays import FloatArray
 from ..basis import basis_of_member
+from ..rows import RANK_TOLERANCE, rank_of
 from ..wrench import WrenchKind
 from .centre import centre_of, centre_rule
 from .decomposition import MemberGraph, robot_graph
-from .freedoms import RANK_TOLERANCE, Freedoms, rank_of
+from .freedoms import Freedoms
 from .graph import Mechanism, check_mechanism
 
 
