@@ -17,6 +17,7 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene, outline
 from ..parts import PoseSymbols
+from .chain import Limb
 from .generic import PathFrame
 from .network import OpenNetwork
 from .opened import OpenedPath
@@ -34,18 +35,14 @@ class DrawnPath(NamedTuple):
     """A path of a limb to be drawn.
 
     Attributes:
-        limb: name of the limb.
-        number: of the path among those of its limb, from 1.
-        paths: number of paths of its limb.
-        stem: number of joints, as they are written, that all paths of the limb share.
+        limb: the limb.
+        number: index of the path among those of its limb.
         path: the path.
         row: index of its row among those of the limb, where it has one only and the limb has others.
     """
 
-    limb: str
+    limb: Limb
     number: int
-    paths: int
-    stem: int
     path: OpenedPath
     row: int | None
 
@@ -86,13 +83,13 @@ class _Sketch:
             return
         if any((each.start, each.end) == (start.name, end.name) for each in self.links):
             return
-        limb = None if drawn is None or drawn.limb not in self.carrying else drawn.limb
+        limb = None if drawn is None or drawn.limb.name not in self.carrying else drawn.limb.name
         row = None if drawn is None or limb is None else drawn.row
         self.links.append(Link(start.name, end.name, body, limb, kind, row))
 
-    def symbol(self, name: str, joint: PlacedJoint, place: Place, body: Body, limb: str) -> None:
+    def symbol(self, name: str, joint: PlacedJoint, place: Place, body: Body, limb: Limb) -> None:
         """Add the symbol of a joint, unless it has been drawn with another path."""
-        axes, owner = tuple(axis.now for axis in joint.axes), limb if limb in self.carrying else None
+        axes, owner = tuple(axis.now for axis in joint.axes), limb.name if limb.name in self.carrying else None
         self.joints.setdefault(name, JointSymbol(name, joint.kind, place.now, axes, body, owner, joint.is_actuated))
 
     def is_along(self, start: Place, end: Place, axes: Sequence[Place]) -> bool:
@@ -128,7 +125,7 @@ def scene_of(
     """
     sketch = _Sketch(frame, float(frame.typical_value(frame.size).item()), origin, carrying)
     for drawn in paths:
-        _add_path(sketch, drawn, [each for each in paths if each.limb == drawn.limb])
+        _add_path(sketch, drawn, [each for each in paths if each.limb is drawn.limb])
     for network in networks:
         _add_network(sketch, network)
     centre = sketch.node("P", Place(pose.position, origin), Body.PLATFORM)
@@ -140,16 +137,11 @@ def scene_of(
 def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> None:
     """Add a path of a limb, whose paths are ``own``."""
     joints = placed_joints(drawn.path, sketch.frame)
-    stem = drawn.stem if drawn.paths > 1 else 0
+    stem = len(drawn.limb.stem) if len(drawn.limb.branches) > 1 else 0
     previous: _Node | None = None
     for k, joint in enumerate(joints):
-        in_stem = joint.number <= stem
-        name = (
-            f"{drawn.limb}:{joint.number}"
-            if in_stem or drawn.paths == 1
-            else f"{drawn.limb}.{drawn.number}:{joint.number}"
-        )
-        if not in_stem and previous is not None and joints[k - 1].number <= stem:
+        name = drawn.limb.label(drawn.number, joint.number - 1)
+        if joint.number > stem and previous is not None and joints[k - 1].number <= stem:
             previous = _fork(sketch, drawn, own, previous, k)
         previous = _add_joint(sketch, drawn, joints, k, name, previous)
         if k == 0:
@@ -163,7 +155,7 @@ def _fork(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath], stem: _No
     """Return the middle of the first joints of a limb's branches, at the end of a bar from the stem."""
     firsts = [placed_joints(each.path, sketch.frame)[k].foot for each in own]
     middle = sum(firsts, Place(SX.zeros(3), SX.zeros(3))) / len(firsts)
-    fork = sketch.node(f"{drawn.limb}:fork", middle, Body.LIMB)
+    fork = sketch.node(f"{drawn.limb.name}:fork", middle, Body.LIMB)
     sketch.link(stem, fork, drawn._replace(row=None), LinkKind.BAR, Body.LIMB)
     return fork
 

@@ -231,7 +231,7 @@ class _Builder:
         rows, member = resistance(limb.name, path, ranks, limb.centre)
         before = sum(row.limb == limb.name for row in self.wrenches)
         row = before if len(limb.branches) > 1 and len(rows) == 1 else None
-        self.paths.append(DrawnPath(limb.name, index + 1, len(limb.branches), len(limb.stem), path, row))
+        self.paths.append(DrawnPath(limb, index, path, row))
         several, name = len(limb.branches) > 1, limb.member(index)
         self.wrenches += [replace(each, member=name) for each in rows] if several else rows
         self.members += [] if member is None else [replace(member, name=name if several else "")]
