@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
@@ -258,37 +258,42 @@ def _centre(network: OpenNetwork, member: NestedMember) -> SX:
     return sum(places, SX.zeros(3)) * (1 / len(places))
 
 
-@dataclass(frozen=True, eq=False)
-class ResistingNetwork:
-    """Members and actuators of a network.
+@dataclass(eq=False, kw_only=True)
+class ResistingParts:
+    """Members and actuators of limbs, while these are added one after the other.
 
     Attributes:
         members: that resist the platform.
         actuators: all actuated joints.
         positions: of the actuators from home, (1, 1) each.
-        screws: of each member's joints.
-        structure: of each member.
+        screws: of the joints of paths, and of each member of networks.
+        structure: of the same.
     """
 
-    members: list[Member]
-    actuators: list[Actuator]
-    positions: list[SX]
-    screws: list[JointScrews]
-    structure: list[PathStructure]
+    members: list[Member] = field(default_factory=list)
+    actuators: list[Actuator] = field(default_factory=list)
+    positions: list[SX] = field(default_factory=list)
+    screws: list[JointScrews] = field(default_factory=list)
+    structure: list[PathStructure] = field(default_factory=list)
 
 
-def resisting(
-    network: OpenNetwork, frame: PathFrame, symbols: Sequence[SX], points: Sequence[ClosedPoint]
-) -> ResistingNetwork:
-    """Return members and actuators of a network, with ranks measured at closed configurations.
+def add_resisting(
+    found: ResistingParts,
+    network: OpenNetwork,
+    frame: PathFrame,
+    symbols: Sequence[SX],
+    points: Sequence[ClosedPoint],
+) -> None:
+    """Add members and actuators of a network, with ranks measured at closed configurations.
 
     Args:
+        found: to which they are added.
         network: at any pose.
         frame: values that all parts of the robot share.
         symbols: of dimensions, unknowns, rotation and position.
         points: closed configurations.
     """
-    robot, limb, found = frame.robot, network.name, ResistingNetwork([], [], [], [], [])
+    robot, limb = frame.robot, network.name
     actuated = [k for k in network.joints if network.joint(k).actuated]
     screws: dict[int, dict[str, SX]] = {k: {} for k in actuated}
     rate_sizes = {k: robot.size if is_slide(network, k) else SX(1) for k in actuated}
@@ -327,7 +332,6 @@ def resisting(
         twists, factors = ca.horzcat(SX(6, 0), *screws[k].values()), relations[:, column] / rate_sizes[k]
         found.actuators.append(Actuator(name, limb, tuple(screws[k]), twists, axis.dimension, factors))
         found.positions.append(axis.way(network.values[k, 0]))
-    return found
 
 
 def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoint]) -> SX:

@@ -11,16 +11,13 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from ..limbjoints import LimbJoint, LimbLink
-from ..member import Member
 from ..model import Model
 from ..parts import (
     Actuator,
     AssemblySign,
     Closure,
     Dimension,
-    JointScrews,
     Parameter,
-    PathStructure,
     PoseSymbols,
     Unknown,
 )
@@ -45,7 +42,7 @@ from .modelparts import (
 )
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
-from .nested import nested_joints, resisting
+from .nested import ResistingParts, add_resisting, nested_joints
 from .network import OpenNetwork, open_network
 from .opened import OpenedPath, Variables, closures, distance_equations, open_path, slide_length
 from .pictures import DrawnPath, scene_of
@@ -118,26 +115,21 @@ def robot(
 
 
 @dataclass(eq=False)
-class _Builder:
+class _Builder(ResistingParts):
     """The parts of a robot's model while its limbs are added one after the other."""
 
     frame: PathFrame
     wrenches: list[Wrench] = field(default_factory=list)
-    members: list[Member] = field(default_factory=list)
     unknowns: list[Unknown] = field(default_factory=list)
     closure: list[Closure] = field(default_factory=list)
     checks: list[Closure] = field(default_factory=list)
     signs: list[AssemblySign] = field(default_factory=list)
     distances: list[Closure] = field(default_factory=list)
-    actuators: list[Actuator] = field(default_factory=list)
-    positions: list[SX] = field(default_factory=list)
-    screws: list[JointScrews] = field(default_factory=list)
     paths: list[DrawnPath] = field(default_factory=list)
     joints: list[LimbJoint] = field(default_factory=list)
     links: list[tuple[OpenedPath, list[LimbLink]]] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     ranks: dict[tuple[int, int], Ranks] = field(default_factory=dict)
-    structure: list[PathStructure] = field(default_factory=list)
     networks: list[OpenNetwork] = field(default_factory=list)
 
     @property
@@ -306,12 +298,7 @@ def model_of_home(
     loops = examine_loops(frame, closure, builder.unknowns)
     numbers = [at_home.symbols, unknowns, pose.rotation, pose.position]
     for network in builder.networks:
-        found = resisting(network, frame, numbers, loops.points)
-        builder.members += found.members
-        builder.actuators += found.actuators
-        builder.positions += found.positions
-        builder.screws += found.screws
-        builder.structure += found.structure
+        add_resisting(builder, network, frame, numbers, loops.points)
     _check_carrying(builder)
     actuators = with_all_relations(builder.actuators)
     members = [with_kinds(member, actuators, at_home.size, numbers, loops.points) for member in builder.members]

@@ -45,13 +45,6 @@ class Angle(NamedTuple):
         return Angle(-self.sine, self.cosine)
 
 
-class TwoAngles(NamedTuple):
-    """The angles of two rotations that follow each other."""
-
-    first: Angle
-    second: Angle
-
-
 def angle_about(axis: SX, before: SX, after: SX) -> Angle:
     """Return the angle by which a rotation about a unit axis (3, 1) takes one vector (3, 1) to another.
 
@@ -66,7 +59,7 @@ def rotation_angle(axis: SX, rotation: SX) -> Angle:
     return Angle(ca.dot(axis, ca.inv_skew(rotation - rotation.T)), ca.trace(rotation) - 1)
 
 
-def two_angles(axes: tuple[SX, SX], before: SX, after: SX, sign: float) -> TwoAngles:
+def two_angles(axes: tuple[SX, SX], before: SX, after: SX, sign: float) -> tuple[Angle, Angle]:
     """Return the angles q1 and q2 with ``after = R(a1, q1) R(a2, q2) before``.
 
     ``a1 . after = a1 . R(a2, q2) before`` is ``A + B cos q2 + C sin q2`` and has two solutions; at home, where
@@ -87,7 +80,7 @@ def two_angles(axes: tuple[SX, SX], before: SX, after: SX, sign: float) -> TwoAn
     square = B * B + C * C
     sine, cosine = second.sine / square, second.cosine / square
     turned = before + sine * ca.cross(a2, before) + (1 - cosine) * (a2 * ca.dot(a2, before) - before)
-    return TwoAngles(angle_about(a1, turned, after), second)
+    return angle_about(a1, turned, after), second
 
 
 class _Coordinates(NamedTuple):
@@ -186,11 +179,11 @@ class PathJoints:
         sign = self._sign(a1, a2, path.joints[end].point - joint.point)
         if sign == 0:
             return _Coordinates([], "its first axis, its second axis and the rod are in one plane at home")
-        found = two_angles((a1, a2), home / ca.norm_2(home), body.rotation.T @ now / ca.norm_2(now), sign)
+        first, second = two_angles((a1, a2), home / ca.norm_2(home), body.rotation.T @ now / ca.norm_2(now), sign)
         if is_base_side:
-            return _Coordinates([_angle(found.first), _angle(found.second)])
+            return _Coordinates([_angle(first), _angle(second)])
         # From the platform, the rotations come in the other order and have the other sign.
-        return _Coordinates([_angle(found.second.reversed), _angle(found.first.reversed)])
+        return _Coordinates([_angle(second.reversed), _angle(first.reversed)])
 
     def _sign(self, a1: SX, a2: SX, vector: SX) -> float:
         """Return the sign of ``a1 . (a2 x vector)`` at the typical dimensions; 0 where it is not distinct."""

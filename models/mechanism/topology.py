@@ -70,19 +70,17 @@ class Bridges(NamedTuple):
     Attributes:
         bridges: their indices, in the order of the paths.
         is_open: whether the bridges alone are a path: no loop is between the nodes.
-        exists: whether there is a path.
     """
 
     bridges: list[int]
     is_open: bool
-    exists: bool = True
 
 
 def bridges_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> Bridges:
     """Return the edges that every path from one node to another uses."""
     path = path_between(start, end, edges)
     if path is None:
-        return Bridges([], is_open=False, exists=False)
+        return Bridges([], is_open=False)
     bridges = [k for k in path if end not in reached(start, [edge for j, edge in enumerate(edges) if j != k])]
     return Bridges(bridges, is_open=len(bridges) == len(path))
 
