@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import io
 import pickle
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
 from typing import Any, Self, TypeVar
@@ -25,7 +25,7 @@ Value = TypeVar("Value")
 
 
 def expressions_of(value: object) -> list[SX]:
-    """Return all expressions of a value and its parts: of data classes, tuples and mappings."""
+    """Return all expressions of a value and its parts: of data classes, tuples and dicts."""
     if isinstance(value, SX):
         return [value]
     return [expression for part in _parts(value).values() for expression in expressions_of(part)]
@@ -39,7 +39,7 @@ def with_expressions(value: Value, expressions: Iterator[SX]) -> Value:
         found = next(expressions)
     elif isinstance(value, tuple):
         found = tuple.__new__(type(value), parts.values())
-    elif isinstance(value, Mapping):
+    elif isinstance(value, dict):
         found = parts
     elif parts:
         found = replace(found, **parts)
@@ -48,11 +48,11 @@ def with_expressions(value: Value, expressions: Iterator[SX]) -> Value:
 
 
 def _parts(value: object) -> dict[Any, object]:
-    """Return the parts of a value: fields, items of a mapping, or elements of a tuple by their places."""
+    """Return the parts of a value: fields, items of a dict, or elements of a tuple by their places."""
     if isinstance(value, tuple):
         return dict(enumerate(value))
-    if isinstance(value, Mapping):
-        return dict(value)
+    if isinstance(value, dict):
+        return value
     return {each.name: getattr(value, each.name) for each in fields(value)} if is_dataclass(value) else {}
 
 
