@@ -22,14 +22,13 @@ from numpy.typing import NDArray
 from .arrays import FloatArray
 from .member import pseudo_inverse
 from .parts import Dimension, JointScrews
+from .rows import RANK_TOLERANCE, rank_of
 
 if TYPE_CHECKING:
     from .model import Model
 
 Flags: TypeAlias = NDArray[np.bool_]
 
-#: Work rates below this part of those of unit size are zero: a closed loop is known to the root of rounding at worst.
-RANK_TOLERANCE = 1e-7
 #: Rates below this part of the largest are rounding errors of a solution: such an actuator takes no part.
 _TAKES_PART = 1e-6
 
@@ -101,14 +100,14 @@ def drive_of(driven: FloatArray, relations: FloatArray, unit: FloatArray, size: 
     sizes = np.linalg.norm(scaled, axis=1, keepdims=True)
     scaled = np.divide(scaled, sizes, out=np.zeros_like(scaled), where=sizes > 0)
     _, values, right = np.linalg.svd(scaled)
-    kept = right[: int(np.count_nonzero(values > RANK_TOLERANCE))]
+    kept = right[: rank_of(values, 1.0)]
     works = driven * unit
     works = works - (works @ kept.T) @ kept
     left, values, right = np.linalg.svd(works)
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * size))
+    rank = rank_of(values, size)
     inverse = (right[:rank].T / values[:rank]) @ left[:, :rank].T
     _, every, right = np.linalg.svd(np.vstack([works / size, kept]))
-    idle = right[int(np.count_nonzero(every > RANK_TOLERANCE)) :].T
+    idle = right[rank_of(every, 1.0) :].T
     is_zero = np.linalg.norm(driven * unit, axis=0) <= RANK_TOLERANCE * size
     is_zero = is_zero & (np.linalg.norm(kept, axis=0) <= RANK_TOLERANCE)
     return Drive(works, left[:, :rank].T, left[:, rank:].T, idle, is_zero, unit, inverse)
@@ -138,7 +137,7 @@ def with_loops(
         rows = [k for k, row in enumerate(model.frame_rows) if row.member == each.member]
         passive = each.passive
         left, values, right = np.linalg.svd(loops[:, passive])
-        rank = int(np.count_nonzero(values > RANK_TOLERANCE * values.max(initial=0.0)))
+        rank = rank_of(values)
         by_actuators = loops[:, each.driven]
         closing = right[:rank].T @ ((left[:, :rank].T @ by_actuators) / values[:rank, None])
         motions = screws[:, each.driven] - screws[:, passive] @ closing

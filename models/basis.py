@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .actuation import RANK_TOLERANCE, Velocities, limb_drive
+from .actuation import Velocities, limb_drive
 from .arrays import FloatArray, first_largest
 from .model import Model
+from .rows import rank_of
 from .wrench import WrenchKind
 
 #: Components of unit wrenches below this are zero: rounding leaves about 1e-12 of a limb that is nearly singular.
@@ -96,7 +97,7 @@ def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
         return 0
     scaled = np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / length])
     values = np.linalg.svd(scaled, compute_uv=False)
-    return int(np.count_nonzero(values > RANK_TOLERANCE * max(1.0, float(values[0]))))
+    return rank_of(values, max(1.0, float(values[0])))
 
 
 def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:

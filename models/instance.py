@@ -12,8 +12,7 @@ basis of its wrenches; its rows here are all rows of ``P``, which are not indepe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import islice
+from dataclasses import dataclass
 from typing import TypeVar
 
 import casadi as ca
@@ -21,10 +20,11 @@ import numpy as np
 from casadi import SX
 
 from .arrays import FloatArray
-from .limbjoints import LimbJoint, LimbLink, expressions_of
+from .limbjoints import LimbJoint, LimbLink
 from .member import Member, resistance
 from .model import Model
 from .parts import Actuator, Closure, Unknown, rate_relations
+from .whole import expressions_of, with_expressions
 from .wrench import Wrench, WrenchKind
 
 #: A matrix or vector of symbols or of numbers.
@@ -145,38 +145,22 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         length: (1, 1) characteristic length, by which couple rows are multiplied.
         twists: (6, 1) each, angular velocity, then velocity of the platform's point at the world origin.
     """
-    every = (*model.closure, *model.loops, *model.distances)
-    outputs = [
-        ca.horzcat(SX(3, 0), *[row.force for row in model.wrenches]),
-        ca.horzcat(SX(3, 0), *[row.moment for row in model.wrenches]),
-        ca.vertcat(SX(0, 1), *[row.square for row in model.wrenches]),
-        ca.vertcat(SX(0, 1), *[equation.expression for equation in model.closure]),
-        ca.vertcat(SX(0, 1), *[equation.expression for equation in model.loops]),
-        ca.vertcat(SX(0, 1), *[equation.expression for equation in model.distances]),
-        ca.vertcat(SX(0, 1), *[equation.size for equation in every]),
-        ca.vertcat(SX(0, 1), *[each.value for each in model.signs]),
-        *[quantity.values for quantity in model.quantities],
-        *[joint for leg in model.legs for joint in (leg.base, leg.platform)],
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *expressions_of((*model.joints, *model.links)),
-    ]
-    function = ca.Function("model", Substitution.identity(model).all, outputs)
-    force, moment, square, closure, loops, distances, sizes, signs, *others = function.call(substitution.all)
-    sizes = sizes_at(model, every, substitution.reference, sizes)
-    ends = closure.numel(), closure.numel() + loops.numel()
-    following = iter(others)
-    quantities = list(islice(following, len(model.quantities)))
-    joints = list(islice(following, 2 * len(model.legs)))
-    parts = list(islice(following, 2 * len(model.members)))
-    members = [
-        replace(member, centre=centre, screws=screws)
-        for member, centre, screws in zip(model.members, parts[::2], parts[1::2], strict=True)
-    ]
-    actuators = tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators)
-    rows = [
-        replace(row, force=force[:, i], moment=moment[:, i], square=square[i]) for i, row in enumerate(model.wrenches)
-    ]
+    given = (
+        (model.wrenches, model.members, model.actuators, model.closure, model.loops, model.distances),
+        (model.signs, model.quantities, model.joints, model.links),
+        tuple((leg.base, leg.platform) for leg in model.legs),
+    )
+    function = ca.Function("model", Substitution.identity(model).all, expressions_of(given))
+    found, (signs, quantities, joints, links), ends = with_expressions(given, iter(function.call(substitution.all)))
+    rows, members, actuators, *equations = found
+
+    def left_sides(own: Sequence[Closure], replaced: Sequence[Closure]) -> SX:
+        """Return the left sides (k, 1) of equations, of order 1."""
+        sizes = ca.vertcat(SX(0, 1), *[each.size for each in replaced])
+        sides = ca.vertcat(SX(0, 1), *[each.expression for each in replaced])
+        return sides / sizes_at(model, own, substitution.reference, sizes)
+
+    closure, loops, distances = map(left_sides, (model.closure, model.loops, model.distances), equations)
     return RobotInstance(
         parameters=substitution.parameters,
         rotation=substitution.rotation,
@@ -184,23 +168,23 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         jacobian=jacobian(rows, length, members),
         rates=ca.horzcat(*[rates(rows, twist, length, members) for twist in twists]),
         F=ca.vertcat(*[objective(rows, twist, length, members) for twist in twists]),
-        squares=square,
+        squares=ca.vertcat(SX(0, 1), *[row.square for row in rows]),
         magnitude=ca.vertcat(*[magnitude(rows, twist, substitution.position, length, members) for twist in twists]),
-        quantities=tuple(quantities),
+        quantities=tuple(each.values for each in quantities),
         legs=tuple(
             LegInstance(leg.name, base, platform, substitution.position + substitution.rotation @ platform - base)
-            for leg, base, platform in zip(model.legs, joints[::2], joints[1::2], strict=True)
+            for leg, (base, platform) in zip(model.legs, ends, strict=True)
         ),
-        closure=closure / sizes[: ends[0], :],
-        rows=tuple(rows),
+        closure=closure,
+        rows=rows,
         inputs=ca.veccat(*substitution.all, length, *twists),
-        loops=loops / sizes[ends[0] : ends[1], :],
-        distances=distances / sizes[ends[1] :, :],
+        loops=loops,
+        distances=distances,
         driven=driven(rows, actuators, length, members),
         relations=rate_relations(actuators),
-        signs=signs,
-        joints=tuple(each.replaced(following) for each in model.joints),
-        links=tuple(each.replaced(following) for each in model.links),
+        signs=ca.vertcat(SX(0, 1), *[each.value for each in signs]),
+        joints=joints,
+        links=links,
         reference=substitution.reference,
     )
 

@@ -7,9 +7,7 @@ is then given by its sine and cosine.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import casadi as ca
 from casadi import SX
@@ -87,24 +85,6 @@ class LimbJoint:
             self.name != "" and joint in {self.name, f"{path}:{self.name}", f"{self.limb}:{self.name}"}
         )
 
-    @property
-    def expressions(self) -> list[SX]:
-        """All expressions of the joint."""
-        found = [part for each in self.coordinates for part in (each.value, each.cosine) if part is not None]
-        return found if self.cone is None else [*found, self.cone.link, self.cone.home, self.cone.other]
-
-    def replaced(self, expressions: Iterator[SX]) -> Self:
-        """Return the joint with the next expressions of an iterator in the place of its own."""
-        coordinates = [
-            replace(each, value=next(expressions), cosine=None if each.cosine is None else next(expressions))
-            for each in self.coordinates
-        ]
-        cone = self.cone
-        if cone is not None:
-            link, home, other = (next(expressions) for _ in range(3))
-            cone = JointCone(link, home, other, cone.turn)
-        return replace(self, coordinates=tuple(coordinates), cone=cone)
-
 
 @dataclass(frozen=True, eq=False)
 class LimbLink:
@@ -121,18 +101,3 @@ class LimbLink:
     ends: frozenset[str]
     start: SX
     span: SX
-
-    @property
-    def expressions(self) -> list[SX]:
-        """All expressions of the link."""
-        return [self.start, self.span]
-
-    def replaced(self, expressions: Iterator[SX]) -> Self:
-        """Return the link with the next expressions of an iterator in the place of its own."""
-        start, span = next(expressions), next(expressions)
-        return replace(self, start=start, span=span)
-
-
-def expressions_of(parts: Iterable[LimbJoint | LimbLink]) -> list[SX]:
-    """Return all expressions of joints and links, in the order in which ``replaced`` takes them."""
-    return [expression for part in parts for expression in part.expressions]

@@ -8,15 +8,15 @@ determine. A model contains no values, bounds of variables, tasks or solvers; th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 
 import casadi as ca
 from casadi import SX
 
 from .drawing import Scene
-from .limbjoints import LimbJoint, LimbLink, expressions_of
+from .limbjoints import LimbJoint, LimbLink
 from .member import Member
 from .parts import (
     Actuator,
@@ -32,7 +32,7 @@ from .parts import (
     Unknown,
 )
 from .shown import Shown
-from .whole import Whole
+from .whole import Whole, expressions_of
 from .wrench import RowLabel, Wrench, WrenchKind
 
 
@@ -222,33 +222,12 @@ def _check_symbols(model: Model) -> None:
     scalars = ca.vertcat(*[ca.vec(symbol) for symbol in declared])
     if len({scalars[i].element_hash() for i in range(scalars.numel())}) < scalars.numel():
         raise _model_error(model, "a symbol stands for two things")
-    used: Iterable[SX] = [
-        *(part for row in model.wrenches for part in (row.force, row.moment, row.square)),
-        *(
-            part
-            for member in model.members
-            for part in (member.centre, member.screws, member.slide)
-            if part is not None
-        ),
-        *(part for each in model.actuators for part in (each.screws, each.relations)),
-        *(part for each in model.joint_screws for part in (each.all, each.loops)),
-        *(
-            part
-            for equation in (*model.closure, *model.loops, *model.distances)
-            for part in (equation.expression, equation.size)
-        ),
-        *(unknown.size for unknown in model.unknowns),
-        *(each.value for each in model.signs),
-        *(quantity.values for quantity in model.quantities),
-        *(expression for _, expression in model.scene.expressions),
-        *(joint for leg in model.legs for joint in (leg.base, leg.platform)),
-        *expressions_of((*model.joints, *model.links)),
-    ]
+    others = [getattr(model, each.name) for each in fields(model) if each.name not in ("legs", "built")]
+    used = expressions_of((*others, *((leg.base, leg.platform) for leg in model.legs)))
     known = {scalars[i].element_hash() for i in range(scalars.numel())}
     errors = ca.veccat(SX(0), *[error for leg in model.legs for error in (leg.base_error, leg.platform_error)])
     known_if_built = known | {errors[i].element_hash() for i in range(errors.numel())}
-    built = [part for row in model.built for part in (row.force, row.moment, row.square)]
-    for expressions, allowed in ((used, known), (built, known_if_built)):
+    for expressions, allowed in ((used, known), (expressions_of(model.built), known_if_built)):
         stray = sorted({str(s) for s in ca.symvar(ca.veccat(SX(0), *expressions)) if s.element_hash() not in allowed})
         if stray:
             raise _model_error(model, f"symbols are used but not declared: {', '.join(stray)}")

@@ -1,20 +1,24 @@
-"""Independent rows of a matrix that varies, and columns in groups whose spans are independent, from several points."""
+"""Ranks: independent rows of a matrix that varies, and groups of columns with independent spans."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .arrays import FloatArray
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 #: Rows that are left with less than this part of the longest depend on the others: rounding leaves 1e-14.
 DEPENDENT = 1e-8
-#: Singular values of columns of unit length below this are zero.
-_ZERO = 1e-7
+#: Singular values below this part of those of unit size are zero: a closed loop is known to the root of rounding at
+#: worst.
+RANK_TOLERANCE = 1e-7
 #: Products of unit vectors that differ by less than this are the same, and columns depend on each other by more: those
-#: that are independent, with singular values above ``_ZERO``, do so by 1e-16 over the smallest one at most.
+#: that are independent, with singular values above ``RANK_TOLERANCE``, do so by 1e-16 over the smallest one at most.
 _SAME = 1e-9
 
 
@@ -23,6 +27,12 @@ class ColumnGroup(NamedTuple):
 
     columns: tuple[int, ...]
     rank: int
+
+
+def rank_of(values: NDArray[np.floating[Any]], scale: float | None = None) -> int:
+    """Return the number of singular values that are not zero, measured by the largest one or by a given scale."""
+    reference = float(values.max(initial=0.0)) if scale is None else scale
+    return int(np.count_nonzero(values > RANK_TOLERANCE * reference))
 
 
 def independent_rows(jacobians: Sequence[FloatArray]) -> tuple[int, ...]:
@@ -109,7 +119,7 @@ def _fixed_rotations(matrices: Sequence[FloatArray]) -> list[int]:
         own: list[int] = []
         for j in (k, *range(products.shape[1])):
             at = np.ix_([*own, j], [*own, j])
-            if is_same[at].all() and np.linalg.eigvalsh(products[0][at])[0] > _ZERO:
+            if is_same[at].all() and np.linalg.eigvalsh(products[0][at])[0] > RANK_TOLERANCE:
                 own.append(j)
         most = max(most, sorted(own), key=len)
     return most
@@ -117,7 +127,7 @@ def _fixed_rotations(matrices: Sequence[FloatArray]) -> list[int]:
 
 def _rank(columns: FloatArray) -> int:
     """Return the rank of columns of at most unit length."""
-    return int(np.count_nonzero(np.linalg.svd(columns, compute_uv=False) > _ZERO))
+    return rank_of(np.linalg.svd(columns, compute_uv=False), 1.0)
 
 
 def _dependence(columns: FloatArray) -> FloatArray:

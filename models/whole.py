@@ -1,24 +1,59 @@
-"""Values that are pickled and copied as a whole, because symbols connect their parts.
+"""Values that are one whole, because symbols connect their parts: walked, pickled and copied.
 
-A CasADi symbol is known by its identity: two expressions that are pickled one by one lose the symbols that they share,
-and CasADi itself pickles none outside a context that is global to the process. A :class:`Whole` is therefore pickled
-with everything in it at once: all its expressions in one piece, in which shared symbols stay shared, and everything
-else beside it.
+The expressions of a value are those of its parts, in the order of their fields. A CasADi symbol is known by its
+identity: two expressions that are pickled one by one lose the symbols that they share, and CasADi itself pickles none
+outside a context that is global to the process. A :class:`Whole` is therefore pickled with everything in it at once:
+all its expressions in one piece, in which shared symbols stay shared, and everything else beside it.
 """
 
 from __future__ import annotations
 
 import io
 import pickle
-from dataclasses import fields
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from .arrays import FloatArray
+
+Value = TypeVar("Value")
+
+
+def expressions_of(value: object) -> list[SX]:
+    """Return all expressions of a value and its parts: of data classes, tuples and dicts."""
+    if isinstance(value, SX):
+        return [value]
+    return [expression for part in _parts(value).values() for expression in expressions_of(part)]
+
+
+def with_expressions(value: Value, expressions: Iterator[SX]) -> Value:
+    """Return a value with the next expressions of an iterator in the place of those of :func:`expressions_of`."""
+    parts = {key: with_expressions(part, expressions) for key, part in _parts(value).items()}
+    found: Any = value
+    if isinstance(value, SX):
+        found = next(expressions)
+    elif isinstance(value, tuple):
+        found = tuple.__new__(type(value), parts.values())
+    elif isinstance(value, dict):
+        found = parts
+    elif parts:
+        found = replace(found, **parts)
+    same_type: Value = found
+    return same_type
+
+
+def _parts(value: object) -> dict[Any, object]:
+    """Return the parts of a value: fields, items of a dict, or elements of a tuple by their places."""
+    if isinstance(value, tuple):
+        return dict(enumerate(value))
+    if isinstance(value, dict):
+        return value
+    return {each.name: getattr(value, each.name) for each in fields(value)} if is_dataclass(value) else {}
 
 
 class Whole:

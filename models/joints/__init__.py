@@ -2,17 +2,15 @@
 
 The modules in order, each of which imports only those before it: ``expression`` (the small language of a robot's
 numbers), ``motion`` (displacements and screws as symbols), ``forms`` (forms of the values of a robot as it is written),
-``words`` and ``graphwords`` (a robot as it is written, by limbs or by links), ``chain`` (joints and limbs with their
-symbols), ``linkgraph`` (limbs and nested loops among links), ``mechanisms`` (robots in numbers), ``generic`` (ranks at
-random dimensions), ``faults`` (joints that contradict themselves, and almost parallel axes), ``cut`` (the joint at
-which a limb's loop is opened), ``opened`` (the opened limb: current screws and equations), ``distances`` (equations
-that follow), ``modes`` (signs of home's assembly), ``resistance`` (rows and members of a limb), ``angles`` and
-``states`` (joints' coordinates from home), ``segments`` (links), ``loops`` (independent loop equations), ``network``
-(nested loops at any pose), ``nested`` (their members), ``nestedlimb`` (their unknowns, rows and actuators), ``outline``
-(corners of a plate), ``placed`` (joints at any pose), ``networkpictures`` and ``pictures`` (the drawing), ``structure``
-(its numbers for people), ``modelparts`` (measured parts of the model), ``robot`` (the model), ``centres`` (the model
-with errors of joint centres), ``closedform`` (a model without unknowns that follow from the pose in closed form),
-``limbequations``, ``elimination`` and ``replacing`` (unknowns that follow one after the other, of any dimensions).
+``words`` (a robot as it is written), ``chain`` (joints, limbs and links at home), ``mechanisms`` (robots in numbers),
+``generic`` (ranks at random dimensions), ``faults`` (joints that contradict themselves, and almost parallel axes),
+``cut`` (the joint at which a limb's loop is opened), ``opened`` (the opened limb: current screws and equations),
+``modes`` (signs of home's assembly), ``resistance`` (rows and members of a limb), ``states`` (joints' coordinates from
+home, and links), ``loops`` (independent loop equations), ``network`` (nested loops at any pose), ``nested`` (their
+members and actuators), ``placed`` (joints at any pose), ``pictures`` (the drawing), ``modelparts`` (measured and listed
+parts of the model), ``robot`` (the model), ``centres`` (the model with errors of joint centres), ``replacing`` and
+``elimination`` (unknowns that follow one after the other, of any dimensions), ``closedform`` (a model without unknowns
+that follow from the pose in closed form).
 
 The model is imported from ``robot`` itself, or as :func:`screwsynth.models.robot`: what asks for one module here, or
 for the kinds of faults, does not load them all.

@@ -16,17 +16,15 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
 from ..catalog import gallery_names, gallery_tables
 from ..displaced import Centre, DisplacedRobot, error_parameter
 from ..model import Model
-from .chain import HomeRobot, Joint, Limb
+from .chain import Joint, Limb, home_of
 from .forms import RobotError
-from .generic import INCIDENT, are_parallel, sampled_dimensions
-from .graphwords import read_robot
-from .linkgraph import home_of
-from .motion import AxisKind
+from .generic import PathFrame, sampled_dimensions
+from .motion import AxisKind, Motion
 from .robot import joint_labels, model_of_home
+from .words import read_robot
 
 #: Part of the robot's size by which joint centres are off where ranks are measured: small enough for loops to close.
 _OFF = 0.01
@@ -47,7 +45,7 @@ def displaced_robot(model: Model) -> DisplacedRobot:
     if robot.graph is not None:
         raise RobotError("joint", "is one of links and joints, whose centres are not known as those of limbs")
     exact = sampled_dimensions(robot)
-    displaced = _Displaced(robot, exact)
+    displaced = _Displaced(PathFrame(robot, exact, Motion.none()))
     limbs = tuple(displaced.limb(limb) for limb in robot.limbs)
     errors = ca.vertcat(SX(0, 1), *[each.error for each in displaced.centres])
     count = int(errors.numel())
@@ -86,15 +84,14 @@ class _Displaced:
     """Joints with errors of their centres.
 
     Args:
-        robot: at home.
-        samples: (s, d) values of its dimensions.
+        frame: of the robot at home.
 
     Attributes:
         centres: those that have an error so far.
     """
 
-    def __init__(self, robot: HomeRobot, samples: FloatArray) -> None:
-        self._robot, self._samples = robot, samples
+    def __init__(self, frame: PathFrame) -> None:
+        self._frame = frame
         self.centres: list[Centre] = []
         # By identity: paths of a limb share the joints of its stem.
         self._joints: dict[int, Joint] = {}
@@ -121,9 +118,7 @@ class _Displaced:
         groups: list[list[Joint]] = []
         for joint in joints:
             for group in groups:
-                off = ca.norm_2(joint.point - group[0].point) / self._robot.size
-                function = ca.Function("off", [self._robot.symbols], [ca.densify(off)])
-                if all(float(function(each)) < INCIDENT for each in self._samples):
+                if self._frame.coincide(joint.point, group[0].point):
                     group.append(joint)
                     break
             else:
@@ -138,7 +133,7 @@ class _Displaced:
         error = self._new(name)
         first = axes[0]
         turns = all(axis.kind is AxisKind.ROTATION for axis in axes)
-        if turns and all(are_parallel(self._robot, first.axis, axis.axis, self._samples) for axis in axes[1:]):
+        if turns and all(self._frame.are_parallel(first.axis, axis.axis) for axis in axes[1:]):
             return error - first.axis * ca.dot(first.axis, error)
         return error
 

@@ -1,7 +1,8 @@
 """Joints and limbs at home, as expressions of the robot's dimensions.
 
 A limb is one path of joints from base to platform, or several that share the joints of a stem. The copies of a limb
-that is repeated are its rotations about the axis of repetition.
+that is repeated are its rotations about the axis of repetition. A robot of links and joints has limbs where its graph
+has them; other parts of it are left over as networks.
 """
 
 from __future__ import annotations
@@ -15,12 +16,14 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
+from ..mechanism.decomposition import GraphJoint, LimbPaths, Step, decompose
+from ..mechanism.topology import bridges_between, reached
 from ..parts import Dimension
 from ..screws import Displacement, Screw, screw_displacement, unit_vector
 from .expression import ExpressionError, UnknownNameError, evaluate
 from .forms import RobotError, VectorExpression
-from .motion import AxisKind, JointAxis
-from .words import JointWords, LimbWords, RepeatWords, RobotWords
+from .motion import UNIT_VECTORS, AxisKind, JointAxis
+from .words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords
 
 #: Entries of a rotation of repetition this near to -1, -1/2, 0, 1/2 or 1 are these numbers: a turn by 120 degrees then
 #: leaves no entries of rounding error in the expressions.
@@ -78,6 +81,10 @@ class Limb:
         """Return the name of a path, by its index: that of the limb, with a number where there are several."""
         return f"{self.name}.{path + 1}" if len(self.branches) > 1 else self.name
 
+    def label(self, path: int, joint: int) -> str:
+        """Return the label of a joint of a path, such as ``2:3``, or ``2.1:3`` on a branch, by their indices."""
+        return f"{self.name if joint < len(self.stem) else self.member(path)}:{joint + 1}"
+
     @property
     def paths(self) -> list[tuple[Joint, ...]]:
         """Joints of each path from base to platform."""
@@ -103,7 +110,7 @@ class HomeGraph:
         base, platform: names of two of them.
         joints: between them.
         couplings: each as indices of joints, with a factor (1, 1) each; radians and lengths.
-        networks: indices of the joints of each part that no limb has, and the reason, as a clause.
+        networks: indices of the joints of each part that no limb has.
     """
 
     links: tuple[str, ...]
@@ -111,7 +118,7 @@ class HomeGraph:
     platform: str
     joints: tuple[LinkJoint, ...]
     couplings: tuple[tuple[tuple[int, SX], ...], ...]
-    networks: tuple[tuple[tuple[int, ...], str], ...]
+    networks: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,59 +151,27 @@ class HomeRobot:
         return [joint for limb in self.limbs for path in limb.paths for joint in path]
 
 
-def home_robot(words: RobotWords) -> HomeRobot:
-    """Return a robot at home, from its words.
+def home_of(words: RobotWords) -> HomeRobot:
+    """Return a robot at home, given by limbs or by links and joints.
 
     Raises:
-        RobotError: an expression has a fault.
+        RobotError: an expression has a fault, or the graph is no robot.
     """
-    head = home_head(words)
-    limbs = [limb for group, written in enumerate(words.limbs) for limb in _limbs(group, written, head.names)]
-    return head.with_parts(tuple(limbs), None)
-
-
-@dataclass(frozen=True, eq=False)
-class HomeHead:
-    """Dimensions and home of a robot, before its joints.
-
-    Attributes:
-        words: of the robot.
-        names: values of the names that expressions may use, (1, 1) each.
-        symbols: those of the dimensions among them.
-        typical: (d,) typical values of the dimensions.
-        home: (3, 1) origin of the platform frame, length.
-    """
-
-    words: RobotWords
-    names: Mapping[str, SX]
-    symbols: Mapping[str, SX]
-    typical: FloatArray
-    home: SX
-
-    def with_parts(self, limbs: tuple[Limb, ...], graph: HomeGraph | None) -> HomeRobot:
-        """Return the robot with limbs, and with links and joints where it is given by these."""
-        stacked = ca.vertcat(SX(0, 1), *self.symbols.values())
-        lengths = [self.symbols[name] for name, item in self.words.dimensions.items() if item.kind is Dimension.LENGTH]
-        robot = HomeRobot(self.words, stacked, self.typical, self.home, SX(1), limbs, graph)
-        return replace(robot, size=_size(lengths, robot.joints, stacked))
-
-
-def home_head(words: RobotWords) -> HomeHead:
-    """Return dimensions and home of a robot.
-
-    Raises:
-        RobotError: an expression has a fault.
-    """
+    dimensions = words.dimensions.items()
     symbols = {name: SX.sym(name) for name in words.dimensions}
-    typical = [
-        math.radians(item.typical) if item.kind is Dimension.ANGLE else item.typical
-        for item in words.dimensions.values()
-    ]
+    typical = [math.radians(item.typical) if item.kind is Dimension.ANGLE else item.typical for _, item in dimensions]
     names: dict[str, SX] = dict(symbols)
     for name, text in words.derived.items():
         later = [each for each in words.derived if each not in names]
         names[name] = scalar_value(f"derived, {name}", text, names, later)
-    return HomeHead(words, names, symbols, np.array(typical), _vector("home", words.home, names))
+    home, graph = _vector("home", words.home, names), None
+    limbs = [limb for group, written in enumerate(words.limbs) for limb in _limbs(group, written, names)]
+    if words.graph is not None:
+        graph, limbs = _linked(words.graph, names)
+    stacked = ca.vertcat(SX(0, 1), *symbols.values())
+    lengths = [symbols[name] for name, item in dimensions if item.kind is Dimension.LENGTH]
+    robot = HomeRobot(words, stacked, np.array(typical), home, SX(1), tuple(limbs), graph)
+    return replace(robot, size=_size(lengths, robot.joints, stacked))
 
 
 def _size(lengths: Sequence[SX], joints: Sequence[Joint], symbols: SX) -> SX:
@@ -215,16 +190,16 @@ def _size(lengths: Sequence[SX], joints: Sequence[Joint], symbols: SX) -> SX:
 
 def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:
     """Return the copies of a limb."""
-    known = with_points(f"{words.place}, ", words.points, names)
-    stem = tuple(joint_at_home(joint, known) for joint in words.stem)
-    branches = tuple(tuple(joint_at_home(joint, known) for joint in branch) for branch in words.branches) or ((),)
+    known = _with_points(f"{words.place}, ", words.points, names)
+    stem = tuple(_joint_at_home(joint, known) for joint in words.stem)
+    branches = tuple(tuple(_joint_at_home(joint, known) for joint in branch) for branch in words.branches) or ((),)
     centre = None if words.centre is None else _vector(f"{words.place}, centre", words.centre, known)
     first = Limb("", words.place, group, stem, branches, centre, np.eye(3))
     turns = [None] if words.repeat is None else _turns(words.repeat)
     return [_turned(first, name, turn) for name, turn in zip(words.names, turns, strict=True)]
 
 
-def with_points(place: str, points: Mapping[str, VectorExpression], names: Mapping[str, SX]) -> dict[str, SX]:
+def _with_points(place: str, points: Mapping[str, VectorExpression], names: Mapping[str, SX]) -> dict[str, SX]:
     """Return the values of names with those of points, (3, 1) each.
 
     Args:
@@ -276,27 +251,27 @@ def _turned(limb: Limb, name: str, turn: Displacement | None) -> Limb:
     )
 
 
-def joint_at_home(words: JointWords, names: Mapping[str, SX]) -> Joint:
+def _joint_at_home(words: JointWords, names: Mapping[str, SX]) -> Joint:
     """Return a joint at home."""
     point = _vector(f"{words.place}, at", words.at, names)
-    none = SX.zeros(3)
-
-    def axis(kind: AxisKind, direction: SX, pitch: SX | None = None, rod: SX = none) -> JointAxis:
-        return JointAxis(kind, direction, point, words.actuated, SX(0) if pitch is None else pitch, rod)
-
     given = [_direction(f"{words.place}, axis", each, names) for each in words.axes]
+
+    def axis(kind: AxisKind, direction: SX) -> JointAxis:
+        return JointAxis(kind, direction, point, words.actuated)
+
     match words.type:
         case "S":
-            axes = [axis(AxisKind.ROTATION, SX(np.eye(3)[k].tolist())) for k in range(3)]
+            axes = [axis(AxisKind.ROTATION, each) for each in UNIT_VECTORS]
         case "P":
             axes = [axis(AxisKind.TRANSLATION, given[0])]
         case "C":
             axes = [axis(AxisKind.ROTATION, given[0]), axis(AxisKind.TRANSLATION, given[0])]
         case "H":
-            axes = [axis(AxisKind.ROTATION, given[0], scalar_value(f"{words.place}, pitch", words.pitch, names))]
+            pitch = scalar_value(f"{words.place}, pitch", words.pitch, names)
+            axes = [replace(axis(AxisKind.ROTATION, given[0]), pitch=pitch)]
         case "Pa":
             to = _vector(f"{words.place}, to", words.to if words.to is not None else words.at, names)
-            axes = [axis(AxisKind.PARALLELOGRAM, given[0], rod=to - point)]
+            axes = [replace(axis(AxisKind.PARALLELOGRAM, given[0]), rod=to - point)]
         case _:
             axes = [axis(AxisKind.ROTATION, each) for each in given]
     return Joint(words.place, words.type, point, tuple(axes), words.actuated, words.name)
@@ -347,3 +322,76 @@ def _shown(written: str | float) -> str:
     """Return an expression for a message, cut to a length that is read."""
     text = repr(written)
     return text if len(text) <= _LONGEST_SHOWN else f"{text[: _LONGEST_SHOWN - 3]}..."
+
+
+def _linked(words: GraphWords, names: Mapping[str, SX]) -> tuple[HomeGraph, list[Limb]]:
+    """Return links and joints at home, and the limbs that they have."""
+    _check_graph(words)
+    known = _with_points("", words.points, names)
+    joints = tuple(
+        LinkJoint(each.name, *each.between, None if each.joint is None else _joint_at_home(each.joint, known))
+        for each in words.joints
+    )
+    index = {joint.name: k for k, joint in enumerate(joints)}
+    couplings = []
+    for coupling in words.couplings:
+        factors = []
+        for name, text in coupling.factors.items():
+            factors.append((index[name], scalar_value(f"{coupling.place}, {name}", text, known)))
+        for k, factor in factors:
+            if factor.is_zero():
+                raise RobotError(f"{coupling.place}, {joints[k].name}", "is 0; a coupled joint needs another factor")
+        couplings.append(tuple(factors))
+    edges = [
+        GraphJoint(*each.between, each.joint is not None and each.joint.actuated, each.joint is None)
+        for each in words.joints
+    ]
+    found = decompose(words.base, words.platform, edges, [[k for k, _ in each] for each in couplings])
+    if not (found.limbs or found.networks):
+        raise RobotError("platform", "is joined to the base by no joint that moves")
+    networks = tuple(each.joints for each in found.networks)
+    graph = HomeGraph(words.links, words.base, words.platform, joints, tuple(couplings), networks)
+    return graph, [_limb(k, limb, joints) for k, limb in enumerate(found.limbs)]
+
+
+def _check_graph(graph: GraphWords) -> None:
+    """Refuse links that nothing joins to the base, and a platform on an open chain."""
+    edges = [each.between for each in graph.joints]
+    joined = reached(graph.base, edges)
+    for link in graph.links:
+        if link not in joined:
+            raise RobotError(f"links, {link}", "is joined to the base by no joint, directly or through other links")
+    path = bridges_between(graph.base, graph.platform, edges)
+    if path.is_open:
+        names = ", ".join(graph.joints[k].name for k in path.bridges)
+        raise RobotError("platform", f"is at the end of an open chain ({names}); a parallel robot has closed loops")
+
+
+def _limb(number: int, limb: LimbPaths, joints: Sequence[LinkJoint]) -> Limb:
+    """Return a limb of the graph."""
+    stem = _chain(limb.stem, joints)
+    branches = tuple(_chain(branch, joints) for branch in limb.branches)
+    if len(branches) == 1:
+        stem, branches = (*stem, *branches[0]), ((),)
+    return Limb(str(number + 1), f"limb {number + 1}", number, stem, branches, None, np.eye(3))
+
+
+def _chain(steps: Sequence[Step], joints: Sequence[LinkJoint]) -> tuple[Joint, ...]:
+    """Return the joints of a chain from the base's side on."""
+    found = []
+    for step in steps:
+        joint = joints[step.joint].joint
+        if joint is not None:
+            found.append(joint if step.is_outward else _outward(joint))
+    return tuple(found)
+
+
+def _outward(joint: Joint) -> Joint:
+    """Return a joint with its links exchanged: the axes turn over, and the coordinates keep their signs."""
+    if joint.type == "S":
+        return joint
+    if joint.type == "Pa":
+        (axis,) = joint.axes
+        place = joint.point + axis.rod
+        return replace(joint, point=place, axes=(replace(axis, point=place, rod=-axis.rod),))
+    return replace(joint, axes=tuple(replace(axis, axis=-axis.axis) for axis in reversed(joint.axes)))

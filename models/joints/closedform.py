@@ -18,15 +18,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .. import Closure, Dimension, Model, Substitution, Unknown, Wrench
+from .. import Closure, Dimension, Model, Substitution, Unknown
 from ..drawing import Scene
-from ..limbjoints import expressions_of
+from ..whole import expressions_of, with_expressions
+from .elimination import limb_of
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
@@ -38,6 +39,11 @@ _EDGE = 1e-9
 _SEED = 0
 #: Part of the squared sine or cosine of a reach below which an extended square root is continued by its tangent.
 _EXTENDED = 1e-4
+#: Fields of a model whose expressions may depend on its unknowns, but the drawing.
+_REWRITTEN = (
+    "wrenches", "members", "closure", "loops", "distances", "signs", "quantities", "actuators", "joint_screws",
+    "joints", "links",
+)  # fmt: skip
 
 
 class Reach(NamedTuple):
@@ -74,8 +80,10 @@ def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
         extended: whether the expressions have values out of reach too, for searches that pass through it: the square
             root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
     """
-    symbols = [item.symbol for item in model.unknowns]
-    depends = [_depends_on(equation.expression, symbols) for equation in model.closure] if symbols else []
+    depends = [
+        [k for k, each in enumerate(model.unknowns) if ca.depends_on(equation.expression, each.symbol)]
+        for equation in model.closure
+    ]
     found: dict[int, Solved] = {}
     dropped: set[int] = set()
     reaches: list[Reach] = []
@@ -87,22 +95,12 @@ def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
             if solved is not None:
                 found[k] = solved
                 dropped.add(e)
-                reaches.append(Reach(_limb_of(equation.name), solved.reach))
+                reaches.append(Reach(limb_of(equation.name), solved.reach))
                 break
     if not found:
         return ClosedForm(model, ())
     kept = tuple(each for e, each in enumerate(model.closure) if e not in dropped)
     return ClosedForm(_rewritten(model, found, kept), tuple(reaches))
-
-
-def _limb_of(equation: str) -> str:
-    """Return the limb of a loop equation, such as ``1`` of ``loop 1.2 (1)``."""
-    return equation.removeprefix("loop ").partition(" ")[0].partition(".")[0]
-
-
-def _depends_on(expression: SX, symbols: Sequence[SX]) -> list[int]:
-    """Return the indices of the symbols that an expression depends on."""
-    return [k for k, each in enumerate(symbols) if ca.depends_on(expression, each)]
 
 
 def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:
@@ -125,7 +123,7 @@ def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -
         D, square = -middle, A * A + B * B
         root = sign * _root(square - D * D, square, extended)
         cosine, sine = (A * D + B * root) / square, (B * D - A * root) / square
-        return Solved(2 * ca.atan(sine / (1 + cosine)), sine, cosine, 1 - D * D / square)
+        return Solved.angle(sine, cosine, 1 - D * D / square)
     c0, c1, twice = _at_zero(expression, q, [q, (q, q)])
     c2 = twice / 2
     if _is_same(model, c2, SX(0)) or not _is_same(model, expression, c0 + c1 * q + c2 * q * q):
@@ -163,22 +161,16 @@ def _at_zero(expression: SX, unknowns: SX, by: Sequence[SX | tuple[SX, SX]]) -> 
     return list(function.call([SX.zeros(unknowns.numel()), rest]))
 
 
-def _symbols(model: Model) -> list[SX]:
-    """Return the symbols of a model: parameters, unknowns, rotation, position."""
-    own = Substitution.identity(model)
-    return [own.parameters, own.unknowns, own.rotation, own.position]
-
-
 def _slope_at_home(model: Model, expression: SX) -> float:
     """Return the value of an expression at home, with typical dimensions."""
     typical = [value for item in model.parameters for value in item.typical]
-    function = ca.Function("home", _symbols(model), [ca.densify(expression)])
+    function = ca.Function("home", Substitution.identity(model).all, [ca.densify(expression)])
     return float(function(np.array(typical), 0, np.eye(3), np.array(model.home)))
 
 
 def _is_same(model: Model, one: SX, other: SX) -> bool:
     """Return whether two expressions agree at random values of all symbols."""
-    symbols = _symbols(model)
+    symbols = Substitution.identity(model).all
     function = ca.Function("two", symbols, [ca.densify(one), ca.densify(other)])
     rng = np.random.default_rng(_SEED)
     typical = np.array([value for item in model.parameters for value in item.typical])
@@ -200,46 +192,10 @@ def _rewritten(model: Model, solved: dict[int, Solved], closure: tuple[Closure, 
         solved: by the index of the unknown.
         closure: equations that are left.
     """
-    outputs = [
-        *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
-        *[each.expression for each in (*closure, *model.loops, *model.distances)],
-        *[part for each in model.actuators for part in (each.screws, each.relations)],
-        *[each.value for each in model.signs],
-        *[quantity.values for quantity in model.quantities],
-        *[part for member in model.members for part in (member.centre, member.screws)],
-        *[part for each in model.joint_screws for part in (each.all, each.loops)],
-        *expressions_of((*model.joints, *model.links)),
-    ]
-    following = iter(with_replaced(_symbols(model), outputs, 1, solved))
-
-    def equations(given: Sequence[Closure]) -> tuple[Closure, ...]:
-        return tuple(replace(each, expression=next(following)) for each in given)
-
-    def row(each: Wrench) -> Wrench:
-        force, moment, square = (next(following) for _ in range(3))
-        return replace(each, force=force, moment=moment, square=square)
-
-    # The order of the calls is that of the expressions.
-    wrenches = tuple(row(each) for each in model.wrenches)
-    kept, loops, distances = equations(closure), equations(model.loops), equations(model.distances)
-    actuators = tuple(replace(each, screws=next(following), relations=next(following)) for each in model.actuators)
-    signs = tuple(replace(each, value=next(following)) for each in model.signs)
-    quantities = tuple(replace(each, values=next(following)) for each in model.quantities)
-    members = tuple(replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members)
-    screws = tuple(replace(each, all=next(following), loops=next(following)) for each in model.joint_screws)
-    return replace(
-        model,
-        wrenches=wrenches,
-        closure=kept,
-        loops=loops,
-        distances=distances,
-        actuators=actuators,
-        signs=signs,
-        quantities=quantities,
-        members=members,
-        joint_screws=screws,
-        joints=tuple(each.replaced(following) for each in model.joints),
-        links=tuple(each.replaced(following) for each in model.links),
-        unknowns=tuple(each for k, each in enumerate(model.unknowns) if k not in solved),
-        scene=Scene(),
-    )
+    given: dict[str, Any] = {name: getattr(model, name) for name in _REWRITTEN} | {
+        "closure": closure,
+        "members": tuple(replace(each, slide=None) for each in model.members),
+    }
+    expressions = with_replaced(Substitution.identity(model).all, expressions_of(given), 1, solved)
+    unknowns = tuple(each for k, each in enumerate(model.unknowns) if k not in solved)
+    return replace(model, **with_expressions(given, iter(expressions)), unknowns=unknowns, scene=Scene())

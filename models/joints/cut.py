@@ -11,13 +11,11 @@ import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
-from .chain import HomeRobot, Joint
-from .generic import are_parallel, meeting_point
-from .motion import AxisKind, JointAxis
+from .chain import Joint
+from .generic import PathFrame, meeting_point
+from .motion import UNIT_VECTORS, AxisKind, JointAxis
 
 
 class Cut(NamedTuple):
@@ -39,7 +37,7 @@ class Cut(NamedTuple):
     slide: int | None = None
 
 
-def simplified(robot: HomeRobot, joints: Sequence[Joint], samples: FloatArray) -> list[Joint]:
+def simplified(frame: PathFrame, joints: Sequence[Joint]) -> list[Joint]:
     """Return joints with three passive rotations through one point as a spherical joint, and two as a universal one.
 
     Rotations count where they follow each other, and where no two that follow each other are parallel.
@@ -50,7 +48,7 @@ def simplified(robot: HomeRobot, joints: Sequence[Joint], samples: FloatArray) -
         while end > 0:
             start = _window(found, end, count)
             if start is not None and end - start > 1:
-                point = _common_point(robot, [axis for each in found[start:end] for axis in each.axes], samples)
+                point = _common_point(frame, [axis for each in found[start:end] for axis in each.axes])
                 if point is not None:
                     found[start:end] = [_merged(found[start:end], kind, point)]
                     end = start
@@ -70,20 +68,16 @@ def _window(joints: Sequence[Joint], end: int, count: int) -> int | None:
     return start if left == 0 else None
 
 
-def _common_point(robot: HomeRobot, axes: Sequence[JointAxis], samples: FloatArray) -> SX | None:
-    pairs = itertools.pairwise(axes)
-    if any(are_parallel(robot, one.axis, other.axis, samples) for one, other in pairs):
+def _common_point(frame: PathFrame, axes: Sequence[JointAxis]) -> SX | None:
+    if any(frame.are_parallel(one.axis, other.axis) for one, other in itertools.pairwise(axes)):
         return None
-    return meeting_point(robot, [(axis.point, axis.axis) for axis in axes], samples)
+    return meeting_point(frame, [(axis.point, axis.axis) for axis in axes])
 
 
 def _merged(joints: Sequence[Joint], kind: str, point: SX) -> Joint:
     axes = tuple(axis for joint in joints for axis in joint.axes)
     if kind == "S":
-        basis = (SX(np.eye(3)[k].tolist()) for k in range(3))
-        axes = tuple(
-            JointAxis(AxisKind.ROTATION, each, point, actuated=False, pitch=SX(0), rod=SX.zeros(3)) for each in basis
-        )
+        axes = tuple(JointAxis(AxisKind.ROTATION, each, point) for each in UNIT_VECTORS)
     parts = tuple(part for joint in joints for part in joint.parts or (joint,))
     return Joint(joints[0].place, kind, point, axes, actuated=False, parts=parts)
 

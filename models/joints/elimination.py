@@ -17,7 +17,8 @@ the edge of reach too; a search excludes what is beyond by ``v >= 0``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -27,7 +28,6 @@ import numpy as np
 from casadi import SX
 
 from .. import Dimension, FloatArray, Model, Substitution, Unknown
-from .limbequations import Equation, axes_of, gaps_of, limb_of
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
@@ -40,6 +40,8 @@ _EDGE = 1e-6
 _SEED = 0
 #: Number of results that are kept: a certificate needs those of one robot several times.
 _CACHED = 16
+#: Name of one of the equations of a path's loop.
+_LOOP = re.compile(r"(?:loop|distance) (\S+) \((\d+)\)")
 
 
 class Root(NamedTuple):
@@ -206,7 +208,7 @@ def _from_gap(work: _Elimination, k: int, gap: Equation) -> bool:
     if not work.is_zero(same) or not _is_positive(work, ca.sumsqr(a)):
         return False
     cosine, sine = -ca.dot(a, c) / ca.sumsqr(a), -ca.dot(b, c) / ca.sumsqr(b)
-    work.add(k, Solved(_angle(sine, cosine), sine, cosine, SX(0)))
+    work.add(k, Solved.angle(sine, cosine, SX(0)))
     return True
 
 
@@ -240,7 +242,7 @@ def _angle_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple
     reach = square - C * C
     root = sign * ca.sqrt(ca.fmax(reach, 0))
     cosine, sine = (B * root - A * C) / square, (-B * C - A * root) / square
-    return Solved(_angle(sine, cosine), sine, cosine, SX(0)), reach
+    return Solved.angle(sine, cosine, SX(0)), reach
 
 
 def _slide_of(work: _Elimination, unknown: Unknown, e: SX, sign: float) -> tuple[Solved | None, SX]:
@@ -288,11 +290,6 @@ def _harmonics(work: _Elimination, e: SX, q: SX) -> tuple[SX, SX, SX]:
     return a, b, c
 
 
-def _angle(sine: SX, cosine: SX) -> SX:
-    """Return the angle (1, 1) of a sine and cosine, without a value at half a turn."""
-    return 2 * ca.atan(sine / (1 + cosine))
-
-
 def _is_positive(work: _Elimination, value: SX) -> bool:
     """Return whether a coefficient (1, 1) of order 1 is positive at home."""
     return bool(float(work.values(value)[0, 0]) > _EDGE)
@@ -314,3 +311,50 @@ def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]
         values = typical * (1 + _SPREAD * rng.uniform(-1, 1, typical.shape))
         points.append([values, unknowns, turn, home + _SPREAD * size * rng.uniform(-1, 1, 3)])
     return points
+
+
+class Equation(NamedTuple):
+    """Left sides of equations (k, 1), the length or number by which they are of order 1, and the name of one.
+
+    ``limb`` is the limb whose joints they close; empty for none.
+    """
+
+    expression: SX
+    size: SX
+    limb: str
+    name: str = ""
+
+
+def gaps_of(model: Model) -> dict[str, Equation]:
+    """Return the gap (3, 1) of each path that is opened at the centre of a joint, by the path's name.
+
+    Any three equations of a path would do, as its gap is read off by its form alone: others have another one.
+    """
+    parts: dict[str, dict[int, Equation]] = {}
+    for each in (*model.loops, *model.closure):
+        match = _LOOP.match(each.name)
+        if match is not None:
+            parts.setdefault(match[1], {}).setdefault(
+                int(match[2]), Equation(each.expression, each.size, limb_of(each.name))
+            )
+    first = {name: [own[k] for k in (1, 2, 3) if k in own] for name, own in parts.items()}
+    return {
+        name: Equation(ca.vertcat(*[each.expression for each in own]), own[0].size, own[0].limb)
+        for name, own in first.items()
+        if len(own) == 3
+    }
+
+
+def limb_of(name: str) -> str:
+    """Return the limb of an equation from its name, such as 1 of ``loop 1.2 (3)``; empty where it has another form."""
+    match = _LOOP.match(name)
+    return "" if match is None else match[1].partition(".")[0]
+
+
+def axes_of(model: Model, name: str) -> Iterator[SX]:
+    """Yield the current direction (3, 1) of each rotation of a path's limb."""
+    for each in model.joint_screws:
+        if each.limb == name.partition(".")[0] and not each.is_nested:
+            for k in range(each.all.shape[1]):
+                if not each.all[:3, k].is_zero():
+                    yield each.all[:3, k]

@@ -14,10 +14,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
 from .chain import HomeRobot, Joint, Limb
 from .forms import RobotError
-from .generic import INCIDENT
+from .generic import INCIDENT, PathFrame
 from .motion import AxisKind
 
 #: Axes are almost parallel, or almost meet, where the sine of their angle, or their distance in parts of the robot's
@@ -41,16 +40,13 @@ class _Pair(NamedTuple):
     remark: str = ""
 
 
-def examine_geometry(robot: HomeRobot, samples: FloatArray) -> list[str]:
+def examine_geometry(frame: PathFrame) -> list[str]:
     """Return remarks on axes that are almost parallel or almost meet; refuse joints that contradict themselves.
-
-    Args:
-        robot: the robot at home.
-        samples: (s, d) dimensions.
 
     Raises:
         RobotError: the axes of a universal joint are parallel, a parallelogram is flat, or a rod has no length.
     """
+    robot = frame.robot
     groups: dict[int, Limb] = {}
     for limb in robot.limbs:
         groups.setdefault(limb.group, limb)
@@ -62,8 +58,8 @@ def examine_geometry(robot: HomeRobot, samples: FloatArray) -> list[str]:
         pairs += _joint_faults(robot, (joint,))
     remarks: list[str] = []
     if pairs:
-        function = ca.Function("pairs", [robot.symbols], [ca.densify(ca.vertcat(*[each.measure for each in pairs]))])
-        values = np.abs([function(sample).full().ravel() for sample in (robot.typical, *samples)])
+        measures = ca.vertcat(*[each.measure for each in pairs])
+        values = np.abs(np.vstack([frame.typical_value(measures).T, frame.sampled(measures)]))
         for pair, largest in zip(pairs, values.max(axis=0), strict=True):
             if pair.fault and largest < INCIDENT:
                 raise RobotError(pair.place, pair.fault)

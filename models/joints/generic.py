@@ -12,6 +12,7 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
+from ..rows import rank_of
 from .chain import HomeRobot, Joint
 from .forms import RobotError
 from .motion import AxisKind, Motion
@@ -21,9 +22,6 @@ SAMPLES = 6
 #: Part of a typical dimension by which the samples vary; halved while a sample has no finite value.
 _SPREAD = 0.2
 _HALVINGS = 8
-#: Singular values below this part of the largest, of columns of unit length, are zero: rounding leaves 1e-15, and a
-#: limb that is this near to a lower rank at every one of several random points has it.
-RANK_TOLERANCE = 1e-7
 #: Columns shorter than this part of the longest are zero, as the velocity of a rod's end by its spin is: rounding
 #: leaves 1e-16, and a slide's column is as short as the robot is large.
 _ZERO_COLUMN = 1e-12
@@ -38,13 +36,14 @@ def sampled_dimensions(robot: HomeRobot) -> FloatArray:
         RobotError: the home has no finite value at the typical dimensions.
     """
     joints = robot.joints
-    parts = [part for joint in joints for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)]
-    outputs = ca.densify(ca.veccat(robot.home, *parts))
-    function = ca.Function("home", [robot.symbols], [outputs])
-    for joint in joints:
-        own = ca.veccat(*[part for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)])
+    parts = [
+        ca.veccat(*[part for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)])
+        for joint in joints
+    ]
+    for joint, own in zip(joints, parts, strict=True):
         if not np.isfinite(ca.Function("joint", [robot.symbols], [ca.densify(own)])(robot.typical).full()).all():
             raise RobotError(joint.place, "has no finite place or axis at the typical dimensions")
+    function = ca.Function("home", [robot.symbols], [ca.densify(ca.veccat(robot.home, *parts))])
     if not np.isfinite(function(robot.typical).full()).all():
         raise RobotError("home", "has no finite value at the typical dimensions")
     rng = np.random.default_rng(0)
@@ -62,6 +61,47 @@ def sampled_dimensions(robot: HomeRobot) -> FloatArray:
             row = robot.typical
         rows.append(row)
     return np.array(rows)
+
+
+class PathFrame:
+    """What all paths of a robot share: the robot at home, the platform's displacement, and numbers of its dimensions.
+
+    Args:
+        robot: at home.
+        samples: (s, d) values of its dimensions around the typical ones.
+        platform: displacement of the platform from home.
+    """
+
+    def __init__(self, robot: HomeRobot, samples: FloatArray, platform: Motion) -> None:
+        self.robot, self.samples, self.platform, self.size = robot, samples, platform, robot.size
+
+    def typical_value(self, expression: SX) -> FloatArray:
+        """Return the typical value of an expression of the dimensions, as an array of its shape."""
+        found = ca.Function("typical", [self.robot.symbols], [ca.densify(expression)])(self.robot.typical)
+        return np.asarray(found.full(), dtype=np.float64)
+
+    def value_at_home(self, expression: SX, unknowns: SX) -> float:
+        """Return the value of a scalar expression at home with typical dimensions, where the unknowns (u, 1) are 0."""
+        place, symbols = self.platform, [self.robot.symbols, unknowns, self.platform.rotation, self.platform.image]
+        function = ca.Function("home", symbols, [ca.densify(expression)])
+        return float(function(self.robot.typical, 0, np.eye(3), self.typical_value(place.origin)))
+
+    def sampled(self, expression: SX) -> FloatArray:
+        """Return the values (s, k) of an expression (k, 1) of the dimensions at all samples."""
+        function = ca.Function("sampled", [self.robot.symbols], [ca.densify(expression)])
+        return np.array([function(each).full().ravel() for each in self.samples])
+
+    def is_zero(self, expression: SX) -> bool:
+        """Return whether an expression (k, 1) of the dimensions, of order 1, is zero for all of them."""
+        return bool(np.all(np.abs(self.sampled(expression)) < INCIDENT))
+
+    def coincide(self, one: SX, other: SX) -> bool:
+        """Return whether two places (3, 1) at home are one for all dimensions."""
+        return self.is_zero(ca.norm_2(one - other) / self.size)
+
+    def are_parallel(self, one: SX, other: SX) -> bool:
+        """Return whether two unit vectors (3, 1) at home are parallel for all dimensions."""
+        return self.is_zero(ca.norm_2(ca.cross(one, other)))
 
 
 def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
@@ -82,15 +122,14 @@ def free_screws(joints: Sequence[Joint], values: SX) -> list[list[SX]]:
     return found
 
 
-def rank_of(columns: FloatArray) -> int:
-    """Return the rank of columns, each taken with unit length."""
+def _rank(columns: FloatArray) -> int:
+    """Return the rank of columns, each taken with unit length.
+
+    Rounding leaves 1e-15, and a limb that is near to a lower rank at every one of several random points has it.
+    """
     lengths = np.linalg.norm(columns, axis=0)
     nonzero = lengths > _ZERO_COLUMN * lengths.max(initial=0.0)
-    unit = columns[:, nonzero] / lengths[nonzero]
-    if not unit.size:
-        return 0
-    values = np.linalg.svd(unit, compute_uv=False)
-    return int(np.count_nonzero(values > RANK_TOLERANCE * values[0]))
+    return rank_of(np.linalg.svd(columns[:, nonzero] / lengths[nonzero], compute_uv=False))
 
 
 def random_values(joints: Sequence[Joint], size: float, seed: int) -> FloatArray:
@@ -101,50 +140,40 @@ def random_values(joints: Sequence[Joint], size: float, seed: int) -> FloatArray
     return np.asarray(unit * rng.uniform(-0.7, 0.7, len(axes)))
 
 
-def generic_rank(robot: HomeRobot, joints: Sequence[Joint], columns: SX, values: SX, samples: FloatArray) -> int:
+def generic_rank(frame: PathFrame, joints: Sequence[Joint], columns: SX, values: SX) -> int:
     """Return the largest rank of columns of a limb's screws at random dimensions and joint variables.
 
     Args:
-        robot: the robot.
+        frame: values that all paths of the robot share.
         joints: of the limb.
         columns: (k, n) expressions of the dimensions and of the values.
         values: (v, 1) symbols of the joints' variables.
-        samples: (s, d) dimensions.
     """
     if columns.shape[1] == 0:
         return 0
-    function = ca.Function("columns", [robot.symbols, values], [ca.densify(columns)])
-    size = ca.Function("size", [robot.symbols], [robot.size])
+    function = ca.Function("columns", [frame.robot.symbols, values], [ca.densify(columns)])
     ranks = []
-    for k, sample in enumerate(samples):
-        reach = float(size(sample))
+    for k, (sample, size) in enumerate(zip(frame.samples, frame.sampled(frame.size), strict=True)):
+        reach = float(size[0])
         found = function(sample, random_values(joints, reach, k)).full()
         if found.shape[0] == 6:
             found[3:] /= reach
-        ranks.append(rank_of(found))
+        ranks.append(_rank(found))
     return max(ranks)
 
 
-def are_parallel(robot: HomeRobot, one: SX, other: SX, samples: FloatArray) -> bool:
-    """Return whether two unit vectors (3, 1) are parallel for all dimensions."""
-    function = ca.Function("parallel", [robot.symbols], [ca.norm_2(ca.cross(one, other))])
-    return all(float(function(sample)) < INCIDENT for sample in samples)
-
-
-def meeting_point(robot: HomeRobot, lines: Sequence[tuple[SX, SX]], samples: FloatArray) -> SX | None:
+def meeting_point(frame: PathFrame, lines: Sequence[tuple[SX, SX]]) -> SX | None:
     """Return the point (3, 1) through which lines pass for all dimensions; None where they do not meet in one point.
 
     Args:
-        robot: the robot.
+        frame: values that all paths of the robot share.
         lines: two or more, each a point (3, 1) and a unit direction (3, 1); the first two must not be parallel.
-        samples: (s, d) dimensions.
     """
     (p1, a1), (p2, a2), *_ = lines
     normal = ca.cross(a1, a2)
     met = p1 + a1 * (ca.dot(ca.cross(p2 - p1, a2), normal) / ca.sumsqr(normal))
     for candidate in (p1, p2, met):
-        off = ca.vertcat(*[ca.cross(candidate - point, direction) for point, direction in lines]) / robot.size
-        function = ca.Function("meeting", [robot.symbols], [ca.densify(off)])
-        if all(np.abs(function(sample).full()).max() < INCIDENT for sample in samples):
+        off = ca.vertcat(*[ca.cross(candidate - point, direction) for point, direction in lines]) / frame.size
+        if frame.is_zero(off):
             return candidate
     return None

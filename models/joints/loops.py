@@ -19,6 +19,7 @@ from ..rotation import matrix_from_cayley
 from ..rows import DEPENDENT, independent_rows
 from .chain import HomeRobot
 from .forms import RobotError
+from .generic import PathFrame
 
 #: Closed configurations that are tried; the largest rank among them counts.
 _POINTS = 5
@@ -34,15 +35,15 @@ class ClosedPoint(NamedTuple):
 
     Attributes:
         dimensions: (d,) values.
+        unknowns: (u,) values.
         rotation: (3, 3) of the platform.
         position: (3,) of the platform's origin, length.
-        unknowns: (u,) values.
     """
 
     dimensions: FloatArray
+    unknowns: FloatArray
     rotation: FloatArray
     position: FloatArray
-    unknowns: FloatArray
 
 
 class Loops(NamedTuple):
@@ -52,35 +53,25 @@ class Loops(NamedTuple):
     independent: tuple[int, ...]
 
 
-class PoseOf(NamedTuple):
-    """Symbols of the platform's pose in the equations: rotation (3, 3), and position (3, 1), length."""
-
-    rotation: SX
-    position: SX
-
-
-def examine_loops(
-    robot: HomeRobot, equations: Sequence[Closure], pose: PoseOf, unknowns: Sequence[Unknown], samples: FloatArray
-) -> Loops:
+def examine_loops(frame: PathFrame, equations: Sequence[Closure], unknowns: Sequence[Unknown]) -> Loops:
     """Return closed configurations near home, and which of the loop equations are independent there.
 
     Args:
-        robot: the robot.
+        frame: values that all paths of the robot share.
         equations: of dimensions, pose and unknowns.
-        pose: symbols of the pose.
         unknowns: their symbols, and the sizes by which they become numbers of order 1.
-        samples: (s, d) random dimensions.
 
     Raises:
         RobotError: no closed configuration was found near home.
     """
+    robot, pose = frame.robot, frame.platform
     c, shift = SX.sym("c", 3), SX.sym("shift", 3)
     own, scaled = (ca.vertcat(SX(0, 1), *[item.symbol for item in unknowns]), SX.sym("scaled", len(unknowns)))
     sizes = ca.vertcat(SX(0, 1), *[item.size for item in unknowns])
     moving = ca.vertcat(c, shift, scaled)
     rotation, position = matrix_from_cayley(c), robot.home + robot.size * shift
     stacked = ca.vertcat(SX(0, 1), *[each.scaled for each in equations])
-    (residual,) = ca.Function("closure", [robot.symbols, own, pose.rotation, pose.position], [stacked]).call(
+    (residual,) = ca.Function("closure", [robot.symbols, own, pose.rotation, pose.image], [stacked]).call(
         [robot.symbols, scaled * sizes, rotation, position]
     )
     slopes = _slopes(residual, moving, robot)
@@ -92,14 +83,14 @@ def examine_loops(
     rng = np.random.default_rng(1)
     free = moving.numel()
     for change in _CHANGES:
-        for sample in samples:
+        for sample in frame.samples:
             if len(points) >= _POINTS:
                 break
             z = change * rng.uniform(-1.0, 1.0, free)
             found = _closed(function, z, sample)
             if found is not None:
                 R, p, values = (each.full() for each in placed(found, sample))
-                points.append(ClosedPoint(sample, R, p.ravel(), values.ravel()))
+                points.append(ClosedPoint(sample, values.ravel(), R, p.ravel()))
                 jacobians.append(function(found, sample)[1].full())
     if not points:
         raise RobotError("", "its loops could not be closed at any configuration near home: is it movable?")

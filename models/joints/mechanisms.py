@@ -17,9 +17,8 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..mechanism.graph import Coupling, ElementaryKind, Mechanism, MechanismError, MechanismJoint, MechanismLink
 from ..parts import Dimension
-from .chain import HomeGraph, HomeRobot, Joint
-from .graphwords import read_robot
-from .linkgraph import home_of
+from .chain import HomeGraph, HomeRobot, Joint, home_of
+from .words import read_robot
 
 #: Distance of a parallelogram's rods from its middle line, in parts of their length.
 _APART = 0.1
@@ -56,8 +55,7 @@ def mechanism_at_home(robot: HomeRobot, dimensions: Mapping[str, float] | None =
         for number, path in enumerate(limb.paths):
             at = "base"
             for j, joint in enumerate(path):
-                branch = f".{number + 1}" if j >= len(limb.stem) and len(limb.branches) > 1 else ""
-                label = f"{limb.name}{branch}:{j + 1}"
+                label = limb.label(number, j)
                 is_last = j == len(path) - 1
                 target = "platform" if is_last else known.get(id(joint), f"link {label}")
                 if id(joint) not in known:

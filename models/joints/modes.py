@@ -20,9 +20,9 @@ import casadi as ca
 from casadi import SX
 
 from ..parts import AssemblySign, Unknown
-from .generic import INCIDENT
+from .generic import PathFrame
 from .motion import AxisKind
-from .opened import OpenedPath, PathFrame
+from .opened import OpenedPath
 
 #: Part of its largest possible size below which a mode's sign at home is zero: home is singular. Rounding leaves 1e-16.
 _SINGULAR = 1e-6
@@ -89,5 +89,4 @@ def _normal(path: OpenedPath, frame: PathFrame) -> SX | None:
     first = turning[0][0].axis
     values = [ca.norm_2(ca.cross(first, axis.axis)) for axis, _ in turning[1:]]
     values += [ca.dot(first, axis.axis) for axis in across]
-    is_flat = all(abs(each) <= INCIDENT for value in values for each in frame.sampled(value))
-    return turning[0][1][:3] if is_flat else None
+    return turning[0][1][:3] if all(map(frame.is_zero, values)) else None

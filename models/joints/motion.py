@@ -7,11 +7,16 @@ the robot is described.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
+
+from ..parts import Dimension
+
+#: Unit vectors (3, 1) along x, y and z.
+UNIT_VECTORS = (SX([1, 0, 0]), SX([0, 1, 0]), SX([0, 0, 1]))
 
 
 class Motion(NamedTuple):
@@ -75,9 +80,14 @@ class JointAxis:
     kind: AxisKind
     axis: SX
     point: SX
-    actuated: bool
-    pitch: SX
-    rod: SX
+    actuated: bool = False
+    pitch: SX = field(default_factory=lambda: SX(0))
+    rod: SX = field(default_factory=lambda: SX.zeros(3))
+
+    @property
+    def dimension(self) -> Dimension:
+        """Dimension of its way from home: angle, or length of a slide or a parallelogram."""
+        return Dimension.ANGLE if self.kind is AxisKind.ROTATION else Dimension.LENGTH
 
     def motion(self, value: SX) -> Motion:
         """Return the displacement at a value of the variable: an angle in radians, or a length."""
@@ -111,6 +121,15 @@ class JointAxis:
             return ca.vertcat(SX.zeros(3), at.rotation @ velocity)
         direction = at.rotation @ self.axis
         return ca.vertcat(direction, ca.cross(at.point(self.point), direction) + self.pitch * direction)
+
+    def direction(self, screw: SX) -> SX:
+        """Return its current direction (3, 1) from its current screw (6, 1): that of the motion for a parallelogram."""
+        return screw[:3] if self.kind is AxisKind.ROTATION else screw[3:]
+
+    @property
+    def is_hinge(self) -> bool:
+        """Whether it is a rotation without a pitch."""
+        return self.kind is AxisKind.ROTATION and bool(self.pitch.is_zero())
 
 
 def rotation_about(axis: SX, angle: SX) -> SX:

@@ -1,4 +1,4 @@
-"""Members of a network: screws of the platform that nested loops and coupled joints allow, as expressions.
+"""A network as a limb of a model: its members, actuators and joints, with screws that nested loops and couplings allow.
 
 With the rates ``q`` of a member's passive joints along a spanning tree from the base, its loops demand ``L q = 0``, and
 the platform's twist is ``S q``. The member allows the twists ``S N`` with the projector ``N`` on the null space of
@@ -12,25 +12,29 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
+from ..limbjoints import JointCoordinate, LimbJoint
 from ..mechanism.centre import CentreRule, centre_rule
-from ..mechanism.members import robot_graph
+from ..mechanism.decomposition import robot_graph
 from ..mechanism.topology import spanning_tree
 from ..member import Member, pseudo_inverse
+from ..parts import Actuator, Dimension, JointScrews, PathStructure
+from ..rows import RANK_TOLERANCE, independent_rows, rank_of
 from .chain import HomeRobot
-from .generic import RANK_TOLERANCE
+from .generic import PathFrame
 from .loops import ClosedPoint
 from .mechanisms import mechanism_at_home
 from .motion import AxisKind
 from .network import OpenNetwork
-from .opened import PathFrame
+from .states import COORDINATE_PARTS, rotation_angle
+
+_CUT = "it is part of nested loops, which give it no coordinate of its own"
 
 
 @dataclass(frozen=True)
@@ -159,7 +163,7 @@ def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[Clo
     function = ca.Function("nested", list(symbols), outputs)
     found: Counter[MotionRanks] = Counter()
     for point in points:
-        values = function(point.dimensions, point.unknowns, point.rotation, point.position)
+        values = function(*point)
         platform, length, *loops = (np.asarray(each.full(), dtype=np.float64) for each in values)
         if not all(np.isfinite(each).all() for each in (platform, *loops)):
             continue
@@ -167,28 +171,12 @@ def measured_ranks(motions: Motions, symbols: Sequence[SX], points: Sequence[Clo
         ranks, null = [], np.eye(platform.shape[1])
         for loop in loops:
             _, singular, right = np.linalg.svd(loop @ null)
-            ranks.append(_rank(singular))
+            # A loop that others close already leaves rounding errors alone.
+            ranks.append(rank_of(singular, 1.0))
             null = null @ right[ranks[-1] :].T
-        twists = _rank(np.linalg.svd(about @ null)[1]) if null.size else 0
+        twists = rank_of(np.linalg.svd(about @ null)[1], 1.0) if null.size else 0
         found[MotionRanks(tuple(ranks), twists)] += 1
     return max(found, key=lambda ranks: (found[ranks], ranks))
-
-
-def _rank(values: FloatArray) -> int:
-    """Return the rank of screws of order 1: a loop that others close already leaves rounding errors alone."""
-    return int(np.count_nonzero(values > RANK_TOLERANCE))
-
-
-class DrivenMotion(NamedTuple):
-    """Motion of a member for a unit rate of an actuator.
-
-    Attributes:
-        screw: (6, 1) twist of the platform, up to those that the member allows.
-        open_loops: (m, 1) what passive joints cannot close of all its loops; 0 where the actuator can move alone.
-    """
-
-    screw: SX
-    open_loops: SX
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,12 +200,16 @@ class NullSpace:
         """Twists (6, n) of the platform that free joints allow, as many as there are rates."""
         return self.platform @ self.projector
 
-    def driven(self, screw: SX, loops: SX) -> DrivenMotion:
+    def driven(self, screw: SX, loops: SX) -> tuple[SX, SX]:
         """Return the motion for a unit rate of an actuated joint, the other actuators at rest.
 
         Args:
             screw: (6, 1) of the joint in the platform's twist.
             loops: (m, 1) of the joint in all loops, one below the other.
+
+        Returns:
+            The platform's twist (6, 1), up to those that the member allows, and what passive joints cannot close of all
+            loops (m, 1): 0 where the actuator can move alone.
         """
         rates = SX(self.projector.shape[0], 1)
         open_loops = [SX(0, 1)]
@@ -225,7 +217,7 @@ class NullSpace:
             own, loops = loops[: loop.shape[0], :], loops[loop.shape[0] :, :]
             rates -= inverse @ (own + loop @ rates)
             open_loops.append(own + loop @ rates)
-        return DrivenMotion(screw + self.platform @ rates, ca.vertcat(*open_loops))
+        return screw + self.platform @ rates, ca.vertcat(*open_loops)
 
 
 def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
@@ -243,18 +235,12 @@ def null_space(motions: Motions, ranks: MotionRanks) -> NullSpace:
     return NullSpace(projector, tuple(equations), tuple(inverses), motions.platform)
 
 
-def member_of(limb: str, network: OpenNetwork, each: NestedMember, screws: SX, rank: int) -> Member:
-    """Return a member of a network, with the kinds of its wrenches still to be measured."""
-    return Member(limb, _centre(network, each), screws, rank, (), slide=_slide(network, each))
-
-
 def _slide(network: OpenNetwork, member: NestedMember) -> SX | None:
     """Return the current unit axis (3, 1) along which the centre could lie elsewhere; None where it is determined."""
     if member.is_meeting or len(member.centre) != 1 or network.joint(member.centre[0]).type in ("S", "U", "Pa"):
         return None
     (k,) = member.centre
-    screw = network.screws[k][-1]
-    return screw[3:] if network.joint(k).axes[-1].kind is AxisKind.TRANSLATION else screw[:3]
+    return network.joint(k).axes[-1].direction(network.screws[k][-1])
 
 
 def _centre(network: OpenNetwork, member: NestedMember) -> SX:
@@ -270,3 +256,140 @@ def _centre(network: OpenNetwork, member: NestedMember) -> SX:
         return network.points[one] + first * (ca.dot(ca.cross(apart, second), normal) / ca.sumsqr(normal))
     places = [network.motions[network.ends(k)[1]].point(network.joint(k).point) for k in member.centre]
     return sum(places, SX.zeros(3)) * (1 / len(places))
+
+
+@dataclass(eq=False, kw_only=True)
+class ResistingParts:
+    """Members and actuators of limbs, while these are added one after the other.
+
+    Attributes:
+        members: that resist the platform.
+        actuators: all actuated joints.
+        positions: of the actuators from home, (1, 1) each.
+        screws: of the joints of paths, and of each member of networks.
+        structure: of the same.
+    """
+
+    members: list[Member] = field(default_factory=list)
+    actuators: list[Actuator] = field(default_factory=list)
+    positions: list[SX] = field(default_factory=list)
+    screws: list[JointScrews] = field(default_factory=list)
+    structure: list[PathStructure] = field(default_factory=list)
+
+
+def add_resisting(
+    found: ResistingParts,
+    network: OpenNetwork,
+    frame: PathFrame,
+    symbols: Sequence[SX],
+    points: Sequence[ClosedPoint],
+) -> None:
+    """Add members and actuators of a network, with ranks measured at closed configurations.
+
+    Args:
+        found: to which they are added.
+        network: at any pose.
+        frame: values that all parts of the robot share.
+        symbols: of dimensions, unknowns, rotation and position.
+        points: closed configurations.
+    """
+    robot, limb = frame.robot, network.name
+    actuated = [k for k in network.joints if network.joint(k).actuated]
+    screws: dict[int, dict[str, SX]] = {k: {} for k in actuated}
+    rate_sizes = {k: robot.size if is_slide(network, k) else SX(1) for k in actuated}
+    open_loops = [SX(0, len(actuated))]
+    members = nested_members(robot, network)
+    for number, each in enumerate(members):
+        label = _member_name(network, number) if len(members) > 1 else ""
+        locked = motions_of(network, frame, each.joints, [k for k in each.joints if k not in actuated])
+        ranks = measured_ranks(locked, symbols, points, robot.size)
+        free = motions_of(network, frame, each.joints, each.joints)
+        free_ranks = measured_ranks(free, symbols, points, robot.size)
+        null = null_space(locked, ranks)
+        free_loops, open_columns = ca.vertcat(SX(0, len(free.columns)), *free.loops), []
+        for k in actuated:
+            column = free.columns.index(k)
+            screw, left_open = null.driven(free.platform[:, column], free_loops[:, column])
+            open_columns.append(left_open)
+            if not ca.sparsify(screw).is_zero():
+                screws[k][label or limb] = screw / rate_sizes[k]
+        open_loops.append(ca.horzcat(*open_columns))
+        if ranks.twists < 6:
+            place, slide = _centre(network, each), _slide(network, each)
+            found.members.append(Member(limb, place, null.screws, ranks.twists, (), slide=slide, name=label))
+        labels = tuple(f"{limb}:{network.graph.joints[k].name}" for k in free.columns)
+        driving = tuple(i for i, k in enumerate(free.columns) if k in actuated)
+        sizes = ca.horzcat(*[rate_sizes.get(k, SX(1)) for k in free.columns])
+        motions, loops = (part / ca.repmat(sizes, part.shape[0], 1) for part in (free.platform, free_loops))
+        ends = ranks.twists, free_ranks.twists
+        names = limb, labels, motions, driving, *ends, label or limb
+        found.screws.append(JointScrews(*names, loops, sum(ranks.loops)))
+        found.structure.append(_structure(network, each, number, 6 - ranks.twists, 6 - free_ranks.twists))
+    relations = _relations(ca.vertcat(*open_loops), symbols, points)
+    for column, k in enumerate(actuated):
+        name = network.graph.joints[k].name
+        (axis,) = network.joint(k).axes
+        twists, factors = ca.horzcat(SX(6, 0), *screws[k].values()), relations[:, column] / rate_sizes[k]
+        found.actuators.append(Actuator(name, limb, tuple(screws[k]), twists, axis.dimension, factors))
+        found.positions.append(axis.way(network.values[k, 0]))
+
+
+def _relations(open_loops: SX, symbols: Sequence[SX], points: Sequence[ClosedPoint]) -> SX:
+    """Return independent rows (r, a) of what passive joints cannot close of loops for actuators' rates of order 1.
+
+    Rows that are zero at almost all configurations say nothing, and are left out.
+    """
+    function = ca.Function("relations", list(symbols), [ca.densify(open_loops)])
+    values = [function(*each).full() for each in points]
+    values = [np.where(np.abs(each) > RANK_TOLERANCE, each, 0.0) for each in values]
+    known = [each for each in values if np.isfinite(each).all() and each.any()]
+    if 2 * len(known) <= len(points):
+        return SX(0, open_loops.shape[1])
+    return open_loops[list(independent_rows(known)), :]
+
+
+def _member_name(network: OpenNetwork, number: int) -> str:
+    """Return the name of a member: the first one has the limb's."""
+    return network.name if number == 0 else f"{network.name}.{number + 1}"
+
+
+def _structure(
+    network: OpenNetwork, member: NestedMember, number: int, wrenches: int, constraints: int
+) -> PathStructure:
+    """Return the structure of a member; the first one has the loops of all."""
+    letters = (
+        f"{network.joint(k).type}*" if network.joint(k).actuated else network.joint(k).type for k in member.joints
+    )
+    names = ", ".join(network.graph.joints[k].name for k in network.opened)
+    count = len(network.equations) if number == 0 else 0
+    return PathStructure(
+        limb=network.name,
+        name=_member_name(network, number),
+        joints=" ".join(letters),
+        opened=f"nested: {names}" if number == 0 else "as before",
+        wrenches=wrenches,
+        constraints=constraints,
+        unknowns=network.unknowns if number == 0 else 0,
+        equations=count,
+        kept=count,
+        nested=tuple(network.graph.joints[k].name for k in member.joints),
+    )
+
+
+def nested_joints(network: OpenNetwork) -> list[LimbJoint]:
+    """Return the joints of a network as limits read them; a joint at which a loop is opened may have no coordinate."""
+    limb, found = network.name, []
+    for k in network.joints:
+        joint, name = network.joint(k), network.graph.joints[k].name
+        own = [network.values[k, a] for a in range(len(joint.axes)) if (k, a) in network.values]
+        coordinates: list[JointCoordinate] = []
+        if own:
+            for value, axis, part in zip(own, joint.axes, COORDINATE_PARTS.get(joint.type, ("",)), strict=True):
+                coordinates.append(JointCoordinate(part, axis.dimension, axis.way(value)))
+        elif joint.type == "R":
+            base, other = (network.motions[body] for body in network.ends(k))
+            angle = rotation_angle(joint.axes[0].axis, base.rotation.T @ other.rotation)
+            coordinates.append(JointCoordinate("", Dimension.ANGLE, ca.densify(angle.sine), ca.densify(angle.cosine)))
+        unknown = "" if coordinates else _CUT
+        found.append(LimbJoint(f"{limb}:{name}", name, limb, joint.type, tuple(coordinates), unknown=unknown))
+    return found

@@ -9,22 +9,23 @@ spherical joints turns freely about itself, so that only the two other rotations
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 from casadi import SX
 
 from ..mechanism.topology import Classes, spanning_tree
-from .chain import HomeGraph, HomeRobot, Joint
+from .chain import HomeGraph, Joint
 from .cut import Cut
+from .generic import PathFrame
 from .motion import AxisKind, JointAxis, Motion
 from .opened import (
     LoopEquation,
+    Opened,
     OpenedPath,
-    PathFrame,
     Variables,
     join_joint,
-    loop_equations,
+    join_rigidly,
     normals_of,
     rotations_about,
 )
@@ -34,10 +35,11 @@ _RELUCTANCE = {"P": 1, "H": 1, "Pa": 1, "C": 1, "R": 2, "U": 3, "S": 9}
 
 
 @dataclass(eq=False)
-class OpenNetwork:
+class OpenNetwork(Opened):
     """A network at any pose.
 
     Attributes:
+        name: of the limb that it is.
         graph: of the robot.
         joints: indices of its joints.
         bodies: name that stands for each link and those that are welded to it.
@@ -46,11 +48,11 @@ class OpenNetwork:
             rotations about its centre.
         values: variable (1, 1) of each axis whose variable is an unknown, by joint and number of the axis.
         points: current place (3, 1) of each joint on its first link, length.
-        equations: that hold where the loops are closed.
-        checks: further expressions that are zero there: signs that the equations leave open.
         opened: indices of the joints that close loops.
+        unknowns: number of its joint variables that are unknowns.
     """
 
+    name: str
     graph: HomeGraph
     joints: tuple[int, ...]
     bodies: dict[str, str]
@@ -58,9 +60,8 @@ class OpenNetwork:
     screws: dict[int, list[SX]] = field(default_factory=dict)
     values: dict[tuple[int, int], SX] = field(default_factory=dict)
     points: dict[int, SX] = field(default_factory=dict)
-    equations: list[LoopEquation] = field(default_factory=list)
-    checks: list[SX] = field(default_factory=list)
     opened: list[int] = field(default_factory=list)
+    unknowns: int = 0
 
     def joint(self, k: int) -> Joint:
         """Return a joint at home."""
@@ -84,24 +85,21 @@ class OpenNetwork:
         return self.bodies[self.graph.platform]
 
 
-def open_network(robot: HomeRobot, joints: Sequence[int], variables: Variables, frame: PathFrame) -> OpenNetwork:
+def open_network(name: str, joints: Sequence[int], variables: Variables, frame: PathFrame) -> OpenNetwork:
     """Return a network at any pose.
 
     Args:
-        robot: at home.
+        name: of the limb that it is.
         joints: indices of the network's joints in the robot's graph.
         variables: of the axes of joints in the spanning tree.
         frame: values that all parts of the robot share.
     """
-    graph = robot.graph
+    graph = frame.robot.graph
     if graph is None:
         raise ValueError("the robot has no graph")
-    welded = Classes(graph.links)
-    for each in graph.joints:
-        if each.joint is None:
-            welded.merge(each.inner, each.outer)
+    welded = Classes(graph.links, [(each.inner, each.outer) for each in graph.joints if each.joint is None])
     bodies = {link: welded.find(link) for link in graph.links}
-    found = OpenNetwork(graph, tuple(joints), bodies, {})
+    found = OpenNetwork(name, graph, tuple(joints), bodies, {})
     found.motions = {found.base: Motion.none(), found.platform: frame.platform}
     edges = [found.ends(k) for k in joints]
     coupled = {k for coupling in graph.couplings for k, _ in coupling}
@@ -117,7 +115,7 @@ def open_network(robot: HomeRobot, joints: Sequence[int], variables: Variables, 
         _close(found, joints[i], variables, frame, has_variable=joints[i] in coupled)
     for coupling in graph.couplings:
         if all(k in joints for k, _ in coupling):
-            found.equations.append(_coupling_equation(found, coupling, robot))
+            found.equations.append(_coupling_equation(found, coupling, frame))
     return found
 
 
@@ -126,7 +124,7 @@ def _add_to_tree(network: OpenNetwork, k: int, parent: str, child: str, variable
     joint, at = network.joint(k), network.motions[parent]
     outward = network.ends(k)[0] == parent
     axes = _spanning_axes(network, k, child, frame) if joint.type == "S" else joint.axes
-    stated = replace_axes(joint, axes)
+    stated = joint if axes is joint.axes else replace(joint, axes=axes)
     screws: list[SX] = []
     place = at.point(joint.point)
     for a in range(len(axes)) if outward else range(len(axes) - 1, -1, -1):
@@ -140,13 +138,6 @@ def _add_to_tree(network: OpenNetwork, k: int, parent: str, child: str, variable
     network.motions[child] = at
     network.points[k] = place if outward else at.point(joint.point)
     network.screws[k] = rotations_about(place) if joint.type == "S" else screws
-
-
-def replace_axes(joint: Joint, axes: tuple[JointAxis, ...]) -> Joint:
-    """Return a joint with other axes; the joint itself where they are its own."""
-    if axes is joint.axes:
-        return joint
-    return Joint(joint.place, joint.type, joint.point, axes, joint.actuated, joint.name)
 
 
 def _spanning_axes(network: OpenNetwork, k: int, child: str, frame: PathFrame) -> tuple[JointAxis, ...]:
@@ -165,10 +156,7 @@ def _spanning_axes(network: OpenNetwork, k: int, child: str, frame: PathFrame) -
     (other,) = (j for j in others if j != k)
     rod = network.joint(other).point - joint.point
     directions = [each / ca.norm_2(each) for each in normals_of(rod / ca.norm_2(rod), frame)]
-    return tuple(
-        JointAxis(AxisKind.ROTATION, each, joint.point, actuated=False, pitch=SX(0), rod=SX.zeros(3))
-        for each in directions
-    )
+    return tuple(JointAxis(AxisKind.ROTATION, each, joint.point) for each in directions)
 
 
 def _close(network: OpenNetwork, k: int, variables: Variables, frame: PathFrame, *, has_variable: bool) -> None:
@@ -188,16 +176,13 @@ def _close(network: OpenNetwork, k: int, variables: Variables, frame: PathFrame,
         network.values[k, a] = value = variables(joint, a)
         screws.append(axis.screw(value, at))
         at = at.after(axis.motion(value))
-    turn = at.rotation.T @ platform.rotation
-    apart = at.rotation.T @ (platform.point(joint.point) - at.point(joint.point))
     network.screws[k], network.points[k] = screws, base.point(joint.point)
-    network.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)
-    network.checks.append(3 - ca.trace(turn))
+    join_rigidly(network, at, platform, joint.point, frame)
 
 
-def _coupling_equation(network: OpenNetwork, coupling: Sequence[tuple[int, SX]], robot: HomeRobot) -> LoopEquation:
+def _coupling_equation(network: OpenNetwork, coupling: Sequence[tuple[int, SX]], frame: PathFrame) -> LoopEquation:
     """Return the equation of a coupling, in parts of its first term's factor."""
     first, factor = coupling[0]
     slides = network.joint(first).axes[0].kind is AxisKind.TRANSLATION
     total = sum((each * network.values[k, 0] for k, each in coupling), SX(0))
-    return LoopEquation(total / factor, robot.size if slides else SX(1))
+    return LoopEquation(total / factor, frame.size if slides else SX(1))

@@ -10,11 +10,16 @@ it. The two sides meet at the cut, where equations say that the joint there hold
 * no joint: the two bodies coincide (6).
 
 Each equation has a size, by which it becomes a number of order 1: for lengths the robot's.
+
+Distances follow from these equations, each without the variables of one joint: a hinge or universal joint and the joint
+at the cut are at a distance that the joint's own rotation does not change. The two places, one on each side of the cut,
+have the distance that the joints between give them. Such an equation lacks one or two of the unknowns, so that a search
+of a whole box finds where the others cannot be.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -22,10 +27,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
+from ..parts import Closure
 from .chain import Joint
 from .cut import Cut
-from .motion import Motion
+from .generic import INCIDENT, PathFrame
+from .motion import UNIT_VECTORS, Motion
 
 #: Squared sine of the angle between a slide and its rod below which they are parallel: rounding leaves 1e-16.
 _STRAIGHT = 1e-14
@@ -40,8 +46,21 @@ class LoopEquation(NamedTuple):
     size: SX
 
 
+@dataclass(eq=False, kw_only=True)
+class Opened:
+    """What is opened, a path or a network.
+
+    Attributes:
+        equations: that hold where its loops are closed.
+        checks: further expressions that are zero there: signs that the equations leave open.
+    """
+
+    equations: list[LoopEquation] = field(default_factory=list)
+    checks: list[SX] = field(default_factory=list)
+
+
 @dataclass(eq=False)
-class OpenedPath:
+class OpenedPath(Opened):
     """A path of joints at any pose.
 
     Attributes:
@@ -52,8 +71,6 @@ class OpenedPath:
         points: (3, 1) current place of each joint on the body before it, on the base's side, length.
         sides: displacement of the bodies on the base's and on the platform's side of the cut.
         rod: (3, 1) vector along the rod, to the joint at the cut; None without a rod.
-        equations: that hold where the path is closed.
-        checks: further expressions that are zero there: signs that the equations leave open.
     """
 
     joints: Sequence[Joint]
@@ -63,45 +80,16 @@ class OpenedPath:
     points: list[SX]
     sides: tuple[Motion, Motion]
     rod: SX | None = None
-    equations: list[LoopEquation] = field(default_factory=list)
-    checks: list[SX] = field(default_factory=list)
 
+    def body_before(self, j: int) -> Motion | None:
+        """Return the displacement of the body on the base's side of a joint; None for a rod."""
+        if j in (self.cut.first, self.cut.last + 1):
+            return self.sides[0 if j <= self.cut.last else 1]
+        return self.behind[j - 1] if j else Motion.none()
 
-class PathFrame:
-    """Values that all paths of a robot share: its size, the platform's displacement, and numbers of its dimensions.
-
-    Args:
-        size: (1, 1) the robot's size, length.
-        platform: displacement of the platform from home.
-        symbols: (d, 1) of the dimensions.
-        typical: (d,) their typical values.
-        samples: (s, d) other values of them.
-    """
-
-    def __init__(self, size: SX, platform: Motion, symbols: SX, typical: FloatArray, samples: FloatArray) -> None:
-        self.size, self.platform = size, platform
-        self._symbols, self._typical, self._samples = symbols, typical, samples
-
-    def typical_value(self, expression: SX) -> FloatArray:
-        """Return the typical value of an expression of the dimensions, as an array of its shape."""
-        found = ca.Function("typical", [self._symbols], [ca.densify(expression)])(self._typical)
-        return np.asarray(found.full(), dtype=np.float64)
-
-    def typical_triple(self, vector: SX) -> tuple[float, float, float]:
-        """Return the typical value of a vector (3, 1)."""
-        x, y, z = (float(value) for value in self.typical_value(vector).ravel())
-        return x, y, z
-
-    def value_at_home(self, expression: SX, unknowns: SX) -> float:
-        """Return the value of a scalar expression at home with typical dimensions, where the unknowns (u, 1) are 0."""
-        place = self.platform
-        function = ca.Function("home", [self._symbols, unknowns, place.rotation, place.image], [ca.densify(expression)])
-        return float(function(self._typical, 0, np.eye(3), self.typical_value(place.origin)))
-
-    def sampled(self, expression: SX) -> list[float]:
-        """Return the values of a scalar expression of the dimensions at all samples."""
-        function = ca.Function("sampled", [self._symbols], [ca.densify(expression)])
-        return [float(function(each)) for each in self._samples]
+    def body_behind(self, j: int) -> Motion | None:
+        """Return the displacement of the body on the platform's side of a joint; None for a rod."""
+        return self.behind[j] or (self.sides[1] if j == self.cut.last else None)
 
 
 def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: PathFrame) -> OpenedPath:
@@ -138,17 +126,32 @@ def open_path(joints: Sequence[Joint], cut: Cut, variables: Variables, frame: Pa
     elif cut.type:
         join_joint(path, base, platform, frame)
     else:
-        turn = base.rotation.T @ platform.rotation
-        place = joints[min(cut.first, count - 1)].point
-        apart = base.rotation.T @ (platform.point(place) - base.point(place))
-        path.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)
-        path.checks.append(3 - ca.trace(turn))
+        join_rigidly(path, base, platform, joints[min(cut.first, count - 1)].point, frame)
     return path
+
+
+def closures(kind: str, name: str, sides: Iterable[tuple[SX, ...]]) -> list[Closure]:
+    """Return equations with the name of their limb or path, such as ``loop 1.2 (3)``.
+
+    Args:
+        kind: first word of the names.
+        name: of the limb or path.
+        sides: left side of each, and its size where it is not 1.
+    """
+    return [Closure(f"{kind} {name} ({k + 1})", *each) for k, each in enumerate(sides)]
 
 
 def loop_equations(expressions: SX, size: SX | None = None) -> list[LoopEquation]:
     """Return equations from their left sides (k, 1) and a common size; without one they are of order 1."""
     return [LoopEquation(each, SX(1) if size is None else size) for each in ca.vertsplit(expressions)]
+
+
+def join_rigidly(path: Opened, one: Motion, other: Motion, place: SX, frame: PathFrame) -> None:
+    """Add the equations by which two bodies coincide: their rotations, and a place (3, 1) at home on both, length."""
+    turn = one.rotation.T @ other.rotation
+    apart = one.rotation.T @ (other.point(place) - one.point(place))
+    path.equations += loop_equations(ca.inv_skew(turn - turn.T) / 2) + loop_equations(apart, frame.size)
+    path.checks.append(3 - ca.trace(turn))
 
 
 def join_joint(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame) -> None:
@@ -196,9 +199,10 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     is_straight = True
     if slide is not None:
         offset = square - ca.dot(home, joints[slide].axes[0].axis) ** 2
-        is_straight = all(float(each) <= _STRAIGHT for each in frame.sampled(offset / square))
+        is_straight = bool(np.all(frame.sampled(offset / square) <= _STRAIGHT))
     if joints[far].type == "U" and is_straight:
-        path.screws[far] = _universal_screws(path, sides[0], home, frame)
+        directions = directions_at_rod(path, sides[0], frame)
+        path.screws[far] = [ca.vertcat(each, ca.cross(path.points[far], each)) for each in directions]
     if slide is None:
         path.equations += loop_equations(ca.sumsqr(path.rod) - square, 2 * square)
         return
@@ -209,8 +213,8 @@ def _join_rod(path: OpenedPath, base: Motion, platform: Motion, frame: PathFrame
     path.points[slide] = (path.points[j] + path.points[far]) / 2
 
 
-def _universal_screws(path: OpenedPath, side: Motion, home: SX, frame: PathFrame) -> list[SX]:
-    """Return the current screws of the universal joint at the far end of a rod, whose direction it follows.
+def directions_at_rod(path: OpenedPath, side: Motion, frame: PathFrame, *, is_bounded: bool = False) -> tuple[SX, SX]:
+    """Return the current axes (3, 1) of the universal joint at the far end of a rod, whose direction it follows.
 
     One axis moves with the known body. The other keeps its angles against the first axis and against the rod. With the
     first axis ``u`` and the rod's direction ``d`` it is ``a u + b d + g u x d``, where ``g`` has the sign of home. The
@@ -219,23 +223,23 @@ def _universal_screws(path: OpenedPath, side: Motion, home: SX, frame: PathFrame
     Args:
         path: the path, with its rod.
         side: displacement of the body that the first axis moves with.
-        home: (3, 1) the rod at home, length.
         frame: values that all paths of the robot share.
+        is_bounded: whether the axes have a value beyond the reach too.
     """
-    far = path.cut.far
-    if far is None or path.rod is None:
-        return []
-    axes = path.joints[far].axes if far < path.cut.joint else path.joints[far].axes[::-1]
+    j, far, rod = path.cut.joint, path.cut.far, path.rod
+    if far is None or rod is None:
+        raise ValueError("the path has no rod")
+    home = path.joints[j].point - path.joints[far].point
+    axes = path.joints[far].axes if far < j else path.joints[far].axes[::-1]
     first, second = (axis.axis for axis in axes)
-    u, d, d_home = side.rotation @ first, path.rod / ca.norm_2(path.rod), home / ca.norm_2(home)
+    u, d, d_home = side.rotation @ first, rod / ca.norm_2(rod), home / ca.norm_2(home)
     across, along, w = ca.dot(first, second), ca.dot(second, d_home), ca.dot(u, d)
     a, b = (across - along * w) / (1 - w**2), (along - across * w) / (1 - w**2)
     within = a * u + b * d
     sign = -1.0 if frame.typical_value(ca.dot(second, ca.cross(first, d_home))).item() < 0 else 1.0
-    g = sign * ca.sqrt((1 - ca.sumsqr(within)) / (1 - w**2))
-    directions = [u, within + g * ca.cross(u, d)]
-    place = path.points[far]
-    return [ca.vertcat(each, ca.cross(place, each)) for each in directions]
+    square = 1 - ca.sumsqr(within)
+    g = sign * ca.sqrt((ca.fmax(square, 0) if is_bounded else square) / (1 - w**2))
+    return u, within + g * ca.cross(u, d)
 
 
 def slide_length(path: OpenedPath, frame: PathFrame) -> SX | None:
@@ -261,12 +265,41 @@ def _slide_sign(path: OpenedPath, frame: PathFrame) -> float:
 
 def rotations_about(point: SX) -> list[SX]:
     """Return three rotations (6, 1) about a point."""
-    directions = (SX(np.eye(3)[k].tolist()) for k in range(3))
-    return [ca.vertcat(each, ca.cross(point, each)) for each in directions]
+    return [ca.vertcat(each, ca.cross(point, each)) for each in UNIT_VECTORS]
 
 
 def normals_of(axis: SX, frame: PathFrame) -> list[SX]:
     """Return two vectors (3, 1) across an axis, along those coordinates that are farthest from it typically."""
     order = np.argsort(np.abs(frame.typical_value(axis)).ravel(), kind="stable")
-    first = ca.cross(axis, SX(np.eye(3)[int(order[0])].tolist()))
+    first = ca.cross(axis, UNIT_VECTORS[int(order[0])])
     return [first, ca.cross(axis, first)]
+
+
+def distance_equations(path: OpenedPath, variables: Variables, frame: PathFrame) -> list[LoopEquation]:
+    """Return the equations of a path that is opened at a joint; none of a path with a rod, or opened at no joint.
+
+    Args:
+        path: the path.
+        variables: of the axes of its joints that are not between the two sides.
+        frame: values that all paths of the robot share.
+    """
+    cut = path.cut
+    if cut.far is not None or not cut.type:
+        return []
+    joints, j, size = path.joints, cut.joint, frame.size
+    centre, found = joints[j].point, []
+    for i, joint in enumerate(joints):
+        if i == j or not all(axis.is_hinge for axis in joint.axes):
+            continue
+        apart = ca.norm_2(centre - joint.point) / size
+        if frame.typical_value(apart).item() <= INCIDENT:
+            continue
+        between, side = Motion.none(), path.sides[1 if i < j else 0]
+        steps = range(i + 1, j) if i < j else range(i - 1, j, -1)
+        for k in steps:
+            motions = [axis.motion(variables(joints[k], a)) for a, axis in enumerate(joints[k].axes)]
+            for motion in motions if i < j else [each.inverse() for each in reversed(motions)]:
+                between = between.after(motion)
+        own = ca.sumsqr(between.point(centre) - joint.point)
+        found.append(LoopEquation(ca.sumsqr(side.point(centre) - path.points[i]) - own, size**2))
+    return found

@@ -1,9 +1,13 @@
-"""The drawing of a robot given joint by joint: links as bars and rods, rails, symbols of joints, base and platform."""
+"""The drawing of a robot given joint by joint: links as bars and rods, rails, symbols of joints, base and platform.
+
+Of a network of links and joints, each link is drawn as lines between its joints, in the order of their names.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import casadi as ca
@@ -11,12 +15,13 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene
+from ..drawing import Body, JointKind, JointSymbol, Link, LinkKind, Point, Scene, outline
 from ..parts import PoseSymbols
-from .networkpictures import NetworkDrawing
-from .opened import OpenedPath, PathFrame
-from .outline import outline
-from .placed import PlacedJoint, arc_between, placed_joints
+from .chain import Limb
+from .generic import PathFrame
+from .network import OpenNetwork
+from .opened import OpenedPath
+from .placed import SLIDING, Place, PlacedJoint, arc_between, placed_joints
 
 #: Half of the length of a rail, in parts of the robot's size: it is no dimension of the robot.
 _RAIL = 0.2
@@ -30,18 +35,14 @@ class DrawnPath(NamedTuple):
     """A path of a limb to be drawn.
 
     Attributes:
-        limb: name of the limb.
-        number: of the path among those of its limb, from 1.
-        paths: number of paths of its limb.
-        stem: number of joints, as they are written, that all paths of the limb share.
+        limb: the limb.
+        number: index of the path among those of its limb.
         path: the path.
         row: index of its row among those of the limb, where it has one only and the limb has others.
     """
 
-    limb: str
+    limb: Limb
     number: int
-    paths: int
-    stem: int
     path: OpenedPath
     row: int | None
 
@@ -69,11 +70,11 @@ class _Sketch:
     outlines: dict[Body, list[_Node]] = field(default_factory=lambda: {Body.BASE: [], Body.PLATFORM: []})
     nodes: dict[str, _Node] = field(default_factory=dict)
 
-    def node(self, name: str, place: SX, at_home: SX, body: Body, kind: JointKind | None = None) -> _Node:
+    def node(self, name: str, place: Place, body: Body, kind: JointKind | None = None) -> _Node:
         """Add a point, unless it has been drawn with another path, and return it."""
         if name not in self.nodes:
-            self.points[name] = Point(name, place, body)
-            self.nodes[name] = _Node(name, self.frame.typical_value(at_home).ravel(), kind)
+            self.points[name] = Point(name, place.now, body)
+            self.nodes[name] = _Node(name, self.frame.typical_value(place.home).ravel(), kind)
         return self.nodes[name]
 
     def link(self, start: _Node | None, end: _Node, drawn: DrawnPath | None, kind: LinkKind, body: Body) -> None:
@@ -82,26 +83,26 @@ class _Sketch:
             return
         if any((each.start, each.end) == (start.name, end.name) for each in self.links):
             return
-        limb = None if drawn is None or drawn.limb not in self.carrying else drawn.limb
+        limb = None if drawn is None or drawn.limb.name not in self.carrying else drawn.limb.name
         row = None if drawn is None or limb is None else drawn.row
         self.links.append(Link(start.name, end.name, body, limb, kind, row))
 
-    def symbol(self, name: str, joint: PlacedJoint, place: SX, body: Body, limb: str) -> None:
+    def symbol(self, name: str, joint: PlacedJoint, place: Place, body: Body, limb: Limb) -> None:
         """Add the symbol of a joint, unless it has been drawn with another path."""
-        owner = limb if limb in self.carrying else None
-        self.joints.setdefault(name, JointSymbol(name, joint.kind, place, joint.axes, body, owner, joint.is_actuated))
+        axes, owner = tuple(axis.now for axis in joint.axes), limb.name if limb.name in self.carrying else None
+        self.joints.setdefault(name, JointSymbol(name, joint.kind, place.now, axes, body, owner, joint.is_actuated))
 
-    def is_along(self, start: SX, end: SX, axis: SX | None) -> bool:
-        """Return whether two places (3, 1) at home are apart from each other along an axis (3, 1) at home."""
-        if axis is None:
+    def is_along(self, start: Place, end: Place, axes: Sequence[Place]) -> bool:
+        """Return whether two places are apart from each other along the first of some axes at home."""
+        if not axes:
             return False
-        way, direction = (self.frame.typical_value(each).ravel() for each in (end - start, axis))
+        way, direction = (self.frame.typical_value(each.home).ravel() for each in (end - start, axes[0]))
         apart = float(np.linalg.norm(way))
         return apart > _SAME * self.size and float(np.linalg.norm(np.cross(way, direction))) <= _SAME * apart
 
-    def is_same(self, one: SX, other: SX) -> bool:
-        """Return whether two places at home are one."""
-        return float(np.abs(self.frame.typical_value(one - other)).max()) <= _SAME * self.size
+    def is_same(self, one: Place, other: Place) -> bool:
+        """Return whether two places are one at home."""
+        return float(np.abs(self.frame.typical_value((one - other).home)).max()) <= _SAME * self.size
 
 
 def scene_of(
@@ -110,7 +111,7 @@ def scene_of(
     origin: SX,
     frame: PathFrame,
     carrying: Collection[str],
-    networks: Sequence[NetworkDrawing] = (),
+    networks: Sequence[OpenNetwork] = (),
 ) -> Scene:
     """Return the drawing of paths and networks at a pose.
 
@@ -120,41 +121,27 @@ def scene_of(
         origin: (3, 1) origin of the platform frame at home, length.
         frame: values that all paths share.
         carrying: names of the limbs that have a wrench.
-        networks: drawings of networks.
+        networks: limbs that are networks.
     """
     sketch = _Sketch(frame, float(frame.typical_value(frame.size).item()), origin, carrying)
     for drawn in paths:
-        _add_path(sketch, drawn, [each for each in paths if each.limb == drawn.limb])
+        _add_path(sketch, drawn, [each for each in paths if each.limb is drawn.limb])
     for network in networks:
         _add_network(sketch, network)
-    centre = sketch.node("P", pose.position, origin, Body.PLATFORM)
+    centre = sketch.node("P", Place(pose.position, origin), Body.PLATFORM)
     for body, nodes in sketch.outlines.items():
         _add_outline(sketch, body, nodes, centre if body is Body.PLATFORM else None)
     return Scene(tuple(sketch.points.values()), tuple(sketch.links), joints=tuple(sketch.joints.values()))
 
 
-def _add_network(sketch: _Sketch, network: NetworkDrawing) -> None:
-    """Add a network, with its joints on base and platform among their outlines."""
-    sketch.points |= {each.name: each for each in network.points}
-    sketch.links += network.links
-    sketch.joints |= {each.name: each for each in network.joints}
-    for body, own in ((Body.BASE, network.base), (Body.PLATFORM, network.platform)):
-        sketch.outlines[body] += [sketch.node(name, place, at_home, body) for name, place, at_home in own]
-
-
 def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> None:
     """Add a path of a limb, whose paths are ``own``."""
     joints = placed_joints(drawn.path, sketch.frame)
-    stem = drawn.stem if drawn.paths > 1 else 0
+    stem = len(drawn.limb.stem) if len(drawn.limb.branches) > 1 else 0
     previous: _Node | None = None
     for k, joint in enumerate(joints):
-        in_stem = joint.number <= stem
-        name = (
-            f"{drawn.limb}:{joint.number}"
-            if in_stem or drawn.paths == 1
-            else f"{drawn.limb}.{drawn.number}:{joint.number}"
-        )
-        if not in_stem and previous is not None and joints[k - 1].number <= stem:
+        name = drawn.limb.label(drawn.number, joint.number - 1)
+        if joint.number > stem and previous is not None and joints[k - 1].number <= stem:
             previous = _fork(sketch, drawn, own, previous, k)
         previous = _add_joint(sketch, drawn, joints, k, name, previous)
         if k == 0:
@@ -166,10 +153,9 @@ def _add_path(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath]) -> No
 
 def _fork(sketch: _Sketch, drawn: DrawnPath, own: Sequence[DrawnPath], stem: _Node, k: int) -> _Node:
     """Return the middle of the first joints of a limb's branches, at the end of a bar from the stem."""
-    firsts = [placed_joints(each.path, sketch.frame)[k] for each in own]
-    place = sum((each.foot for each in firsts), SX.zeros(3)) / len(firsts)
-    at_home = sum((each.foot_at_home for each in firsts), SX.zeros(3)) / len(firsts)
-    fork = sketch.node(f"{drawn.limb}:fork", place, at_home, Body.LIMB)
+    firsts = [placed_joints(each.path, sketch.frame)[k].foot for each in own]
+    middle = sum(firsts, Place(SX.zeros(3), SX.zeros(3))) / len(firsts)
+    fork = sketch.node(f"{drawn.limb.name}:fork", middle, Body.LIMB)
     sketch.link(stem, fork, drawn._replace(row=None), LinkKind.BAR, Body.LIMB)
     return fork
 
@@ -185,12 +171,12 @@ def _add_joint(
         return _add_parallelogram(sketch, drawn, joint, name, previous, body)
     if joint.kind is JointKind.PRISMATIC:
         return _add_slide(sketch, drawn, joints, k, name, previous)
-    node = sketch.node(name, joint.place, joint.at_home, body, joint.kind)
+    node = sketch.node(name, joint.place, body, joint.kind)
     kinds = {joint.kind, None if previous is None else previous.kind}
     is_rod = kinds <= set(_ROD_ENDS) or (previous is not None and previous.kind is JointKind.PRISMATIC and k > 1)
     bends = arc_between(joints[k - 1], joint, sketch.frame) if k else []
-    for n, (place, at_home) in enumerate(bends):
-        bend = sketch.node(f"{name} bend {n + 1}", place, at_home, Body.LIMB)
+    for n, place in enumerate(bends):
+        bend = sketch.node(f"{name} bend {n + 1}", place, Body.LIMB)
         sketch.link(previous, bend, drawn, LinkKind.BAR, Body.LIMB)
         previous = bend
     sketch.link(previous, node, drawn, LinkKind.ROD if is_rod else LinkKind.BAR, Body.LIMB)
@@ -202,21 +188,21 @@ def _add_parallelogram(
     sketch: _Sketch, drawn: DrawnPath, joint: PlacedJoint, name: str, previous: _Node | None, body: Body
 ) -> _Node:
     """Add a parallelogram as two rods between two short sides, and return the middle of the far side."""
-    near = sketch.node(f"{name} foot", joint.foot, joint.foot_at_home, Body.BASE if previous is None else Body.LIMB)
+    near = sketch.node(f"{name} foot", joint.foot, Body.BASE if previous is None else Body.LIMB)
     sketch.link(previous, near, drawn, LinkKind.BAR, Body.LIMB)
-    far = sketch.node(name, joint.place, joint.at_home, body)
-    if joint.side is None or joint.side_at_home is None:
+    far = sketch.node(name, joint.place, body)
+    if joint.side is None:
         return far
     corners = []
-    for letter, place, at_home, sign, driven in (
-        ("a", joint.foot, joint.foot_at_home, 1, joint.is_actuated),
-        ("b", joint.foot, joint.foot_at_home, -1, joint.is_actuated),
-        ("c", joint.place, joint.at_home, 1, False),
-        ("d", joint.place, joint.at_home, -1, False),
+    for letter, middle, sign, driven in (
+        ("a", joint.foot, 1, joint.is_actuated),
+        ("b", joint.foot, -1, joint.is_actuated),
+        ("c", joint.place, 1, False),
+        ("d", joint.place, -1, False),
     ):
-        corner = f"{name}{letter}"
-        corners.append(sketch.node(corner, place + sign * joint.side, at_home + sign * joint.side_at_home, Body.LIMB))
-        sketch.symbol(corner, replace(joint, is_actuated=driven), place + sign * joint.side, Body.LIMB, drawn.limb)
+        place = middle + sign * joint.side
+        corners.append(sketch.node(f"{name}{letter}", place, Body.LIMB))
+        sketch.symbol(f"{name}{letter}", replace(joint, is_actuated=driven), place, Body.LIMB, drawn.limb)
     for start, end in ((0, 1), (2, 3), (0, 2), (1, 3)):
         sketch.link(corners[start], corners[end], drawn, LinkKind.ROD, Body.LIMB)
     return far
@@ -229,35 +215,28 @@ def _add_slide(
     joint, is_last = joints[k], k == len(joints) - 1
     leg = _leg_of(sketch, joints, k)
     if leg is not None:
-        middle = sketch.node(name, leg.place, leg.at_home, Body.LIMB, joint.kind)
+        middle = sketch.node(name, leg, Body.LIMB, joint.kind)
         sketch.link(previous, middle, drawn, LinkKind.BAR, Body.LIMB)
-        sketch.symbol(name, joint, leg.place, Body.LIMB, drawn.limb)
+        sketch.symbol(name, joint, leg, Body.LIMB, drawn.limb)
         if not is_last:
             return middle
-        tip = sketch.node(f"{name} end", *_tip(sketch, joint), Body.PLATFORM)
+        tip = sketch.node(f"{name} end", _tip(sketch, joint), Body.PLATFORM)
         sketch.link(middle, tip, drawn, LinkKind.ROD, Body.LIMB)
         return tip
     body = Body.BASE if k == 0 else Body.LIMB
-    foot = sketch.node(f"{name} foot", joint.foot, joint.foot_at_home, body)
+    foot = sketch.node(f"{name} foot", joint.foot, body)
     sketch.link(previous, foot, drawn, LinkKind.BAR, Body.LIMB)
-    if joint.axes and joint.axis_at_home is not None:
-        half, half_at_home = (_RAIL * sketch.frame.size * axis for axis in (joint.axes[0], joint.axis_at_home))
-        start = sketch.node(f"{name} rail start", joint.foot - half, joint.foot_at_home - half_at_home, body)
-        end = sketch.node(f"{name} rail end", joint.foot + half, joint.foot_at_home + half_at_home, body)
+    if joint.axes:
+        half = _RAIL * sketch.frame.size * joint.axes[0]
+        start = sketch.node(f"{name} rail start", joint.foot - half, body)
+        end = sketch.node(f"{name} rail end", joint.foot + half, body)
         sketch.link(start, end, drawn, LinkKind.RAIL, body)
-    node = sketch.node(name, joint.place, joint.at_home, Body.PLATFORM if is_last else Body.LIMB)
+    node = sketch.node(name, joint.place, Body.PLATFORM if is_last else Body.LIMB)
     sketch.symbol(name, joint, joint.place, Body.LIMB, drawn.limb)
     return node
 
 
-class _Place(NamedTuple):
-    """A place (3, 1) in world coordinates and at home, length."""
-
-    place: SX
-    at_home: SX
-
-
-def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> _Place | None:
+def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> Place | None:
     """Return the middle of the leg that a slide lengthens; None where it is on a rail.
 
     A slide lengthens a leg where it is at one of the joints beside it and slides towards the other one. A last slide
@@ -265,30 +244,26 @@ def _leg_of(sketch: _Sketch, joints: Sequence[PlacedJoint], k: int) -> _Place | 
     """
     joint = joints[k]
     if joint.is_in_rod:
-        return _Place(joint.place, joint.at_home)
+        return joint.place
     if k == 0:
         return None
-    before = joints[k - 1]
-    start, end = _Place(joint.foot, joint.foot_at_home), _tip(sketch, joint)
+    before = joints[k - 1].place
+    start, end = joint.foot, _tip(sketch, joint)
     if k + 1 < len(joints):
-        after = joints[k + 1]
-        end = _Place(after.foot, after.foot_at_home)
-        if sketch.is_same(joint.at_home, after.foot_at_home):
-            start = _Place(before.place, before.at_home)
-    if not (
-        sketch.is_same(start.at_home, before.at_home)
-        and sketch.is_along(start.at_home, end.at_home, joint.axis_at_home)
-    ):
+        end = joints[k + 1].foot
+        if sketch.is_same(joint.place, end):
+            start = before
+    if not (sketch.is_same(start, before) and sketch.is_along(start, end, joint.axes)):
         return None
-    return _Place((start.place + end.place) / 2, (start.at_home + end.at_home) / 2)
+    return (start + end) / 2
 
 
-def _tip(sketch: _Sketch, joint: PlacedJoint) -> _Place:
+def _tip(sketch: _Sketch, joint: PlacedJoint) -> Place:
     """Return the point of a slide's axis, on the body behind it, that is nearest to the platform's origin at home."""
-    if not joint.axes or joint.axis_at_home is None:
-        return _Place(joint.place, joint.at_home)
-    way = ca.dot(sketch.origin - joint.at_home, joint.axis_at_home)
-    return _Place(joint.place + way * joint.axes[0], joint.at_home + way * joint.axis_at_home)
+    if not joint.axes:
+        return joint.place
+    way = ca.dot(sketch.origin - joint.place.home, joint.axes[0].home)
+    return joint.place + way * joint.axes[0]
 
 
 def _rail_end(sketch: _Sketch, name: str) -> _Node | None:
@@ -319,3 +294,36 @@ def _add_outline(sketch: _Sketch, body: Body, nodes: Sequence[_Node], centre: _N
         around = sum(float(np.linalg.norm(each - centre.at_home)) for each in ends)
         if len(ends) == 1 or around > (1 + _SAME) * float(np.linalg.norm(ends[0] - ends[1])):
             sketch.link(nearest, centre, None, LinkKind.BAR, body)
+
+
+def _add_network(sketch: _Sketch, network: OpenNetwork) -> None:
+    """Add a network, with its joints on base and platform among their outlines."""
+    name = network.name
+    limb = name if name in sketch.carrying else None
+    plates = {network.base: Body.BASE, network.platform: Body.PLATFORM}
+    ends: dict[str, list[tuple[str, JointKind]]] = {}
+    for k in network.joints:
+        joint, label = network.joint(k), f"{name}:{network.graph.joints[k].name}"
+        kind, bodies = JointKind(joint.type), network.ends(k)
+        body = next((part for link, part in plates.items() if link in bodies), Body.LIMB)
+        motions = [network.motions[each] for each in bodies]
+        places = [Place.on(motions[0], joint.point)] * 2
+        points = [label, label]
+        if kind in SLIDING:
+            home = joint.point + joint.axes[0].rod if kind is JointKind.PARALLELOGRAM else joint.point
+            places[1], points[1] = Place.on(motions[1], home), f"{label} end"
+            sketch.links.append(Link(points[0], points[1], Body.LIMB, limb))
+        for link, point, place in zip(bodies, points, places, strict=True):
+            sketch.points.setdefault(point, Point(point, place.now, body))
+            if link in plates:
+                sketch.outlines[plates[link]].append(sketch.node(point, place, plates[link]))
+            else:
+                ends.setdefault(link, []).append((point, kind))
+        part = slice(3, 6) if kind in (JointKind.PRISMATIC, JointKind.PARALLELOGRAM) else slice(0, 3)
+        shown = {JointKind.SPHERICAL: 0, JointKind.UNIVERSAL: 2}.get(kind, 1)
+        axes = tuple(screw[part] for screw in network.screws[k][:shown])
+        sketch.joints[label] = JointSymbol(label, kind, places[0].now, axes, body, limb, joint.actuated)
+    for own in ends.values():
+        is_rod = len(own) == 2 and all(kind in _ROD_ENDS for _, kind in own)
+        for (one, _), (other, _) in pairwise([*own, own[0]] if len(own) > 2 else own):
+            sketch.links.append(Link(one, other, Body.LIMB, limb, LinkKind.ROD if is_rod else LinkKind.BAR))

@@ -17,6 +17,11 @@ class Solved(NamedTuple):
     cosine: SX | None
     reach: SX
 
+    @classmethod
+    def angle(cls, sine: SX, cosine: SX, reach: SX) -> Solved:
+        """Return an angle from its sine and cosine (1, 1), without a value at half a turn."""
+        return cls(2 * ca.atan(sine / (1 + cosine)), sine, cosine, reach)
+
 
 def with_replaced(symbols: Sequence[SX], outputs: Sequence[SX], argument: int, solved: dict[int, Solved]) -> list[SX]:
     """Return expressions with unknowns replaced; sines and cosines of theirs are replaced as a whole.

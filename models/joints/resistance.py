@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
-import numpy as np
 from casadi import SX
 
-from ..arrays import FloatArray
 from ..member import Member
 from ..wrench import Wrench, force_along
-from .chain import HomeRobot, Joint
+from .chain import Joint
 from .cut import Cut
-from .generic import free_screws, generic_rank
-from .motion import AxisKind, Motion
+from .generic import PathFrame, free_screws, generic_rank
+from .motion import UNIT_VECTORS, AxisKind, Motion
 from .opened import OpenedPath
 
 
@@ -42,14 +40,14 @@ class Centre(NamedTuple):
     slides: bool = False
 
 
-def path_ranks(robot: HomeRobot, joints: Sequence[Joint], cut: Cut, samples: FloatArray) -> Ranks:
+def path_ranks(frame: PathFrame, joints: Sequence[Joint], cut: Cut) -> Ranks:
     """Return the ranks of a path of joints."""
     values = SX.sym("q", sum(len(joint.axes) for joint in joints))
     screws = free_screws(joints, values)
     passive = [j for j, joint in enumerate(joints) if not joint.actuated]
 
     def rank(columns: list[SX], rows: int = 6) -> int:
-        return generic_rank(robot, joints, ca.horzcat(SX(rows, 0), *columns), values, samples)
+        return generic_rank(frame, joints, ca.horzcat(SX(rows, 0), *columns), values)
 
     pinned = None
     if cut.type == "S":
@@ -88,20 +86,10 @@ def resistance(limb: str, path: OpenedPath, ranks: Ranks, given: SX | None) -> t
     is_cut = centre.behind == path.cut.joint and centre.point is joint.point and joint.type in ("R", "U")
     # The point of the joint at the cut is the same on both sides where the loop is closed: one is shorter.
     place = path.points[centre.behind] if body is None or is_cut else body.point(centre.point)
-    slide = _axis(path, centre.behind) if centre.slides else None
+    axis = joint.axes[-1]
+    slides = centre.slides and axis.kind is not AxisKind.PARALLELOGRAM  # whose point is that of its rods
+    slide = axis.direction(path.screws[centre.behind][-1]) if slides else None
     return [], Member(limb, place, ca.horzcat(SX(6, 0), *screws), ranks.passive, (), slide=slide)
-
-
-def _axis(path: OpenedPath, j: int) -> SX | None:
-    """Return the current unit axis (3, 1) of a joint; None for a parallelogram, whose point is that of its rods."""
-    axis, screw = path.joints[j].axes[-1], path.screws[j][-1]
-    match axis.kind:
-        case AxisKind.ROTATION:
-            return screw[:3]
-        case AxisKind.TRANSLATION:
-            return screw[3:]
-        case _:
-            return None
 
 
 def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Member | None]:
@@ -112,14 +100,14 @@ def _pinned(limb: str, path: OpenedPath, rank: int) -> tuple[list[Wrench], Membe
     if path.rod is not None:
         return [force_along(limb, centre, path.rod)], None
     others = [
-        (axis.kind is AxisKind.ROTATION and bool(axis.pitch.is_zero()), screw)
+        (axis.is_hinge, screw)
         for j, (joint, own) in enumerate(zip(path.joints, path.screws, strict=True))
         if not joint.actuated and j != path.cut.joint
         for axis, screw in zip(joint.axes, own, strict=True)
     ]
     velocities = [_velocity(screw, centre) for _, screw in others]
     if rank == 0:
-        return [force_along(limb, centre, SX(np.eye(3)[k].tolist())) for k in range(3)], None
+        return [force_along(limb, centre, each) for each in UNIT_VECTORS], None
     if rank == 2 and len(others) == 2:
         return [force_along(limb, centre, ca.cross(velocities[0], velocities[1]))], None
     if rank == 1 and len(others) == 1 and others[0][0]:

@@ -11,40 +11,44 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from ..limbjoints import LimbJoint, LimbLink
-from ..member import Member
 from ..model import Model
 from ..parts import (
     Actuator,
     AssemblySign,
     Closure,
     Dimension,
-    JointScrews,
     Parameter,
-    PathStructure,
     PoseSymbols,
     Unknown,
 )
 from ..wrench import Wrench
-from .chain import HomeRobot, Joint, Limb
+from .chain import HomeRobot, Joint, Limb, home_of
 from .cut import choose_cut, simplified
-from .distances import distance_equations
 from .faults import examine_geometry
 from .forms import Expression, RobotError, VectorExpression, plain
-from .generic import sampled_dimensions
-from .graphwords import read_robot
-from .linkgraph import home_of
-from .loops import PoseOf, examine_loops
-from .modelparts import actuator_name, generic_ranks, parameters, quantities, with_all_relations, with_kinds
+from .generic import PathFrame, sampled_dimensions
+from .loops import examine_loops
+from .modelparts import (
+    actuator_name,
+    generic_ranks,
+    joint_screws,
+    member_remarks,
+    parameters,
+    quantities,
+    structure_of,
+    with_all_relations,
+    with_kept,
+    with_kinds,
+)
 from .modes import joint_signs, mode_signs
 from .motion import AxisKind, Motion
-from .nestedlimb import NestedLimb, nested_joints, nested_limb, resisting
-from .networkpictures import network_drawing
-from .opened import OpenedPath, PathFrame, Variables, open_path, slide_length
+from .nested import ResistingParts, add_resisting, nested_joints
+from .network import OpenNetwork, open_network
+from .opened import OpenedPath, Variables, closures, distance_equations, open_path, slide_length
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
-from .segments import limb_links, with_shared_places
-from .states import PathJoints
-from .structure import joint_screws, member_remarks, structure_of, with_kept
+from .states import PathJoints, limb_links, with_shared_places
+from .words import read_robot
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
 _TURN = float(np.pi)
@@ -111,38 +115,38 @@ def robot(
 
 
 @dataclass(eq=False)
-class _Builder:
+class _Builder(ResistingParts):
     """The parts of a robot's model while its limbs are added one after the other."""
 
-    robot: HomeRobot
     frame: PathFrame
-    samples: FloatArray
     wrenches: list[Wrench] = field(default_factory=list)
-    members: list[Member] = field(default_factory=list)
     unknowns: list[Unknown] = field(default_factory=list)
     closure: list[Closure] = field(default_factory=list)
     checks: list[Closure] = field(default_factory=list)
     signs: list[AssemblySign] = field(default_factory=list)
     distances: list[Closure] = field(default_factory=list)
-    actuators: list[Actuator] = field(default_factory=list)
-    positions: list[SX] = field(default_factory=list)
-    screws: list[JointScrews] = field(default_factory=list)
     paths: list[DrawnPath] = field(default_factory=list)
     joints: list[LimbJoint] = field(default_factory=list)
     links: list[tuple[OpenedPath, list[LimbLink]]] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
     ranks: dict[tuple[int, int], Ranks] = field(default_factory=dict)
-    structure: list[PathStructure] = field(default_factory=list)
-    networks: list[NestedLimb] = field(default_factory=list)
+    networks: list[OpenNetwork] = field(default_factory=list)
+
+    @property
+    def robot(self) -> HomeRobot:
+        """The robot at home."""
+        return self.frame.robot
 
     def add_network(self, joints: Sequence[int]) -> None:
         """Add joints that are no limb with branches: their unknowns and equations; members follow from closed loops."""
         name = str(len(self.robot.limbs) + len(self.networks) + 1)
-        found = nested_limb(name, self.robot, joints, self._variables(name, {}), self.frame)
-        self.networks.append(found)
-        self.closure += found.closure
-        self.checks += found.checks
-        self.joints += nested_joints(found)
+        count = len(self.unknowns)
+        network = open_network(name, joints, self._variables(name, {}), self.frame)
+        network.unknowns = len(self.unknowns) - count
+        self.networks.append(network)
+        self.closure += closures("loop", name, network.equations)
+        self.checks += closures("sign", name, zip(network.checks, strict=True))
+        self.joints += nested_joints(network)
 
     def add_limb(self, limb: Limb) -> None:
         """Add a limb: its unknowns, equations, rows, members and actuators."""
@@ -186,9 +190,8 @@ class _Builder:
             name = actuator_name(self.robot, limb, joint, k + 1) if len(driven) > 1 else limb.name
             members = tuple(member for *_, member in places)
             (axis,) = joint.axes
-            dimension = Dimension.ANGLE if axis.kind is AxisKind.ROTATION else Dimension.LENGTH
             screws = ca.repmat(path.screws[j][0], 1, len(members))
-            self.actuators.append(Actuator(name, limb.name, members, screws, dimension))
+            self.actuators.append(Actuator(name, limb.name, members, screws, axis.dimension))
             way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[joint, 0])
             self.positions.append(SX(0) if way is None else way)
 
@@ -207,12 +210,11 @@ class _Builder:
         self, limb: Limb, index: int, joints: Sequence[Joint], variables: Variables, labels: Mapping[int, str]
     ) -> OpenedPath | None:
         """Add one path of a limb, and return it; None for a path that constrains nothing and drives nothing."""
-        robot = self.robot
-        joints = simplified(robot, joints, self.samples)
+        joints = simplified(self.frame, joints)
         cut = choose_cut(joints, len(limb.stem) if len(limb.branches) > 1 else 0, with_rods=limb.centre is None)
         key = limb.group, index
         if key not in self.ranks:
-            self.ranks[key] = path_ranks(robot, joints, cut, self.samples)
+            self.ranks[key] = path_ranks(self.frame, joints, cut)
         ranks = self.ranks[key]
         if ranks.passive == 6 and not any(joint.actuated for joint in joints):
             return None
@@ -221,14 +223,13 @@ class _Builder:
         rows, member = resistance(limb.name, path, ranks, limb.centre)
         before = sum(row.limb == limb.name for row in self.wrenches)
         row = before if len(limb.branches) > 1 and len(rows) == 1 else None
-        self.paths.append(DrawnPath(limb.name, index + 1, len(limb.branches), len(limb.stem), path, row))
+        self.paths.append(DrawnPath(limb, index, path, row))
         several, name = len(limb.branches) > 1, limb.member(index)
         self.wrenches += [replace(each, member=name) for each in rows] if several else rows
         self.members += [] if member is None else [replace(member, name=name if several else "")]
-        self.closure += [Closure(f"loop {name} ({k + 1})", *each) for k, each in enumerate(path.equations)]
-        self.checks += [Closure(f"sign {name} ({k + 1})", each) for k, each in enumerate(path.checks)]
-        own = distance_equations(path, variables, self.frame)
-        self.distances += [Closure(f"distance {name} ({k + 1})", *each) for k, each in enumerate(own)]
+        self.closure += closures("loop", name, path.equations)
+        self.checks += closures("sign", name, zip(path.checks, strict=True))
+        self.distances += closures("distance", name, distance_equations(path, variables, self.frame))
         self.signs += joint_signs(limb.name, name, path)
         self.structure.append(structure_of(limb.name, name, path, ranks, len(self.unknowns) - count))
         screws = joint_screws(limb.name, path, ranks, labels)
@@ -263,12 +264,7 @@ def joint_labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping
         joints: of the path.
         known: labels of joints of other paths, which share the joints of the stem.
     """
-    found = {}
-    for j, joint in enumerate(joints):
-        branch = f".{index + 1}" if j >= len(limb.stem) and len(limb.branches) > 1 else ""
-        if id(joint) not in known:
-            found[id(joint)] = f"{limb.name}{branch}:{j + 1}"
-    return found
+    return {id(joint): limb.label(index, j) for j, joint in enumerate(joints) if id(joint) not in known}
 
 
 def model_of_home(
@@ -286,34 +282,28 @@ def model_of_home(
         RobotError: the robot cannot be put together near home.
     """
     words = at_home.words
-    remarks = examine_geometry(at_home, samples)
     pose = PoseSymbols()
-    platform = Motion(pose.rotation, at_home.home, pose.position)
-    frame = PathFrame(at_home.size, platform, at_home.symbols, at_home.typical, samples)
-    builder = _Builder(at_home, frame, samples)
+    frame = PathFrame(at_home, samples, Motion(pose.rotation, at_home.home, pose.position))
+    remarks = examine_geometry(frame)
+    builder = _Builder(frame)
     for limb in at_home.limbs:
         builder.add_limb(limb)
-    for joints, _ in () if at_home.graph is None else at_home.graph.networks:
+    for joints in () if at_home.graph is None else at_home.graph.networks:
         builder.add_network(joints)
     if not builder.networks:
         _check_carrying(builder)
+    x, y, z = map(float, frame.typical_value(at_home.home).ravel())
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
-    loops = examine_loops(at_home, closure, PoseOf(pose.rotation, pose.position), builder.unknowns, samples)
+    loops = examine_loops(frame, closure, builder.unknowns)
     numbers = [at_home.symbols, unknowns, pose.rotation, pose.position]
     for network in builder.networks:
-        found = resisting(network, at_home, frame, numbers, loops.points)
-        builder.members += found.members
-        builder.actuators += found.actuators
-        builder.positions += found.positions
-        builder.screws += found.screws
-        builder.structure += found.structure
+        add_resisting(builder, network, frame, numbers, loops.points)
     _check_carrying(builder)
     actuators = with_all_relations(builder.actuators)
     members = [with_kinds(member, actuators, at_home.size, numbers, loops.points) for member in builder.members]
     independent = tuple(closure[k] for k in loops.independent)
     everything = [replace(each, name=f"{each.name} in full") for each in (*closure, *builder.checks)]
-    drawings = [network_drawing(e.name, e.network, carries=e.name in builder.carrying) for e in builder.networks]
     model = Model(
         name=words.name,
         description=words.description,
@@ -321,11 +311,11 @@ def model_of_home(
         options={"definition": definition},
         parameters=(*parameters(at_home), *more),
         pose=pose,
-        home=frame.typical_triple(at_home.home),
+        home=(x, y, z),
         wrenches=tuple(builder.wrenches),
         members=tuple(members),
         quantities=quantities(builder.actuators, builder.positions),
-        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, drawings),
+        scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, builder.networks),
         unknowns=tuple(builder.unknowns),
         closure=independent,
         loops=tuple(everything),

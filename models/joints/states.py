@@ -1,13 +1,15 @@
-"""The joints of a path as limits read them: coordinates from home, and directions of universal and spherical joints.
+"""The joints and links of a path as limits read them: coordinates from home, directions of cones, and segments.
 
 A joint whose variables are unknowns has these as coordinates. A joint at which the path is opened, and rotations that
-are taken as one spherical joint, have coordinates from the displacements of the bodies on both sides. A universal joint
-at the end of a rod has them from the rod's direction. A rod between two spherical joints turns freely about itself.
+are taken as one spherical joint, have coordinates from the displacements of the bodies on both sides: sine and cosine
+in closed form, each times one positive number. A universal joint at the end of a rod has them from the rod's direction.
+A rod between two spherical joints turns freely about itself. Links are segments between the centres of joints.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import casadi as ca
@@ -15,21 +17,70 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..limbjoints import JointCone, JointCoordinate, LimbJoint
+from ..limbjoints import JointCone, JointCoordinate, LimbJoint, LimbLink
 from ..parts import Dimension
-from .angles import Angle, angle_about, rotation_angle, two_angles
 from .chain import Joint, Limb
-from .generic import INCIDENT
+from .generic import PathFrame
 from .motion import AxisKind, JointAxis, Motion
-from .opened import OpenedPath, PathFrame, slide_length
+from .opened import OpenedPath, slide_length
 
 #: Names of the coordinates of a joint that has two.
-_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
+COORDINATE_PARTS: Mapping[str, tuple[str, ...]] = {"U": ("first", "second"), "C": ("angle", "stroke")}
 #: The solution of an angle that is 0 at home differs from the other one where ``a1 . (a2 x d)`` is above this at home:
 #: rounding leaves 1e-16.
 _DISTINCT = 1e-6
 _ROD = "it ends a rod between two spherical joints, which turns freely about itself"
 _PLANE = "its axes are in one plane at home, where the angles of three rotations are not determined"
+
+
+class Angle(NamedTuple):
+    """An angle by its sine and cosine (1, 1), both times the same positive number."""
+
+    sine: SX
+    cosine: SX
+
+    @property
+    def reversed(self) -> Angle:
+        """The angle with the other sign."""
+        return Angle(-self.sine, self.cosine)
+
+
+def angle_about(axis: SX, before: SX, after: SX) -> Angle:
+    """Return the angle by which a rotation about a unit axis (3, 1) takes one vector (3, 1) to another.
+
+    The vectors have equal parts along the axis, and parts across it that are not zero.
+    """
+    across, turned = before - axis * ca.dot(axis, before), after - axis * ca.dot(axis, after)
+    return Angle(ca.dot(axis, ca.cross(across, turned)), ca.dot(across, turned))
+
+
+def rotation_angle(axis: SX, rotation: SX) -> Angle:
+    """Return the angle of a rotation (3, 3) about a unit axis (3, 1) of it: ``sin`` and ``cos`` times 2."""
+    return Angle(ca.dot(axis, ca.inv_skew(rotation - rotation.T)), ca.trace(rotation) - 1)
+
+
+def two_angles(axes: tuple[SX, SX], before: SX, after: SX, sign: float) -> tuple[Angle, Angle]:
+    """Return the angles q1 and q2 with ``after = R(a1, q1) R(a2, q2) before``.
+
+    ``a1 . after = a1 . R(a2, q2) before`` is ``A + B cos q2 + C sin q2`` and has two solutions; at home, where
+    ``after = before``, one of them is 0. The solutions coincide where a1 lies in the plane of a2 and the vector.
+
+    Args:
+        axes: unit axes a1 and a2, (3, 1) each, at home.
+        before: (3, 1) unit vector at home.
+        after: (3, 1) current unit vector.
+        sign: sign of ``C = a1 . (a2 x before)`` at home.
+    """
+    a1, a2 = axes
+    A = ca.dot(a1, a2) * ca.dot(a2, before)
+    B, C = ca.dot(a1, before) - A, ca.dot(a1, ca.cross(a2, before))
+    n = ca.dot(a1, after) - A
+    w = sign * ca.sqrt(B * B + C * C - n * n)
+    second = Angle(C * n - B * w, B * n + C * w)
+    square = B * B + C * C
+    sine, cosine = second.sine / square, second.cosine / square
+    turned = before + sine * ca.cross(a2, before) + (1 - cosine) * (a2 * ca.dot(a2, before) - before)
+    return angle_about(a1, turned, after), second
 
 
 class _Coordinates(NamedTuple):
@@ -64,7 +115,7 @@ class PathJoints:
                     continue
                 own = [] if each.type == "S" else coordinates.values[start : start + len(each.axes)]
                 start += len(each.axes)
-                names = _PARTS.get(each.type, ("",))
+                names = COORDINATE_PARTS.get(each.type, ("",))
                 named = [
                     JointCoordinate(name, one.dimension, one.value, one.cosine)
                     for name, one in zip(names, own, strict=False)
@@ -128,11 +179,11 @@ class PathJoints:
         sign = self._sign(a1, a2, path.joints[end].point - joint.point)
         if sign == 0:
             return _Coordinates([], "its first axis, its second axis and the rod are in one plane at home")
-        found = two_angles((a1, a2), home / ca.norm_2(home), body.rotation.T @ now / ca.norm_2(now), sign)
+        first, second = two_angles((a1, a2), home / ca.norm_2(home), body.rotation.T @ now / ca.norm_2(now), sign)
         if is_base_side:
-            return _Coordinates([_angle(found.first), _angle(found.second)])
+            return _Coordinates([_angle(first), _angle(second)])
         # From the platform, the rotations come in the other order and have the other sign.
-        return _Coordinates([_angle(found.second.reversed), _angle(found.first.reversed)])
+        return _Coordinates([_angle(second.reversed), _angle(first.reversed)])
 
     def _sign(self, a1: SX, a2: SX, vector: SX) -> float:
         """Return the sign of ``a1 . (a2 x vector)`` at the typical dimensions; 0 where it is not distinct."""
@@ -156,7 +207,7 @@ class PathJoints:
         ):
             for k in others:
                 home = sign * (path.joints[k].point - place)
-                if not is_zero(home, self._frame):
+                if not self._frame.is_zero(ca.norm_2(home) / self._frame.size):
                     return _cone(link(j).rotation @ home, home, opposite(j), turn)
         # All joints have one centre at home: a slide next to the joint has the direction of its link.
         for k, link, opposite in ((j + 1, self._behind, self._before), (j - 1, self._before, self._behind)):
@@ -167,22 +218,11 @@ class PathJoints:
 
     def _before(self, j: int) -> Motion:
         """Return the displacement of the body on the base's side of a joint, which is no rod."""
-        path = self._path
-        if j == path.cut.first and path.cut.last >= path.cut.first:
-            return path.sides[0]
-        if j == path.cut.last + 1:
-            return path.sides[1]
-        behind = path.behind[j - 1] if j > 0 else None
-        return behind or Motion.none()
+        return self._path.body_before(j) or Motion.none()
 
     def _behind(self, j: int) -> Motion:
         """Return the displacement of the body on the platform's side of a joint, which is no rod."""
-        return self._path.behind[j] or self._path.sides[1]
-
-
-def is_zero(vector: SX, frame: PathFrame) -> bool:
-    """Return whether a vector (3, 1) at home, length, is zero for all dimensions."""
-    return all(value < INCIDENT for value in frame.sampled(ca.norm_2(vector) / frame.size))
+        return self._path.body_behind(j) or self._path.sides[1]
 
 
 def _cone(link: SX, home: SX, other: Motion, turn: FloatArray) -> JointCone:
@@ -200,3 +240,71 @@ def _coordinate(axis: JointAxis, value: SX) -> JointCoordinate:
     if axis.kind is AxisKind.PARALLELOGRAM and axis.actuated:
         return JointCoordinate("", Dimension.LENGTH, axis.way(value))
     return JointCoordinate("", Dimension.LENGTH if axis.kind is AxisKind.TRANSLATION else Dimension.ANGLE, value)
+
+
+def limb_links(path: OpenedPath, labels: Mapping[int, str], frame: PathFrame) -> list[LimbLink]:
+    """Return the links of a path, from the base on.
+
+    Of joints that have one centre at home, the one nearest the base is an end of links. A slide along the line between
+    its neighbours is no end: the link is then as long as the slide makes it.
+
+    Args:
+        path: the path.
+        labels: of the joints, by identity.
+        frame: values that all paths of the robot share.
+    """
+    ends: list[int] = []
+    for j, joint in enumerate(path.joints):
+        if not any(frame.coincide(joint.point, path.joints[k].point) for k in ends[-1:]):
+            ends.append(j)
+    ends = [
+        j for i, j in enumerate(ends) if not (0 < i < len(ends) - 1 and _is_along(path, ends[i - 1 : i + 2], frame))
+    ]
+    links = []
+    for one, other in pairwise(ends):
+        names = [labels[id((path.joints[j].parts or (path.joints[j],))[0])] for j in (one, other)]
+        start = _place(path, one)
+        links.append(LimbLink(" to ".join(names), frozenset(names), start, _place(path, other) - start))
+    return links
+
+
+def _place(path: OpenedPath, j: int) -> SX:
+    """Return the current place (3, 1) of a joint on the body behind it: that of a slide moves."""
+    behind = path.behind[j]
+    return path.points[j] if behind is None else behind.point(path.joints[j].point)
+
+
+def _is_along(path: OpenedPath, joints: Sequence[int], frame: PathFrame) -> bool:
+    """Return whether the second of three joints is a slide along the line between the others."""
+    before, slide, behind = (path.joints[j] for j in joints)
+    if slide.type != "P":
+        return False
+    axis = slide.axes[0].axis
+    off = ca.vertcat(ca.cross(slide.point - before.point, axis), ca.cross(behind.point - slide.point, axis))
+    return frame.is_zero(ca.norm_2(off) / frame.size)
+
+
+def with_shared_places(paths: Sequence[tuple[OpenedPath, list[LimbLink]]], frame: PathFrame) -> tuple[LimbLink, ...]:
+    """Return the links of all paths, with one name for joints of the base, or of the platform, that have one centre.
+
+    Args:
+        paths: each path with its links.
+        frame: values that all paths of the robot share.
+    """
+    found = [link for _, links in paths for link in links]
+    names: dict[str, str] = {}
+    for side in (0, -1):
+        known: list[tuple[str, SX]] = []
+        for path, links in paths:
+            if not links:
+                continue
+            label = links[side].name.split(" to ")[side]
+            point = path.joints[side].point
+            same = next((name for name, other in known if frame.coincide(point, other)), None)
+            known += [] if same else [(label, point)]
+            names.setdefault(label, same or label)
+    unique = {link.name: link for link in found}
+    return tuple(
+        LimbLink(link.name, frozenset(names.get(end, end) for end in link.ends), link.start, link.span)
+        for link in unique.values()
+    )

@@ -1,7 +1,7 @@
-"""A robot as it is written: dimensions, points, limbs and joints in words, with their form checked.
+"""A robot as it is written, with its form checked: dimensions and points; limbs and joints, or links and joints.
 
-The tables of a robot file and the arguments of :func:`~screwsynth.models.joints.robot.robot` have the same words. Here
-their form is checked; :mod:`.chain` gives the expressions their values.
+The tables of a robot file and the arguments of :func:`~screwsynth.models.joints.robot.robot` have the same words. Links
+and joints are for shapes that limbs with branches do not have. :mod:`.chain` gives the expressions their values.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .forms import (
 )
 
 #: The joints by name, with their own keys beside ``type`` and ``at``.
-JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
+_JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
     "R": ("axis", "actuated"),
     "P": ("axis", "actuated"),
     "H": ("axis", "pitch", "actuated"),
@@ -39,17 +39,22 @@ JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
     "Pa": ("axis", "to", "actuated"),
 }
 #: Keys of every robot file beside those of its limbs, or of its links and joints.
-HEAD_KEYS = ("name", "description", "length_unit", "home", "dimensions", "derived")
+_HEAD_KEYS = ("name", "description", "length_unit", "home", "dimensions", "derived")
 _MOST_LIMBS = 24
 #: Most joints from base to platform, and most branches of a limb: no limb of a known robot has more than half of them.
 _MOST_JOINTS = 12
 _MOST_BRANCHES = 6
 #: Most joints of a robot with all copies. So many took 4 s to read; 288 did not end within 200 s.
-MOST_IN_ALL = 120
+_MOST_IN_ALL = 120
 #: Fault of a branch with branches of its own.
 NESTED_BRANCH = "is a branch of a branch; allowed are branches of a limb, each with joints up to the platform"
 #: Copies of a limb nearer than this coincide, degrees.
 _SAME_ANGLE = 1e-6
+#: Keys of a robot file with links and joints beside those of every robot file.
+_GRAPH_KEYS = ("links", "base", "platform", "points", "joint", "coupling")
+_MOST_COUPLINGS = 40
+#: Joints with one coordinate, which a coupling relates and an actuator drives.
+_COUPLED = ("R", "P", "H")
 
 
 @dataclass(frozen=True)
@@ -141,18 +146,25 @@ class RobotWords:
     graph: GraphWords | None = None
 
 
-def read_words(tables: Mapping[str, object]) -> RobotWords:
-    """Return a robot from its tables, as ``tomllib`` returns those of a robot file.
+def read_robot(tables: Mapping[str, object]) -> RobotWords:
+    """Return a robot from its tables, which have limbs, or links and joints.
 
     Args:
-        tables: the keys ``name``, ``description``, ``length_unit``, ``home``, ``dimensions``, ``derived`` and ``limb``.
+        tables: as ``tomllib`` returns those of a robot file.
 
     Raises:
         RobotError: a key is unknown or missing, or a value has a form that is not allowed.
     """
-    refuse_other_keys("", tables, (*HEAD_KEYS, "limb"))
-    head = read_head(tables)
-    limbs = tables.get("limb")
+    given = [key for key in _GRAPH_KEYS if tables.get(key) is not None]
+    if given and tables.get("limb") is not None:
+        raise RobotError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")
+    refuse_other_keys("", tables, (*_HEAD_KEYS, *(_GRAPH_KEYS if given else ()), "limb"))
+    head = _head(tables)
+    return replace(head, graph=_graph(tables)) if given else replace(head, limbs=_limbs(tables.get("limb")))
+
+
+def _limbs(limbs: object) -> tuple[LimbWords, ...]:
+    """Return the limbs of a robot."""
     if not isinstance(limbs, Sequence) or isinstance(limbs, str) or not limbs:
         raise RobotError("limb", "is missing: a robot needs at least one [[limb]]")
     read: list[LimbWords] = []
@@ -164,20 +176,16 @@ def read_words(tables: Mapping[str, object]) -> RobotWords:
     if len(names) > _MOST_LIMBS:
         raise RobotError("limb", f"has {len(names)} limbs with all copies; at most {_MOST_LIMBS} are allowed")
     joints = sum(len(each.names) * (len(each.stem) + sum(map(len, each.branches))) for each in read)
-    if joints > MOST_IN_ALL:
-        raise RobotError("limb", f"has {joints} joints with all copies; at most {MOST_IN_ALL} are allowed")
+    if joints > _MOST_IN_ALL:
+        raise RobotError("limb", f"has {joints} joints with all copies; at most {_MOST_IN_ALL} are allowed")
     for limb in names:
         if names.count(limb) > 1:
             raise RobotError("limb", f"has two limbs with the name {limb!r}")
-    return replace(head, limbs=tuple(read))
+    return tuple(read)
 
 
-def read_head(tables: Mapping[str, object]) -> RobotWords:
-    """Return a robot without limbs: its name, home, dimensions and derived numbers.
-
-    Raises:
-        RobotError: a value has a form that is not allowed.
-    """
+def _head(tables: Mapping[str, object]) -> RobotWords:
+    """Return a robot without limbs: its name, home, dimensions and derived numbers."""
     name = tables.get("name")
     if not isinstance(name, str) or not name.strip():
         raise RobotError("name", "is missing: give the robot's name as a text")
@@ -244,9 +252,8 @@ def _check_path(place: str, joints: Sequence[JointWords]) -> None:
         raise RobotError(f"{place}, joints", f"has {len(joints)} joints; at most {_MOST_JOINTS} are allowed")
     names = [joint.name for joint in joints if joint.name]
     for joint in joints:
-        if joint.name and not NAME.fullmatch(joint.name):
-            fault = f"is {joint.name!r}; letters, digits and _ are allowed, a letter first"
-            raise RobotError(f"{joint.place}, name", fault)
+        if joint.name:
+            _check_name(f"{joint.place}, name", joint.name)
         if names.count(joint.name) > 1:
             raise RobotError(f"{place}, joints", f"has two joints with the name {joint.name!r}")
 
@@ -265,18 +272,18 @@ def _only_joints(place: str, branch: object) -> object:
 def _joints(place: str, value: object) -> tuple[JointWords, ...]:
     """Return the joints of a limb or of a branch."""
     return tuple(
-        joint_words(f"{place}, joint {k + 1}", table_of(f"{place}, joint {k + 1}", each))
+        _joint_words(f"{place}, joint {k + 1}", table_of(f"{place}, joint {k + 1}", each))
         for k, each in enumerate(list_of(f"{place}, joints", value))
     )
 
 
-def joint_words(place: str, table: Mapping[str, object]) -> JointWords:
+def _joint_words(place: str, table: Mapping[str, object]) -> JointWords:
     """Return a joint."""
     kind = table.get("type")
-    if not isinstance(kind, str) or kind not in JOINT_KEYS:
-        raise RobotError(f"{place}, type", f"is {kind!r}; allowed are {', '.join(JOINT_KEYS)}")
+    if not isinstance(kind, str) or kind not in _JOINT_KEYS:
+        raise RobotError(f"{place}, type", f"is {kind!r}; allowed are {', '.join(_JOINT_KEYS)}")
     place = f"{place} ({kind})"
-    allowed = ("type", "name", "at", *JOINT_KEYS[kind])
+    allowed = ("type", "name", "at", *_JOINT_KEYS[kind])
     if "actuated" in table and "actuated" not in allowed:
         raise RobotError(f"{place}, actuated", "is not allowed: write its axes as joints R or P of their own")
     refuse_other_keys(place, table, allowed)
@@ -343,3 +350,102 @@ def _dimension(name: str, value: object) -> DimensionWords:
         raise RobotError(f"{place}, kind", f"is {kind!r}; allowed are {', '.join(kinds)}")
     typical = real_of(f"{place}, typical", table["typical"])
     return DimensionWords(typical, kinds[kind], text_of(f"{place}, description", table.get("description", "")))
+
+
+def _graph(tables: Mapping[str, object]) -> GraphWords:
+    """Return links, joints and couplings."""
+    links = _links(tables)
+    base, platform = (_end(tables, role, links) for role in ("base", "platform"))
+    if base == platform:
+        raise RobotError("platform", f"is {platform!r}, which is the base; two links are needed")
+    points = {key: vector_of(f"point {key}", value) for key, value in table_of("points", tables.get("points")).items()}
+    check_names(points, "a point")
+    written = list_of("joint", tables.get("joint") or ())
+    if not written:
+        raise RobotError("joint", "is missing: a robot of links needs tables [[joint]]")
+    if len(written) > _MOST_IN_ALL:
+        raise RobotError("joint", f"has {len(written)} joints; at most {_MOST_IN_ALL} are allowed")
+    joints = [_joint(k + 1, table_of(f"joint {k + 1}", each), links) for k, each in enumerate(written)]
+    names = [joint.name for joint in joints]
+    for joint in joints:
+        if names.count(joint.name) > 1:
+            raise RobotError(joint.place, "is given twice; each joint needs a name of its own")
+    unused = [link for link in links if not any(link in joint.between for joint in joints)]
+    if unused:
+        raise RobotError(f"links, {unused[0]}", "has no joint; each link needs one, or is left out")
+    couplings = list_of("coupling", tables.get("coupling") or ())
+    if len(couplings) > _MOST_COUPLINGS:
+        raise RobotError("coupling", f"has {len(couplings)} couplings; at most {_MOST_COUPLINGS} are allowed")
+    return GraphWords(
+        links=tuple(links),
+        base=base,
+        platform=platform,
+        points=points,
+        joints=tuple(joints),
+        couplings=tuple(_coupling(k + 1, each, joints) for k, each in enumerate(couplings)),
+    )
+
+
+def _links(tables: Mapping[str, object]) -> list[str]:
+    """Return the names of the links."""
+    links = [text_of("links", each) for each in list_of("links", tables.get("links") or ())]
+    if not links:
+        raise RobotError("links", 'is missing: give the names of all links, such as ["base", "arm", "platform"]')
+    for name in links:
+        _check_name(f"links, {name}", name)
+        if links.count(name) > 1:
+            raise RobotError(f"links, {name}", "is given twice; each link needs a name of its own")
+    return links
+
+
+def _end(tables: Mapping[str, object], role: str, links: Sequence[str]) -> str:
+    """Return the link that is the base or the platform: the one of this name, where the file names none."""
+    name = text_of(role, tables.get(role, role))
+    if name not in links:
+        raise RobotError(role, f"is {name!r}, which is no link; links are {', '.join(links)}")
+    return name
+
+
+def _check_name(place: str, name: str) -> None:
+    """Refuse a name that is no word."""
+    if not NAME.fullmatch(name):
+        raise RobotError(place, f"is {name!r}; letters, digits and _ are allowed, a letter first")
+
+
+def _joint(number: int, table: Mapping[str, object], links: Sequence[str]) -> LinkJointWords:
+    """Return a joint between two links."""
+    name = text_of(f"joint {number}, name", table.get("name", f"joint_{number}"))
+    _check_name(f"joint {number}, name", name)
+    place = f"joint {name}"
+    between = [text_of(f"{place}, between", each) for each in list_of(f"{place}, between", table.get("between", ()))]
+    if len(between) != 2:
+        raise RobotError(f"{place}, between", f"has {len(between)} links; a joint is between 2, the base's side first")
+    for link in between:
+        if link not in links:
+            raise RobotError(f"{place}, between", f"has {link!r}, which is no link; links are {', '.join(links)}")
+    if between[0] == between[1]:
+        raise RobotError(f"{place}, between", f"has the link {link!r} twice; two different links are needed")
+    rest = {key: value for key, value in table.items() if key != "between"}
+    if table.get("type") == "weld":
+        refuse_other_keys(f"{place} (weld)", rest, ("name", "type"))
+        return LinkJointWords(place, name, (between[0], between[1]), None)
+    joint = _joint_words(place, {**rest, "name": name})
+    return LinkJointWords(joint.place, name, (between[0], between[1]), joint)
+
+
+def _coupling(number: int, value: object, joints: Sequence[LinkJointWords]) -> CouplingWords:
+    """Return a coupling of joints with one coordinate each."""
+    place = f"coupling {number}"
+    table = table_of(place, value)
+    refuse_other_keys(place, table, ("factors",))
+    written = table_of(f"{place}, factors", table.get("factors"))
+    types = {each.name: "weld" if each.joint is None else each.joint.type for each in joints}
+    factors = {name: expression_of(f"{place}, {name}", factor) for name, factor in written.items()}
+    for name in factors:
+        if name not in types:
+            raise RobotError(f"{place}, {name}", f"is no joint; joints are {', '.join(types)}")
+        if types[name] not in _COUPLED:
+            raise RobotError(f"{place}, {name}", f"is a joint {types[name]}; only R, P and H have one coordinate")
+    if len(factors) < 2:
+        raise RobotError(f"{place}, factors", f"has {len(factors)} joints; a coupling needs 2 or more")
+    return CouplingWords(place, factors)

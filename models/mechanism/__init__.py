@@ -1,20 +1,18 @@
 """Robots of any topology in numbers: links and joints as a graph, at one configuration.
 
-The modules in order, each of which imports only those before it: ``graph`` (links, joints and couplings), ``topology``
-(connected parts, bridges, spanning trees), ``checks`` (a mechanism that contradicts itself), ``motions`` (links and
-screws at any coordinates), ``closing`` (closed loops at a pose or at positions of the actuators), ``decomposition``
-(limbs and branches in the graph), ``limbs`` (tables of a robot file), ``members`` (parts that resist the platform),
-``freedoms`` (twists that joints allow), ``centre`` (a member's), ``wrenches`` (resistance, F, rates and ranks),
-``singularities`` (ranks against generic ones). Mechanisms from robot files are made where these are read, in
-:mod:`screwsynth.models.joints.mechanisms`.
+The modules in order, each of which imports only those before it: ``topology`` (connected parts, bridges, spanning
+trees), ``graph`` (links, joints and couplings, and a mechanism that contradicts itself), ``motions`` (links and screws
+at any coordinates), ``closing`` (closed loops at a pose or at positions of the actuators), ``decomposition`` (limbs,
+branches, and parts that resist the platform), ``limbs`` (tables of a robot file), ``freedoms`` (twists that joints
+allow), ``centre`` (a member's), ``wrenches`` (resistance, F, rates and ranks), ``singularities`` (ranks against generic
+ones). Mechanisms from robot files are made where these are read, in :mod:`screwsynth.models.joints.mechanisms`.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .checks import check_mechanism
 from .closing import ClosedMechanism, close
-from .graph import Coupling, Mechanism, MechanismError, MechanismJoint, MechanismLink
+from .graph import Coupling, Mechanism, MechanismError, MechanismJoint, MechanismLink, check_mechanism
 from .limbs import limbs_of, links_of, robot_tables
 from .singularities import MechanismSingularity, SingularityType, generic_ranks, singularities_of
 from .wrenches import MemberWrenches, RobotRanks, RobotWrenches, wrenches_of

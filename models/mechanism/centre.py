@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray
+from .decomposition import MemberGraph
 from .graph import Mechanism, MechanismJoint
-from .members import MemberGraph
 from .motions import size_of
 from .topology import Classes, bridges_between
 
@@ -41,7 +41,11 @@ def centre_of(mechanism: Mechanism, rule: CentreRule) -> FloatArray:
     joints = [mechanism.joints[k] for k in rule.joints]
     if not rule.is_meeting:
         return np.asarray(np.mean([joint.point for joint in joints], axis=0))
-    one, other = joints
+    return _crossing(*joints)
+
+
+def _crossing(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
+    """Return the point (3,) of one axis that is nearest to another one, which is not parallel."""
     normal = np.cross(one.axis, other.axis)
     along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
     return np.asarray(one.point + along * one.axis)
@@ -73,10 +77,8 @@ def centre_rule(mechanism: Mechanism, member: MemberGraph) -> CentreRule:
 
 def _rows(mechanism: Mechanism, member: MemberGraph) -> list[list[int]]:
     """Return the passive joints that every path from base to platform has, in rows that follow each other directly."""
-    classes = Classes([link.name for link in mechanism.links])
-    for joint in mechanism.joints:
-        if joint.kind == "weld":
-            classes.merge(joint.inner, joint.outer)
+    welds = [(joint.inner, joint.outer) for joint in mechanism.joints if joint.kind == "weld"]
+    classes = Classes([link.name for link in mechanism.links], welds)
     own = [mechanism.joints[k] for k in member.joints]
     edges = [(classes.find(joint.inner), classes.find(joint.outer)) for joint in own]
     path = bridges_between(classes.find(mechanism.base), classes.find(mechanism.platform), edges)
@@ -96,11 +98,8 @@ def _meet(joints: Sequence[MechanismJoint], size: float) -> bool:
     """Return whether the axes of hinges meet in one point."""
     if any(joint.kind != "R" for joint in joints):
         return False
-    one, other = joints[0], joints[1]
-    normal = np.cross(one.axis, other.axis)
-    if float(np.linalg.norm(normal)) < _MEET:
+    if float(np.linalg.norm(np.cross(joints[0].axis, joints[1].axis))) < _MEET:
         return False
-    along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
-    point = one.point + along * one.axis
+    point = _crossing(joints[0], joints[1])
     apart = [float(np.linalg.norm(np.cross(point - joint.point, joint.axis))) for joint in joints]
     return max(apart) < _MEET * size

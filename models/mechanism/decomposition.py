@@ -1,6 +1,12 @@
-"""A mechanism's graph taken apart into limbs: serial chains from base to platform, and branches behind a driven stem.
+"""A mechanism's graph taken apart: into limbs, and into the members that resist the platform with locked actuators.
 
-The symbolic form of robots given joint by joint has these. Parts of another shape are left over, each with the reason.
+The limbs of robots given joint by joint are serial chains from base to platform, and branches behind a driven stem.
+Parts of another shape are left over, each with the reason.
+
+For members, links that a locked joint, a weld, or a joint that couplings hold still joins become one. Without base and
+platform, each connected part of the rest is a member; so is a joint directly between base and platform. Joints that a
+coupling relates belong to one member. The same with free actuators is a *limb* here, of any shape. Links that hang on
+one joint are left out.
 """
 
 from __future__ import annotations
@@ -9,6 +15,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from .graph import Mechanism
 from .topology import Classes, parts
 
 
@@ -57,12 +64,10 @@ class Decomposition:
     Attributes:
         limbs: in the order of their first joints.
         networks: other parts that join base and platform.
-        idle: joints that join nothing to the platform: on dangling links, or on loops of the base alone.
     """
 
     limbs: tuple[LimbPaths, ...]
     networks: tuple[Network, ...]
-    idle: tuple[int, ...]
 
 
 def decompose(
@@ -76,23 +81,19 @@ def decompose(
         joints: between links.
         couplings: indices of the joints of each coupling, which belong together.
     """
-    welded = Classes([name for joint in joints for name in (joint.one, joint.other)] + [base, platform])
-    for joint in joints:
-        if joint.is_weld:
-            welded.merge(joint.one, joint.other)
+    names = [name for joint in joints for name in (joint.one, joint.other)] + [base, platform]
+    welded = Classes(names, [(joint.one, joint.other) for joint in joints if joint.is_weld])
     ends = [(welded.find(joint.one), welded.find(joint.other)) for joint in joints]
     root, top = welded.find(base), welded.find(platform)
     moving = [k for k, joint in enumerate(joints) if not joint.is_weld and ends[k][0] != ends[k][1]]
     coupled = {k for coupling in couplings for k in coupling}
     limbs: list[LimbPaths] = []
     networks: list[Network] = []
-    used: set[int] = set()
-    for own in _parts(ends, moving, (root, top), couplings):
+    for own in _joined(ends, moving, (root, top), couplings):
         kept = without_dangling(ends, own, (root, top), coupled)
         nodes = {node for k in kept for node in ends[k]}
         if not {root, top} <= nodes:
             continue
-        used |= set(kept)
         if coupled & set(kept):
             networks.append(Network(tuple(kept), "its joints are coupled"))
             continue
@@ -101,31 +102,22 @@ def decompose(
             limbs.append(found)
         else:
             networks.append(Network(tuple(kept), found))
-    idle = tuple(k for k in moving if k not in used)
-    return Decomposition(tuple(limbs), tuple(networks), idle)
+    return Decomposition(tuple(limbs), tuple(networks))
 
 
-def _parts(
-    ends: Sequence[tuple[str, str]], moving: Sequence[int], roots: tuple[str, str], couplings: Sequence[Collection[int]]
+def _joined(
+    ends: Sequence[tuple[str, str]], joints: Sequence[int], roots: tuple[str, str], couplings: Sequence[Collection[int]]
 ) -> list[list[int]]:
-    """Return the joints in parts that share links other than base and platform, or a coupling."""
-    edges = [ends[k] for k in moving]
-    nodes = list(dict.fromkeys(node for edge in edges for node in edge if node not in roots))
-    part_of = {node: number for number, part in enumerate(parts(nodes, edges)) for node in part}
-    names = Classes([str(k) for k in moving])
-    by_part: dict[int, int] = {}
-    for k in moving:
-        for node in ends[k]:
-            if node in part_of:
-                names.merge(str(k), str(by_part.setdefault(part_of[node], k)))
+    """Return joints in groups that share links other than base and platform, or a coupling."""
+    # A joint is a node here; joints that share a link, or a coupling, have an edge.
+    edges: list[tuple[int, int]] = []
+    first: dict[str, int] = {}
+    for k in joints:
+        edges += [(k, first.setdefault(node, k)) for node in ends[k] if node not in roots]
     for coupling in couplings:
-        own = [k for k in coupling if k in moving]
-        for k in own[1:]:
-            names.merge(str(k), str(own[0]))
-    groups: dict[str, list[int]] = {}
-    for k in moving:
-        groups.setdefault(names.find(str(k)), []).append(k)
-    return list(groups.values())
+        coupled = [k for k in coupling if k in joints]
+        edges += [(k, coupled[0]) for k in coupled[1:]]
+    return parts(joints, edges)
 
 
 def without_dangling(
@@ -185,3 +177,86 @@ def _limb(
     if not all(joints[step.joint].is_actuated for step in stem):
         return "a passive joint is before its branches"
     return LimbPaths(tuple(stem), tuple(branches))
+
+
+@dataclass(frozen=True)
+class MemberGraph:
+    """A member in the graph.
+
+    Attributes:
+        limb: number of the limb that it is part of, from 0.
+        passive: indices of the joints that move while actuators are locked.
+        joints: indices of these joints and of all others between base and platform that the member's freedoms with free
+            actuators depend on: those of the limb but for the passive ones of other members.
+        on_platform: indices of the passive joints on the platform, or on a link that is locked to it.
+    """
+
+    limb: int
+    passive: tuple[int, ...]
+    joints: tuple[int, ...]
+    on_platform: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class RobotGraph:
+    """Members of a mechanism, and indices of the joints of each limb, that join its base and its platform."""
+
+    members: tuple[MemberGraph, ...]
+    limbs: tuple[tuple[int, ...], ...]
+
+
+def robot_graph(mechanism: Mechanism) -> RobotGraph:
+    """Return the members and limbs of a mechanism.
+
+    Where locked actuators alone join base and platform, each limb is one member.
+    """
+    joints = mechanism.joints
+    names = [link.name for link in mechanism.links]
+    index = {joint.name: k for k, joint in enumerate(joints)}
+    couplings = [[index[name] for name, _ in coupling.factors] for coupling in mechanism.couplings]
+    moving = [k for k, joint in enumerate(joints) if joint.kind != "weld"]
+    welds = [(joint.inner, joint.outer) for joint in joints if joint.kind == "weld"]
+    welded = Classes(names, welds)
+    roots = welded.find(mechanism.base), welded.find(mechanism.platform)
+    ends = [(welded.find(joint.inner), welded.find(joint.outer)) for joint in joints]
+    moving = without_dangling(ends, moving, roots, {k for coupling in couplings for k in coupling})
+    still = _still(mechanism, couplings)
+    locked = Classes(names, [*welds, *((joints[k].inner, joints[k].outer) for k in still)])
+    limbs = _members(mechanism, welded, moving, couplings)
+    is_rigid = locked.find(mechanism.base) == locked.find(mechanism.platform)
+    if is_rigid:
+        groups = [[k for k in limb if k not in still] for limb in limbs]
+        locked = welded
+    else:
+        groups = _members(mechanism, locked, [k for k in moving if k not in still], couplings)
+    members = []
+    top = locked.find(mechanism.platform)
+    for number, limb in enumerate(limbs):
+        own = groups if not is_rigid else [groups[number]]
+        own = [group for group in own if is_rigid or set(group) <= set(limb)]
+        passive = {k for group in own for k in group}
+        for group in own:
+            on_platform = [k for k in group if top in (locked.find(joints[k].inner), locked.find(joints[k].outer))]
+            kept = tuple(k for k in limb if k not in passive or k in group)
+            members.append(MemberGraph(number, tuple(group), kept, tuple(on_platform)))
+    return RobotGraph(tuple(members), tuple(map(tuple, limbs)))
+
+
+def _still(mechanism: Mechanism, couplings: Sequence[Collection[int]]) -> set[int]:
+    """Return the joints that stand still with locked actuators: these, and those that couplings then hold."""
+    found = {k for k, joint in enumerate(mechanism.joints) if joint.actuated}
+    while True:
+        held = {next(k for k in each if k not in found) for each in couplings if sum(k not in found for k in each) == 1}
+        if not held:
+            return found
+        found |= held
+
+
+def _members(
+    mechanism: Mechanism, classes: Classes, joints: Sequence[int], couplings: Sequence[Collection[int]]
+) -> list[list[int]]:
+    """Return the groups of joints between classes of links that join base and platform."""
+    roots = classes.find(mechanism.base), classes.find(mechanism.platform)
+    ends = [(classes.find(joint.inner), classes.find(joint.outer)) for joint in mechanism.joints]
+    groups = _joined(ends, [k for k in joints if ends[k][0] != ends[k][1]], roots, couplings)
+    return [group for group in groups if set(roots) <= {node for k in group for node in ends[k]}]

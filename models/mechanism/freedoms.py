@@ -13,19 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import FloatArray
+from ..rows import rank_of
 from .graph import Mechanism, MechanismJoint
 from .motions import WIDTHS, joint_screws, size_of
 from .topology import spanning_tree
-
-#: Singular values of twists of order 1 below this part of the largest are zero: a closed loop is known to the root of
-#: rounding at worst, as for the rank of J.
-RANK_TOLERANCE = 1e-7
-
-
-def rank_of(values: FloatArray, scale: float | None = None) -> int:
-    """Return the number of singular values that are not zero, measured by the largest one or by a given scale."""
-    reference = float(values.max(initial=0.0)) if scale is None else scale
-    return int(np.count_nonzero(values > RANK_TOLERANCE * reference))
 
 
 def null_space(matrix: FloatArray) -> FloatArray:

@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray
-from .checks import check_mechanism
-from .decomposition import GraphJoint, LimbPaths, Network, Step, decompose
-from .graph import Mechanism, MechanismError, MechanismJoint
+from .decomposition import Decomposition, GraphJoint, LimbPaths, Network, Step, decompose
+from .graph import Mechanism, MechanismError, MechanismJoint, check_mechanism
 
 #: Entries of an axis, and distances and differences of directions that show a parallelogram, in parts of its rods: only
 #: rounding is less, as a robot file states an exact one.
@@ -42,11 +41,7 @@ def limbs_of(mechanism: Mechanism) -> dict[str, Any]:
         MechanismError: the mechanism contradicts itself, or a part of it is no limb: nested loops, coupled joints, or a
             passive joint before branches.
     """
-    check_mechanism(mechanism)
-    joints = _file_joints(mechanism)
-    found = decompose(
-        mechanism.base, mechanism.platform, [each.graph for each in joints], _couplings(mechanism, joints)
-    )
+    joints, found = _decomposed(mechanism)
     if found.networks:
         raise MechanismError(*_sentence(found.networks[0], joints))
     limbs = [_limb_table(limb, joints) for limb in found.limbs]
@@ -90,10 +85,7 @@ def robot_tables(mechanism: Mechanism) -> dict[str, Any]:
     Raises:
         MechanismError: the mechanism contradicts itself.
     """
-    check_mechanism(mechanism)
-    joints = _file_joints(mechanism)
-    graph = [each.graph for each in joints]
-    found = decompose(mechanism.base, mechanism.platform, graph, _couplings(mechanism, joints))
+    _, found = _decomposed(mechanism)
     return links_of(mechanism) if found.networks else limbs_of(mechanism)
 
 
@@ -103,10 +95,13 @@ def _head(mechanism: Mechanism) -> dict[str, Any]:
     return {"name": mechanism.name or "robot", "home": _numbers(platform.position)}
 
 
-def _couplings(mechanism: Mechanism, joints: Sequence[_FileJoint]) -> list[list[int]]:
-    """Return the indices of the joints of each coupling."""
+def _decomposed(mechanism: Mechanism) -> tuple[list[_FileJoint], Decomposition]:
+    """Return the joints of a mechanism as a robot file has them, and its limbs by their indices."""
+    check_mechanism(mechanism)
+    joints = _file_joints(mechanism)
     index = {name: k for k, each in enumerate(joints) for name in each.names}
-    return [[index[name] for name, _ in coupling.factors] for coupling in mechanism.couplings]
+    couplings = [[index[name] for name, _ in coupling.factors] for coupling in mechanism.couplings]
+    return joints, decompose(mechanism.base, mechanism.platform, [each.graph for each in joints], couplings)
 
 
 def _sentence(network: Network, joints: Sequence[_FileJoint]) -> tuple[str, str]:

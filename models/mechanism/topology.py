@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
 Node = TypeVar("Node", bound=Hashable)
@@ -10,10 +10,17 @@ Edge = tuple[Node, Node]
 
 
 class Classes:
-    """Links that move as one: the sets of a partition, by a name that stands for each (union and find)."""
+    """Links that move as one: the sets of a partition, by a name that stands for each (union and find).
 
-    def __init__(self, names: Iterable[str]) -> None:
+    Args:
+        names: of all links.
+        pairs: of those that move as one.
+    """
+
+    def __init__(self, names: Iterable[str], pairs: Iterable[tuple[str, str]] = ()) -> None:
         self._parents = {name: name for name in names}
+        for pair in pairs:
+            self.merge(*pair)
 
     def find(self, name: str) -> str:
         """Return the name that stands for the set of a name."""
@@ -63,19 +70,17 @@ class Bridges(NamedTuple):
     Attributes:
         bridges: their indices, in the order of the paths.
         is_open: whether the bridges alone are a path: no loop is between the nodes.
-        exists: whether there is a path.
     """
 
     bridges: list[int]
     is_open: bool
-    exists: bool = True
 
 
 def bridges_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> Bridges:
     """Return the edges that every path from one node to another uses."""
     path = path_between(start, end, edges)
     if path is None:
-        return Bridges([], is_open=False, exists=False)
+        return Bridges([], is_open=False)
     bridges = [k for k in path if end not in reached(start, [edge for j, edge in enumerate(edges) if j != k])]
     return Bridges(bridges, is_open=len(bridges) == len(path))
 
@@ -154,8 +159,3 @@ def spanning_tree(
     used = {branch.edge for branch in branches}
     chords = [k for k, edge in enumerate(edges) if k not in used and edge[0] in known]
     return SpanningTree(branches, chords)
-
-
-def renamed(edges: Iterable[Edge[str]], names: Mapping[str, str]) -> list[Edge[str]]:
-    """Return edges with other names of their nodes."""
-    return [(names.get(one, one), names.get(other, other)) for one, other in edges]

@@ -16,12 +16,12 @@ import numpy as np
 from ..actuation import drive_of
 from ..arrays import FloatArray
 from ..basis import basis_of_member
+from ..rows import RANK_TOLERANCE, rank_of
 from ..wrench import WrenchKind
 from .centre import centre_of, centre_rule
-from .checks import check_mechanism
-from .freedoms import RANK_TOLERANCE, Freedoms, rank_of
-from .graph import Mechanism
-from .members import MemberGraph, robot_graph
+from .decomposition import MemberGraph, robot_graph
+from .freedoms import Freedoms
+from .graph import Mechanism, check_mechanism
 
 
 def scaled_twists(twists: FloatArray, centre: FloatArray, length: float) -> FloatArray:
@@ -175,7 +175,7 @@ def wrenches_of(mechanism: Mechanism, length: float = 1.0) -> RobotWrenches:
     members = tuple(_member(mechanism, freedoms, each, length) for each in graph.members)
     constraints = [np.zeros((0, 6))]
     for limb in graph.limbs:
-        allowed = freedoms.allowed(limb.joints, limb.joints)
+        allowed = freedoms.allowed(limb, limb)
         constraints.append(_reciprocal(freedoms, allowed.twists))
     stacked = np.vstack(constraints)
     rows = [np.zeros((0, 6)), *[_reciprocal(freedoms, member.twists) for member in members]]

@@ -11,9 +11,9 @@ import numpy as np
 
 from ....models import Dimension, FloatArray, Model
 from ....models.catalog import gallery_names, gallery_tables
-from ....models.joints.graphwords import read_robot
-from ....models.joints.linkgraph import home_of
+from ....models.joints.chain import home_of
 from ....models.joints.mechanisms import mechanism_at_home
+from ....models.joints.words import read_robot
 from ....models.limbjoints import LimbJoint
 from ....models.mechanism import Mechanism
 from ....models.mechanism.closing import ClosedMechanism, close, closed_near

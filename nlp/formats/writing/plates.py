@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....models import Dimension, FloatArray
-from ....models.joints.outline import outline
+from ....models.drawing import outline
 from ....models.mechanism import Mechanism
 from ...units import Units
 from .numbers import number

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from ....models import FloatArray
-from ....models.joints.outline import outline
+from ....models.drawing import outline
 from ....models.mechanism import Mechanism
 
 #: Joints nearer to each other than this part of the robot's size are at one place.
