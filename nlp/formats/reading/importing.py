@@ -19,10 +19,9 @@ from ....models.mechanism import (
 )
 from ...errors import InputError, listing
 from .description import Description
-from .leastgaps import close_from_other_starts, least_gaps
 from .meeting import with_meeting_joints
 from .mjcf import read_mjcf
-from .newton import CLOSED, LEAST, Closed, Gap, close
+from .newton import CLOSED, LEAST, Closed, Gap, close, close_from_other_starts, least_gaps
 from .reduction import Ends, Reduced, reduce
 from .snapping import near_misses, snapped
 from .universal import with_universal_joints
