@@ -109,3 +109,7 @@ class Mechanism:
     base: str
     platform: str
     couplings: tuple[Coupling, ...] = ()
+
+    def link(self, name: str) -> MechanismLink:
+        """Return a link by its name."""
+        return next(link for link in self.links if link.name == name)

@@ -99,8 +99,7 @@ def robot_tables(mechanism: Mechanism) -> dict[str, Any]:
 
 def _head(mechanism: Mechanism) -> dict[str, Any]:
     """Return name and home."""
-    (platform,) = (link for link in mechanism.links if link.name == mechanism.platform)
-    return {"name": mechanism.name or "robot", "home": _numbers(platform.position)}
+    return {"name": mechanism.name or "robot", "home": _numbers(mechanism.link(mechanism.platform).position)}
 
 
 def _couplings(mechanism: Mechanism, joints: Sequence[_FileJoint]) -> list[list[int]]:

@@ -13,7 +13,7 @@ from ..case.case import Case
 from ..case.pose import Free
 from ..errors import InputError
 from ..evidence.closing import closed_start
-from ..evidence.state import evaluate, loops_are_closed
+from ..evidence.state import evaluate
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from .solved.mechanism_of import mechanism_of
@@ -77,11 +77,6 @@ def fixed_point(case: Case) -> tuple[Nlp, FloatArray] | None:
         return None
     nlp = formulate(case)
     return nlp, closed_start(nlp)
-
-
-def is_assembled(nlp: Nlp, x: FloatArray) -> bool:
-    """Return whether the loops of the robot are closed at a point (n,)."""
-    return loops_are_closed(nlp, x)
 
 
 def check_same_robot(nlp: Nlp, x: FloatArray, jacobian: FloatArray) -> None:

@@ -22,10 +22,9 @@ from screwsynth.models.mechanism import (
     wrenches_of,
 )
 from screwsynth.nlp import InputError
-from screwsynth.nlp.formats.reading.checking import check_text
-from screwsynth.nlp.formats.reading.filetext import robot_file_text
 from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.reading.robotfile import check_text, robot_file_text
 from screwsynth.nlp.formats.reading.snapping import near_misses, snapped
 
 E = np.eye(3)

@@ -14,8 +14,8 @@ from builders import Array
 
 from screwsynth.models.mechanism import wrenches_of
 from screwsynth.nlp import InputError
+from screwsynth.nlp.formats.frames import Frame, rotation_vector
 from screwsynth.nlp.formats.reading.description import Description
-from screwsynth.nlp.formats.reading.frames import Frame, rotation_vector
 from screwsynth.nlp.formats.reading.importing import Request, import_robot
 from screwsynth.nlp.formats.reading.mjcf import read_mjcf
 from screwsynth.nlp.formats.reading.newton import close, gap_of, gap_of_coupling

@@ -6,11 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-import numpy as np
-
-from ....models.arrays import FloatArray
 from ....models.mechanism import Coupling, MechanismJoint
-from .frames import Frame
+from ..frames import Frame
 
 #: Largest coordinate, in the file's unit of length: beyond it, squares of distances lose what a loop is open by.
 LARGEST = 1e9
@@ -103,15 +100,6 @@ class Description:
     def place_of(self, name: str) -> Frame:
         """Return the place of a body in the world; of one without size between two joints, the world's own."""
         return next((body.place for body in self.bodies if body.name == name), Frame())
-
-
-def axis_frame(point: FloatArray, axis: FloatArray) -> Frame:
-    """Return a frame at a point (3,) with z along an axis (3,) of any length but zero."""
-    z = axis / np.linalg.norm(axis)
-    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    return Frame(point, np.column_stack([x, np.cross(z, x), z]))
 
 
 def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:

@@ -19,12 +19,12 @@ from ....models.mechanism import (
 )
 from ...errors import InputError, listing
 from .description import Description
-from .meeting import with_meeting_joints
+from .meeting import with_meeting_joints, with_universal_joints
 from .mjcf import read_mjcf
 from .newton import CLOSED, LEAST, Closed, Gap, close, close_from_other_starts, least_gaps
 from .reduction import Ends, Reduced, reduce
 from .snapping import near_misses, snapped
-from .universal import with_universal_joints
+from .symmetry import joints_of_limb
 from .urdf import read_urdf
 from .xmltext import read_xml
 
@@ -87,14 +87,14 @@ def import_robot(request: Request) -> Imported:
     given = _read(request)
     reduced = reduce(given, request.ends)
     gaps, notes = reduced.gaps, list(reduced.notes)
-    worst = _worst(reduced)
+    worst = reduced.worst.share(reduced.size)
     if worst > OPEN and not request.closes:
         raise InputError(f"{_open_loop(given, reduced)}{_advice(given, request.keyframe)}")
     if worst > CLOSED:
         loops = _with_loops(given, gaps)
         closed = close(loops, reduced.size)
         moved = _reduced_at(closed, given, request)
-        if _worst(moved) > LEAST:
+        if moved.worst.share(moved.size) > LEAST:
             found = close_from_other_starts(loops, reduced.size)
             if found is None:
                 raise InputError(_not_closed(given, loops, moved, request))
@@ -130,11 +130,6 @@ def _read(request: Request) -> Description:
     raise InputError(f"{request.path}: begins with <{tag}>; <mujoco> of MJCF or <robot> of URDF is needed")
 
 
-def _worst(reduced: Reduced) -> float:
-    """Return by how much the loops are open at most, in parts of the size."""
-    return max((gap_share(gap, reduced.size) for gap in reduced.gaps), default=0.0)
-
-
 def _with_loops(given: Description, gaps: Sequence[Gap]) -> Description:
     """Return a description with the loops of the mechanism alone: those of side chains stay as they are."""
     names = {gap.name for gap in gaps}
@@ -164,8 +159,7 @@ def _not_closed(given: Description, loops: Description, reduced: Reduced, reques
 
 def _open_loop(given: Description, reduced: Reduced) -> str:
     """Return the sentence that says which loop is open most."""
-    worst = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size))
-    fault = f"the loop {worst.name} is open by {gap_words(worst)}"
+    fault = f"the loop {reduced.worst.name} is open by {reduced.worst.words}"
     return f"{given.source}: {fault}, more than {OPEN:g} of the robot's size {reduced.size:.3g}"
 
 
@@ -186,10 +180,10 @@ def _closed_words(closed: Closed, reduced: Reduced) -> str:
     moved += f" and {closed.way:.3g}" if closed.way else ""
     kept = "driven joints stayed" if closed.kept else "driven joints moved too"
     words = f"loops were closed by Newton's method: {moved}; {kept}"
-    left = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size))
-    if gap_share(left, reduced.size) <= CLOSED:
+    left = reduced.worst
+    if left.share(reduced.size) <= CLOSED:
         return words
-    fault = f"{left.name} stays open by {gap_words(left)}, the least squares of numbers that contradict each other"
+    fault = f"{left.name} stays open by {left.words}, the least squares of numbers that contradict each other"
     return f"{words}; {fault}: the robot file has the joint where its first body has it"
 
 
@@ -205,16 +199,6 @@ def _singular(mechanism: Mechanism, size: float) -> Iterator[str]:
         where = "" if each.type is SingularityType.ARCHITECTURE else " where it stands"
         whose = "the robot" if each.member is None else f"member {each.member + 1}"
         yield f"{whose} is singular{where}: {each.type.value}"
-
-
-def gap_words(gap: Gap) -> str:
-    """Return how far a loop is open in words."""
-    return f"{gap.distance:.3g} and {math.degrees(gap.angle):.3g} deg"
-
-
-def gap_share(gap: Gap, size: float) -> float:
-    """Return how far a loop is open, in parts of the robot's size."""
-    return max(gap.distance / size, gap.angle)
 
 
 def _without_rounding(value: Any, size: float) -> Any:  # noqa: ANN401 - tables of any depth
@@ -236,8 +220,7 @@ def _with_limb_names(tables: dict[str, Any]) -> dict[str, Any]:
     taken: set[str] = set()
     limbs = []
     for limb in tables["limb"]:
-        joints = [*limb.get("joints", []), *(joint for branch in limb.get("branch", []) for joint in branch["joints"])]
-        named = [joint for joint in joints if "name" in joint]
+        named = [joint for joint in joints_of_limb(limb) if "name" in joint]
         chosen = next((each["name"] for each in named if each.get("actuated")), named[0]["name"] if named else "")
         name = chosen if chosen and chosen not in taken else ""
         taken.add(name)

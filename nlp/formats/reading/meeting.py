@@ -1,12 +1,14 @@
-"""Hinges that stand for one joint: several about one axis, and three through one point, which are a ball.
+"""Joints that stand for one: hinges about one axis, three hinges through one point, which are a ball, and pairs.
 
+In the tables of a robot file two crossing hinges are a universal joint, and a hinge and a slide along it are a ``C``.
 What a limb carries depends on axes that meet exactly. Joints are replaced only where they do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -181,3 +183,60 @@ def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint
             new if each.name == first else each for each in given.joints if each.name == first or each.name not in names
         ),
     )
+
+
+def with_universal_joints(tables: Mapping[str, Any], size: float) -> dict[str, Any]:
+    """Return the tables of a robot file with limbs, with pairs of passive joints as one joint ``U`` or ``C``.
+
+    Args:
+        tables: of the robot file, with numbers; one with links and joints stays as it is.
+        size: of the robot.
+    """
+    if "limb" not in tables:
+        return dict(tables)
+    return {**tables, "limb": [_limb(limb, size) for limb in tables["limb"]]}
+
+
+def _limb(limb: Mapping[str, Any], size: float) -> dict[str, Any]:
+    """Return a limb with its joints paired; those before and behind a branching are paired apart."""
+    found = dict(limb)
+    if "joints" in limb:
+        found["joints"] = _paired(limb["joints"], size)
+    if "branch" in limb:
+        found["branch"] = [{**branch, "joints": _paired(branch["joints"], size)} for branch in limb["branch"]]
+    return found
+
+
+def _paired(joints: Sequence[Mapping[str, Any]], size: float) -> list[dict[str, Any]]:
+    """Return joints with pairs as one."""
+    found: list[dict[str, Any]] = []
+    rest = [dict(joint) for joint in joints]
+    while rest:
+        first = rest.pop(0)
+        pair = None if not rest else _pair(first, rest[0], size)
+        if pair is not None:
+            rest.pop(0)
+        found.append(pair or first)
+    return found
+
+
+def _pair(one: Mapping[str, Any], other: Mapping[str, Any], size: float) -> dict[str, Any] | None:
+    """Return two joints as one; None where they are not."""
+    kinds = one["type"], other["type"]
+    if one.get("actuated") or other.get("actuated") or kinds not in (("R", "R"), ("R", "P"), ("P", "R")):
+        return None
+    first, second = (
+        MechanismJoint("", each["type"], "", "", np.array(each["at"]), np.array(each["axis"])) for each in (one, other)
+    )
+    named = {"name": one["name"]} if "name" in one else {}
+    distance, sine = axes_gap(first, second)
+    if kinds == ("R", "R"):
+        if sine < ALMOST or distance > SAME_POINT * size:
+            return None
+        meeting = meeting_point(first, second)
+        at = one["at"] if float(np.linalg.norm(meeting - first.point)) <= SAME_POINT * size else meeting.tolist()
+        return {"type": "U", **named, "at": at, "axes": [one["axis"], other["axis"]]}
+    if sine > SAME_POINT:
+        return None
+    hinge = one if kinds[0] == "R" else other
+    return {"type": "C", **named, "at": hinge["at"], "axis": hinge["axis"]}

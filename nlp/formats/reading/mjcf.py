@@ -14,10 +14,9 @@ import numpy as np
 
 from ....models.mechanism import Coupling, MechanismJoint
 from ...errors import InputError
+from ..extra import required
+from ..frames import Frame, rotation_from_quaternion
 from .description import Body, Closing, Description, LoopClosure, common_name, unique_name
-from .extra import required
-from .frames import Frame, rotation_from_quaternion
-from .includes import with_includes
 from .mjcfclean import clean_model
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def read_mjcf(root: Element, path: Path, keyframe: str = "") -> Description:
         InputError: MuJoCo is not installed, or the model cannot be read.
     """
     mujoco = required("mujoco", "MJCF files")
-    clean = clean_model(with_includes(root, path), str(path), keyframe)
+    clean = clean_model(root, path, keyframe)
     warnings: list[str] = []
     mujoco.set_mju_user_warning(warnings.append)
     try:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,8 +11,8 @@ import numpy as np
 
 from ....models.arrays import FloatArray
 from ....models.mechanism import Coupling, MechanismJoint
+from ..frames import Frame, cross_matrix, rotation_about, rotation_vector
 from .description import Body, Closing, Description, LoopClosure
-from .frames import Frame, cross_matrix, rotation_about, rotation_vector
 
 #: Loops are closed where no equation is larger, in parts of the robot's size: rounding leaves 1e-16 to 1e-14.
 CLOSED = 1e-12
@@ -49,6 +50,20 @@ class Gap(NamedTuple):
     name: str
     distance: float
     angle: float
+
+    def share(self, size: float) -> float:
+        """Return how far the loop is open, in parts of the robot's size."""
+        return max(self.distance / size, self.angle)
+
+    @property
+    def words(self) -> str:
+        """How far the loop is open in words."""
+        return f"{self.distance:.3g} and {math.degrees(self.angle):.3g} deg"
+
+
+def worst_of(gaps: Sequence[Gap], size: float) -> Gap:
+    """Return the gap of the loop that is open most; one of 0 where there is no loop."""
+    return max(gaps, key=lambda gap: gap.share(size), default=Gap("", 0.0, 0.0))
 
 
 class Closed(NamedTuple):

@@ -11,10 +11,10 @@ import numpy as np
 from ....models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink
 from ....models.mechanism.topology import between
 from ...errors import InputError, listing, nearest
+from ..frames import Frame
 from .description import LARGEST, Description
 from .elements import bodies_of, elements_of, rigid_groups
-from .frames import Frame
-from .newton import Gap, gap_of, gap_of_coupling
+from .newton import Gap, gap_of, gap_of_coupling, worst_of
 
 #: Most names that a message lists.
 _MOST_NAMES = 12
@@ -49,6 +49,11 @@ class Reduced(NamedTuple):
     size: float
     gaps: tuple[Gap, ...]
     notes: tuple[str, ...]
+
+    @property
+    def worst(self) -> Gap:
+        """The gap of the loop that is open most."""
+        return worst_of(self.gaps, self.size)
 
 
 def size_of(given: Description) -> float:

@@ -19,8 +19,8 @@ import numpy as np
 from ....models.arrays import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint
 from ...errors import InputError
+from ..frames import cross_matrix
 from .elements import SAME_POINT
-from .frames import cross_matrix
 from .meeting import ALMOST, axes_gap
 
 #: Steps of Newton's method, which needs three to five.

@@ -12,14 +12,13 @@ import numpy as np
 from ....models.arrays import FloatArray
 from ....models.mechanism import Coupling, MechanismJoint
 from ...errors import InputError, listing
+from ..frames import Frame, perpendiculars
 from .description import Body, Description, LoopClosure, unique_name
-from .frames import Frame, perpendiculars
 from .urdfelements import axis_of, link_of, name_of, number_of, origin_of
 from .urdfloops import (
     LoopFile,
-    closures_of_constraints,
+    closures_of_elements,
     closures_of_frames,
-    closures_of_loop_joints,
     closures_of_pairs,
     read_loop_file,
 )
@@ -188,9 +187,7 @@ class _Reader:
         links = {name: (name, Frame()) for name in places}
         joints = {joint.name: (joint.outer, Frame()) for joint in self.joints if joint.name not in links}
         taken = {joint.name for joint in self.joints}
-        closures = closures_of_constraints(self.root, self.links, taken, self.source)
-        taken |= {each.name for each in closures}
-        closures += closures_of_loop_joints(self.root, self.links, taken, self.source)
+        closures = closures_of_elements(self.root, self.links, taken, self.source)
         taken |= {each.name for each in closures}
         if self.loops is not None:
             return [*closures, *closures_of_pairs(self.loops, {**links, **joints})], []

@@ -24,7 +24,7 @@ _PARALLEL = 1e-3
 
 def extent_of(mechanism: Mechanism) -> float:
     """Return the largest extent of the joints' centres and of the platform's origin; 1 where all are at one place."""
-    platform = next(link for link in mechanism.links if link.name == mechanism.platform)
+    platform = mechanism.link(mechanism.platform)
     points = np.array([platform.position, *(joint.point for joint in mechanism.joints)])
     return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 

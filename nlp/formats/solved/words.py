@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from ....models.mechanism import Mechanism
 
@@ -33,7 +32,8 @@ class ExportedJoint:
     follows: bool = False
 
 
-class RobotMechanism(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RobotMechanism:
     """A robot as a mechanism at a pose.
 
     Attributes:

@@ -7,9 +7,8 @@ from collections.abc import Collection
 from ....models import Dimension
 from ...errors import InputError, nearest
 from ..solved.mechanism_of import Exported
-from .dxf import check_dxf, dxf_text
 from .mjcf import mjcf_text
-from .plates import Plate, plate_of, plates_csv
+from .plates import Plate, dxf_text, plate_of, plates_csv, required_dxf
 from .readme import readme_text
 from .tables import joints_csv, links_csv
 from .urdf import urdf_of
@@ -29,7 +28,7 @@ def check_formats(formats: Collection[str]) -> tuple[str, ...]:
             raise InputError(f"--format {name}: is no format; {nearest(name, (*FORMATS, 'all'))}")
     chosen = tuple(name for name in FORMATS if name in formats or "all" in formats)
     if "dxf" in chosen:
-        check_dxf()
+        required_dxf()
     return chosen
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ....models import FloatArray
 from ....models.mechanism import Mechanism, MechanismError, MechanismJoint, MechanismLink
+from ..solved.words import unique_names
 
 #: Order in which joints come into the tree.
 _WEIGHTS = {"weld": 0, "R": 1, "P": 1, "H": 1, "S": 2}
@@ -75,11 +76,7 @@ class Tree:
     @property
     def base(self) -> MechanismLink:
         """The base."""
-        return self.link(self.mechanism.base)
-
-    def link(self, name: str) -> MechanismLink:
-        """Return a link of the mechanism by its name."""
-        return next(link for link in self.mechanism.links if link.name == name)
+        return self.mechanism.link(self.mechanism.base)
 
     def below(self, link: str) -> Iterator[Edge]:
         """Return the edges from a link to its children."""
@@ -116,15 +113,7 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
         elif joint.kind == "weld":
             closings.append(Closing(joint.name, "weld", joint.outer, joint.inner, joint.point))
         else:
-            copy = replace(links[joint.outer], name=_copy_name(joint.name, links))
+            copy = replace(links[joint.outer], name=unique_names([f"end_of_{joint.name}"], links)[0])
             edges.append(Edge(joint, joint.inner, copy, np.array(joint.axis), is_copy=True))
             closings.append(Closing(joint.name, "weld", copy.name, joint.outer, joint.point))
     return Tree(mechanism, tuple(edges), tuple(closings))
-
-
-def _copy_name(joint: str, links: dict[str, MechanismLink]) -> str:
-    """Return a name for the copy of a link behind a joint that no link has."""
-    name = f"end_of_{joint}"
-    while name in links:
-        name += "_"
-    return name
