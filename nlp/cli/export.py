@@ -37,8 +37,7 @@ def export(
     from ..case.reader import read_case
     from ..errors import one_line
     from ..evidence.state import loops_are_closed
-    from ..formats.export import check_pose, check_same_robot, files_at, fixed_point
-    from ..formats.writing.folder import check_formats
+    from ..formats.export import check_formats, check_pose, check_same_robot, files_at, fixed_point
     from ..output.files import check_folder, check_outputs, write_folder
     from .progress import solve_with_progress
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from ..system.strictjson import json_tree, value_of
 from ..units import objective_unit, rate_unit, twist_units
 from .runtimelimits import RunTimeLimit
 from .subject import bounds_in_c
+
+#: Numbers or names by the key of each column.
+Columns: TypeAlias = Mapping[str, list[Any]]
 
 
 class NumberColumns(NamedTuple):
@@ -41,12 +44,12 @@ class NumberColumns(NamedTuple):
     """
 
     F_unit: str
-    variables: Mapping[str, Sequence[Any]]
-    parameters: Mapping[str, Sequence[Any]]
-    limits: Mapping[str, Sequence[Any]]
-    constraints: Mapping[str, Sequence[Any]]
-    rows: Mapping[str, Sequence[Any]]
-    tasks: Mapping[str, Sequence[Any]]
+    variables: Columns
+    parameters: Columns
+    limits: Columns
+    constraints: Columns
+    rows: Columns
+    tasks: Columns
 
 
 def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> NumberColumns:
@@ -79,14 +82,14 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
             "name": [each.name for each in program.variables],
             "unit": of_variables,
             "multiplier_unit": multipliers(of_variables),
-            "lower": bounds.lower,
-            "upper": bounds.upper,
-            "start": nlp.start,
+            "lower": bounds.lower.tolist(),
+            "upper": bounds.upper.tolist(),
+            "start": nlp.start.tolist(),
         },
         parameters={
             "name": [each.name for each in program.arguments],
             "unit": of_parameters,
-            "default": nlp.arguments,
+            "default": nlp.arguments.tolist(),
         },
         limits={
             "key": [each.key for each in limits],
@@ -100,8 +103,8 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
         constraints={
             "name": [each.name for each in program.constraints],
             "multiplier_unit": multipliers(squares),
-            "lower": nlp.g_lower,
-            "upper": nlp.g_upper,
+            "lower": nlp.g_lower.tolist(),
+            "upper": nlp.g_upper.tolist(),
         },
         rows={
             "limb": [row.limb for row in program.model.frame_rows],
@@ -155,7 +158,7 @@ def json_text(manifest: Mapping[str, object]) -> str:
     return json.dumps(manifest, indent=1, ensure_ascii=True, allow_nan=False) + "\n"
 
 
-def _objects(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+def _objects(columns: Columns) -> list[dict[str, Any]]:
     """Return objects of JSON from their values by key; None where a number is infinite."""
     rows = zip(*columns.values(), strict=True)
     return [{key: _plain(value) for key, value in zip(columns, row, strict=True)} for row in rows]

@@ -194,7 +194,7 @@ def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
     return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 
 
-def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, Sequence[Any]]) -> dict[str, str]:
+def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[Any]]) -> dict[str, str]:
     """Return the texts for the placeholders about limits, whose names, units and numbers are the columns."""
     L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", found.limits, found.sides, found.widenings
     named = zip(columns["c_name"], limits, columns["unit"], strict=True)

@@ -104,11 +104,11 @@ def row_of(line: str | bytes) -> Row:
     data = json_tree(line)
     if not isinstance(data, list) or len(data) != len(Row._fields):
         raise ValueError("the line is no row")
-    return Row(*(value_of(kind, value, name) for (name, kind), value in zip(_kinds(), data, strict=True)))
+    return Row(*(value_of(kind, value, name) for (name, kind), value in zip(row_kinds(), data, strict=True)))
 
 
 @cache
-def _kinds() -> tuple[tuple[str, object], ...]:
+def row_kinds() -> tuple[tuple[str, object], ...]:
     """Return the fields of a row with their types."""
     return tuple(get_type_hints(Row).items())
 

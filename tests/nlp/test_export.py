@@ -35,11 +35,11 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.formats.export import exported_files
 from screwsynth.nlp.formats.frames import quaternion_of, roll_pitch_yaw_of
 from screwsynth.nlp.formats.reading.importing import Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
-from screwsynth.nlp.formats.writing.folder import exported_files
 from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.formats.writing.urdf import urdf_of
 

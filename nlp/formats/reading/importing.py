@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ....models.mechanism import (
     Mechanism,
@@ -60,22 +60,15 @@ class Request:
     snap: float = 0.0
 
 
-class Imported(NamedTuple):
-    """A robot that was imported.
+@dataclass(frozen=True, eq=False)
+class Imported(Reduced):
+    """A robot that was imported, with how far its loops are open in the description.
 
     Attributes:
         tables: of the robot file, with numbers.
-        mechanism: the same robot as links and joints.
-        size: largest distance of two joints, length.
-        gaps: how far its loops are open in the description.
-        notes: sentences about what was found, assumed or left out.
     """
 
     tables: dict[str, Any]
-    mechanism: Mechanism
-    size: float
-    gaps: tuple[Gap, ...]
-    notes: tuple[str, ...]
 
 
 def import_robot(request: Request) -> Imported:
@@ -112,7 +105,7 @@ def import_robot(request: Request) -> Imported:
         raise InputError(f"{given.source}: {error}") from None
     more = [*near_misses(met.mechanism, reduced.size), *_singular(met.mechanism, reduced.size)]
     tables = _without_rounding(with_universal_joints(tables, reduced.size), reduced.size)
-    return Imported(_with_limb_names(tables), met.mechanism, reduced.size, gaps, (*notes, *met.notes, *more))
+    return Imported(met.mechanism, reduced.size, gaps, (*notes, *met.notes, *more), _with_limb_names(tables))
 
 
 def _read(request: Request) -> Description:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -59,11 +59,6 @@ class Gap(NamedTuple):
     def words(self) -> str:
         """How far the loop is open in words."""
         return f"{self.distance:.3g} and {math.degrees(self.angle):.3g} deg"
-
-
-def worst_of(gaps: Sequence[Gap], size: float) -> Gap:
-    """Return the gap of the loop that is open most; one of 0 where there is no loop."""
-    return max(gaps, key=lambda gap: gap.share(size), default=Gap("", 0.0, 0.0))
 
 
 class Closed(NamedTuple):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from ...errors import InputError, listing, nearest
 from ..frames import Frame
 from .description import LARGEST, Description
 from .elements import bodies_of, elements_of, rigid_groups
-from .newton import Gap, gap_of, gap_of_coupling, worst_of
+from .newton import Gap, gap_of, gap_of_coupling
 
 #: Most names that a message lists.
 _MOST_NAMES = 12
@@ -35,7 +34,8 @@ class Ends:
     actuated: tuple[str, ...] = ()
 
 
-class Reduced(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Reduced:
     """The mechanism between base and platform.
 
     Attributes:
@@ -52,8 +52,8 @@ class Reduced(NamedTuple):
 
     @property
     def worst(self) -> Gap:
-        """The gap of the loop that is open most."""
-        return worst_of(self.gaps, self.size)
+        """The gap of the loop that is open most; one of 0 where there is no loop."""
+        return max(self.gaps, key=lambda gap: gap.share(self.size), default=Gap("", 0.0, 0.0))
 
 
 def size_of(given: Description) -> float:

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from ....models import FloatArray
-from ....models.mechanism import Mechanism, MechanismError, MechanismJoint, MechanismLink
+from ....models.mechanism import Mechanism, MechanismError, MechanismJoint, MechanismLink, topology
 from ..solved.words import unique_names
 
 #: Order in which joints come into the tree.
@@ -65,7 +65,7 @@ class Tree:
 
     Attributes:
         mechanism: the mechanism.
-        edges: joints of the tree, each behind that of its parent.
+        edges: joints of the tree, in their order below each link.
         closings: constraints that close the loops.
     """
 
@@ -89,25 +89,19 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     Raises:
         MechanismError: a link is not connected with the base.
     """
-    links = {link.name: link for link in mechanism.links}
-    reached = {mechanism.base}
-    rest = list(enumerate(mechanism.joints))
-    edges: list[Edge] = []
-    while True:
-        near = [(k, joint) for k, joint in rest if (joint.inner in reached) != (joint.outer in reached)]
-        if not near:
-            break
-        k, joint = min(near, key=lambda each: (_WEIGHTS[each[1].kind], each[0]))
-        forward = joint.inner in reached
-        parent, child = (joint.inner, joint.outer) if forward else (joint.outer, joint.inner)
-        edges.append(Edge(joint, parent, links[child], joint.axis if forward else -joint.axis))
-        reached.add(child)
-        rest.remove((k, joint))
-    for name in links:
-        if name not in reached:
-            raise MechanismError(f"link {name}", "is not connected with the base")
+    links, joints = {link.name: link for link in mechanism.links}, mechanism.joints
+    order = [(_WEIGHTS[joint.kind], k) for k, joint in enumerate(joints)]
+    ends = [(joint.inner, joint.outer) for joint in joints]
+    branches, chords = topology.spanning_tree([mechanism.base], ends, lambda k: order[k][0])
+    apart = next((name for name in links if name not in {mechanism.base, *(each.child for each in branches)}), None)
+    if apart is not None:
+        raise MechanismError(f"link {apart}", "is not connected with the base")
+    edges = [
+        Edge(joints[k], parent, links[child], joints[k].axis if joints[k].inner == parent else -joints[k].axis)
+        for k, parent, child in sorted(branches, key=lambda each: order[each.edge])
+    ]
     closings = []
-    for _, joint in rest:
+    for joint in (joints[k] for k in chords):
         if joint.kind == "S":
             closings.append(Closing(joint.name, "connect", joint.outer, joint.inner, joint.point))
         elif joint.kind == "weld":
