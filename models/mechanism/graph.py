@@ -45,6 +45,10 @@ class MechanismLink:
     position: FloatArray = field(default_factory=lambda: np.zeros(3))
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
 
+    def local(self, point: FloatArray) -> FloatArray:
+        """Return a point (3,) of the world in the link's frame."""
+        return np.asarray(self.rotation.T @ (point - self.position))
+
 
 @dataclass(frozen=True, eq=False)
 class MechanismJoint:

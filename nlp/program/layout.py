@@ -45,7 +45,7 @@ from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFa
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
 from ..errors import CaseError
-from .limits import ProgramNumbers, limit_constraints
+from .limits import limit_constraints
 from .loops import needed_equations
 from .nlp import Nlp
 from .places import Epigraph, FreeRotation, HeldRotation, Place, Places, RotationPlaces, SymbolTable
@@ -187,12 +187,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         loops = [loops[k] for k in needed]
     varying, fixed = _divided(case, [*constraints, *loops], table)
     numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
-    limits = limit_constraints(
-        case,
-        robots,
-        dict(zip(case.scalars, numbers, strict=True)),
-        ProgramNumbers(table.variables_vector, table.arguments_vector, table.bounds, table.values),
-    )
+    limits = limit_constraints(case, robots, dict(zip(case.scalars, numbers, strict=True)), table)
     places = Places(
         numbers=(
             *(place for placed in parameters for place in placed.places),

@@ -101,7 +101,7 @@ class _Writer:
             self._joint(inner, edge)
             shape = shape_of(self._mechanism, child.name, self._size)
             middle = np.mean(shape.points, axis=0) if shape.points else edge.joint.point
-            place = numbers(child.rotation.T @ (middle - child.position))
+            place = numbers(child.local(middle))
             inertia = numbers([shape.inertia] * 3)
             ET.SubElement(inner, "inertial", pos=place, mass=number(shape.mass), diaginertia=inertia)
             if not edge.is_copy:
@@ -117,7 +117,7 @@ class _Writer:
         joint, child = edge.joint, edge.child
         if joint.kind == "weld":
             return
-        place = numbers(child.rotation.T @ (joint.point - child.position))
+        place = numbers(child.local(joint.point))
         element = ET.SubElement(body, "joint", name=joint.name, type=_TYPES[joint.kind], pos=place)
         if joint.kind == "S":
             self._home.append("1 0 0 0")
@@ -135,13 +135,13 @@ class _Writer:
         """Add the lines of a link."""
         shape = shape_of(self._mechanism, link.name, self._size)
         for start, end in shape.lines:
-            ends = [link.rotation.T @ (shape.points[k] - link.position) for k in (start, end)]
+            ends = [link.local(shape.points[k]) for k in (start, end)]
             line = numbers(np.concatenate(ends))
             ET.SubElement(body, "geom", type="capsule", fromto=line, size=number(ROD * self._size), rgba=colour)
 
     def _mark(self, body: ET.Element, link: MechanismLink, joint: MechanismJoint, axis: FloatArray) -> None:
         """Add the mark of a joint to a link: a ball, or a pin along the axis (3,)."""
-        place = link.rotation.T @ (joint.point - link.position)
+        place = link.local(joint.point)
         colour = _DRIVEN if joint.actuated else _JOINT
         if joint.kind == "S":
             ET.SubElement(body, "geom", type="sphere", pos=numbers(place), size=number(MARK * self._size), rgba=colour)
@@ -157,7 +157,7 @@ class _Writer:
             ends = {"name": each.name, "body1": self._body(each.first), "body2": self._body(each.second)}
             if each.kind == "connect":
                 body = self._mechanism.link(each.first)
-                anchor = numbers(body.rotation.T @ (each.point - body.position))
+                anchor = numbers(body.local(each.point))
                 ET.SubElement(equality, "connect", ends, anchor=anchor)
             else:
                 # Rotations count as lengths of the robot's size, so that the rows of the weld are of one order.

@@ -19,6 +19,7 @@ from ....models.mechanism import Mechanism
 from ...units import Units
 from ..extra import required
 from .numbers import number
+from .shapes import joint_centres
 from .tables import csv_text
 
 #: Extents of points across a plane, sines of angles, and distances in parts of the robot's size, that count as zero.
@@ -67,19 +68,8 @@ def plate_of(mechanism: Mechanism, link: str, size: float) -> Plate:
         link: name of the link.
         size: the robot's.
     """
-    frame = mechanism.link(link)
-    centres: list[FloatArray] = []
-    names: list[list[str]] = []
-    for joint in mechanism.joints:
-        if link in (joint.inner, joint.outer):
-            place = frame.rotation.T @ (joint.point - frame.position)
-            same = [k for k, one in enumerate(centres) if np.linalg.norm(one - place) <= _FLAT * size]
-            if same:
-                names[same[0]].append(joint.name)
-            else:
-                centres.append(place)
-                names.append([joint.name])
-    points = np.array(centres).reshape(-1, 3)
+    frame, centres = mechanism.link(link), joint_centres(mechanism, link, size)
+    points = np.array([frame.local(point) for point, _ in centres]).reshape(-1, 3)
     middle = points.mean(axis=0) if len(points) else np.zeros(3)
     normal = _normal(points - middle, size)
     x = np.eye(3)[0] - normal * normal[0]
@@ -90,7 +80,7 @@ def plate_of(mechanism: Mechanism, link: str, size: float) -> Plate:
     origin = normal * float(middle @ normal)
     flat = (points - origin) @ axes
     corners = tuple(outline(points)) if len(points) else ()
-    return Plate(link, tuple(map(tuple, names)), origin, axes, flat[:, :2], flat[:, 2], corners)
+    return Plate(link, tuple(tuple(names) for _, names in centres), origin, axes, flat[:, :2], flat[:, 2], corners)
 
 
 def _normal(points: FloatArray, size: float) -> FloatArray:

@@ -51,7 +51,7 @@ def links_csv(mechanism: Mechanism, units: Units) -> str:
     head += [f"{own} axis {c}" for own in _COORDINATES for c in _COORDINATES]
     rows = []
     for link in mechanism.links:
-        origin = base.rotation.T @ (link.position - base.position)
+        origin = base.local(link.position)
         axes = base.rotation.T @ link.rotation
         rows.append([link.name, *map(number, origin), *map(number, axes.T.ravel())])
     return csv_text(head, rows)
@@ -81,4 +81,4 @@ def _place(joint: MechanismJoint, link: MechanismLink) -> list[str]:
     axis: list[str] = [""] * 3
     if joint.kind not in ("S", "weld"):
         axis = [number(value) for value in link.rotation.T @ joint.axis]
-    return [*(number(value) for value in link.rotation.T @ (joint.point - link.position)), *axis]
+    return [*(number(value) for value in link.local(joint.point)), *axis]

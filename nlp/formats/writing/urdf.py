@@ -221,7 +221,7 @@ class _Writer:
         inertial = ET.SubElement(element, "inertial")
         middle = np.zeros(3)
         if frame is not None and shape.points:
-            middle = frame.rotation.T @ (np.mean(shape.points, axis=0) - frame.position)
+            middle = frame.local(np.mean(shape.points, axis=0))
         ET.SubElement(inertial, "origin", xyz=numbers(middle), rpy="0 0 0")
         ET.SubElement(inertial, "mass", value=number(shape.mass))
         moments = {"ixx": shape.inertia, "iyy": shape.inertia, "izz": shape.inertia, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
@@ -229,7 +229,7 @@ class _Writer:
         for start, end in shape.lines:
             if frame is None:
                 break
-            one, other = (frame.rotation.T @ (shape.points[k] - frame.position) for k in (start, end))
+            one, other = (frame.local(shape.points[k]) for k in (start, end))
             visual = ET.SubElement(element, "visual")
             turn = numbers(roll_pitch_yaw_of(axis_frame(one, other - one).rotation))
             ET.SubElement(visual, "origin", xyz=numbers((one + other) / 2), rpy=turn)
@@ -249,6 +249,6 @@ def _quoted(text: str) -> str:
 
 def _origin(link: MechanismLink, parent: MechanismLink) -> dict[str, str]:
     """Return the attributes of a frame's place in another one."""
-    place = parent.rotation.T @ (link.position - parent.position)
+    place = parent.local(link.position)
     turn = roll_pitch_yaw_of(parent.rotation.T @ link.rotation)
     return {"xyz": numbers(place), "rpy": direction(turn)}
