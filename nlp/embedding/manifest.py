@@ -21,8 +21,8 @@ from ..program.nlp import Nlp
 from ..system.reading import read_limited
 from ..system.strictjson import json_tree, value_of
 from ..units import objective_unit, rate_unit, twist_units
+from .ctext import NO_BOUND
 from .runtimelimits import RunTimeLimit
-from .subject import bounds_in_c
 
 #: Numbers or names by the key of each column.
 Columns: TypeAlias = Mapping[str, list[Any]]
@@ -75,15 +75,18 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
     readings = [each.reading for each in program.constraints]
     powers = ["" if not each.power else units.label(each.dimension) for each in readings]
     squares = [f"{unit}²" if unit and each.power == 2 else unit for unit, each in zip(powers, readings, strict=True)]
-    bounds = bounds_in_c(nlp)
+    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
+    if epigraph is not None:
+        # A level has no bounds: it follows from the task, which may change.
+        lower[epigraph.level], upper[epigraph.level] = -NO_BOUND, NO_BOUND
     return NumberColumns(
         F_unit=F,
         variables={
             "name": [each.name for each in program.variables],
             "unit": of_variables,
             "multiplier_unit": multipliers(of_variables),
-            "lower": bounds.lower.tolist(),
-            "upper": bounds.upper.tolist(),
+            "lower": lower.tolist(),
+            "upper": upper.tolist(),
             "start": nlp.start.tolist(),
         },
         parameters={

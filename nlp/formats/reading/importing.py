@@ -98,14 +98,15 @@ def import_robot(request: Request) -> Imported:
     if request.snap:
         mechanism, note = snapped(mechanism, reduced.size, request.snap)
         notes.append(note)
-    met = with_meeting_joints(mechanism, reduced.size)
+    mechanism, more = with_meeting_joints(mechanism, reduced.size)
+    notes += more
     try:
-        tables = robot_tables(met.mechanism)
+        tables = robot_tables(mechanism)
     except MechanismError as error:
         raise InputError(f"{given.source}: {error}") from None
-    more = [*near_misses(met.mechanism, reduced.size), *_singular(met.mechanism, reduced.size)]
+    notes += [*near_misses(mechanism, reduced.size), *_singular(mechanism, reduced.size)]
     tables = _without_rounding(with_universal_joints(tables, reduced.size), reduced.size)
-    return Imported(met.mechanism, reduced.size, gaps, (*notes, *met.notes, *more), _with_limb_names(tables))
+    return Imported(mechanism, reduced.size, gaps, tuple(notes), _with_limb_names(tables))
 
 
 def _read(request: Request) -> Description:

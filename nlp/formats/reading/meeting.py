@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,22 +28,10 @@ _FLAT = 1e-3
 _MOST_NAMES = 12
 
 
-class Met(NamedTuple):
-    """A mechanism with hinges replaced.
-
-    Attributes:
-        mechanism: the mechanism.
-        notes: sentences about joints that were replaced.
-    """
-
-    mechanism: Mechanism
-    notes: tuple[str, ...]
-
-
-def with_meeting_joints(given: Mechanism, size: float) -> Met:
+def with_meeting_joints(given: Mechanism, size: float) -> tuple[Mechanism, list[str]]:
     """Return a mechanism with passive hinges about one axis as one hinge, and three through one point as a ball.
 
-    Only hinges with nothing else between them are replaced, and none that a coupling names.
+    Only hinges with nothing else between them are replaced, and none that a coupling names. Notes say which.
 
     Args:
         given: the mechanism.
@@ -59,7 +47,7 @@ def with_meeting_joints(given: Mechanism, size: float) -> Met:
         balls.append(words)
     notes = [f"hinges about one axis were read as one hinge: {_some(hinges)}"] if hinges else []
     notes += [f"three hinges through one point were read as a ball joint: {_some(balls)}"] if balls else []
-    return Met(given, tuple(notes))
+    return given, notes
 
 
 def _some(words: list[str]) -> str:
