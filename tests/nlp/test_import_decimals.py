@@ -161,9 +161,7 @@ def test_relations_that_move_joints_too_far_are_refused() -> None:
     given = Mechanism("row", links, tuple(row), "base", "platform")
     with pytest.raises(InputError, match=r"--snap 1: the axes cannot all be made to meet or to be parallel"):
         snapped(given, 10.0, 1.0)
-    np.testing.assert_allclose(
-        [each.point for each in snapped(given, 10.0, 0.5)[0].joints], [j.point for j in row]
-    )
+    np.testing.assert_allclose([each.point for each in snapped(given, 10.0, 0.5)[0].joints], [j.point for j in row])
 
 
 def legs_of_decimals(by: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ....models.arrays import FloatArray
 from ....models.joints import RobotError
 from ....models.mechanism import Mechanism, MechanismError, mechanism_of, wrenches_of
 from ...case.robotfile import check_form, model_of_definition
-from ...case.toml import toml_key, toml_lines, toml_text
+from ...case.toml import toml_key, toml_lines, toml_table, toml_tables, toml_text
 from ...errors import CaseError, InputError, one_line
 from .freeing import with_dimensions
 from .importing import Imported
@@ -32,15 +32,10 @@ BEGINNING = f"# {_IMPORTED}"
 _LONGEST = 110
 
 
-class Written(NamedTuple):
-    """Text of a robot file, and lines about it as label and text."""
-
-    text: str
-    lines: tuple[tuple[str, str], ...]
-
-
-def robot_file(found: Imported, source: str, wanted: Sequence[str], offers: Offers | None) -> Written:
-    """Return the text of the robot file of an imported robot.
+def robot_file(
+    found: Imported, source: str, wanted: Sequence[str], offers: Offers | None
+) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """Return the text of the robot file of an imported robot, and lines about it as label and text.
 
     Args:
         found: the robot.
@@ -57,9 +52,9 @@ def robot_file(found: Imported, source: str, wanted: Sequence[str], offers: Offe
     is_folded = any("repeat" in limb for limb in tables.get("limb", ()))
     difference = check_text(text, found.mechanism, found.size, _COPIES if is_folded else SAME_ROBOT)
     if not is_folded:
-        return Written(text, ())
+        return text, ()
     words = f"work rates differ by up to {difference:.2g} from those of the model, as its limbs are not exact copies"
-    return Written(text, (("copies", words),))
+    return text, (("copies", words),)
 
 
 def robot_file_text(tables: Mapping[str, Any], remarks: Sequence[str] = ()) -> str:
@@ -73,13 +68,11 @@ def robot_file_text(tables: Mapping[str, Any], remarks: Sequence[str] = ()) -> s
     named = ("dimensions", "derived", "limb", "joint", "coupling")
     lines += toml_lines({key: value for key, value in tables.items() if key not in named})
     for key in ("dimensions", "derived"):
-        if tables.get(key):
-            lines += ["", f"[{key}]", *toml_lines(tables[key])]
+        lines += toml_table(f"[{key}]", tables.get(key, {}))
     for limb in tables.get("limb", ()):
         lines += ["", "[[limb]]", *_limb_lines(limb)]
     for key in ("joint", "coupling"):
-        for each in tables.get(key, ()):
-            lines += ["", f"[[{key}]]", *toml_lines(each)]
+        lines += toml_tables(f"[[{key}]]", tables.get(key, ()))
     return "\n".join(lines) + "\n"
 
 
