@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from itertools import takewhile
 
 from ....models.mechanism import Coupling, MechanismJoint
 from ..frames import Frame
@@ -112,8 +113,5 @@ def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:
 
 def common_name(names: Sequence[str]) -> str:
     """Return the common beginning of names such as ``closing_a_1`` and ``closing_a_2``; empty for none."""
-    common = names[0]
-    for name in names[1:]:
-        common = common[: next((k for k, (a, b) in enumerate(zip(common, name, strict=False)) if a != b), len(common))]
-        common = common[: len(name)]
-    return common.rstrip("_-. ")
+    common = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+    return "".join(letters[0] for letters in common).rstrip("_-. ")

@@ -20,8 +20,7 @@ from ....models.mechanism.closing import ClosedMechanism, close, closed_near
 from ...case.toml import plain_value
 from ...errors import InputError
 from ...evidence.state import RobotState
-from .links import extent_of, framed, renamed
-from .words import ExportedJoint, RobotMechanism, joint_name, link_name, unique_names
+from .words import ExportedJoint, RobotMechanism, extent_of, framed, joint_name, link_name, renamed, unique_names
 
 #: Parts of a joint by its type, one for each elementary joint: names of coordinates, and ends of joints' names.
 _PARTS: Mapping[str, tuple[tuple[str, str], ...]] = {
