@@ -148,7 +148,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
         [table.add(f"{at}{item.name}", item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
-        for at in _unknown_prefixes(case)
+        for at in ([""] if case.pose_count == 1 else [f"at{k + 1}_" for k in range(case.pose_count)])
     ]
     length = table.add("characteristic_length", Dimension.LENGTH, case.characteristic_length).symbols
     twists = [
@@ -231,12 +231,6 @@ def _ranges_of_unknowns(model: Model, reference: tuple[float, ...]) -> list[Free
     values = [float(size) for size in ca.vertsplit(sizes)] if model.unknowns else []
     pairs = zip(model.unknowns, values, strict=True)
     return [Free(size * item.lower, size * item.upper) for item, size in pairs]
-
-
-def _unknown_prefixes(case: Case) -> list[str]:
-    """Return the prefix of the names of the unknowns at each pose; an empty one for a single pose."""
-    count = case.pose_count
-    return [f"at{k + 1}_" for k in range(count)] if count > 1 else [""]
 
 
 def _unit_length(name: str, direction: SX) -> BoundedConstraint:

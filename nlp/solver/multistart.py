@@ -132,7 +132,9 @@ def solve_program(
         phase(Phase.RELAXATION, 0, few.starts)
         elastic = formulate_relaxation(nlp)
         points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
-        relaxed = _search(elastic, few, points, jobs, _during_relaxation(phase), solver, no_phase)
+        relaxed = _search(
+            elastic, few, points, jobs, lambda done, total, _: phase(Phase.RELAXATION, done, total), solver, no_phase
+        )
         # An optimum of the relaxed program is often degenerate, with more active limits than variables, so that it
         # need not count as converged: a feasible point is enough.
         feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
@@ -149,11 +151,6 @@ def solve_program(
         # All limits can hold at once: the first search only missed the feasible set, which this point lies in.
         solution = _search(nlp, search, [*first, least.x[: nlp.n]], jobs, None, solver, phase)
     return replace(solution, relaxation=moved, seconds=time.perf_counter() - began)
-
-
-def _during_relaxation(phase: PhaseProgress) -> Progress:
-    """Return the progress of the search for the smallest relaxation."""
-    return lambda done, total, _best: phase(Phase.RELAXATION, done, total)
 
 
 def _search(

@@ -169,7 +169,7 @@ class CompiledEngine:
         began = time.perf_counter()
         block = self.places.block(values)
         numbers = block.numbers
-        bounded = self.places.has_bounds
+        bounded = bool(self.places.bounds)  # whether bounds of variables change
         found = self.library.solve(
             p=numbers.arguments,
             lower=numbers.lower if bounded else None,

@@ -82,7 +82,8 @@ def import_robot(request: Request) -> Imported:
     gaps, notes = reduced.gaps, list(reduced.notes)
     worst = reduced.worst.share(reduced.size)
     if worst > OPEN and not request.closes:
-        raise InputError(f"{_open_loop(given, reduced)}{_advice(given, request.keyframe)}")
+        advice = f"--close closes it by Newton's method{_other_keyframes(given, request.keyframe)}"
+        raise InputError(f"{_open_loop(given, reduced)}; {advice}")
     if worst > CLOSED:
         loops = _with_loops(given, gaps)
         closed = close(loops, reduced.size)
@@ -155,11 +156,6 @@ def _open_loop(given: Description, reduced: Reduced) -> str:
     """Return the sentence that says which loop is open most."""
     fault = f"the loop {reduced.worst.name} is open by {reduced.worst.words}"
     return f"{given.source}: {fault}, more than {OPEN:g} of the robot's size {reduced.size:.3g}"
-
-
-def _advice(given: Description, keyframe: str) -> str:
-    """Return what to do about open loops."""
-    return f"; --close closes it by Newton's method{_other_keyframes(given, keyframe)}"
 
 
 def _other_keyframes(given: Description, keyframe: str) -> str:

@@ -112,24 +112,15 @@ def reduce(given: Description, ends: Ends) -> Reduced:
     )
     bodies = {body.name: body.place for body in given.bodies}
     own = {each.name for each in kept}
+    # A closure counts where it is a joint that is kept, or two; where it welds bodies of a link that is kept; and where
+    # it is a further ball of a hinge there.
     gaps = [
         gap_of(each, bodies)
         for each in given.closures
-        if _closes(each.name, own) or _merges(given, each.name, leader, names)
+        if own & {each.name, f"{each.name} 1"} or {leader[each.first], leader[each.second]} <= names.keys()
     ]
     gaps += [gap_of_coupling(given, each) for each in given.couplings if _holds(given, each, own, leader, names)]
     return Reduced(mechanism, _extent([each.point for each in kept]), tuple(gaps), (*given.notes, *notes, *more))
-
-
-def _closes(name: str, own: set[str]) -> bool:
-    """Return whether a closure is among the joints that are kept, as one joint or as two."""
-    return name in own or f"{name} 1" in own
-
-
-def _merges(given: Description, name: str, leader: dict[str, str], names: dict[str, str]) -> bool:
-    """Return whether a closure welds bodies of a link that is kept, or is a further ball of a hinge there."""
-    closure = next(each for each in given.closures if each.name == name)
-    return leader[closure.first] in names and leader[closure.second] in names
 
 
 def _holds(
