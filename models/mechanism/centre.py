@@ -41,7 +41,11 @@ def centre_of(mechanism: Mechanism, rule: CentreRule) -> FloatArray:
     joints = [mechanism.joints[k] for k in rule.joints]
     if not rule.is_meeting:
         return np.asarray(np.mean([joint.point for joint in joints], axis=0))
-    one, other = joints
+    return meeting_point(*joints)
+
+
+def meeting_point(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
+    """Return the point (3,) of the first axis that is nearest to the second, which is not parallel."""
     normal = np.cross(one.axis, other.axis)
     along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
     return np.asarray(one.point + along * one.axis)
@@ -97,10 +101,8 @@ def _meet(joints: Sequence[MechanismJoint], size: float) -> bool:
     if any(joint.kind != "R" for joint in joints):
         return False
     one, other = joints[0], joints[1]
-    normal = np.cross(one.axis, other.axis)
-    if float(np.linalg.norm(normal)) < _MEET:
+    if float(np.linalg.norm(np.cross(one.axis, other.axis))) < _MEET:
         return False
-    along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
-    point = one.point + along * one.axis
+    point = meeting_point(one, other)
     apart = [float(np.linalg.norm(np.cross(point - joint.point, joint.axis))) for joint in joints]
     return max(apart) < _MEET * size

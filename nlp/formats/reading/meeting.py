@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ....models.arrays import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint
+from ....models.mechanism.centre import meeting_point
 from ...errors import listing
 from .description import common_name
 from .elements import SAME_POINT
@@ -83,13 +83,6 @@ def axes_gap(one: MechanismJoint, other: MechanismJoint) -> tuple[float, float]:
     if sine < ALMOST:
         return float(np.linalg.norm(np.cross(one.axis, apart))), sine
     return abs(float(apart @ normal)) / sine, sine
-
-
-def meeting_point(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
-    """Return the point (3,) of the first axis that is nearest to the second, which is not parallel."""
-    normal = np.cross(one.axis, other.axis)
-    way = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
-    return np.asarray(one.point + way * one.axis)
 
 
 def _joints_of_links(given: Mechanism) -> dict[str, list[MechanismJoint]]:
