@@ -41,11 +41,11 @@ def centre_of(mechanism: Mechanism, rule: CentreRule) -> FloatArray:
     joints = [mechanism.joints[k] for k in rule.joints]
     if not rule.is_meeting:
         return np.asarray(np.mean([joint.point for joint in joints], axis=0))
-    return _crossing(*joints)
+    return meeting_point(*joints)
 
 
-def _crossing(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
-    """Return the point (3,) of one axis that is nearest to another one, which is not parallel."""
+def meeting_point(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
+    """Return the point (3,) of the first axis that is nearest to the second, which is not parallel."""
     normal = np.cross(one.axis, other.axis)
     along = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
     return np.asarray(one.point + along * one.axis)
@@ -100,6 +100,6 @@ def _meet(joints: Sequence[MechanismJoint], size: float) -> bool:
         return False
     if float(np.linalg.norm(np.cross(joints[0].axis, joints[1].axis))) < _MEET:
         return False
-    point = _crossing(joints[0], joints[1])
+    point = meeting_point(joints[0], joints[1])
     apart = [float(np.linalg.norm(np.cross(point - joint.point, joint.axis))) for joint in joints]
     return max(apart) < _MEET * size

@@ -238,7 +238,7 @@ class _Pose:
 
 def _pose_path(mechanism: Mechanism, position: FloatArray | None, rotation: FloatArray | None) -> _Pose:
     """Return the path of the platform from the stated pose to another one."""
-    link = next(each for each in mechanism.links if each.name == mechanism.platform)
+    link = mechanism.link(mechanism.platform)
     shift = np.zeros(3) if position is None else np.asarray(position, dtype=np.float64) - link.position
     turn = np.eye(3) if rotation is None else np.asarray(rotation, dtype=np.float64) @ link.rotation.T
     return _Pose(link.position, shift, rotation_vector(turn))

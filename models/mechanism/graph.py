@@ -53,6 +53,10 @@ class MechanismLink:
     position: FloatArray = field(default_factory=lambda: np.zeros(3))
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
 
+    def local(self, point: FloatArray) -> FloatArray:
+        """Return a point (3,) of the world in the link's frame."""
+        return np.asarray(self.rotation.T @ (point - self.position))
+
 
 @dataclass(frozen=True, eq=False)
 class MechanismJoint:
@@ -117,6 +121,10 @@ class Mechanism:
     base: str
     platform: str
     couplings: tuple[Coupling, ...] = ()
+
+    def link(self, name: str) -> MechanismLink:
+        """Return a link by its name."""
+        return next(link for link in self.links if link.name == name)
 
 
 def check_mechanism(mechanism: Mechanism) -> None:

@@ -91,8 +91,7 @@ def robot_tables(mechanism: Mechanism) -> dict[str, Any]:
 
 def _head(mechanism: Mechanism) -> dict[str, Any]:
     """Return name and home."""
-    (platform,) = (link for link in mechanism.links if link.name == mechanism.platform)
-    return {"name": mechanism.name or "robot", "home": _numbers(platform.position)}
+    return {"name": mechanism.name or "robot", "home": _numbers(mechanism.link(mechanism.platform).position)}
 
 
 def _decomposed(mechanism: Mechanism) -> tuple[list[_FileJoint], Decomposition]:

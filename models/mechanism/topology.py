@@ -109,6 +109,19 @@ def path_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> list[in
     return found
 
 
+def between(edges: Sequence[Edge[Node]], first: Node, last: Node) -> list[int]:
+    """Return the indices of the edges that lie on paths from one node to another that pass each node once.
+
+    No single node separates such an edge from one that joins the two nodes: they are in one biconnected component.
+    """
+    kept = list(range(len(edges)))
+    for node in dict.fromkeys(each for edge in [(first, last), *edges] for each in edge):
+        rest = [edge for edge in [(first, last), *(edges[k] for k in kept)] if node not in edge]
+        beside = reached(last if node == first else first, rest)
+        kept = [k for k in kept if beside.intersection({*edges[k]} - {node})]
+    return kept
+
+
 class Branch(NamedTuple):
     """An edge of a spanning tree: its index, and its ends from the root on."""
 

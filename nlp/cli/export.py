@@ -36,8 +36,8 @@ def export(
     """
     from ..case.reader import read_case
     from ..errors import one_line
-    from ..formats.export import check_pose, check_same_robot, files_at, fixed_point, is_assembled
-    from ..formats.writing.folder import check_formats
+    from ..evidence.state import loops_are_closed
+    from ..formats.export import check_formats, check_pose, check_same_robot, files_at, fixed_point
     from ..output.files import check_folder, check_outputs, write_folder
     from .progress import solve_with_progress
 
@@ -64,7 +64,7 @@ def export(
         fault = "" if solution.status.is_answer else f"the solve is {solution.status.value}"
     else:
         nlp, x = fixed
-        fault = "" if is_assembled(nlp, x) else "the robot's loops do not close there"
+        fault = "" if loops_are_closed(nlp, x) else "the robot's loops do not close there"
         if jacobian is not None and not fault:
             check_same_robot(nlp, x, jacobian)
     if fault:

@@ -94,9 +94,9 @@ def import_(
     if suggest and offers is not None:
         lines += offer_lines(offers, found.size)
     if out is not None:
-        written = robot_file(found, Path(file).name, free or [], offers)
-        lines += written.lines
-        write_text(out, written.text)
+        text, more = robot_file(found, Path(file).name, free or [], offers)
+        lines += more
+        write_text(out, text)
     if out != "-":
         title = Line(found.mechanism.name, tone=Tone.TITLE)
         show(console(), [title, *(Line(text, label=label) for label, text in lines)])

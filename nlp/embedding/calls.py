@@ -167,7 +167,7 @@ def _inner_calls(program: Program, matrices: Sequence[SX]) -> tuple[InnerCall, .
             calls.append(InnerCall(Call(Form(span_of_leg), inputs), leg.span))
         rows = [_inputs_of_row(row, legs) for row in robot.rows]
         # The rows of a member are those of one projector: they are no rows that one form gives each by itself.
-        is_by_row = len(program.robots) == 1 or all(row.form == _FORCE_OF_LEG for row in rows)
+        is_by_row = len(program.robots) == 1 or all(form == _FORCE_OF_LEG for form, _ in rows)
         if is_by_row and not program.model.members:
             calls += _calls_of_rows(robot, rows)
         if len(program.robots) > 1:
@@ -185,26 +185,22 @@ def _with_first_joints(leg: LegInstance, first: LegInstance) -> LegInstance:
     return replace(leg, base=first.base, platform=first.platform) if same else leg
 
 
-class _RowInputs(NamedTuple):
-    """A row: the form of its rates, and the inputs that determine the row."""
+def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> tuple[Form, SX]:
+    """Return the form of a row's rates, and its inputs: base and span of a leg that it acts along, or the wrench's own.
 
-    form: Form
-    inputs: SX
-
-
-def _inputs_of_row(row: Wrench, legs: Sequence[LegInstance]) -> _RowInputs:
-    """Return the inputs of a row: base and span of a leg that it acts along, else force, moment and square."""
+    The wrench's own are force, moment and square.
+    """
     for leg in legs:
         along = force_along(leg.name, leg.base, leg.span)
         if row.kind is WrenchKind.FORCE and row.limb == leg.name:
             pairs = ((row.force, along.force), (row.moment, along.moment), (row.square, along.square))
             if all(ca.is_equal(one, other, _DEPTH) for one, other in pairs):
-                return _RowInputs(_FORCE_OF_LEG, ca.vertcat(leg.base, leg.span))
+                return _FORCE_OF_LEG, ca.vertcat(leg.base, leg.span)
     kind = WrenchKind.FORCE if row.kind is WrenchKind.FORCE else WrenchKind.COUPLE
-    return _RowInputs(_OF_KIND[kind], ca.vertcat(row.force, row.moment, row.square))
+    return _OF_KIND[kind], ca.vertcat(row.force, row.moment, row.square)
 
 
-def _calls_of_rows(robot: RobotInstance, rows: Sequence[_RowInputs]) -> list[InnerCall]:
+def _calls_of_rows(robot: RobotInstance, rows: Sequence[tuple[Form, SX]]) -> list[InnerCall]:
     """Return the calls that give each row's rates, and those that give F and F without cancellation from them."""
     tasks = robot.F.numel()
     at = robot.inputs.numel() - 6 * tasks
@@ -212,11 +208,11 @@ def _calls_of_rows(robot: RobotInstance, rows: Sequence[_RowInputs]) -> list[Inn
     for j in range(tasks):
         twist = robot.inputs[at + 6 * j : at + 6 * j + 6]
         terms, sizes = SX.sym("term", len(rows)), SX.sym("size", len(rows))
-        for i, row in enumerate(rows):
-            inputs = ca.vertcat(length, twist, row.inputs)
-            calls.append(InnerCall(Call(row.form, inputs), ca.vertcat(robot.rates[i, j], terms[i])))
-            form = Form(_size_of_row, row.form.numbers)
-            calls.append(InnerCall(Call(form, ca.vertcat(length, twist, robot.position, row.inputs)), sizes[i]))
+        for i, (form, inputs) in enumerate(rows):
+            rate = Call(form, ca.vertcat(length, twist, inputs))
+            calls.append(InnerCall(rate, ca.vertcat(robot.rates[i, j], terms[i])))
+            size = Call(Form(_size_of_row, form.numbers), ca.vertcat(length, twist, robot.position, inputs))
+            calls.append(InnerCall(size, sizes[i]))
         calls.append(InnerCall(Call(Form(ca.sum1), terms), robot.F[j]))
         calls.append(InnerCall(Call(Form(ca.sum1), sizes), robot.magnitude[j]))
     return calls

@@ -39,11 +39,11 @@ from .ctext import (
     version_texts,
 )
 from .loops import find_loops
-from .manifest import MANIFEST, UnitData, manifest_text
+from .manifest import MANIFEST, NumberColumns, manifest_text, number_columns
 from .measure import NOT_MEASURED
 from .runtimelimits import held_by_fixed_numbers, held_texts, limit_texts, run_time_limits
 from .stages import StagedFunctions, casadi_work, loop_texts, loop_work, stage_functions
-from .subject import Subject, bounds_in_c, find_subject, magnitude_of, objective_words, turning_joints
+from .subject import Subject, find_subject, magnitude_of, objective_words, turning_joints
 from .worstcase import worst_case_texts
 
 _TEMPLATES = Path(__file__).parent / "c"
@@ -99,9 +99,10 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     held = held_by_fixed_numbers(nlp)
     staged = stage_functions(nlp.program, magnitude_of(nlp), f"{prefix}_CASADI", held)
     limits = run_time_limits(nlp, f"{prefix}_CASADI")
-    names, units = _substitutions(subject, staged), UnitData(nlp)
+    columns = number_columns(nlp, limits.limits, prefix)
+    names = _substitutions(subject, staged, columns)
     names |= held_texts(held, limits)
-    names |= limit_texts(limits, prefix, units.of_case.label, units.limit_multipliers(limits.limits))
+    names |= limit_texts(limits, prefix, columns.limits)
     parts = _PARTS | ({"-home.c": "home.c"} if "signs" in staged.functions else {})
     parts |= {"-loops.c": "loops.c"} if staged.loops else {}
     parts |= {"-spectrum.c": "spectrum.c"} if staged.loops.spectra else {}
@@ -114,7 +115,7 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     files |= {name: _fill_template(f"{name}.in", names) for name in _OTHERS}
     casadi = _casadi_files((*staged.all, *limits.functions), f"{prefix}_CASADI")
     files |= {f"{prefix}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
-    return files | {MANIFEST: manifest_text(nlp, limits.limits, names, files)}
+    return files | {MANIFEST: manifest_text(nlp, columns, names, files)}
 
 
 def size_words(case: Case, files: Mapping[str, str]) -> str:
@@ -169,7 +170,7 @@ def _casadi_files(functions: Iterable[ca.Function], name: str) -> dict[str, str]
     return {end: for_controllers(text) for end, text in texts.items()}
 
 
-def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
+def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberColumns) -> dict[str, str]:
     """Return the texts for the templates' placeholders."""
     nlp, optimum = subject
     case, program = nlp.case, nlp.program
@@ -230,7 +231,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
         "solver_bytes": str(8 * solver_work + 4 * solver_iwork),
         "seeds": "/* Where the solver searches from, in half ranges from the middle of the bounds. */\n"
         + matrix_table(f"{prefix}_seeds[{prefix.upper()}_SEEDS][{prefix.upper()}_N + 1]", seeds),
-        "tables": _tables(nlp, prefix),
+        "tables": _tables(nlp, prefix, columns),
         "count": str(points),
         "has_optimum": str(int(optimum is not None)),
         # Fewer digits than Ipopt's rounding error has, so that they are the same on every machine.
@@ -241,47 +242,43 @@ def _substitutions(subject: Subject, staged: StagedFunctions) -> dict[str, str]:
     }
 
 
-def _tables(nlp: Nlp, prefix: str) -> str:
+def _tables(nlp: Nlp, prefix: str, columns: NumberColumns) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
-    case, program = nlp.case, nlp.program
-    units = UnitData(nlp)
-    turning = turning_joints(nlp)
+    program, turning = nlp.program, turning_joints(nlp)
+    _, variables, parameters, _, constraints, rows, tasks = columns
     kinds = [list(Dimension).index(each.dimension) for each in program.variables]
-    bounds = bounds_in_c(nlp)
     if program.places.epigraph is not None:
         kinds[program.places.epigraph.level] = len(Dimension)
     N, P, M, C, T = (f"{prefix.upper()}_{each}" for each in ("N", "P", "M", "C", "TASKS"))
     blocks = [
         "/* Free variables: names, units, kinds (one scale for each), bounds, and where a search may begin. */",
-        string_table(f"{prefix}_variable_names", N, [each.name for each in program.variables]),
-        string_table(f"{prefix}_variable_units", N, units.variables),
+        string_table(f"{prefix}_variable_names", N, variables["name"]),
+        string_table(f"{prefix}_variable_units", N, variables["unit"]),
         integer_table(f"{prefix}_variable_kinds", N, kinds),
         integer_table(f"{prefix}_variable_is_joint", N, [int(i in program.places.inner) for i in range(nlp.n)]),
         integer_table(f"{prefix}_variable_turns", N, [int(i in turning) for i in range(nlp.n)]),
-        number_table(f"{prefix}_variable_lower", N, bounds.lower),
-        number_table(f"{prefix}_variable_upper", N, bounds.upper),
-        number_table(f"{prefix}_variable_starts", N, nlp.start),
+        number_table(f"{prefix}_variable_lower", N, variables["lower"]),
+        number_table(f"{prefix}_variable_upper", N, variables["upper"]),
+        number_table(f"{prefix}_variable_starts", N, variables["start"]),
         "/* Fixed numbers: names, units, and the case's values. */",
-        string_table(f"{prefix}_parameter_names", P, [each.name for each in program.arguments]),
-        string_table(f"{prefix}_parameter_units", P, units.parameters),
-        number_table(f"{prefix}_parameter_defaults", P, nlp.arguments),
+        string_table(f"{prefix}_parameter_names", P, parameters["name"]),
+        string_table(f"{prefix}_parameter_units", P, parameters["unit"]),
+        number_table(f"{prefix}_parameter_defaults", P, parameters["default"]),
         "/* Units of F, of each task's rates, and of multipliers of variables' bounds, for the case's twists. */",
-        f"static const char *const {prefix}_F_unit = {string_literal(units.F)};",
-        string_table(f"{prefix}_rate_units", T, units.rates),
-        string_table(f"{prefix}_multiplier_units", N, units.variable_multipliers),
+        f"static const char *const {prefix}_F_unit = {string_literal(columns.F_unit)};",
+        string_table(f"{prefix}_rate_units", T, tasks["rate_unit"]),
+        string_table(f"{prefix}_multiplier_units", N, variables["multiplier_unit"]),
         "/* Rows of the Jacobian: the limb of each, and whether it is a force, a couple or another wrench. */",
-        string_table(f"{prefix}_row_limbs", M, [row.limb for row in program.model.frame_rows]),
-        string_table(f"{prefix}_row_kinds", M, [row.kind.value for row in program.model.frame_rows]),
+        string_table(f"{prefix}_row_limbs", M, rows["limb"]),
+        string_table(f"{prefix}_row_kinds", M, rows["kind"]),
         "/* Constraints: names, units of their multipliers, and bounds; 1e300 is none. */",
-        string_table(f"{prefix}_constraint_names", C, [each.name for each in program.constraints]),
-        string_table(f"{prefix}_constraint_multiplier_units", C, units.constraint_multipliers),
-        number_table(f"{prefix}_constraint_lower", C, nlp.g_lower),
-        number_table(f"{prefix}_constraint_upper", C, nlp.g_upper),
+        string_table(f"{prefix}_constraint_names", C, constraints["name"]),
+        string_table(f"{prefix}_constraint_multiplier_units", C, constraints["multiplier_unit"]),
+        number_table(f"{prefix}_constraint_lower", C, constraints["lower"]),
+        number_table(f"{prefix}_constraint_upper", C, constraints["upper"]),
         "/* Tasks: names, and twists of six numbers each. */",
-        string_table(f"{prefix}_task_names", T, [task.name for task in case.tasks]),
-        number_table(
-            f"{prefix}_task_twists", f"6 * {T}", np.concatenate([np.asarray(task.twist) for task in case.tasks])
-        ),
+        string_table(f"{prefix}_task_names", T, tasks["name"]),
+        number_table(f"{prefix}_task_twists", f"6 * {T}", np.concatenate(tasks["twist"])),
     ]
     if program.places.weights:
         blocks.append("/* Indices in p of the tasks' weights. */")

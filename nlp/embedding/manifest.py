@@ -9,10 +9,9 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,79 +20,105 @@ from ..errors import InputError
 from ..program.nlp import Nlp
 from ..system.reading import read_limited
 from ..system.strictjson import json_tree, value_of
-from ..units import Units, objective_unit, rate_unit, twist_units
+from ..units import objective_unit, rate_unit, twist_units
+from .ctext import NO_BOUND
 from .runtimelimits import RunTimeLimit
-from .subject import bounds_in_c
+
+#: Numbers or names by the key of each column.
+Columns: TypeAlias = Mapping[str, list[Any]]
 
 
-@dataclass(frozen=True)
-class UnitData:
-    """Units of a program's numbers in C, for the case's own tasks; empty for a plain number."""
+class NumberColumns(NamedTuple):
+    """The numbers of a program in C, column by column: names, units, bounds and values, for the case's own tasks.
 
-    nlp: Nlp
+    Angles are radians. A unit is empty for a plain number, and where the tasks do not agree in that of F.
 
-    @cached_property
-    def of_case(self) -> Units:
-        """Units of lengths and angles: angles are radians in C."""
-        return replace(self.nlp.case.units, angle="rad")
+    Attributes:
+        F_unit: unit of F.
+        variables: the free variables; the unit of a level is F's.
+        parameters: the fixed numbers.
+        limits: those that can be set at run time.
+        constraints: with the units of their multipliers.
+        rows: of the Jacobian.
+        tasks: with the units of their rates.
+    """
 
-    @property
-    def _twists(self) -> list[list[float]]:
-        return [np.asarray(task.twist, dtype=np.float64).tolist() for task in self.nlp.case.tasks]
+    F_unit: str
+    variables: Columns
+    parameters: Columns
+    limits: Columns
+    constraints: Columns
+    rows: Columns
+    tasks: Columns
 
-    @property
-    def F(self) -> str:  # noqa: N802 - as everywhere
-        """Unit of F; empty where the tasks do not agree in it."""
-        return objective_unit(self._twists, self.of_case)
 
-    @property
-    def rates(self) -> tuple[str, ...]:
-        """Unit of the rates of each task."""
-        return tuple(rate_unit(twist, self.of_case) for twist in self._twists)
+def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> NumberColumns:
+    """Return the numbers of a program in C, with the limits that can be set; C's names begin with the prefix."""
+    case, program, epigraph = nlp.case, nlp.program, nlp.program.places.epigraph
+    units = replace(case.units, angle="rad")
+    twists = [np.asarray(task.twist, dtype=np.float64).tolist() for task in case.tasks]
+    F = objective_unit(twists, units)
+    of_variables, of_parameters, of_limits = (
+        [units.label(each.dimension) for each in numbers] for numbers in (program.variables, program.arguments, limits)
+    )
+    for twist, places in zip(twists, program.places.twists, strict=False):
+        of_parameters[places.start : places.stop] = twist_units(twist, units)
+    if epigraph is not None:
+        of_variables[epigraph.level] = F
+        for index in (epigraph.ceiling, *epigraph.best):
+            of_parameters[index] = F
 
-    @property
-    def variables(self) -> tuple[str, ...]:
-        """Unit of each variable; that of a level is F's."""
-        program = self.nlp.program
-        found = [self.of_case.label(each.dimension) for each in program.variables]
-        if program.places.epigraph is not None:
-            found[program.places.epigraph.level] = self.F
-        return tuple(found)
+    def multipliers(labels: Iterable[str]) -> list[str]:
+        """Return units of F over others; empty where F has none."""
+        return ["" if label == F else f"{F}/{label}" if F and label else F for label in labels]
 
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Unit of each fixed number."""
-        program = self.nlp.program
-        found = [self.of_case.label(each.dimension) for each in program.arguments]
-        for twist, places in zip(self._twists, program.places.twists, strict=False):
-            found[places.start : places.stop] = twist_units(twist, self.of_case)
-        epigraph = program.places.epigraph
-        for index in () if epigraph is None else (epigraph.ceiling, *epigraph.best):
-            found[index] = self.F
-        return tuple(found)
-
-    @property
-    def variable_multipliers(self) -> tuple[str, ...]:
-        """Unit of the multipliers of each variable's bounds."""
-        return tuple(self._multiplier(unit) for unit in self.variables)
-
-    @property
-    def constraint_multipliers(self) -> tuple[str, ...]:
-        """Unit of the multipliers of each constraint's bounds."""
-        readings = [each.reading for each in self.nlp.program.constraints]
-        units = [self.of_case.label(each.dimension) if each.power else "" for each in readings]
-        squares = [f"{unit}²" if unit and each.power == 2 else unit for unit, each in zip(units, readings, strict=True)]
-        return tuple(map(self._multiplier, squares))
-
-    def limit_multipliers(self, limits: Sequence[RunTimeLimit]) -> tuple[str, ...]:
-        """Return the unit of each limit's multiplier."""
-        return tuple(self._multiplier(self.of_case.label(each.dimension)) for each in limits)
-
-    def _multiplier(self, unit: str) -> str:
-        """Return the unit of F over another one; empty where F has none."""
-        if unit == self.F:
-            return ""
-        return f"{self.F}/{unit}" if self.F and unit else self.F
+    readings = [each.reading for each in program.constraints]
+    powers = ["" if not each.power else units.label(each.dimension) for each in readings]
+    squares = [f"{unit}²" if unit and each.power == 2 else unit for unit, each in zip(powers, readings, strict=True)]
+    lower, upper = np.array(nlp.lower), np.array(nlp.upper)
+    if epigraph is not None:
+        # A level has no bounds: it follows from the task, which may change.
+        lower[epigraph.level], upper[epigraph.level] = -NO_BOUND, NO_BOUND
+    return NumberColumns(
+        F_unit=F,
+        variables={
+            "name": [each.name for each in program.variables],
+            "unit": of_variables,
+            "multiplier_unit": multipliers(of_variables),
+            "lower": lower.tolist(),
+            "upper": upper.tolist(),
+            "start": nlp.start.tolist(),
+        },
+        parameters={
+            "name": [each.name for each in program.arguments],
+            "unit": of_parameters,
+            "default": nlp.arguments.tolist(),
+        },
+        limits={
+            "key": [each.key for each in limits],
+            "c_name": [f"{prefix.upper()}_LIMIT_{each.name}" for each in limits],
+            "unit": of_limits,
+            "multiplier_unit": multipliers(of_limits),
+            "default": [each.default for each in limits],
+            "above": [each.above for each in limits],
+            "most": [each.most for each in limits],
+        },
+        constraints={
+            "name": [each.name for each in program.constraints],
+            "multiplier_unit": multipliers(squares),
+            "lower": nlp.g_lower.tolist(),
+            "upper": nlp.g_upper.tolist(),
+        },
+        rows={
+            "limb": [row.limb for row in program.model.frame_rows],
+            "kind": [row.kind.value for row in program.model.frame_rows],
+        },
+        tasks={
+            "name": [task.name for task in case.tasks],
+            "twist": twists,
+            "rate_unit": [rate_unit(twist, units) for twist in twists],
+        },
+    )
 
 
 #: Name of the manifest in the folder.
@@ -104,13 +129,12 @@ FORMAT = 2
 _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=re.MULTILINE)
 
 
-def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, str], files: Mapping[str, str]) -> str:
+def manifest_text(nlp: Nlp, columns: NumberColumns, names: Mapping[str, str], files: Mapping[str, str]) -> str:
     """Return the manifest's text, from the texts of the templates' placeholders and of all other files by name."""
-    case, program, prefix = nlp.case, nlp.program, names["id"]
-    bounds = bounds_in_c(nlp)
-    units = UnitData(nlp)
+    case, prefix = nlp.case, names["id"]
     header = files[f"{prefix}.h"]
     statuses = _STATUS.findall(header[header.index("typedef enum") : header.index("} screwsynth_status;")])
+    numbers = columns._asdict()
     manifest = {
         "format": FORMAT,
         "screwsynth": __version__,
@@ -119,38 +143,8 @@ def manifest_text(nlp: Nlp, limits: Sequence[RunTimeLimit], names: Mapping[str, 
         "title": case.title,
         "prefix": prefix,
         "sense": nlp.sense.value,
-        "F_unit": units.F,
-        "variables": _objects(
-            name=[each.name for each in program.variables],
-            unit=units.variables,
-            multiplier_unit=units.variable_multipliers,
-            lower=bounds.lower,
-            upper=bounds.upper,
-            start=nlp.start,
-        ),
-        "parameters": _objects(
-            name=[each.name for each in program.arguments], unit=units.parameters, default=nlp.arguments
-        ),
-        "limits": _objects(
-            key=[each.key for each in limits],
-            c_name=[f"{prefix.upper()}_LIMIT_{each.name}" for each in limits],
-            unit=[units.of_case.label(each.dimension) for each in limits],
-            multiplier_unit=units.limit_multipliers(limits),
-            default=[each.default for each in limits],
-            above=[each.above for each in limits],
-            most=[each.most for each in limits],
-        ),
-        "constraints": _objects(
-            name=[each.name for each in program.constraints],
-            multiplier_unit=units.constraint_multipliers,
-            lower=nlp.g_lower,
-            upper=nlp.g_upper,
-        ),
-        "rows": [{"limb": row.limb, "kind": row.kind.value} for row in program.model.frame_rows],
-        "tasks": [
-            {"name": task.name, "twist": np.asarray(task.twist).tolist(), "rate_unit": unit}
-            for task, unit in zip(case.tasks, units.rates, strict=True)
-        ],
+        "F_unit": numbers.pop("F_unit"),
+        **{key: _objects(own) for key, own in numbers.items()},
         "notice": "" if case.workspace is None else case.workspace.stated_pose_notice,
         "seeds": int(names["nseeds"]),
         "statuses": [{"code": code, "name": name, "meaning": text} for code, (name, text) in enumerate(statuses)],
@@ -167,14 +161,14 @@ def json_text(manifest: Mapping[str, object]) -> str:
     return json.dumps(manifest, indent=1, ensure_ascii=True, allow_nan=False) + "\n"
 
 
-def _objects(**columns: Iterable[str | float]) -> list[dict[str, str | float | None]]:
+def _objects(columns: Columns) -> list[dict[str, Any]]:
     """Return objects of JSON from their values by key; None where a number is infinite."""
     rows = zip(*columns.values(), strict=True)
     return [{key: _plain(value) for key, value in zip(columns, row, strict=True)} for row in rows]
 
 
-def _plain(value: str | float) -> str | float | None:
-    if isinstance(value, str):
+def _plain(value: str | float | list[float]) -> str | float | list[float] | None:
+    if isinstance(value, str | list):
         return value
     return float(value) if math.isfinite(value) else None
 

@@ -15,6 +15,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -242,22 +243,20 @@ def _called_by_pointer(function: str, frames: Mapping[str, int], prefix: str) ->
 
 def _deepest(function: str, frames: Mapping[str, int], calls: Mapping[str, set[str]]) -> int | None:
     """Return the deepest sum of frames from a function; None where a function may call itself."""
-    found: dict[str, int] = {}
-    open_calls: set[str] = set()
-
-    def depth(name: str) -> int | None:
-        if name in open_calls:
-            return None
-        if name not in found:
-            open_calls.add(name)
-            below = [depth(each) for each in sorted(calls.get(name, ()))]
-            open_calls.remove(name)
-            if any(each is None for each in below):
-                return None
-            found[name] = frames.get(name, 0) + _RETURN + max((each for each in below if each is not None), default=0)
-        return found[name]
-
-    return depth(function)
+    below: dict[str, set[str]] = {}
+    waiting = [function]
+    while waiting:
+        name = waiting.pop()
+        if name not in below:
+            below[name] = calls.get(name, set())
+            waiting += below[name]
+    depths: dict[str, int] = {}
+    try:
+        for name in TopologicalSorter(below).static_order():
+            depths[name] = frames.get(name, 0) + _RETURN + max((depths[each] for each in below[name]), default=0)
+    except CycleError:
+        return None
+    return depths[function]
 
 
 #: What stands in the place of the figures where no compiler was run.

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -194,23 +194,18 @@ def _limit(key: str, reading: Reading, value: float) -> RunTimeLimit:
     return RunTimeLimit(key, "", reading.dimension, value, above, max(reading.most, value))
 
 
-def limit_texts(
-    found: RunTimeLimits, prefix: str, unit_of: Callable[[Dimension], str], multiplier_units: Sequence[str]
-) -> dict[str, str]:
-    """Return the texts for the placeholders about limits."""
+def limit_texts(found: RunTimeLimits, prefix: str, columns: Mapping[str, list[Any]]) -> dict[str, str]:
+    """Return the texts for the placeholders about limits, whose names, units and numbers are the columns."""
     L, limits, sides, widenings = f"{prefix.upper()}_LIMITS", found.limits, found.sides, found.widenings
-    units = [unit_of(each.dimension) for each in limits]
-    members = [
-        f"    {prefix.upper()}_LIMIT_{each.name} = {k}, /* {_description(each, unit)} */\n"
-        for k, (each, unit) in enumerate(zip(limits, units, strict=True))
-    ]
+    named = zip(columns["c_name"], limits, columns["unit"], strict=True)
+    members = [f"    {name} = {k}, /* {_description(each, unit)} */\n" for k, (name, each, unit) in enumerate(named)]
     tables = [
-        string_table(f"{prefix}_limit_keys", L, [each.key for each in limits]),
-        string_table(f"{prefix}_limit_units", L, units),
-        string_table(f"{prefix}_limit_multiplier_units", L, multiplier_units),
-        number_table(f"{prefix}_limit_defaults", L, [each.default for each in limits]),
-        number_table(f"{prefix}_limit_above", L, [each.above for each in limits]),
-        number_table(f"{prefix}_limit_most", L, [each.most for each in limits]),
+        string_table(f"{prefix}_limit_keys", L, columns["key"]),
+        string_table(f"{prefix}_limit_units", L, columns["unit"]),
+        string_table(f"{prefix}_limit_multiplier_units", L, columns["multiplier_unit"]),
+        number_table(f"{prefix}_limit_defaults", L, columns["default"]),
+        number_table(f"{prefix}_limit_above", L, columns["above"]),
+        number_table(f"{prefix}_limit_most", L, columns["most"]),
     ]
     of_sides = [
         integer_table("side_constraints", "SIDES", [each.constraint for each in sides]),

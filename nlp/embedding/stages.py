@@ -6,6 +6,7 @@ a dimension rarely and the point always. Sines of fixed angles and the like must
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -238,7 +239,7 @@ def loop_texts(staged: StagedFunctions, prefix: str) -> dict[str, str]:
         "loop_tables": _tables(staged),
         "loop_cases": _cases(staged.of_loops),
         **{f"most_{name}": str(count) for name, count in most.items()},
-        "ncolumns": str(len(_columns(staged).columns)),
+        "ncolumns": str(sum(map(len, _columns(staged)))),
         "casadi_work": str(casadi_work(staged)),
         # Eigenvalues by another order of operations, and by inverses, lose two digits more.
         "limits_close": "1e-10" if loops.spectra else "1e-12",
@@ -256,7 +257,7 @@ def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
     if not loops:
         return 0
     plain, slots = len(loops.plain), loops.slot_count
-    first = slots + len(_columns(staged).columns) + sum(_largest(staged).values()) + plain * (1 + n)
+    first = slots + sum(map(len, _columns(staged))) + sum(_largest(staged).values()) + plain * (1 + n)
     second = slots + plain + loops.entries.numel() + n + n * n + n
     of_j = 6 * rows
     # The locals of spectrum.c: matrices (6, 6) along the variables, and second derivatives.
@@ -264,15 +265,8 @@ def loop_work(staged: StagedFunctions, rows: int, n: int) -> int:
     return first + second + (3 * of_j + 2 * of_j * n + n * n + spectrum if loops.spectra else 0)
 
 
-class _Columns(NamedTuple):
-    """Variables on which slots depend: where those of each slot begin, with the end of the last, and their indices."""
-
-    first: list[int]
-    columns: list[int]
-
-
-def _columns(staged: StagedFunctions) -> _Columns:
-    """Return the variables on which the slots depend by structure."""
+def _columns(staged: StagedFunctions) -> list[list[int]]:
+    """Return the variables on which each slot depends by structure."""
     entries = staged.loops.entries
     own: list[list[int]] = [[] for _ in range(staged.loops.slot_count)]
     for row, column in zip(*ca.jacobian(entries, staged.x).sparsity().get_triplet(), strict=True):
@@ -282,10 +276,7 @@ def _columns(staged: StagedFunctions) -> _Columns:
             for value, place in enumerate(outputs):
                 taken = (own[slots[i]] for r, i in functions.slopes if r == value)
                 own[place] = sorted({column for columns in taken for column in columns})
-    first = [0]
-    for columns in own:
-        first.append(first[-1] + len(columns))
-    return _Columns(first, [column for columns in own for column in sorted(columns)])
+    return [sorted(columns) for columns in own]
 
 
 def _largest(staged: StagedFunctions) -> dict[str, int]:
@@ -323,7 +314,8 @@ def _tables(staged: StagedFunctions) -> str:
     names = ("slots", "constant_places", "outputs", "slope_places", "second_places")
     blocks = [short_table(name, table) for name, table in zip(names, tables, strict=True)]
     columns = _columns(staged)
-    blocks += [short_table("first_column", columns.first), short_table("columns", columns.columns)]
+    blocks.append(short_table("first_column", itertools.accumulate(map(len, columns), initial=0)))
+    blocks.append(short_table("columns", [each for own in columns for each in own]))
     blocks.append(f"static const loop loops[LOOPS + 1] = {{\n{rows}}};")
     blocks.append(short_table("plain_places", loops.plain))
     if loops.spectra:

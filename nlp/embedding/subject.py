@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, frozen_vector
+from ...models import frozen_vector
 from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
@@ -22,7 +22,6 @@ from ..proof.statement.standard_form import is_in_home_mode
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
 from ..solver.status import Status
-from .ctext import NO_BOUND
 
 #: Names of joints that a message shows.
 _MOST_SHOWN = 8
@@ -38,21 +37,6 @@ class Subject(NamedTuple):
 
     nlp: Nlp
     optimum: float | None
-
-
-class Bounds(NamedTuple):
-    """Bounds (n,) of variables."""
-
-    lower: FloatArray
-    upper: FloatArray
-
-
-def bounds_in_c(nlp: Nlp) -> Bounds:
-    """Return the bounds of a program's variables in C. A level has none: it follows from the task, which may change."""
-    lower, upper, epigraph = np.array(nlp.lower), np.array(nlp.upper), nlp.program.places.epigraph
-    if epigraph is not None:
-        lower[epigraph.level], upper[epigraph.level] = -NO_BOUND, NO_BOUND
-    return Bounds(lower, upper)
 
 
 def find_subject(case: Case) -> Subject:

@@ -7,18 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...models import FloatArray
+from ...models import Dimension, FloatArray
 from ...models.mechanism import MechanismError
 from ..case.case import Case
 from ..case.pose import Free
-from ..errors import InputError
+from ..errors import InputError, nearest
 from ..evidence.closing import closed_start
-from ..evidence.state import evaluate, loops_are_closed
+from ..evidence.state import evaluate
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
-from .solved.mechanism_of import mechanism_of
-from .writing.folder import check_formats, exported_files
+from .solved.mechanism_of import Exported, mechanism_of
+from .writing.mjcf import mjcf_text
+from .writing.plates import Plate, dxf_text, plate_of, plates_csv, required_dxf
+from .writing.readme import readme_text
+from .writing.tables import joints_csv, links_csv
+from .writing.urdf import urdf_of
 
+#: The formats that can be asked for.
+FORMATS = ("mjcf", "urdf", "csv", "dxf")
 #: Largest difference of J'J of a result from that of its numbers, in parts of its largest entry: results are closed to
 #: the solver's accuracy, and another assembly of the joints differs by parts of 1.
 _SAME = 1e-6
@@ -79,11 +85,6 @@ def fixed_point(case: Case) -> tuple[Nlp, FloatArray] | None:
     return nlp, closed_start(nlp)
 
 
-def is_assembled(nlp: Nlp, x: FloatArray) -> bool:
-    """Return whether the loops of the robot are closed at a point (n,)."""
-    return loops_are_closed(nlp, x)
-
-
 def check_same_robot(nlp: Nlp, x: FloatArray, jacobian: FloatArray) -> None:
     """Refuse a point whose Jacobian is not that of a result, up to the basis of the wrenches of a member.
 
@@ -114,3 +115,50 @@ def check_pose(case: Case, pose: int) -> None:
     """
     if not 1 <= pose <= case.pose_count:
         raise InputError(f"--pose {pose}: the case has {case.pose_count} pose{'s' * (case.pose_count > 1)}")
+
+
+def check_formats(formats: Collection[str]) -> tuple[str, ...]:
+    """Return the formats that are asked for, each once; ``all`` is all of them.
+
+    Raises:
+        InputError: there is no such format, or a library that it needs is not installed.
+    """
+    for name in formats:
+        if name not in (*FORMATS, "all"):
+            raise InputError(f"--format {name}: is no format; {nearest(name, (*FORMATS, 'all'))}")
+    chosen = tuple(name for name in FORMATS if name in formats or "all" in formats)
+    if "dxf" in chosen:
+        required_dxf()
+    return chosen
+
+
+def exported_files(exported: Exported, formats: Collection[str]) -> dict[str, str]:
+    """Return the texts of the files of a robot by name, with a page that explains them.
+
+    Args:
+        exported: the robot.
+        formats: ``mjcf``, ``urdf``, ``csv``, ``dxf``, or ``all``.
+
+    Raises:
+        InputError: there is no such format, or a library that it needs is not installed.
+        MechanismError: the robot's links are not connected.
+    """
+    chosen = check_formats(formats)
+    mechanism, units = exported.mechanism, exported.case.units
+    files: dict[str, str] = {}
+    plates: tuple[Plate, ...] = ()
+    if "mjcf" in chosen:
+        files["robot.xml"] = mjcf_text(mechanism)
+    if "urdf" in chosen:
+        urdf = urdf_of(mechanism)
+        files["robot.urdf"], files["robot.yaml"] = urdf.text, urdf.loops_text(mechanism)
+    if "csv" in chosen:
+        files["joints.csv"] = joints_csv(mechanism, exported.joints, units)
+        files["links.csv"] = links_csv(mechanism, units)
+    if "csv" in chosen or "dxf" in chosen:
+        plates = tuple(plate_of(mechanism, link, exported.size) for link in (mechanism.base, mechanism.platform))
+        files["plates.csv"] = plates_csv(plates, units)
+    if "dxf" in chosen:
+        for plate in plates:
+            files[f"{plate.name}.dxf"] = dxf_text(plate, units.label(Dimension.LENGTH))
+    return {"README.md": readme_text(exported, list(files), plates if "dxf" in chosen else ()), **files}

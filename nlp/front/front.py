@@ -131,7 +131,7 @@ def pareto(
     size = np.where(size > 0, size, 1.0)
     ends = [builder.polished(end, size) for end in ends]
     reached(Milestone.POINT)
-    say = progress if progress is not None else _say_nothing
+    say = progress or (lambda _done, _total: None)
     if len(wanted) == 2:
         found, gaps = _spread_between(builder, ends, size, points, say)
     else:
@@ -139,10 +139,6 @@ def pareto(
     if certified:
         found = [replace(point, certificate=_certificate(point, jobs, len(found) - k)) for k, point in enumerate(found)]
     return Front(case, wanted, tuple(found), tuple(gaps), builder.failed, time.perf_counter() - began)
-
-
-def _say_nothing(_done: int, _total: int) -> None:
-    pass
 
 
 def _spread_between(

@@ -45,7 +45,7 @@ from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFa
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
 from ..errors import CaseError
-from .limits import ProgramNumbers, limit_constraints
+from .limits import limit_constraints
 from .loops import needed_equations
 from .nlp import Nlp
 from .places import Epigraph, FreeRotation, HeldRotation, Place, Places, RotationPlaces, SymbolTable
@@ -148,7 +148,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
         [table.add(f"{at}{item.name}", item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
-        for at in _unknown_prefixes(case)
+        for at in ([""] if case.pose_count == 1 else [f"at{k + 1}_" for k in range(case.pose_count)])
     ]
     length = table.add("characteristic_length", Dimension.LENGTH, case.characteristic_length).symbols
     twists = [
@@ -187,12 +187,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         loops = [loops[k] for k in needed]
     varying, fixed = _divided(case, [*constraints, *loops], table)
     numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
-    limits = limit_constraints(
-        case,
-        robots,
-        dict(zip(case.scalars, numbers, strict=True)),
-        ProgramNumbers(table.variables_vector, table.arguments_vector, table.bounds, table.values),
-    )
+    limits = limit_constraints(case, robots, dict(zip(case.scalars, numbers, strict=True)), table)
     places = Places(
         numbers=(
             *(place for placed in parameters for place in placed.places),
@@ -236,12 +231,6 @@ def _ranges_of_unknowns(model: Model, reference: tuple[float, ...]) -> list[Free
     values = [float(size) for size in ca.vertsplit(sizes)] if model.unknowns else []
     pairs = zip(model.unknowns, values, strict=True)
     return [Free(size * item.lower, size * item.upper) for item, size in pairs]
-
-
-def _unknown_prefixes(case: Case) -> list[str]:
-    """Return the prefix of the names of the unknowns at each pose; an empty one for a single pose."""
-    count = case.pose_count
-    return [f"at{k + 1}_" for k in range(count)] if count > 1 else [""]
 
 
 def _unit_length(name: str, direction: SX) -> BoundedConstraint:

@@ -17,8 +17,8 @@ from ...models import RobotInstance
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, PairFamily
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
-from ..case.pose import Free
 from ..errors import CaseError
+from .places import SymbolTable
 from .repeated import without_repeated
 
 #: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
@@ -44,17 +44,8 @@ class LimitConstraints(NamedTuple):
     fixed_families: tuple[PairFamily, ...] = ()
 
 
-class ProgramNumbers(NamedTuple):
-    """The numbers of a program: symbols ``x`` (n, 1) with their bounds, and ``p`` (k, 1) with their values."""
-
-    x: SX
-    p: SX
-    bounds: Sequence[Free]
-    values: Sequence[float]
-
-
 def limit_constraints(
-    case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX], numbers: ProgramNumbers
+    case: Case, robots: Sequence[RobotInstance], named: Mapping[str, SX], table: SymbolTable
 ) -> LimitConstraints:
     """Return the limits of a case as constraints, each once.
 
@@ -62,21 +53,21 @@ def limit_constraints(
         case: the case.
         robots: the robot at each pose.
         named: symbols of the case's own numbers by name, radians for angles.
-        numbers: the program's numbers.
+        table: the program's numbers as symbols.
 
     Raises:
         CaseError: a limit that depends on fixed numbers alone has no finite value.
     """
     if not case.limits:
         return LimitConstraints((), ())
-    few, deferred, fixed = _sorted_families(list(_families(case, robots, named)), numbers)
-    limits = without_repeated(list(_constraints(case, robots, named, few)), numbers.x, numbers.p)
+    x, p = table.variables_vector, table.arguments_vector
+    few, deferred, fixed = _sorted_families(list(_families(case, robots, named)), table)
+    limits = without_repeated(list(_constraints(case, robots, named, few)), x, p)
     if not limits:
         return LimitConstraints((), (), deferred, fixed)
     expressions = ca.vertcat(*[item.constraint.expression for item in limits])
-    x, p = numbers.x, numbers.p
-    free = ca.which_depends(expressions, x, 1, True) if numbers.bounds else [False] * len(limits)
-    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(0, numbers.values).full().ravel()
+    free = ca.which_depends(expressions, x, 1, True) if table.bounds else [False] * len(limits)
+    values = ca.Function("limits", [x, p], [ca.densify(expressions)])(0, table.values).full().ravel()
     varying: list[BoundedConstraint] = []
     constant: list[BoundedConstraint] = []
     for item, varies, value in zip(limits, free, values, strict=True):
@@ -90,12 +81,13 @@ def limit_constraints(
 
 
 def _sorted_families(
-    families: Sequence[PairFamily], numbers: ProgramNumbers
+    families: Sequence[PairFamily], table: SymbolTable
 ) -> tuple[list[tuple[BoundedConstraint, ...]], tuple[PairFamily, ...], tuple[PairFamily, ...]]:
     """Return pairs that are constraints from the start, families whose pairs come when needed, and fixed families.
 
     The pairs are all those of few values, and the tightest one of fixed values.
     """
+    x, p = table.variables_vector, table.arguments_vector
     pairs: list[tuple[BoundedConstraint, ...]] = []
     deferred: list[PairFamily] = []
     fixed: list[PairFamily] = []
@@ -103,11 +95,11 @@ def _sorted_families(
         count = int(family.values.numel())
         if count <= _ALL_PAIRS:
             pairs += [family.pair(a, b) for a, b in itertools.permutations(range(count), 2)]
-        elif numbers.bounds and any(ca.which_depends(family.values, numbers.x, 1, True)):
+        elif table.bounds and any(ca.which_depends(family.values, x, 1, True)):
             deferred.append(family)
         else:
-            function = ca.Function("values", [numbers.x, numbers.p], [ca.densify(family.values)])
-            order = np.argsort(function(0, numbers.values).full().ravel(), kind="stable")
+            function = ca.Function("values", [x, p], [ca.densify(family.values)])
+            order = np.argsort(function(0, table.values).full().ravel(), kind="stable")
             pairs.append(family.pair(int(order[0]), int(order[-1])))
             fixed.append(family)
     return pairs, tuple(deferred), tuple(fixed)

@@ -132,7 +132,9 @@ def solve_program(
         phase(Phase.RELAXATION, 0, few.starts)
         elastic = formulate_relaxation(nlp)
         points = [relaxation_point(nlp, x) for x in (solution.x, nlp.start)]
-        relaxed = _search(elastic, few, points, jobs, _during_relaxation(phase), solver, no_phase)
+        relaxed = _search(
+            elastic, few, points, jobs, lambda done, total, _: phase(Phase.RELAXATION, done, total), solver, no_phase
+        )
         # An optimum of the relaxed program is often degenerate, with more active limits than variables, so that it
         # need not count as converged: a feasible point is enough.
         feasible = [start for start in relaxed.starts if start.violation <= FEASIBLE]
@@ -149,11 +151,6 @@ def solve_program(
         # All limits can hold at once: the first search only missed the feasible set, which this point lies in.
         solution = _search(nlp, search, [*first, least.x[: nlp.n]], jobs, None, solver, phase)
     return replace(solution, relaxation=moved, seconds=time.perf_counter() - began)
-
-
-def _during_relaxation(phase: PhaseProgress) -> Progress:
-    """Return the progress of the search for the smallest relaxation."""
-    return lambda done, total, _best: phase(Phase.RELAXATION, done, total)
 
 
 def _search(
@@ -215,7 +212,7 @@ def _search_within(
         found = {k: start for k, start in found.items() if k not in left}
     interrupted = is_requested()
     if not found:  # interrupted before the first start was done
-        return _at_the_start(nlp, search, began)
+        return _outcome(Status.INTERRUPTED, nlp, nlp.start, examine(nlp, nlp.start), search, began)
     done = [found[k] for k in sorted(found)]
     starts, optima = distinct_optima(nlp, done, phase)
     better = _find_better_start(nlp, starts, optima)
@@ -224,24 +221,16 @@ def _search_within(
     else:
         x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
         evidence = examine(nlp, x)
-    return ProgramSolution(
-        status=Status.INTERRUPTED if interrupted else _status(evidence, bool(optima) and better is None),
-        nlp=nlp,
-        x=frozen_array(x, (nlp.n,)),
-        state=state_or_none(nlp, x),
-        evidence=evidence,
-        starts=tuple(starts),
-        optima=tuple(optima),
-        seed=search.seed,
-        seconds=time.perf_counter() - began,
-    )
+    status = Status.INTERRUPTED if interrupted else _status(evidence, bool(optima) and better is None)
+    return replace(_outcome(status, nlp, x, evidence, search, began), starts=tuple(starts), optima=tuple(optima))
 
 
-def _at_the_start(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
-    """Return the outcome of a search that was interrupted before a start was done: the first starting point."""
-    x, seconds = frozen_array(nlp.start, (nlp.n,)), time.perf_counter() - began
-    state, evidence = state_or_none(nlp, x), examine(nlp, x)
-    return ProgramSolution(Status.INTERRUPTED, nlp, x, state, evidence, (), (), search.seed, seconds)
+def _outcome(
+    status: Status, nlp: Nlp, x: FloatArray, evidence: Evidence | None, search: Search, began: float
+) -> ProgramSolution:
+    """Return the outcome of a search at its best point (n,), without starts."""
+    state, own = state_or_none(nlp, x), frozen_array(x, (nlp.n,))
+    return ProgramSolution(status, nlp, own, state, evidence, (), (), search.seed, time.perf_counter() - began)
 
 
 def _best_value(nlp: Nlp, starts: Iterable[Start]) -> float | None:
@@ -255,8 +244,7 @@ def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
     x = closed_point(nlp, search)
     status = Status.EVALUATED if linearise(nlp, x).violation <= FEASIBLE else Status.INFEASIBLE
     evidence = None if status is Status.EVALUATED else examine(nlp, x)
-    state, seconds = state_or_none(nlp, x), time.perf_counter() - began
-    return ProgramSolution(status, nlp, frozen_array(x, (nlp.n,)), state, evidence, (), (), search.seed, seconds)
+    return _outcome(status, nlp, x, evidence, search, began)
 
 
 def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from ..results.jsondata import finite_or_none, vector
 from ..results.point import head_data, stated_pose_notice, versions
 from ..results.sweep import Column, SweepResult
 from ..results.tradeoffwording import unit_of_objective
-from .journal import Row
+from .journal import Row, row_kinds
 from .sweep import Sweep
 
 
@@ -73,32 +74,19 @@ def columns_of(sweep: Sweep, rows: Sequence[Row]) -> SweepColumns:
     def numbers(values: Sequence[float | None]) -> FloatArray:
         return frozen_array(np.array(values, dtype=np.float64), (len(rows),))
 
-    points = sweep.points
-    values = {
-        name: frozen_array(column, (len(points),)) for name, column in zip(points.names, points.values.T, strict=True)
-    }
-    design = {
-        name: numbers([row.x[k] if k < len(row.x) else None for row in rows]) for k, name in enumerate(sweep.variables)
-    }
+    def column(name: str, kind: object) -> Any:  # noqa: ANN401 - as the fields of SweepColumns
+        values = [getattr(row, name) for row in rows]
+        if kind is int:
+            return np.array(values, dtype=np.int64)
+        return numbers(values) if kind in (float, float | None) else tuple(values)
+
+    points, variables = sweep.points, sweep.variables
+    values = zip(points.names, points.values.T, strict=True)
+    design = {name: numbers([row.x[k] if k < len(row.x) else None for row in rows]) for k, name in enumerate(variables)}
     return SweepColumns(
-        numbers=MappingProxyType(values),
-        status=tuple(row.status for row in rows),
-        F=numbers([row.F for row in rows]),
+        numbers=MappingProxyType({name: frozen_array(each, (len(points),)) for name, each in values}),
         design=MappingProxyType(design),
-        active=tuple(row.active for row in rows),
-        multipliers=tuple(row.multipliers for row in rows),
-        verdict=tuple(row.verdict for row in rows),
-        stationarity=numbers([row.stationarity for row in rows]),
-        feasibility=numbers([row.feasibility for row in rows]),
-        curvature=numbers([row.curvature for row in rows]),
-        starts=np.array([row.starts for row in rows], dtype=np.int64),
-        converged=np.array([row.converged for row in rows], dtype=np.int64),
-        engine=tuple(row.engine for row in rows),
-        seconds=numbers([row.seconds for row in rows]),
-        note=tuple(row.note for row in rows),
-        certificate=tuple(row.certificate for row in rows),
-        bound=numbers([row.bound for row in rows]),
-        gap=numbers([row.gap for row in rows]),
+        **{name: column(name, kind) for name, kind in row_kinds() if name not in ("point", "x")},
     )
 
 

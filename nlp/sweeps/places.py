@@ -77,11 +77,6 @@ class Places:
     task: Mapping[int, tuple[str, int | None]]
     written: Mapping[str, Any]
 
-    @property
-    def has_bounds(self) -> bool:
-        """Whether bounds of variables change."""
-        return bool(self.bounds)
-
     def block(self, values: FloatArray) -> Block:
         """Return the program's numbers at points with values (N, m)."""
         nlp, count = self.nlp, len(values)

@@ -35,12 +35,12 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.formats.export import exported_files
+from screwsynth.nlp.formats.frames import quaternion_of, roll_pitch_yaw_of
 from screwsynth.nlp.formats.reading.importing import Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
-from screwsynth.nlp.formats.writing.folder import exported_files
 from screwsynth.nlp.formats.writing.mjcf import mjcf_text
-from screwsynth.nlp.formats.writing.numbers import quaternion, roll_pitch_yaw
 from screwsynth.nlp.formats.writing.urdf import urdf_of
 
 ROBOTS = (*gallery_names(), "stewart-gough", "hexapod", "three-upu")
@@ -318,9 +318,9 @@ def test_rotations_survive_their_three_forms() -> None:
             pitched = turn_about(z, rng.uniform(-3, 3)) @ turn_about(y, np.pi / 2)
             R = R @ np.diag([1.0, -1.0, -1.0]) @ R.T if rng.uniform() < 0.5 else pitched
         found = np.zeros(9)
-        mujoco.mju_quat2Mat(found, quaternion(R))
+        mujoco.mju_quat2Mat(found, quaternion_of(R))
         np.testing.assert_allclose(found.reshape(3, 3), R, atol=1e-14)
-        roll, pitch, yaw = roll_pitch_yaw(R)
+        roll, pitch, yaw = roll_pitch_yaw_of(R)
         np.testing.assert_allclose(turn_about(z, yaw) @ turn_about(y, pitch) @ turn_about(x, roll), R, atol=1e-14)
 
 

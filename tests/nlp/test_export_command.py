@@ -1,6 +1,7 @@
 """The command ``export``: its files, cases that it takes and refuses, and results instead of a solve."""
 
 import json
+import sys
 from pathlib import Path
 
 import mujoco
@@ -49,7 +50,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
         ("--format", "mjcf", "--out", str(out), "--pose", "2"): "--pose 2: the case has 1 pose",
     }.items():
         refusal_of(cli("export", case, *words), fault)
-    monkeypatch.setattr("screwsynth.nlp.formats.writing.dxf.find_spec", lambda _: None)
+    monkeypatch.setitem(sys.modules, "ezdxf", None)
     missing = "ezdxf, which is not installed: pip install 'screwsynth[robots]'"
     refusal_of(cli("export", case, "--format", "all", "--out", str(out)), missing)
     assert not out.exists()

@@ -16,14 +16,13 @@ from builders import Array, Run, output_of, refusal_of, saved, turn_about
 
 from screwsynth.models import RobotError, Substitution, jacobian, robot
 from screwsynth.models.mechanism import mechanism_of, wrenches_of
+from screwsynth.models.mechanism.topology import between
 from screwsynth.nlp import InputError, load_case
-from screwsynth.nlp.formats.reading.blocks import between
-from screwsynth.nlp.formats.reading.checking import check_text
-from screwsynth.nlp.formats.reading.filetext import robot_file_text
-from screwsynth.nlp.formats.reading.frames import Frame, rotation_from_roll_pitch_yaw
+from screwsynth.nlp.formats.frames import Frame, rotation_from_roll_pitch_yaw
 from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.newton import close, gap_of
 from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.reading.robotfile import check_text, robot_file_text
 from screwsynth.nlp.formats.reading.urdf import read_urdf
 from screwsynth.nlp.formats.reading.xmltext import read_xml
 

@@ -22,10 +22,9 @@ from screwsynth.models.mechanism import (
     wrenches_of,
 )
 from screwsynth.nlp import InputError
-from screwsynth.nlp.formats.reading.checking import check_text
-from screwsynth.nlp.formats.reading.filetext import robot_file_text
 from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.reading.robotfile import check_text, robot_file_text
 from screwsynth.nlp.formats.reading.snapping import near_misses, snapped
 
 E = np.eye(3)
@@ -128,19 +127,19 @@ def test_axes_that_nearly_meet_are_told_and_snapped(tables: dict[str, Any]) -> N
         notes = list(near_misses(off, 1.0))
         assert notes
         assert all("--snap" in note for note in notes)
-        found = snapped(off, 1.0, 6 * by)
-        assert "were made exact" in found.note
-        again = wrenches_of(found.mechanism, 1.0)
+        found, note = snapped(off, 1.0, 6 * by)
+        assert "were made exact" in note
+        again = wrenches_of(found, 1.0)
         assert (again.ranks.freedoms, again.ranks.constraints) == (true.ranks.freedoms, true.ranks.constraints)
-        assert not list(near_misses(found.mechanism, 1.0))
-        for one, other in zip(found.mechanism.joints, exact.joints, strict=True):
+        assert not list(near_misses(found, 1.0))
+        for one, other in zip(found.joints, exact.joints, strict=True):
             assert np.abs(one.point - other.point).max() < 20 * by
             assert np.abs(one.axis - other.axis).max() < 20 * by
             if one.kind != "S":
                 assert np.linalg.norm(one.axis) == pytest.approx(1, abs=1e-15)
         shapes = [
             [joint["type"] for limb in robot_tables(each)["limb"] for joint in limb["joints"]]
-            for each in (found.mechanism, exact)
+            for each in (found, exact)
         ]
         assert shapes[0] == shapes[1]
         P, Q = (np.linalg.pinv(each.jacobian) @ each.jacobian for each in (again, true))
@@ -162,9 +161,7 @@ def test_relations_that_move_joints_too_far_are_refused() -> None:
     given = Mechanism("row", links, tuple(row), "base", "platform")
     with pytest.raises(InputError, match=r"--snap 1: the axes cannot all be made to meet or to be parallel"):
         snapped(given, 10.0, 1.0)
-    np.testing.assert_allclose(
-        [each.point for each in snapped(given, 10.0, 0.5).mechanism.joints], [j.point for j in row]
-    )
+    np.testing.assert_allclose([each.point for each in snapped(given, 10.0, 0.5)[0].joints], [j.point for j in row])
 
 
 def legs_of_decimals(by: float) -> str:

@@ -14,8 +14,8 @@ from builders import Array
 
 from screwsynth.models.mechanism import wrenches_of
 from screwsynth.nlp import InputError
+from screwsynth.nlp.formats.frames import Frame, rotation_vector
 from screwsynth.nlp.formats.reading.description import Description
-from screwsynth.nlp.formats.reading.frames import Frame, rotation_vector
 from screwsynth.nlp.formats.reading.importing import Request, import_robot
 from screwsynth.nlp.formats.reading.mjcf import read_mjcf
 from screwsynth.nlp.formats.reading.newton import close, gap_of, gap_of_coupling
@@ -206,16 +206,16 @@ def coordinates(model: Any, given: Description, places: dict[str, Frame], start:
     before = {body.name: body.place for body in given.bodies}
     for joint in given.joints:
         address = model.joint(joint.name).qposadr[0] if joint.kind != "weld" else -1
-        parent, after = parents[joint.body], places[joint.body]
+        parent, after = parents[joint.outer], places[joint.outer]
         if joint.kind == "S":
             # The last joint of its body, which hangs on the body before with its own quaternion at the reference.
             own = np.zeros(9)
-            mujoco.mju_quat2Mat(own, model.body(joint.body).quat)
+            mujoco.mju_quat2Mat(own, model.body(joint.outer).quat)
             quaternion = np.zeros(4)
             mujoco.mju_mat2Quat(quaternion, (own.reshape(3, 3).T @ places[parent].rotation.T @ after.rotation).ravel())
             yield address, quaternion
         elif joint.kind in ("R", "P"):
-            way = (places[parent].inverse() @ after) @ (before[parent].inverse() @ before[joint.body]).inverse()
+            way = (places[parent].inverse() @ after) @ (before[parent].inverse() @ before[joint.outer]).inverse()
             axis = before[parent].rotation.T @ joint.axis
             moved = axis @ (way.position if joint.kind == "P" else rotation_vector(way.rotation))
             yield address, np.array([start[address] + moved])

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from itertools import takewhile
 
-import numpy as np
-
-from ....models.arrays import FloatArray
-from ....models.mechanism import Coupling
-from ....models.mechanism.graph import ElementaryKind
-from .frames import Frame
+from ....models.mechanism import Coupling, MechanismJoint
+from ..frames import Frame
 
 #: Largest coordinate, in the file's unit of length: beyond it, squares of distances lose what a loop is open by.
 LARGEST = 1e9
@@ -30,27 +27,6 @@ class Body:
     name: str
     parent: str
     place: Frame
-
-
-@dataclass(frozen=True, eq=False)
-class TreeJoint:
-    """The joint between a body and its parent, at its stated position.
-
-    Attributes:
-        name: unique among the joints.
-        kind: ``R``, ``P``, ``S`` or ``weld``.
-        body: name of the body that it moves; its parent is the other one.
-        point: (3,) its centre or a point of its axis, in the world.
-        axis: (3,) unit direction of its axis in the world; zero for ``S`` and ``weld``.
-        range: smallest and largest coordinate, counted from the stated position; None for no limit.
-    """
-
-    name: str
-    kind: ElementaryKind
-    body: str
-    point: FloatArray
-    axis: FloatArray
-    range: tuple[float, float] | None = None
 
 
 class Closing(Enum):
@@ -98,7 +74,8 @@ class Description:
         source: name of the file, for messages.
         root: name of the fixed body.
         bodies: parents before children.
-        joints: at most one for each body; one that floats freely has none.
+        joints: between a body, the outer link, and its parent, at their stated positions; a body that floats freely has
+            none.
         closures: joints that close loops.
         couplings: linear relations of joint coordinates.
         offsets: value of each coupling at the stated configuration, by its name; 0 where it has none.
@@ -112,7 +89,7 @@ class Description:
     source: str
     root: str
     bodies: tuple[Body, ...]
-    joints: tuple[TreeJoint, ...]
+    joints: tuple[MechanismJoint, ...]
     closures: tuple[LoopClosure, ...]
     couplings: tuple[Coupling, ...] = ()
     offsets: Mapping[str, float] = field(default_factory=dict)
@@ -122,17 +99,8 @@ class Description:
     notes: tuple[str, ...] = ()
 
     def place_of(self, name: str) -> Frame:
-        """Return the place of a body in the world."""
-        return next(body.place for body in self.bodies if body.name == name)
-
-
-def axis_frame(point: FloatArray, axis: FloatArray) -> Frame:
-    """Return a frame at a point (3,) with z along an axis (3,) of any length but zero."""
-    z = axis / np.linalg.norm(axis)
-    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    return Frame(point, np.column_stack([x, np.cross(z, x), z]))
+        """Return the place of a body in the world; of one without size between two joints, the world's own."""
+        return next((body.place for body in self.bodies if body.name == name), Frame())
 
 
 def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:
@@ -145,8 +113,5 @@ def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:
 
 def common_name(names: Sequence[str]) -> str:
     """Return the common beginning of names such as ``closing_a_1`` and ``closing_a_2``; empty for none."""
-    common = names[0]
-    for name in names[1:]:
-        common = common[: next((k for k, (a, b) in enumerate(zip(common, name, strict=False)) if a != b), len(common))]
-        common = common[: len(name)]
-    return common.rstrip("_-. ")
+    common = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+    return "".join(letters[0] for letters in common).rstrip("_-. ")

@@ -2,65 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from ....models.arrays import FloatArray
+from ....models.mechanism import MechanismJoint
 from ....models.mechanism.graph import ElementaryKind
+from ....models.mechanism.topology import Classes
 from .description import Closing, Description, LoopClosure
-from .frames import Frame
 
 #: Points nearer than this, in parts of the robot's size, are one point: rounding of decimals of nine digits.
 SAME_POINT = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class Element:
-    """An elementary joint between two bodies.
-
-    Attributes:
-        name: unique.
-        kind: ``R``, ``P``, ``S`` or ``weld``.
-        first: name of a body.
-        second: name of the other, whose motion relative to the first the coordinate counts.
-        point: (3,) its centre or a point of its axis, in the world.
-        axis: (3,) unit direction of its axis in the world; zero for ``S`` and ``weld``.
-        range: smallest and largest coordinate.
-        closure: whether it closes a loop.
-    """
-
-    name: str
-    kind: ElementaryKind
-    first: str
-    second: str
-    point: FloatArray
-    axis: FloatArray
-    range: tuple[float, float] | None = None
-    closure: bool = False
-
-
-def elements_of(given: Description, size: float) -> list[Element]:
+def elements_of(given: Description, size: float) -> list[MechanismJoint]:
     """Return all joints of a description: couplings of one joint hold it, and two balls are a hinge, three a weld.
 
     Args:
         given: the description.
         size: of the robot.
     """
-    parents = {body.name: body.parent for body in given.bodies}
     held = {each.factors[0][0] for each in given.couplings if len(each.factors) == 1}
-    found: list[Element] = []
-    for joint in given.joints:
-        kind: ElementaryKind = "weld" if joint.name in held else joint.kind
-        axis = np.zeros(3) if kind == "weld" else joint.axis
-        found.append(Element(joint.name, kind, parents[joint.body], joint.body, joint.point, axis, joint.range))
-    for closure in given.closures:
-        found += _closing_elements(given, closure)
-    return _with_hinges(found, size)
+    joints = [replace(joint, kind="weld", axis=np.zeros(3)) if joint.name in held else joint for joint in given.joints]
+    closing = [each for closure in given.closures for each in _closing_joints(given, closure)]
+    return _with_hinges(joints, closing, size)
 
 
-def _closing_elements(given: Description, closure: LoopClosure) -> list[Element]:
+def _closing_joints(given: Description, closure: LoopClosure) -> list[MechanismJoint]:
     """Return the elementary joints of a closure; between two of them stands a body without size."""
     A = given.place_of(closure.first) @ closure.first_frame
     B = given.place_of(closure.second) @ closure.second_frame
@@ -73,68 +44,48 @@ def _closing_elements(given: Description, closure: LoopClosure) -> list[Element]
         Closing.CYLINDER: [("R", z), ("P", z)],
         Closing.UNIVERSAL: [("R", z), ("R", other)],
     }
-    middle = f"{closure.name} cross"
-    bodies = [closure.first, closure.second]
     written = parts[closure.closing]
-    if len(written) == 2:
-        bodies.insert(1, middle)
+    is_one = len(written) == 1
+    bodies = [closure.first, *([] if is_one else [f"{closure.name} cross"]), closure.second]
+    names = [closure.name] if is_one else [f"{closure.name} {k + 1}" for k in range(len(written))]
     return [
-        Element(
-            closure.name if len(written) == 1 else f"{closure.name} {k + 1}",
-            kind,
-            bodies[k],
-            bodies[k + 1],
-            A.position,
-            axis,
-            closure=True,
-        )
-        for k, (kind, axis) in enumerate(written)
+        MechanismJoint(name, kind, bodies[k], bodies[k + 1], A.position, axis)
+        for k, (name, (kind, axis)) in enumerate(zip(names, written, strict=True))
     ]
 
 
-def rigid_groups(elements: list[Element], bodies: list[str]) -> dict[str, str]:
+def rigid_groups(joints: Sequence[MechanismJoint], bodies: list[str]) -> dict[str, str]:
     """Return for each body the first one of those to which welds fix it."""
-    group = {name: name for name in bodies}
-
-    def leader(name: str) -> str:
-        while group[name] != name:
-            name = group[name]
-        return name
-
-    for each in elements:
+    groups = Classes(bodies)
+    for each in joints:
         if each.kind == "weld":
-            one, other = sorted((leader(each.first), leader(each.second)), key=bodies.index)
-            group[other] = one
-    return {name: leader(name) for name in bodies}
+            one, other = sorted((groups.find(each.inner), groups.find(each.outer)), key=bodies.index)
+            groups.merge(other, one)
+    return {name: groups.find(name) for name in bodies}
 
 
-def bodies_of(given: Description, elements: list[Element]) -> list[str]:
+def bodies_of(given: Description, joints: Sequence[MechanismJoint]) -> list[str]:
     """Return the names of all bodies, with those that stand between elementary joints of one closure."""
     names = [body.name for body in given.bodies]
-    return list(dict.fromkeys([*names, *(name for each in elements for name in (each.first, each.second))]))
+    return list(dict.fromkeys([*names, *(name for each in joints for name in (each.inner, each.outer))]))
 
 
-def place_in(given: Description, name: str) -> Frame:
-    """Return the place of a body in the world; of one without size, the world's own."""
-    return next((body.place for body in given.bodies if body.name == name), Frame())
-
-
-def _with_hinges(elements: list[Element], size: float) -> list[Element]:
+def _with_hinges(joints: list[MechanismJoint], closing: list[MechanismJoint], size: float) -> list[MechanismJoint]:
     """Return the joints with closing balls between the same two rigid bodies as one joint."""
-    bodies = list(dict.fromkeys(name for each in elements for name in (each.first, each.second)))
-    leader = rigid_groups(elements, bodies)
-    pairs: dict[frozenset[str], list[Element]] = {}
-    for each in elements:
-        if each.kind == "S" and each.closure:
-            pairs.setdefault(frozenset((leader[each.first], leader[each.second])), []).append(each)
-    replaced: dict[str, Element | None] = {}
+    both = [*joints, *closing]
+    leader = rigid_groups(both, list(dict.fromkeys(name for each in both for name in (each.inner, each.outer))))
+    pairs: dict[frozenset[str], list[MechanismJoint]] = {}
+    for each in closing:
+        if each.kind == "S":
+            pairs.setdefault(frozenset((leader[each.inner], leader[each.outer])), []).append(each)
+    replaced: dict[str, MechanismJoint | None] = {}
     for balls in pairs.values():
         if len(balls) > 1:
             replaced |= {each.name: None for each in balls[1:]} | {balls[0].name: _joined(balls, size)}
-    return [new for each in elements if (new := replaced.get(each.name, each)) is not None]
+    return [new for each in both if (new := replaced.get(each.name, each)) is not None]
 
 
-def _joined(balls: list[Element], size: float) -> Element:
+def _joined(balls: list[MechanismJoint], size: float) -> MechanismJoint:
     """Return the joint that several balls between two bodies are: a ball, a hinge, or a weld."""
     first = balls[0]
     apart = [each.point - first.point for each in balls[1:]]
@@ -147,6 +98,4 @@ def _joined(balls: list[Element], size: float) -> Element:
         float(np.linalg.norm(np.cross(one - other, axis))) <= SAME_POINT * size
         for one, other in combinations([np.zeros(3), *apart], 2)
     )
-    kind: ElementaryKind = "R" if straight else "weld"
-    direction = axis if straight else np.zeros(3)
-    return Element(first.name, kind, first.first, first.second, first.point, direction, closure=True)
+    return replace(first, kind="R", axis=axis) if straight else replace(first, kind="weld")

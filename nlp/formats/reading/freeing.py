@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, nearest
-from .symmetry import CircleOffer, FoldOffer, Offers
-from .tablejoints import joints_of, joints_of_limb
+from .symmetry import CircleOffer, FoldOffer, Offers, joints_of, joints_of_limb
 
 #: A slide whose axis is parallel to the line between its neighbours to this sine follows that line.
 _ALONG = 1e-9

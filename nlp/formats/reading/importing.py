@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ....models.mechanism import (
     Mechanism,
@@ -19,13 +19,12 @@ from ....models.mechanism import (
 )
 from ...errors import InputError, listing
 from .description import Description
-from .leastgaps import close_from_other_starts, least_gaps
-from .meeting import with_meeting_joints
+from .meeting import with_meeting_joints, with_universal_joints
 from .mjcf import read_mjcf
-from .newton import CLOSED, LEAST, Closed, Gap, close
+from .newton import CLOSED, LEAST, Closed, Gap, close, close_from_other_starts, least_gaps
 from .reduction import Ends, Reduced, reduce
 from .snapping import near_misses, snapped
-from .universal import with_universal_joints
+from .symmetry import joints_of_limb
 from .urdf import read_urdf
 from .xmltext import read_xml
 
@@ -61,22 +60,15 @@ class Request:
     snap: float = 0.0
 
 
-class Imported(NamedTuple):
-    """A robot that was imported.
+@dataclass(frozen=True, eq=False)
+class Imported(Reduced):
+    """A robot that was imported, with how far its loops are open in the description.
 
     Attributes:
         tables: of the robot file, with numbers.
-        mechanism: the same robot as links and joints.
-        size: largest distance of two joints, length.
-        gaps: how far its loops are open in the description.
-        notes: sentences about what was found, assumed or left out.
     """
 
     tables: dict[str, Any]
-    mechanism: Mechanism
-    size: float
-    gaps: tuple[Gap, ...]
-    notes: tuple[str, ...]
 
 
 def import_robot(request: Request) -> Imported:
@@ -88,14 +80,15 @@ def import_robot(request: Request) -> Imported:
     given = _read(request)
     reduced = reduce(given, request.ends)
     gaps, notes = reduced.gaps, list(reduced.notes)
-    worst = _worst(reduced)
+    worst = reduced.worst.share(reduced.size)
     if worst > OPEN and not request.closes:
-        raise InputError(f"{_open_loop(given, reduced)}{_advice(given, request.keyframe)}")
+        advice = f"--close closes it by Newton's method{_other_keyframes(given, request.keyframe)}"
+        raise InputError(f"{_open_loop(given, reduced)}; {advice}")
     if worst > CLOSED:
         loops = _with_loops(given, gaps)
         closed = close(loops, reduced.size)
         moved = _reduced_at(closed, given, request)
-        if _worst(moved) > LEAST:
+        if moved.worst.share(moved.size) > LEAST:
             found = close_from_other_starts(loops, reduced.size)
             if found is None:
                 raise InputError(_not_closed(given, loops, moved, request))
@@ -106,14 +99,15 @@ def import_robot(request: Request) -> Imported:
     if request.snap:
         mechanism, note = snapped(mechanism, reduced.size, request.snap)
         notes.append(note)
-    met = with_meeting_joints(mechanism, reduced.size)
+    mechanism, more = with_meeting_joints(mechanism, reduced.size)
+    notes += more
     try:
-        tables = robot_tables(met.mechanism)
+        tables = robot_tables(mechanism)
     except MechanismError as error:
         raise InputError(f"{given.source}: {error}") from None
-    more = [*near_misses(met.mechanism, reduced.size), *_singular(met.mechanism, reduced.size)]
+    notes += [*near_misses(mechanism, reduced.size), *_singular(mechanism, reduced.size)]
     tables = _without_rounding(with_universal_joints(tables, reduced.size), reduced.size)
-    return Imported(_with_limb_names(tables), met.mechanism, reduced.size, gaps, (*notes, *met.notes, *more))
+    return Imported(mechanism, reduced.size, gaps, tuple(notes), _with_limb_names(tables))
 
 
 def _read(request: Request) -> Description:
@@ -129,11 +123,6 @@ def _read(request: Request) -> Description:
         return read_urdf(root, request.path, request.loops)
     tag = root.tag[:40]
     raise InputError(f"{request.path}: begins with <{tag}>; <mujoco> of MJCF or <robot> of URDF is needed")
-
-
-def _worst(reduced: Reduced) -> float:
-    """Return by how much the loops are open at most, in parts of the size."""
-    return max((gap_share(gap, reduced.size) for gap in reduced.gaps), default=0.0)
 
 
 def _with_loops(given: Description, gaps: Sequence[Gap]) -> Description:
@@ -165,14 +154,8 @@ def _not_closed(given: Description, loops: Description, reduced: Reduced, reques
 
 def _open_loop(given: Description, reduced: Reduced) -> str:
     """Return the sentence that says which loop is open most."""
-    worst = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size))
-    fault = f"the loop {worst.name} is open by {gap_words(worst)}"
+    fault = f"the loop {reduced.worst.name} is open by {reduced.worst.words}"
     return f"{given.source}: {fault}, more than {OPEN:g} of the robot's size {reduced.size:.3g}"
-
-
-def _advice(given: Description, keyframe: str) -> str:
-    """Return what to do about open loops."""
-    return f"; --close closes it by Newton's method{_other_keyframes(given, keyframe)}"
 
 
 def _other_keyframes(given: Description, keyframe: str) -> str:
@@ -187,10 +170,10 @@ def _closed_words(closed: Closed, reduced: Reduced) -> str:
     moved += f" and {closed.way:.3g}" if closed.way else ""
     kept = "driven joints stayed" if closed.kept else "driven joints moved too"
     words = f"loops were closed by Newton's method: {moved}; {kept}"
-    left = max(reduced.gaps, key=lambda gap: gap_share(gap, reduced.size))
-    if gap_share(left, reduced.size) <= CLOSED:
+    left = reduced.worst
+    if left.share(reduced.size) <= CLOSED:
         return words
-    fault = f"{left.name} stays open by {gap_words(left)}, the least squares of numbers that contradict each other"
+    fault = f"{left.name} stays open by {left.words}, the least squares of numbers that contradict each other"
     return f"{words}; {fault}: the robot file has the joint where its first body has it"
 
 
@@ -206,16 +189,6 @@ def _singular(mechanism: Mechanism, size: float) -> Iterator[str]:
         where = "" if each.type is SingularityType.ARCHITECTURE else " where it stands"
         whose = "the robot" if each.member is None else f"member {each.member + 1}"
         yield f"{whose} is singular{where}: {each.type.value}"
-
-
-def gap_words(gap: Gap) -> str:
-    """Return how far a loop is open in words."""
-    return f"{gap.distance:.3g} and {math.degrees(gap.angle):.3g} deg"
-
-
-def gap_share(gap: Gap, size: float) -> float:
-    """Return how far a loop is open, in parts of the robot's size."""
-    return max(gap.distance / size, gap.angle)
 
 
 def _without_rounding(value: Any, size: float) -> Any:  # noqa: ANN401 - tables of any depth
@@ -237,8 +210,7 @@ def _with_limb_names(tables: dict[str, Any]) -> dict[str, Any]:
     taken: set[str] = set()
     limbs = []
     for limb in tables["limb"]:
-        joints = [*limb.get("joints", []), *(joint for branch in limb.get("branch", []) for joint in branch["joints"])]
-        named = [joint for joint in joints if "name" in joint]
+        named = [joint for joint in joints_of_limb(limb) if "name" in joint]
         chosen = next((each["name"] for each in named if each.get("actuated")), named[0]["name"] if named else "")
         name = chosen if chosen and chosen not in taken else ""
         taken.add(name)

@@ -1,17 +1,19 @@
-"""Hinges that stand for one joint: several about one axis, and three through one point, which are a ball.
+"""Joints that stand for one: hinges about one axis, three hinges through one point, which are a ball, and pairs.
 
+In the tables of a robot file two crossing hinges are a universal joint, and a hinge and a slide along it are a ``C``.
 What a limb carries depends on axes that meet exactly. Joints are replaced only where they do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ....models.arrays import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint
+from ....models.mechanism.centre import meeting_point
 from ...errors import listing
 from .description import common_name
 from .elements import SAME_POINT
@@ -26,22 +28,10 @@ _FLAT = 1e-3
 _MOST_NAMES = 12
 
 
-class Met(NamedTuple):
-    """A mechanism with hinges replaced.
-
-    Attributes:
-        mechanism: the mechanism.
-        notes: sentences about joints that were replaced.
-    """
-
-    mechanism: Mechanism
-    notes: tuple[str, ...]
-
-
-def with_meeting_joints(given: Mechanism, size: float) -> Met:
+def with_meeting_joints(given: Mechanism, size: float) -> tuple[Mechanism, list[str]]:
     """Return a mechanism with passive hinges about one axis as one hinge, and three through one point as a ball.
 
-    Only hinges with nothing else between them are replaced, and none that a coupling names.
+    Only hinges with nothing else between them are replaced, and none that a coupling names. Notes say which.
 
     Args:
         given: the mechanism.
@@ -57,7 +47,7 @@ def with_meeting_joints(given: Mechanism, size: float) -> Met:
         balls.append(words)
     notes = [f"hinges about one axis were read as one hinge: {_some(hinges)}"] if hinges else []
     notes += [f"three hinges through one point were read as a ball joint: {_some(balls)}"] if balls else []
-    return Met(given, tuple(notes))
+    return given, notes
 
 
 def _some(words: list[str]) -> str:
@@ -93,13 +83,6 @@ def axes_gap(one: MechanismJoint, other: MechanismJoint) -> tuple[float, float]:
     if sine < ALMOST:
         return float(np.linalg.norm(np.cross(one.axis, apart))), sine
     return abs(float(apart @ normal)) / sine, sine
-
-
-def meeting_point(one: MechanismJoint, other: MechanismJoint) -> FloatArray:
-    """Return the point (3,) of the first axis that is nearest to the second, which is not parallel."""
-    normal = np.cross(one.axis, other.axis)
-    way = float(np.cross(other.point - one.point, other.axis) @ normal) / float(normal @ normal)
-    return np.asarray(one.point + way * one.axis)
 
 
 def _joints_of_links(given: Mechanism) -> dict[str, list[MechanismJoint]]:
@@ -181,3 +164,60 @@ def _replaced(given: Mechanism, run: list[MechanismJoint], joint: MechanismJoint
             new if each.name == first else each for each in given.joints if each.name == first or each.name not in names
         ),
     )
+
+
+def with_universal_joints(tables: Mapping[str, Any], size: float) -> dict[str, Any]:
+    """Return the tables of a robot file with limbs, with pairs of passive joints as one joint ``U`` or ``C``.
+
+    Args:
+        tables: of the robot file, with numbers; one with links and joints stays as it is.
+        size: of the robot.
+    """
+    if "limb" not in tables:
+        return dict(tables)
+    return {**tables, "limb": [_limb(limb, size) for limb in tables["limb"]]}
+
+
+def _limb(limb: Mapping[str, Any], size: float) -> dict[str, Any]:
+    """Return a limb with its joints paired; those before and behind a branching are paired apart."""
+    found = dict(limb)
+    if "joints" in limb:
+        found["joints"] = _paired(limb["joints"], size)
+    if "branch" in limb:
+        found["branch"] = [{**branch, "joints": _paired(branch["joints"], size)} for branch in limb["branch"]]
+    return found
+
+
+def _paired(joints: Sequence[Mapping[str, Any]], size: float) -> list[dict[str, Any]]:
+    """Return joints with pairs as one."""
+    found: list[dict[str, Any]] = []
+    rest = [dict(joint) for joint in joints]
+    while rest:
+        first = rest.pop(0)
+        pair = None if not rest else _pair(first, rest[0], size)
+        if pair is not None:
+            rest.pop(0)
+        found.append(pair or first)
+    return found
+
+
+def _pair(one: Mapping[str, Any], other: Mapping[str, Any], size: float) -> dict[str, Any] | None:
+    """Return two joints as one; None where they are not."""
+    kinds = one["type"], other["type"]
+    if one.get("actuated") or other.get("actuated") or kinds not in (("R", "R"), ("R", "P"), ("P", "R")):
+        return None
+    first, second = (
+        MechanismJoint("", each["type"], "", "", np.array(each["at"]), np.array(each["axis"])) for each in (one, other)
+    )
+    named = {"name": one["name"]} if "name" in one else {}
+    distance, sine = axes_gap(first, second)
+    if kinds == ("R", "R"):
+        if sine < ALMOST or distance > SAME_POINT * size:
+            return None
+        meeting = meeting_point(first, second)
+        at = one["at"] if float(np.linalg.norm(meeting - first.point)) <= SAME_POINT * size else meeting.tolist()
+        return {"type": "U", **named, "at": at, "axes": [one["axis"], other["axis"]]}
+    if sine > SAME_POINT:
+        return None
+    hinge = one if kinds[0] == "R" else other
+    return {"type": "C", **named, "at": hinge["at"], "axis": hinge["axis"]}

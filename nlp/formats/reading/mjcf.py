@@ -12,12 +12,11 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from ....models.mechanism import Coupling
+from ....models.mechanism import Coupling, MechanismJoint
 from ...errors import InputError
-from .description import Body, Closing, Description, LoopClosure, TreeJoint, common_name, unique_name
-from .extra import required
-from .frames import Frame, rotation_from_quaternion
-from .includes import with_includes
+from ..extra import required
+from ..frames import Frame, rotation_from_quaternion
+from .description import Body, Closing, Description, LoopClosure, common_name, unique_name
 from .mjcfclean import clean_model
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def read_mjcf(root: Element, path: Path, keyframe: str = "") -> Description:
         InputError: MuJoCo is not installed, or the model cannot be read.
     """
     mujoco = required("mujoco", "MJCF files")
-    clean = clean_model(with_includes(root, path), str(path), keyframe)
+    clean = clean_model(root, path, keyframe)
     warnings: list[str] = []
     mujoco.set_mju_user_warning(warnings.append)
     try:
@@ -81,7 +80,7 @@ class _Reader:
         self.joint_names = self._names(model.njnt, model.joint, "joint")
         self.mocap = {self.body_names[k] for k in range(model.nbody) if model.body_mocapid[k] >= 0}
         self.bodies: list[Body] = []
-        self.joints: list[TreeJoint] = []
+        self.joints: list[MechanismJoint] = []
         self.notes: list[str] = []
 
     def _names(self, count: int, of: Any, kind: str) -> list[str]:  # noqa: ANN401 - no stubs
@@ -136,11 +135,8 @@ class _Reader:
             self.bodies.append(Body(name, "", place))
             return
         if not numbers:
-            self.joints.append(
-                TreeJoint(
-                    unique_name(f"{name} fixed", set(self.joint_names)), "weld", name, place.position, np.zeros(3)
-                )
-            )
+            fixed = unique_name(f"{name} fixed", set(self.joint_names))
+            self.joints.append(MechanismJoint(fixed, "weld", parent, name, place.position))
             self.bodies.append(Body(name, parent, place))
             return
         for j in numbers:
@@ -153,7 +149,8 @@ class _Reader:
             if model.jnt_limited[j] and kind != "S":
                 low, high = model.jnt_range[j] - data.qpos[model.jnt_qposadr[j]]
                 limits = (float(low), float(high))
-            self.joints.append(TreeJoint(self.joint_names[j], kind, moved, data.xanchor[j].copy(), axis, limits))
+            point = data.xanchor[j].copy()
+            self.joints.append(MechanismJoint(self.joint_names[j], kind, parent, moved, point, axis, range=limits))
             self.bodies.append(Body(moved, parent, place))
             parent = moved
 

@@ -1,11 +1,13 @@
-"""A MuJoCo model reduced to bodies, joints, sites and equalities, so that no mesh, texture or plugin is needed."""
+"""The files of a MuJoCo model as one tree of bodies, joints, sites and equalities, which needs no mesh or plugin."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from ...errors import InputError, nearest
+from .xmltext import LARGEST_FILE, read_xml
 
 #: Elements that remain, by the element that holds them; of a body's children those of ``body``.
 _KEPT = {
@@ -30,6 +32,12 @@ _TRANSMISSIONS = {
 }
 #: Most copies that ``replicate`` may make in all: a robot has dozens of bodies.
 _MOST_COPIES = 2000
+#: Deepest chain of files that include each other.
+_DEEPEST = 16
+#: Most files of one model.
+_MOST_FILES = 200
+#: Elements whose children stand in the place of an ``include``.
+_ROOTS = ("mujoco", "mujocoinclude")
 
 
 class CleanModel(NamedTuple):
@@ -48,17 +56,19 @@ class CleanModel(NamedTuple):
     notes: tuple[str, ...]
 
 
-def clean_model(root: Element, source: str, keyframe: str = "") -> CleanModel:
+def clean_model(main: Element, path: Path, keyframe: str = "") -> CleanModel:
     """Return a model without what does not matter for its geometry.
 
     Args:
-        root: the model, with its included files.
-        source: name of the file, for messages.
+        main: root of the main file.
+        path: of the main file.
         keyframe: name or number of the keyframe that is wanted; empty for none.
 
     Raises:
-        InputError: the model is put together from other models, copies bodies too often, or has no such keyframe.
+        InputError: an included file cannot be read or found, includes itself, or there are too many; the model is put
+            together from other models, copies bodies too often, or has no such keyframe.
     """
+    root, source = _Files(path).expanded(main, (path,)), str(path)
     for element in root.iter("attach"):
         fault = f"attaches {element.get('model', 'another model')!r}; write the model as one file first"
         raise InputError(f"{source}: {fault}")
@@ -79,6 +89,47 @@ def clean_model(root: Element, source: str, keyframe: str = "") -> CleanModel:
         attributes = {key: value for key, value in keys[keyframe].attrib.items() if key in _KEYFRAME}
         SubElement(SubElement(result, "keyframe"), "key", attributes)
     return CleanModel(result, driven, tuple(keys), tuple(dict.fromkeys(notes)))
+
+
+class _Files:
+    """The files of one model: how many there are, and how large they are together."""
+
+    def __init__(self, main: Path) -> None:
+        self.main, self.files, self.size = main, 0, 0
+
+    def expanded(self, element: Element, chain: tuple[Path, ...]) -> Element:
+        """Return an element with the content of included files in the place of each ``include``."""
+        result = Element(element.tag, element.attrib)
+        result.text = element.text
+        for child in element:
+            if child.tag == "include":
+                result.extend(self._included(child, chain))
+            else:
+                result.append(self.expanded(child, chain))
+        return result
+
+    def _included(self, element: Element, chain: tuple[Path, ...]) -> list[Element]:
+        """Return the elements of an included file."""
+        name = element.get("file", "")
+        if not name:
+            raise InputError(f"{chain[-1]}: an include names no file")
+        # MuJoCo looks beside the main file; models that are put together by hand mean the file that includes.
+        places = [self.main.parent / name, chain[-1].parent / name]
+        path = next((each for each in places if each.is_file()), places[0])
+        if any(path.resolve() == each.resolve() for each in chain):
+            raise InputError(f"{chain[-1]}: includes {name}, which includes itself")
+        if len(chain) > _DEEPEST:
+            raise InputError(f"{chain[-1]}: includes {name} more than {_DEEPEST} files deep")
+        if not path.is_file():
+            raise InputError(f"{chain[-1]}: includes {name}, which cannot be found")
+        self.files, self.size = self.files + 1, self.size + path.stat().st_size
+        if self.files > _MOST_FILES or self.size > LARGEST_FILE:
+            most = f"{_MOST_FILES} files or {LARGEST_FILE // 2**20} MB"
+            raise InputError(f"{self.main}: includes more than {most} in all")
+        root = read_xml(path)
+        if root.tag not in _ROOTS:
+            raise InputError(f"{path}: begins with <{root.tag}>; <mujoco> or <mujocoinclude> is needed")
+        return list(self.expanded(root, (*chain, path)))
 
 
 def _driven_joints(root: Element, notes: list[str]) -> tuple[str, ...]:

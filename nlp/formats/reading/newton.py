@@ -1,17 +1,18 @@
-"""Loops of a description closed by Newton's method."""
+"""Loops of a description closed by Newton's method, and by least squares from other starts where it does not."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ....models.arrays import FloatArray
-from ....models.mechanism import Coupling
-from .description import Body, Closing, Description, LoopClosure, TreeJoint
-from .frames import Frame, cross_matrix, rotation_about, rotation_vector
+from ....models.mechanism import Coupling, MechanismJoint
+from ..frames import Frame, cross_matrix, rotation_about, rotation_vector
+from .description import Body, Closing, Description, LoopClosure
 
 #: Loops are closed where no equation is larger, in parts of the robot's size: rounding leaves 1e-16 to 1e-14.
 CLOSED = 1e-12
@@ -27,6 +28,15 @@ LEAST = 1e-4
 #: Driven joints move only where this makes the least squares so much smaller.
 _WORTH = 0.1
 
+#: Random starts beside the stated configuration, their largest motions in radians and parts of the size, and the seed.
+_STARTS, _FAR, _SEED = 4, (0.1, 0.3, 1.0), 0
+#: Steps of the Levenberg-Marquardt method: these loops need 60 to 140.
+_MOST_DAMPED = 300
+#: Factors of the damping after a step that reduces the squares, and after one that does not; its smallest and largest.
+_SMALLER, _LARGER, _LEAST_DAMPING, _MOST_DAMPING = 0.2, 4.0, 1e-10, 1e12
+#: Largest step, and the largest part of a vector of equations that a step may still take away at the end.
+_MOST_WAY, _STATIONARY = 1.0, 1e-9
+
 
 class Gap(NamedTuple):
     """How far a loop is open.
@@ -40,6 +50,15 @@ class Gap(NamedTuple):
     name: str
     distance: float
     angle: float
+
+    def share(self, size: float) -> float:
+        """Return how far the loop is open, in parts of the robot's size."""
+        return max(self.distance / size, self.angle)
+
+    @property
+    def words(self) -> str:
+        """How far the loop is open in words."""
+        return f"{self.distance:.3g} and {math.degrees(self.angle):.3g} deg"
 
 
 class Closed(NamedTuple):
@@ -61,9 +80,8 @@ class Closed(NamedTuple):
 def gap_of(closure: LoopClosure, places: Mapping[str, Frame]) -> Gap:
     """Return how far a closure is open where its bodies are."""
     A, B = (places[name] @ frame for name, frame in _sides(closure))
-    equations = _equations(closure, A, B, None)
-    lengths = {Closing.SLIDE: 2, Closing.CYLINDER: 2}.get(closure.closing, 3)
-    return Gap(closure.name, float(np.linalg.norm(equations[:lengths])), float(np.linalg.norm(equations[lengths:])))
+    found = _equations(closure, A, B, None, np.zeros((6, 0)))
+    return Gap(closure.name, float(np.linalg.norm(found.lengths)), float(np.linalg.norm(found.angles)))
 
 
 def gap_of_coupling(given: Description, coupling: Coupling) -> Gap:
@@ -81,59 +99,41 @@ def _sides(closure: LoopClosure) -> tuple[tuple[str, Frame], tuple[str, Frame]]:
     return (closure.first, closure.first_frame), (closure.second, closure.second_frame)
 
 
-def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None) -> FloatArray:
-    """Return the equations of a closure, lengths before angles.
+class _Equations(NamedTuple):
+    """Equations of a closure, lengths (k,) and angles (m,), and their derivatives (k, n) and (m, n)."""
+
+    lengths: FloatArray
+    angles: FloatArray
+    by_lengths: FloatArray
+    by_angles: FloatArray
+
+
+def _equations(closure: LoopClosure, A: Frame, B: Frame, kept: float | None, twist: FloatArray) -> _Equations:
+    """Return the equations of a closure, and their derivatives by motions of its second body relative to the first.
 
     Args:
         closure: the closure.
         A: its frame on the first body, in the world.
         B: its frame on the second body.
         kept: cosine between the axes of a universal joint; None for that of the frames themselves.
-    """
-    # In axes of the first body's frame no common motion of both bodies changes an equation.
-    apart = A.rotation.T @ (B.position - A.position)
-    z, other = A.rotation[:, 2], B.rotation[:, 2]
-    match closure.closing:
-        case Closing.BALL:
-            return np.asarray(apart)
-        case Closing.WELD:
-            return np.concatenate([apart, rotation_vector(A.rotation.T @ B.rotation)])
-        case Closing.HINGE:
-            return np.concatenate([apart, A.rotation[:, :2].T @ other])
-        case Closing.SLIDE:
-            return np.concatenate([apart[:2], rotation_vector(A.rotation.T @ B.rotation)])
-        case Closing.CYLINDER:
-            return np.concatenate([apart[:2], A.rotation[:, :2].T @ other])
-        case Closing.UNIVERSAL:
-            return np.append(apart, 0.0 if kept is None else float(z @ other) - kept)
-
-
-def _derivatives(closure: LoopClosure, A: Frame, B: Frame, twist: FloatArray) -> FloatArray:
-    """Return the derivatives of a closure's equations by motions of its second body relative to the first.
-
-    Args:
-        closure: the closure.
-        A: its frame on the first body, in the world.
-        B: its frame on the second body.
         twist: (6, n) twists of the second body minus those of the first, velocities at the world's origin.
     """
     w, v = twist[:3], twist[3:]
-    point = A.rotation.T @ (v - cross_matrix(B.position) @ w)
+    # In axes of the first body's frame no common motion of both bodies changes an equation.
+    apart, moved = A.rotation.T @ (B.position - A.position), A.rotation.T @ (v - cross_matrix(B.position) @ w)
     x, y, z, other = *A.rotation.T, B.rotation[:, 2]
-    tilt = np.array([np.cross(other, x), np.cross(other, y)]) @ w
+    angles, turned = np.zeros(0), np.zeros((0, twist.shape[1]))
     match closure.closing:
-        case Closing.BALL:
-            return np.asarray(point)
-        case Closing.WELD:
-            return np.vstack([point, A.rotation.T @ w])
-        case Closing.HINGE:
-            return np.vstack([point, tilt])
-        case Closing.SLIDE:
-            return np.vstack([point[:2], A.rotation.T @ w])
-        case Closing.CYLINDER:
-            return np.vstack([point[:2], tilt])
+        case Closing.WELD | Closing.SLIDE:
+            angles, turned = rotation_vector(A.rotation.T @ B.rotation), A.rotation.T @ w
+        case Closing.HINGE | Closing.CYLINDER:
+            angles, turned = A.rotation[:, :2].T @ other, np.array([np.cross(other, x), np.cross(other, y)]) @ w
         case Closing.UNIVERSAL:
-            return np.vstack([point, np.cross(other, z)[None] @ w])
+            angles = np.array([0.0 if kept is None else float(z @ other) - kept])
+            turned = np.cross(other, z)[None] @ w
+    # Along the axis of a slide or cylinder the frames are free.
+    count = 2 if closure.closing in (Closing.SLIDE, Closing.CYLINDER) else 3
+    return _Equations(apart[:count], angles, moved[:count], turned)
 
 
 class Mover:
@@ -141,7 +141,7 @@ class Mover:
 
     def __init__(self, given: Description, size: float, *, keeps_driven: bool) -> None:
         self.given, self.size = given, size
-        self.joint_of = {joint.body: joint for joint in given.joints}
+        self.joint_of = {joint.outer: joint for joint in given.joints}
         self.index: dict[str, slice] = {}
         count = 0
         for body in given.bodies[1:]:
@@ -179,17 +179,13 @@ class Mover:
         for closure in self.given.closures:
             A, B = (moved[name] @ self.given.place_of(name) @ frame for name, frame in _sides(closure))
             twist = screws[closure.second] - screws[closure.first]
-            value = _equations(closure, A, B, self.cosines[closure.name])
-            row = _derivatives(closure, A, B, twist)
-            lengths = {Closing.SLIDE: 2, Closing.CYLINDER: 2}.get(closure.closing, 3)
-            value[:lengths] /= self.size
-            row[:lengths] /= self.size
-            values.append(value)
-            rows.append(row)
+            found = _equations(closure, A, B, self.cosines[closure.name], twist)
+            values.append(np.concatenate([found.lengths / self.size, found.angles]))
+            rows.append(np.vstack([found.by_lengths / self.size, found.by_angles]))
         for coupling in self.given.couplings:
             row = np.zeros(self.count)
             for name, factor in coupling.factors:
-                body = next(joint.body for joint in self.given.joints if joint.name == name)
+                body = next(joint.outer for joint in self.given.joints if joint.name == name)
                 row[self.index[body]] = factor
             change = sum(factor * self.coordinates[name] for name, factor in coupling.factors)
             unit = self.size if _is_length(self.given, coupling) else 1.0
@@ -282,7 +278,7 @@ def close(given: Description, size: float) -> Closed:
 def closed_by(mover: Mover, *, kept: bool) -> Closed:
     """Return the description with all joints where they were moved; ``kept`` is as in :class:`Closed`."""
     given = mover.given
-    turns = [rotation_vector(mover.own[j.body].rotation) for j in given.joints if j.kind in ("R", "S")]
+    turns = [rotation_vector(mover.own[j.outer].rotation) for j in given.joints if j.kind in ("R", "S")]
     ways = [abs(mover.coordinates[j.name]) for j in given.joints if j.kind == "P"]
     return Closed(
         _moved(given, mover),
@@ -322,10 +318,9 @@ def solve(mover: Mover, rank: float = _RANKS[0]) -> float:
 def _moved(given: Description, mover: Mover) -> Description:
     """Return a description with all its bodies and joints where they were moved."""
     moved = mover.moved()
-    parents = {body.name: body.parent for body in given.bodies}
 
-    def joint(each: TreeJoint) -> TreeJoint:
-        carried, way = moved[parents[each.body]], mover.coordinates[each.name]
+    def joint(each: MechanismJoint) -> MechanismJoint:
+        carried, way = moved[each.inner], mover.coordinates[each.name]
         limits = None if each.range is None else (each.range[0] - way, each.range[1] - way)
         point, axis = carried.position + carried.rotation @ each.point, carried.rotation @ each.axis
         return replace(each, point=point, axis=axis, range=limits)
@@ -342,4 +337,75 @@ def _moved(given: Description, mover: Mover) -> Description:
     )
 
 
-__all__ = ["CLOSED", "LEAST", "Closed", "Gap", "Mover", "close", "closed_by", "gap_of", "gap_of_coupling", "solve"]
+def close_from_other_starts(given: Description, size: float) -> Closed | None:
+    """Return a description with its loops closed from another start; None where none of a few closes them."""
+    for kept in (True, False):
+        for mover in _movers(given, size, kept=kept):
+            if _least_squares(mover) <= LEAST and solve(mover) <= LEAST:
+                return closed_by(mover, kept=kept)
+    return None
+
+
+def least_gaps(given: Description, size: float) -> dict[str, float]:
+    """Return loops that do not close by themselves, all others cut and no actuator held.
+
+    Returns:
+        The largest equation at the smallest sum of squares that was found, by the loop's name, in parts of the size.
+    """
+    parts = [replace(given, closures=(each,), couplings=()) for each in given.closures]
+    found = {each.closures[0].name: _least_of(each, size) for each in parts}
+    return {name: value for name, value in found.items() if value > LEAST}
+
+
+def _least_of(given: Description, size: float) -> float:
+    """Return the largest equation of the start that comes closest."""
+    least = float("inf")
+    for mover in _movers(given, size, kept=False):
+        least = min(least, _least_squares(mover))
+        if least <= LEAST:
+            break
+    return least
+
+
+def _movers(given: Description, size: float, *, kept: bool) -> Iterator[Mover]:
+    """Yield joints where the model stands, and at random positions, some near and some far."""
+    rng = np.random.default_rng(_SEED)
+    for k in range(1 + _STARTS):
+        mover = Mover(given, size, keeps_driven=kept)
+        if k:
+            mover.step(rng.uniform(-1, 1, mover.count) * _FAR[k % len(_FAR)] * _scales(mover))
+        yield mover
+
+
+def _scales(mover: Mover) -> FloatArray:
+    """Return the unit (n,) of each coordinate: the size for a slide and for the position of a free body, else 1."""
+    scales = np.ones(mover.count)
+    for body, place in mover.index.items():
+        joint = mover.joint_of.get(body)
+        if joint is None:
+            scales[place][3:] = mover.size
+        elif joint.kind == "P":
+            scales[place] = mover.size
+    return scales
+
+
+def _least_squares(mover: Mover) -> float:
+    """Move the joints to a smallest sum of squares by the Levenberg-Marquardt method; return the largest equation."""
+    scales, damping = _scales(mover), 1.0
+    values, derivatives = mover.state()
+    for _ in range(_MOST_DAMPED):
+        J, size = derivatives * scales, float(np.linalg.norm(values))
+        if not size or float(np.linalg.norm(J.T @ values)) <= _STATIONARY * size or damping > _MOST_DAMPING:
+            break
+        way = -np.linalg.solve(J.T @ J + damping * np.eye(mover.count), J.T @ values)
+        way *= min(1.0, _MOST_WAY / float(np.linalg.norm(way)))
+        before = dict(mover.own), dict(mover.coordinates)
+        mover.step(scales * way)
+        values, derivatives = mover.state()
+        if float(np.linalg.norm(values)) < size:
+            damping = max(damping * _SMALLER, _LEAST_DAMPING)
+        else:
+            mover.own, mover.coordinates = before
+            values, derivatives = mover.state()
+            damping *= _LARGER
+    return float(np.abs(values).max(initial=0.0))

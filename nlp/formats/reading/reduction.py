@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from ....models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink
+from ....models.mechanism.topology import between
 from ...errors import InputError, listing, nearest
-from .blocks import between
+from ..frames import Frame
 from .description import LARGEST, Description
-from .elements import Element, bodies_of, elements_of, place_in, rigid_groups
-from .frames import Frame
+from .elements import bodies_of, elements_of, rigid_groups
 from .newton import Gap, gap_of, gap_of_coupling
 
 #: Most names that a message lists.
@@ -35,7 +34,8 @@ class Ends:
     actuated: tuple[str, ...] = ()
 
 
-class Reduced(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Reduced:
     """The mechanism between base and platform.
 
     Attributes:
@@ -49,6 +49,11 @@ class Reduced(NamedTuple):
     size: float
     gaps: tuple[Gap, ...]
     notes: tuple[str, ...]
+
+    @property
+    def worst(self) -> Gap:
+        """The gap of the loop that is open most; one of 0 where there is no loop."""
+        return max(self.gaps, key=lambda gap: gap.share(self.size), default=Gap("", 0.0, 0.0))
 
 
 def size_of(given: Description) -> float:
@@ -85,21 +90,20 @@ def reduce(given: Description, ends: Ends) -> Reduced:
         raise InputError(f"{given.source}: --base {base}: no such body; {nearest(base, every[:_MOST_NAMES])}")
     elements = elements_of(given, size_of(given))
     leader = rigid_groups(elements, bodies_of(given, elements))
-    moving = [each for each in elements if leader[each.first] != leader[each.second]]
+    moving = [each for each in elements if leader[each.inner] != leader[each.outer]]
     start, end = leader[base], leader[platform]
     if start == end:
         raise InputError(f"{given.source}: --platform {ends.platform}: is rigidly joined to the base {base}")
-    edges = [(leader[each.first], leader[each.second]) for each in moving]
+    edges = [(leader[each.inner], leader[each.outer]) for each in moving]
     kept = [moving[k] for k in between(edges, start, end)]
     _refuse_open(given, ends, kept, leader, (start, end))
     driven, notes = _driven(given, ends, kept)
     names = _link_names(given, kept, leader, {start: base, end: ends.platform})
-    joints = _oriented(kept, leader, start, driven, names)
     couplings, driven, more = _couplings(given, kept, driven)
-    joints = [replace(each, actuated=each.name in driven) for each in joints]
-    places = {key: origin if key == end else place_in(given, key) for key in names}
+    joints = _oriented(kept, leader, start, driven, names)
+    places = {key: origin if key == end else given.place_of(key) for key in names}
     mechanism = Mechanism(
-        name=_word(given.name),
+        name=given.name.strip(),
         links=tuple(MechanismLink(name, places[key].position, places[key].rotation) for key, name in names.items()),
         joints=tuple(joints),
         base=base,
@@ -108,24 +112,15 @@ def reduce(given: Description, ends: Ends) -> Reduced:
     )
     bodies = {body.name: body.place for body in given.bodies}
     own = {each.name for each in kept}
+    # A closure counts where it is a joint that is kept, or two; where it welds bodies of a link that is kept; and where
+    # it is a further ball of a hinge there.
     gaps = [
         gap_of(each, bodies)
         for each in given.closures
-        if _closes(each.name, own) or _merges(given, each.name, leader, names)
+        if own & {each.name, f"{each.name} 1"} or {leader[each.first], leader[each.second]} <= names.keys()
     ]
     gaps += [gap_of_coupling(given, each) for each in given.couplings if _holds(given, each, own, leader, names)]
     return Reduced(mechanism, _extent([each.point for each in kept]), tuple(gaps), (*given.notes, *notes, *more))
-
-
-def _closes(name: str, own: set[str]) -> bool:
-    """Return whether a closure is among the joints that are kept, as one joint or as two."""
-    return name in own or f"{name} 1" in own
-
-
-def _merges(given: Description, name: str, leader: dict[str, str], names: dict[str, str]) -> bool:
-    """Return whether a closure welds bodies of a link that is kept, or is a further ball of a hinge there."""
-    closure = next(each for each in given.closures if each.name == name)
-    return leader[closure.first] in names and leader[closure.second] in names
 
 
 def _holds(
@@ -133,7 +128,7 @@ def _holds(
 ) -> bool:
     """Return whether a coupling ties joints that are kept, or fixes a joint within a link that is kept."""
     tied = [name for name, _ in coupling.factors]
-    bodies = [joint.body for joint in given.joints if joint.name in tied]
+    bodies = [joint.outer for joint in given.joints if joint.name in tied]
     return own.issuperset(tied) if len(tied) > 1 else all(leader[body] in names for body in bodies)
 
 
@@ -182,14 +177,14 @@ def _platform(given: Description, name: str) -> tuple[str, Frame]:
 
 
 def _refuse_open(
-    given: Description, ends: Ends, kept: list[Element], leader: dict[str, str], nodes: tuple[str, str]
+    given: Description, ends: Ends, kept: list[MechanismJoint], leader: dict[str, str], nodes: tuple[str, str]
 ) -> None:
     """Refuse a platform to which no path, or only one, leads from the base."""
     where = f"{given.source}: --platform {ends.platform}:"
     base = ends.base or given.root
     if not kept:
         raise InputError(f"{where} no joints lead to it from the base {base}; choose the base by --base")
-    links = {leader[name] for each in kept for name in (each.first, each.second)} | set(nodes)
+    links = {leader[name] for each in kept for name in (each.inner, each.outer)} | set(nodes)
     if len(kept) < len(links):
         fault = "is at the end of an open chain"
         raise InputError(
@@ -197,7 +192,7 @@ def _refuse_open(
         )
 
 
-def _driven(given: Description, ends: Ends, kept: list[Element]) -> tuple[set[str], list[str]]:
+def _driven(given: Description, ends: Ends, kept: list[MechanismJoint]) -> tuple[set[str], list[str]]:
     """Return the actuated joints of the mechanism, and notes about actuators elsewhere."""
     own = [each.name for each in kept]
     if ends.actuated:
@@ -233,7 +228,7 @@ def _leading(given: Description, own: Sequence[str]) -> set[str]:
 
 
 def _couplings(
-    given: Description, kept: list[Element], driven: set[str]
+    given: Description, kept: list[MechanismJoint], driven: set[str]
 ) -> tuple[tuple[Coupling, ...], set[str], list[str]]:
     """Return the couplings within the mechanism; a joint coupled to a driven one outside it counts as driven."""
     own = {each.name for each in kept}
@@ -259,16 +254,16 @@ def _couplings(
 
 
 def _link_names(
-    given: Description, kept: list[Element], leader: dict[str, str], given_names: dict[str, str]
+    given: Description, kept: list[MechanismJoint], leader: dict[str, str], given_names: dict[str, str]
 ) -> dict[str, str]:
     """Return the name of each rigid link by its first body, in the order of the bodies."""
     order = {name: k for k, name in enumerate(bodies_of(given, kept))}
-    keys = {leader[name] for each in kept for name in (each.first, each.second)} | set(given_names)
+    keys = {leader[name] for each in kept for name in (each.inner, each.outer)} | set(given_names)
     return {key: given_names.get(key, key) for key in sorted(keys, key=lambda key: order.get(key, len(order)))}
 
 
 def _oriented(
-    kept: list[Element], leader: dict[str, str], start: str, driven: set[str], names: dict[str, str]
+    kept: list[MechanismJoint], leader: dict[str, str], start: str, driven: set[str], names: dict[str, str]
 ) -> list[MechanismJoint]:
     """Return the joints with the link nearer to the base inside.
 
@@ -278,7 +273,7 @@ def _oriented(
     waiting = [start]
     for node in waiting:
         for each in kept:
-            ends = leader[each.first], leader[each.second]
+            ends = leader[each.inner], leader[each.outer]
             if node in ends:
                 other = ends[1] if ends[0] == node else ends[0]
                 if other not in depth:
@@ -286,18 +281,10 @@ def _oriented(
                     waiting.append(other)
     joints = []
     for each in kept:
-        first, second = leader[each.first], leader[each.second]
+        first, second = leader[each.inner], leader[each.outer]
         turned = depth[second] < depth[first]
         inner, outer = (second, first) if turned else (first, second)
         axis = -each.axis + 0.0 if turned else each.axis
-        joints.append(
-            MechanismJoint(
-                each.name, each.kind, names[inner], names[outer], each.point, axis, 0.0, each.name in driven, each.range
-            )
-        )
+        actuated = each.name in driven
+        joints.append(replace(each, inner=names[inner], outer=names[outer], axis=axis, actuated=actuated))
     return joints
-
-
-def _word(name: str) -> str:
-    """Return a robot's name."""
-    return name.strip()

@@ -19,8 +19,8 @@ import numpy as np
 from ....models.arrays import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint
 from ...errors import InputError
+from ..frames import cross_matrix
 from .elements import SAME_POINT
-from .frames import cross_matrix
 from .meeting import ALMOST, axes_gap
 
 #: Steps of Newton's method, which needs three to five.
@@ -123,15 +123,8 @@ def _parallelograms(given: Mechanism, joints: Sequence[MechanismJoint], within: 
                     yield i, j, k, m
 
 
-class Snapped(NamedTuple):
-    """A mechanism whose axes were moved, and a sentence about it."""
-
-    mechanism: Mechanism
-    note: str
-
-
-def snapped(given: Mechanism, size: float, within: float) -> Snapped:
-    """Return a mechanism with the relations that its joints have within a length as exact ones.
+def snapped(given: Mechanism, size: float, within: float) -> tuple[Mechanism, str]:
+    """Return a mechanism with the relations that its joints have within a length as exact ones, and a note about it.
 
     Args:
         given: the mechanism.
@@ -175,7 +168,7 @@ def snapped(given: Mechanism, size: float, within: float) -> Snapped:
     count = sum(each.off > SAME_POINT * size for each in relations)
     note = f"{count} relations of axes that were off by up to {within:g} were made exact"
     note += f": joints moved by up to {way:.1g}, their axes turned by up to {turn / size:.1g} rad"
-    return Snapped(replace(given, joints=tuple(new)), note)
+    return replace(given, joints=tuple(new)), note
 
 
 class _Rows:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ....models.arrays import FloatArray
-from .frames import rotation_about
-from .tablejoints import LimbNumbers, limbs_in_numbers
+from ..frames import rotation_about
 
 #: Places and directions that differ by less than this, in parts of the robot's size, are taken for the same: models
 #: that are written with six digits differ by 1e-6 and less.
@@ -79,6 +78,27 @@ class Offers(NamedTuple):
     mirrors: tuple[Mirror, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class _LimbNumbers:
+    """A limb in numbers, its joints in the order of the file.
+
+    Attributes:
+        index: of the limb in the file.
+        shape: types, actuation and branches: limbs of one shape may be copies of each other.
+        names: of the joints.
+        points: (n, 3) their places.
+        axes: (m, 3) the axes of its joints, in order.
+        driven: whether each axis is that of an actuated joint, whose sign counts.
+    """
+
+    index: int
+    shape: tuple[Any, ...]
+    names: tuple[str, ...]
+    points: FloatArray
+    axes: FloatArray
+    driven: tuple[bool, ...]
+
+
 def offers_of(tables: Mapping[str, Any], size: float) -> Offers:
     """Return the circles and symmetries of a robot file with limbs in numbers.
 
@@ -86,22 +106,22 @@ def offers_of(tables: Mapping[str, Any], size: float) -> Offers:
         tables: of the robot file; one with links and joints has none.
         size: of the robot.
     """
-    limbs = limbs_in_numbers(tables)
+    limbs = _limbs_in_numbers(tables)
     circles = _circles(limbs, size)
     fold = next((found for circle in circles if (found := _fold(limbs, circle, size)) is not None), None)
     mirrors = _mirrors(limbs, circles[0], size) if circles else []
     return Offers(tuple(circles), fold, tuple(mirrors))
 
 
-def _groups(limbs: list[LimbNumbers]) -> list[list[LimbNumbers]]:
+def _groups(limbs: list[_LimbNumbers]) -> list[list[_LimbNumbers]]:
     """Return the limbs by shape."""
-    shapes: dict[tuple[Any, ...], list[LimbNumbers]] = {}
+    shapes: dict[tuple[Any, ...], list[_LimbNumbers]] = {}
     for limb in limbs:
         shapes.setdefault(limb.shape, []).append(limb)
     return list(shapes.values())
 
 
-def _circles(limbs: list[LimbNumbers], size: float) -> list[CircleOffer]:
+def _circles(limbs: list[_LimbNumbers], size: float) -> list[CircleOffer]:
     """Return the circles on which the same joint of all limbs of a shape lies."""
     found: list[CircleOffer] = []
     for group in _groups(limbs):
@@ -160,7 +180,7 @@ def _rounded_direction(axis: FloatArray) -> FloatArray:
     return nearest if float(np.linalg.norm(axis - nearest)) < _ROUND else axis
 
 
-def _turned(limb: LimbNumbers, other: LimbNumbers, matrix: FloatArray, centre: FloatArray, size: float) -> float:
+def _turned(limb: _LimbNumbers, other: _LimbNumbers, matrix: FloatArray, centre: FloatArray, size: float) -> float:
     """Return how far a limb after an orthogonal map about a point is from another one; infinity for another shape.
 
     A reflection turns the axes of rotation over once more, so that signs of axes do not count there.
@@ -177,7 +197,7 @@ def _turned(limb: LimbNumbers, other: LimbNumbers, matrix: FloatArray, centre: F
     return float(max(found))
 
 
-def _fold(limbs: list[LimbNumbers], circle: CircleOffer, size: float) -> FoldOffer | None:
+def _fold(limbs: list[_LimbNumbers], circle: CircleOffer, size: float) -> FoldOffer | None:
     """Return the rotations about a circle's axis that map the robot to itself; None where there are none."""
     most = min(len(group) for group in _groups(limbs))
     for count in range(most, 1, -1):
@@ -211,7 +231,7 @@ def _orbits(images: Mapping[int, int]) -> tuple[tuple[int, ...], ...]:
     return tuple(found)
 
 
-def _mirrors(limbs: list[LimbNumbers], circle: CircleOffer, size: float) -> list[Mirror]:
+def _mirrors(limbs: list[_LimbNumbers], circle: CircleOffer, size: float) -> list[Mirror]:
     """Return the planes through a circle's axis in which the robot is its own mirror image."""
     radial = _radial(circle.points, circle.centre, circle.axis)
     found: list[Mirror] = []
@@ -227,3 +247,49 @@ def _mirrors(limbs: list[LimbNumbers], circle: CircleOffer, size: float) -> list
         if max(gaps) < SAME * size:
             found.append(Mirror(circle.centre, normal, max(gaps)))
     return found
+
+
+def joints_of_limb(limb: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the tables of all joints of a limb: those that its branches share, then those of each branch."""
+    return [*limb.get("joints", []), *(joint for branch in limb.get("branch", []) for joint in branch["joints"])]
+
+
+def joints_of(tables: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the index of the limb and the table of every joint; the index is 0 in a file without limbs."""
+    for joint in tables.get("joint", []):
+        if "at" in joint:
+            yield 0, joint
+    for index, limb in enumerate(tables.get("limb", [])):
+        for joint in joints_of_limb(limb):
+            yield index, joint
+
+
+def _limbs_in_numbers(tables: Mapping[str, Any]) -> list[_LimbNumbers]:
+    """Return the limbs of a robot file that has numbers only."""
+    found = []
+    for index, limb in enumerate(tables.get("limb", [])):
+        joints = joints_of_limb(limb)
+        shape = (
+            tuple((joint["type"], bool(joint.get("actuated"))) for joint in joints),
+            len(limb.get("joints", [])),
+            tuple(len(branch["joints"]) for branch in limb.get("branch", [])),
+        )
+        points = [point for joint in joints for point in (joint["at"], *([joint["to"]] if "to" in joint else []))]
+        axes = [(axis, bool(joint.get("actuated"))) for joint in joints for axis in _axes(joint)]
+        names = tuple(name for joint in joints for name in [joint.get("name", "")] * (2 if "to" in joint else 1))
+        found.append(
+            _LimbNumbers(
+                index,
+                shape,
+                names,
+                np.array(points, dtype=np.float64).reshape(-1, 3),
+                np.array([axis for axis, _ in axes], dtype=np.float64).reshape(-1, 3),
+                tuple(driven for _, driven in axes),
+            )
+        )
+    return found
+
+
+def _axes(joint: Mapping[str, Any]) -> list[Any]:
+    """Return the axes of a joint."""
+    return [joint["axis"]] if "axis" in joint else list(joint.get("axes", []))

@@ -10,16 +10,15 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from ....models.arrays import FloatArray
-from ....models.mechanism import Coupling
+from ....models.mechanism import Coupling, MechanismJoint
 from ...errors import InputError, listing
-from .description import Body, Description, LoopClosure, TreeJoint, unique_name
-from .frames import Frame, perpendiculars
+from ..frames import Frame, perpendiculars
+from .description import Body, Description, LoopClosure, unique_name
 from .urdfelements import axis_of, link_of, name_of, number_of, origin_of
 from .urdfloops import (
     LoopFile,
-    closures_of_constraints,
+    closures_of_elements,
     closures_of_frames,
-    closures_of_loop_joints,
     closures_of_pairs,
     read_loop_file,
 )
@@ -68,7 +67,7 @@ class _Reader:
         self.elements = {name_of(each, self.source): each for each in root.findall("joint")}
         self._unique(root.findall("joint"))
         self.bodies: list[Body] = []
-        self.joints: list[TreeJoint] = []
+        self.joints: list[MechanismJoint] = []
         #: Last elementary joint of each joint: the one that carries its name.
         self.moved: dict[str, str] = {}
 
@@ -145,7 +144,7 @@ class _Reader:
             own = name if last else unique_name(f"{name} {k + 1}", set(self.elements))
             axis = at.rotation @ local if part in ("R", "P") else np.zeros(3)
             limits = self._limits(element, kind, where) if len(parts) == 1 and part in ("R", "P") else None
-            self.joints.append(TreeJoint(own, part, moved, at.position, axis, limits))
+            self.joints.append(MechanismJoint(own, part, parent, moved, at.position, axis, range=limits))
             self.bodies.append(Body(moved, parent, at))
             parent = moved
         return at
@@ -186,16 +185,14 @@ class _Reader:
         """Return the joints that close loops, and notes about them."""
         places = {body.name: body.place for body in self.bodies}
         links = {name: (name, Frame()) for name in places}
-        joints = {joint.name: (joint.body, Frame()) for joint in self.joints if joint.name not in links}
+        joints = {joint.name: (joint.outer, Frame()) for joint in self.joints if joint.name not in links}
         taken = {joint.name for joint in self.joints}
-        closures = closures_of_constraints(self.root, self.links, taken, self.source)
-        taken |= {each.name for each in closures}
-        closures += closures_of_loop_joints(self.root, self.links, taken, self.source)
+        closures = closures_of_elements(self.root, self.links, taken, self.source)
         taken |= {each.name for each in closures}
         if self.loops is not None:
             return [*closures, *closures_of_pairs(self.loops, {**links, **joints})], []
         # A frame is a link without size that is fixed to its parent.
-        fixed = {joint.body for joint in self.joints if joint.kind == "weld"}
+        fixed = {joint.outer for joint in self.joints if joint.kind == "weld"}
         frames = {name: (name, Frame()) for name in places if name in fixed}
         found, notes = closures_of_frames(frames, sorted(taken), places)
         # A hinge's second pair of frames lies on other links than the first, fixed to the same ones.

@@ -9,8 +9,8 @@ import numpy as np
 
 from ....models.arrays import FloatArray
 from ...errors import InputError, listing
+from ..frames import Frame, rotation_from_roll_pitch_yaw
 from .description import LARGEST
-from .frames import Frame, rotation_from_roll_pitch_yaw
 
 #: Shortest vector that is a direction: a shorter one is a zero in decimals.
 _SHORTEST = 1e-12

@@ -14,19 +14,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ....models.arrays import FloatArray
 from ...errors import InputError, listing
 from ...system.reading import read_limited
-from .description import Closing, LoopClosure, axis_frame, common_name, unique_name
-from .extra import required
-from .frames import Frame
+from ..extra import required
+from ..frames import Frame, axis_frame
+from .description import Closing, LoopClosure, common_name, unique_name
 from .urdfelements import axis_of, link_of, name_of, origin_of
 
 #: Largest YAML file, bytes: those that are published have 2 kB.
@@ -172,62 +171,31 @@ def _towards(frame: Frame, link: str, end: tuple[str, Frame], places: Mapping[st
     return axis_frame(frame.position, direction) if np.linalg.norm(direction) > 0 else frame
 
 
-def closures_of_constraints(root: Element, links: set[str], taken: set[str], source: str) -> list[LoopClosure]:
-    """Return the closures of the elements ``<constraint>``.
+def closures_of_elements(root: Element, links: set[str], taken: Collection[str], source: str) -> list[LoopClosure]:
+    """Return the closures of the elements ``<constraint>`` and ``<loop_joint>``.
 
     Raises:
-        InputError: a link or type is unknown, or a number is none.
+        InputError: a link or type is unknown, the hinge or slide of a loop joint has no axis, or a number is none.
     """
-    found: list[LoopClosure] = []
-    for element in root.findall("constraint"):
+    found: dict[str, LoopClosure] = {}
+    for element in (*root.findall("constraint"), *root.findall("loop_joint")):
+        is_joint = element.tag == "loop_joint"
         name = name_of(element, source)
-        place = f"{source}: constraint {name}"
+        place = f"{source}: {element.tag} {name}"
         kind = element.get("type", "")
-        if kind not in _CONSTRAINTS:
-            raise InputError(f'{place}, type = "{kind[:60]}": must be one of {listing(_CONSTRAINTS)}')
-        sides = [link_of(element, side, links, place) for side in ("parent", "child")]
-        frames = [origin_of(element, f"{side}_origin", place) for side in ("parent", "child")]
-        axes = [axis_of(element, f"{side}_axis", place) for side in ("parent", "child")]
-        found.append(_closure(_CONSTRAINTS[kind], name, sides, frames, axes, taken | {each.name for each in found}))
-    return found
-
-
-def closures_of_loop_joints(root: Element, links: set[str], taken: set[str], source: str) -> list[LoopClosure]:
-    """Return the closures of the elements ``<loop_joint>``.
-
-    Raises:
-        InputError: a link or type is unknown, a hinge or slide has no axis, or a number is none.
-    """
-    found: list[LoopClosure] = []
-    for element in root.findall("loop_joint"):
-        name = name_of(element, source)
-        place = f"{source}: loop_joint {name}"
-        kind = element.get("type", "")
-        allowed = [key for key in _CONSTRAINTS if key != "universal"]
+        allowed = [key for key in _CONSTRAINTS if not (is_joint and key == "universal")]
         if kind not in allowed:
             raise InputError(f'{place}, type = "{kind[:60]}": must be one of {listing(allowed)}')
-        sides = [link_of(element, side, links, place) for side in ("link1", "link2")]
-        frames = [origin_of(element, side, place) for side in ("link1", "link2")]
-        closing = _CONSTRAINTS[kind]
-        if closing not in (Closing.BALL, Closing.WELD) and element.find("axis") is None:
-            raise InputError(
-                f"{place}, axis: is missing; a joint of the type {kind} needs it, in the frame of each link"
-            )
-        axes = [axis_of(element, "axis", place)] * 2
-        found.append(_closure(closing, name, sides, frames, axes, taken | {each.name for each in found}))
-    return found
-
-
-def _closure(
-    closing: Closing,
-    name: str,
-    sides: Sequence[str],
-    frames: Sequence[Frame],
-    axes: Sequence[FloatArray],
-    taken: set[str],
-) -> LoopClosure:
-    """Return a closure between two links, given a frame on each and the joint's axis in that frame."""
-    if closing is not Closing.WELD:
-        turned = [axis_frame(np.zeros(3), axis).rotation for axis in axes]
-        frames = [Frame(each.position, each.rotation @ turn) for each, turn in zip(frames, turned, strict=True)]
-    return LoopClosure(unique_name(name, taken), closing, sides[0], sides[1], frames[0], frames[1])
+        closing, sides = _CONSTRAINTS[kind], ("link1", "link2") if is_joint else ("parent", "child")
+        first, second = (link_of(element, side, links, place) for side in sides)
+        frames = [origin_of(element, side if is_joint else f"{side}_origin", place) for side in sides]
+        if is_joint and closing not in (Closing.BALL, Closing.WELD) and element.find("axis") is None:
+            fault = f"is missing; a joint of the type {kind} needs it, in the frame of each link"
+            raise InputError(f"{place}, axis: {fault}")
+        axes = [axis_of(element, "axis" if is_joint else f"{side}_axis", place) for side in sides]
+        if closing is not Closing.WELD:
+            turned = [axis_frame(np.zeros(3), axis).rotation for axis in axes]
+            frames = [Frame(each.position, each.rotation @ turn) for each, turn in zip(frames, turned, strict=True)]
+        chosen = unique_name(name, {*taken, *found})
+        found[chosen] = LoopClosure(chosen, closing, first, second, *frames)
+    return list(found.values())

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from ....models.arrays import FloatArray
 from ....models.mechanism import wrenches_of
 from ...errors import listing
-from .importing import Imported, gap_share, gap_words
+from .importing import Imported
 from .newton import CLOSED
 from .symmetry import SAME, Offers
 
@@ -47,11 +47,10 @@ def _loops(found: Imported) -> str:
     """Return how far the loops of the description are open."""
     if not found.gaps:
         return "closed by the description's own joints"
-    worst = max(found.gaps, key=lambda gap: gap_share(gap, found.size))
-    share = gap_share(worst, found.size)
+    share = found.worst.share(found.size)
     if share <= CLOSED:
         return "closed in the file, to rounding"
-    return f"open in the file by up to {gap_words(worst)} ({share:.2g} of the size)"
+    return f"open in the file by up to {found.worst.words} ({share:.2g} of the size)"
 
 
 def offer_lines(offers: Offers, size: float) -> Iterator[tuple[str, str]]:

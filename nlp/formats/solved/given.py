@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....models import Dimension, FloatArray, Model
+from ....models import Dimension, Model
 from ....models.catalog import gallery_names, gallery_tables
 from ....models.joints.chain import home_of
 from ....models.joints.mechanisms import mechanism_at_home
@@ -19,8 +19,8 @@ from ....models.mechanism import Mechanism
 from ....models.mechanism.closing import ClosedMechanism, close, closed_near
 from ...case.toml import plain_value
 from ...errors import InputError
-from .links import extent_of, framed, renamed
-from .words import ExportedJoint, RobotMechanism, joint_name, link_name, unique_names
+from ...evidence.state import RobotState
+from .words import ExportedJoint, RobotMechanism, extent_of, framed, joint_name, link_name, renamed, unique_names
 
 #: Parts of a joint by its type, one for each elementary joint: names of coordinates, and ends of joints' names.
 _PARTS: Mapping[str, tuple[tuple[str, str], ...]] = {
@@ -46,19 +46,15 @@ class GivenRobot(NamedTuple):
 
     Attributes:
         model: the robot.
-        parameters: values (1,) of its dimensions by name, radians for angles.
+        state: its dimensions and the pose.
         joints: as limits read them.
         coordinates: known coordinates from home by label and part of a joint, such as ``("2:3", "first")``.
-        rotation: (3, 3) ``R`` of the pose.
-        position: (3,) ``p`` of the pose, length.
     """
 
     model: Model
-    parameters: Mapping[str, FloatArray]
+    state: RobotState
     joints: tuple[LimbJoint, ...]
     coordinates: Mapping[tuple[str, str], float]
-    rotation: FloatArray
-    position: FloatArray
 
 
 def tables_of(model: Model) -> Mapping[str, object]:
@@ -80,7 +76,7 @@ def given_mechanism(robot: GivenRobot) -> RobotMechanism:
     home = home_of(read_robot(tables_of(robot.model)))
     has_networks = home.graph is not None and bool(home.graph.networks)
     angles = {name for name, each in home.words.dimensions.items() if each.kind is Dimension.ANGLE}
-    numbers = {name: float(value.item()) for name, value in robot.parameters.items()}
+    numbers = {name: float(value.item()) for name, value in robot.state.parameters.items()}
     values = {name: math.degrees(value) if name in angles else value for name, value in numbers.items()}
     # Limbs are named alike, whether they are written limb by limb or link by link.
     at_home = mechanism_at_home(home if has_networks else replace(home, graph=None), values)
@@ -105,7 +101,7 @@ def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint
         value = robot.coordinates.get((each.label, each.part))
         if value is not None and joint.kind != "S":
             wanted[joint.name] = value / (each.lever or 1.0)
-    near = closed_near(at_home, wanted, robot.position, robot.rotation)
+    near = closed_near(at_home, wanted, robot.state.position, robot.state.rotation)
     if near is not None and _apart(robot, near, wanted, size) <= _SAME:
         return near
     driven = {joint.name: wanted[joint.name] for joint in at_home.joints if joint.actuated and joint.name in wanted}
@@ -119,8 +115,11 @@ def _closed(robot: GivenRobot, at_home: Mechanism, words: Sequence[ExportedJoint
 def _apart(robot: GivenRobot, closed: ClosedMechanism, wanted: Mapping[str, float], size: float) -> float:
     """Return how far a mechanism is from the program's pose and coordinates: radians, or parts of the robot's size."""
     found = closed.mechanism
-    platform = next(link for link in found.links if link.name == found.platform)
-    apart = [np.abs(platform.rotation - robot.rotation).max(), np.abs(platform.position - robot.position).max() / size]
+    platform = found.link(found.platform)
+    apart = [
+        np.abs(platform.rotation - robot.state.rotation).max(),
+        np.abs(platform.position - robot.state.position).max() / size,
+    ]
     for joint in found.joints:
         if joint.name in wanted:
             difference = closed.coordinates[joint.name] - wanted[joint.name]

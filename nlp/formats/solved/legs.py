@@ -20,8 +20,7 @@ from ....models import Body, FloatArray, Model, WrenchKind
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
 from ....models.mechanism.graph import ElementaryKind
 from ...errors import InputError
-from .links import extent_of, framed
-from .words import ExportedJoint, RobotMechanism, joint_name, link_name, unique_names
+from .words import ExportedJoint, RobotMechanism, extent_of, framed, joint_name, link_name, unique_names
 
 #: Sine of the angle between a leg and the z axis below which they are parallel.
 _PARALLEL = 1e-9

@@ -1,42 +1,43 @@
-"""A solved case as a mechanism: every joint at its place, at one pose of the platform."""
+"""A solved case as a mechanism: every joint at its place, at one pose of the platform.
+
+Joints have ranges from ``leg_length``, from ``actuator_angle`` and ``actuator_length``, and from ranges of joints, all
+counted from the exported pose. Other limits (cones, strokes, clearances, rates) are no ranges of one joint.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
-from ....models.mechanism import Mechanism
+from ....models.limbjoints import LimbJoint
+from ....models.mechanism import MechanismJoint
 from ...case.case import Case
 from ...evidence.state import RobotState, evaluate
 from ...program.nlp import Nlp
 from .given import GivenRobot, given_mechanism, tables_of
 from .legs import PosedLeg, axes_of, check_legs, leg_mechanism
-from .ranges import joint_range
-from .words import ExportedJoint
+from .words import ExportedJoint, RobotMechanism
+
+#: A slide with one side of a range has this many times the robot's size as the other: no loop of the robot is as long.
+_FAR = 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class Exported:
+class Exported(RobotMechanism):
     """A solved case as a mechanism, with what its files say about it.
 
     Attributes:
         case: the case.
         pose: number of the pose, from 1.
-        mechanism: at that pose.
-        joints: its joints in the words of the case, in the mechanism's order.
-        size: largest extent of the joints' centres, length.
-        notes: sentences for people about choices that the case leaves open.
     """
 
     case: Case
     pose: int
-    mechanism: Mechanism
-    joints: tuple[ExportedJoint, ...]
-    size: float
-    notes: tuple[str, ...]
 
 
 def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
@@ -58,7 +59,7 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
     lengths: dict[str, float] = {}
     if tables_of(model):
         coordinates = _coordinates(nlp, x, pose - 1)
-        given = GivenRobot(model, state.parameters, known, coordinates, state.rotation, state.position)
+        given = GivenRobot(model, state, known, coordinates)
         found = given_mechanism(given)
     else:
         check_legs(model)
@@ -67,11 +68,11 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
         found = leg_mechanism(model.name, legs, state.rotation, state.position)
     labelled = {joint.label: joint for joint in known}
     joints = tuple(
-        replace(joint, range=joint_range(nlp.case, joint, words, labelled.get(words.label), lengths, found.size))
+        replace(joint, range=_joint_range(nlp.case, joint, words, labelled.get(words.label), lengths, found.size))
         for joint, words in zip(found.mechanism.joints, found.joints, strict=True)
     )
     mechanism = replace(found.mechanism, joints=joints)
-    return Exported(nlp.case, pose, mechanism, found.joints, found.size, found.notes)
+    return Exported(mechanism, found.joints, found.size, found.notes, nlp.case, pose)
 
 
 def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:
@@ -105,3 +106,50 @@ def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLe
         PosedLeg(leg.name, base[:, k], base[:, k] + span[:, k], tuple(axes[:, i] for i in axes_of(model, leg.name)))
         for k, leg in enumerate(legs)
     ]
+
+
+def _joint_range(
+    case: Case,
+    joint: MechanismJoint,
+    words: ExportedJoint,
+    given: LimbJoint | None,
+    lengths: Mapping[str, float],
+    size: float,
+) -> tuple[float, float] | None:
+    """Return the smallest and the largest coordinate of a joint from the exported pose; None without a limit.
+
+    Args:
+        case: with its limits.
+        joint: the joint.
+        words: the same in the words of the case.
+        given: the joint of the robot file that it is part of; None for a leg.
+        lengths: of the legs at that pose, by limb.
+        size: length of the order of the robot's own.
+    """
+    if not case.limits or joint.kind in ("S", "weld") or words.follows:
+        return None
+    # The classes of limits need pydantic, which a case without limits does not load.
+    from ...case.limits.interval import QuantityLimit  # noqa: PLC0415
+    from ...case.limits.joint_motion import JointMotion  # noqa: PLC0415
+    from ...case.limits.legs import LegLength  # noqa: PLC0415
+
+    is_slide = joint.kind == "P"
+    measure = "actuator_angle" if words.lever is None and not is_slide else "actuator_length"
+    lower, upper, lever, value = -math.inf, math.inf, words.lever or 1.0, words.coordinate or 0.0
+    for limit in case.limits:
+        at = None
+        if isinstance(limit, LegLength) and joint.actuated and words.actuator in lengths:
+            at = lengths[words.actuator]
+        elif isinstance(limit, QuantityLimit) and joint.actuated and given is not None:
+            at = value if limit.measure == measure else None
+        elif isinstance(limit, JointMotion) and given is not None and given.is_called(limit.joint):
+            at = value if limit.part == words.part else None
+        if at is not None and isinstance(limit, LegLength | QuantityLimit | JointMotion):
+            lower = max(lower, -math.inf if limit.min is None else limit.min / lever - at)
+            upper = min(upper, math.inf if limit.max is None else limit.max / lever - at)
+    if math.isinf(lower) and math.isinf(upper):
+        return None
+    # Formats have ranges with two sides; a limit of an angle counts within half a turn from home.
+    far = _FAR * size if is_slide else math.pi
+    middle = 0.0 if is_slide else -value
+    return max(lower, middle - far), min(upper, middle + far)

@@ -1,13 +1,25 @@
-"""A robot at a pose as a mechanism in the words of the case, and names that files of every format take."""
+"""A robot at a pose as a mechanism in the words of the case: names that every format takes, and frames of links.
+
+The origin of a link's frame is at the joint by which the link hangs from the base's side. The x axis points to the
+link's farthest other joint. The z axis is the axis of the first joint, or of another, as far as it is normal to x; else
+the world's.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from ....models.mechanism import Mechanism
+import numpy as np
+
+from ....models import FloatArray
+from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
+
+#: Distance, in parts of the robot's size, below which two joints are at one place; and sine of the angle between two
+#: directions below which they are parallel.
+_NEAR = 1e-9
+_PARALLEL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -33,7 +45,8 @@ class ExportedJoint:
     follows: bool = False
 
 
-class RobotMechanism(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RobotMechanism:
     """A robot as a mechanism at a pose.
 
     Attributes:
@@ -74,3 +87,87 @@ def unique_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
         known.add(one)
         found.append(one)
     return found
+
+
+def extent_of(mechanism: Mechanism) -> float:
+    """Return the largest extent of the joints' centres and of the platform's origin; 1 where all are at one place."""
+    platform = mechanism.link(mechanism.platform)
+    points = np.array([platform.position, *(joint.point for joint in mechanism.joints)])
+    return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+
+
+def framed(mechanism: Mechanism, coordinates: Mapping[str, float], size: float) -> Mechanism:
+    """Return a mechanism whose links have frames at their joints; slides and screws state their points on inner links.
+
+    Args:
+        mechanism: whose slides and screws state their points on outer links.
+        coordinates: of its joints by name, from where both links have them at one point, radians or length.
+        size: length of the order of the robot's own.
+    """
+    joints = tuple(_on_inner_link(joint, coordinates.get(joint.name, 0.0)) for joint in mechanism.joints)
+
+    def link(each: MechanismLink) -> MechanismLink:
+        if each.name in (mechanism.base, mechanism.platform):
+            return each
+        first = next(joint for joint in mechanism.joints if joint.outer == each.name)
+        others = [joint for joint in joints if joint.inner == each.name]
+        points, axes = [first, *others], [first.axis, *(joint.axis for joint in others)]
+        return replace(each, position=first.point, rotation=_rotation([one.point for one in points], axes, size))
+
+    # Links in the order of the joints behind which they are; the platform is the last one.
+    order = dict.fromkeys((mechanism.base, *(joint.outer for joint in joints if joint.outer != mechanism.platform)))
+    links = {each.name: link(each) for each in mechanism.links}
+    return replace(mechanism, links=tuple(links[name] for name in (*order, mechanism.platform)), joints=joints)
+
+
+def renamed(mechanism: Mechanism, names: Mapping[str, str]) -> Mechanism:
+    """Return a mechanism whose links have other names, that every format takes; its ends are ``base`` and ``platform``.
+
+    Args:
+        mechanism: the mechanism.
+        names: of links by the old ones; those that are missing keep theirs.
+    """
+    ends = {mechanism.base: "base", mechanism.platform: "platform"}
+    inner = [link.name for link in mechanism.links if link.name not in ends]
+    new = unique_names((clean_name(names.get(name, name)) for name in inner), ends.values())
+    called = ends | dict(zip(inner, new, strict=True))
+    links = tuple(replace(link, name=called[link.name]) for link in mechanism.links)
+    joints = tuple(replace(joint, inner=called[joint.inner], outer=called[joint.outer]) for joint in mechanism.joints)
+    return replace(mechanism, links=links, joints=joints, base="base", platform="platform")
+
+
+def _on_inner_link(joint: MechanismJoint, coordinate: float) -> MechanismJoint:
+    """Return a joint with the point that its inner link has, in the place of that of its outer one."""
+    way = {"P": coordinate, "H": joint.pitch * coordinate}.get(joint.kind, 0.0)
+    return replace(joint, point=joint.point - way * joint.axis) if way else joint
+
+
+def _rotation(points: Sequence[FloatArray], axes: Sequence[FloatArray], size: float) -> FloatArray:
+    """Return the axes of a link's frame as columns (3, 3), in the world.
+
+    Args:
+        points: (3,) each, centres of its joints in the world; the first one is the frame's origin.
+        axes: (3,) each, their unit axes in the world; zero for spherical joints.
+        size: length of the order of the robot's own.
+    """
+    ways = [point - points[0] for point in points[1:]]
+    farthest = max((float(np.linalg.norm(way)) for way in ways), default=0.0)
+    # Of joints that are equally far the first one counts: rounding would choose another one at each pose.
+    far = next((way for way in ways if float(np.linalg.norm(way)) >= (1 - _NEAR) * farthest), np.zeros(3))
+    known = [axis for axis in axes if axis.any()]
+    world = [np.eye(3)[k] for k in (2, 0, 1)]
+    if farthest > _NEAR * size:
+        x = far / np.linalg.norm(far)
+        z = _across((*known, *world), x)
+    else:
+        z = known[0] if known else world[0]
+        x = _across((*known, *world[1:], world[0]), z)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _across(directions: Sequence[FloatArray], axis: FloatArray) -> FloatArray:
+    """Return the unit vector (3,) of the part normal to a unit axis of the first direction that is not along it."""
+    parts = (direction - axis * float(direction @ axis) for direction in directions)
+    # Of the world's three directions, which are among them, one at least is not along the axis.
+    part = next(part for part in parts if float(np.linalg.norm(part)) > _PARALLEL)
+    return np.asarray(part / np.linalg.norm(part))

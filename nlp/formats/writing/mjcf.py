@@ -15,7 +15,8 @@ import numpy as np
 
 from ....models import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
-from .numbers import direction, number, numbers, quaternion
+from ..frames import quaternion_of
+from .numbers import direction, number, numbers, plain_name
 from .shapes import MARK, PIN, ROD, extent, shape_of
 from .tree import Edge, spanning_tree
 
@@ -59,7 +60,7 @@ class _Writer:
 
     def text(self) -> str:
         """Return the file."""
-        root = ET.Element("mujoco", model=_model_name(self._mechanism.name))
+        root = ET.Element("mujoco", model=plain_name(self._mechanism.name))
         root.append(ET.Comment(_COMMENT))
         ET.SubElement(root, "compiler", angle="radian", autolimits="true")
         option = ET.SubElement(root, "option", gravity="0 0 0", timestep=number(_STEP), integrator="implicitfast")
@@ -100,7 +101,7 @@ class _Writer:
             self._joint(inner, edge)
             shape = shape_of(self._mechanism, child.name, self._size)
             middle = np.mean(shape.points, axis=0) if shape.points else edge.joint.point
-            place = numbers(child.rotation.T @ (middle - child.position))
+            place = numbers(child.local(middle))
             inertia = numbers([shape.inertia] * 3)
             ET.SubElement(inner, "inertial", pos=place, mass=number(shape.mass), diaginertia=inertia)
             if not edge.is_copy:
@@ -116,7 +117,7 @@ class _Writer:
         joint, child = edge.joint, edge.child
         if joint.kind == "weld":
             return
-        place = numbers(child.rotation.T @ (joint.point - child.position))
+        place = numbers(child.local(joint.point))
         element = ET.SubElement(body, "joint", name=joint.name, type=_TYPES[joint.kind], pos=place)
         if joint.kind == "S":
             self._home.append("1 0 0 0")
@@ -134,13 +135,13 @@ class _Writer:
         """Add the lines of a link."""
         shape = shape_of(self._mechanism, link.name, self._size)
         for start, end in shape.lines:
-            ends = [link.rotation.T @ (shape.points[k] - link.position) for k in (start, end)]
+            ends = [link.local(shape.points[k]) for k in (start, end)]
             line = numbers(np.concatenate(ends))
             ET.SubElement(body, "geom", type="capsule", fromto=line, size=number(ROD * self._size), rgba=colour)
 
     def _mark(self, body: ET.Element, link: MechanismLink, joint: MechanismJoint, axis: FloatArray) -> None:
         """Add the mark of a joint to a link: a ball, or a pin along the axis (3,)."""
-        place = link.rotation.T @ (joint.point - link.position)
+        place = link.local(joint.point)
         colour = _DRIVEN if joint.actuated else _JOINT
         if joint.kind == "S":
             ET.SubElement(body, "geom", type="sphere", pos=numbers(place), size=number(MARK * self._size), rgba=colour)
@@ -151,31 +152,16 @@ class _Writer:
 
     def _equalities(self, root: ET.Element) -> None:
         """Add the constraints that close loops and couple coordinates."""
-        links = {link.name: link for link in self._mechanism.links}
         equality = ET.SubElement(root, "equality")
         for each in self._tree.closings:
+            ends = {"name": each.name, "body1": self._body(each.first), "body2": self._body(each.second)}
             if each.kind == "connect":
-                body = links[each.first]
-                anchor = numbers(body.rotation.T @ (each.point - body.position))
-                ET.SubElement(
-                    equality,
-                    "connect",
-                    name=each.name,
-                    body1=self._body(each.first),
-                    body2=self._body(each.second),
-                    anchor=anchor,
-                )
+                body = self._mechanism.link(each.first)
+                anchor = numbers(body.local(each.point))
+                ET.SubElement(equality, "connect", ends, anchor=anchor)
             else:
                 # Rotations count as lengths of the robot's size, so that the rows of the weld are of one order.
-                scale = number(self._size)
-                ET.SubElement(
-                    equality,
-                    "weld",
-                    name=each.name,
-                    body1=self._body(each.first),
-                    body2=self._body(each.second),
-                    torquescale=scale,
-                )
+                ET.SubElement(equality, "weld", ends, torquescale=number(self._size))
         for joint in self._mechanism.joints:
             if joint.kind == "H":
                 _couple(equality, f"{joint.name}_pitch", (joint.name, -joint.pitch), (_slide_name(joint), 1.0))
@@ -228,10 +214,5 @@ def _placed(link: MechanismLink, parent: MechanismLink | None) -> dict[str, str]
     turn: FloatArray = np.eye(3) if parent is None else parent.rotation
     return {
         "pos": numbers(turn.T @ (link.position - origin)),
-        "quat": direction(quaternion(turn.T @ link.rotation)),
+        "quat": direction(quaternion_of(turn.T @ link.rotation)),
     }
-
-
-def _model_name(name: str) -> str:
-    """Return a robot's name without the characters that XML has no place for."""
-    return "".join(char if char.isprintable() else "_" for char in name)

@@ -1,8 +1,15 @@
-"""Base and platform as flat plates: joint centres in the plane of their plate, and their distances from it."""
+"""Base and platform as flat plates: joint centres in the plane of their plate, and their distances from it.
+
+Drawings of plates are written in DXF by ezdxf: joint centres, outline and names.
+"""
 
 from __future__ import annotations
 
+import io
+from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +17,17 @@ from ....models import Dimension, FloatArray
 from ....models.drawing import outline
 from ....models.mechanism import Mechanism
 from ...units import Units
+from ..extra import required
 from .numbers import number
+from .shapes import joint_centres
 from .tables import csv_text
 
 #: Extents of points across a plane, sines of angles, and distances in parts of the robot's size, that count as zero.
 _FLAT = 1e-9
+#: Codes of length units in DXF's header by the label of a case; 0, no unit, for all others.
+_UNITS: Mapping[str, int] = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "km": 7, "um": 13, "dm": 14}
+#: Radius of a joint's circle and height of letters, in parts of the plate's extent.
+_CIRCLE, _LETTERS = 0.02, 0.025
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +68,8 @@ def plate_of(mechanism: Mechanism, link: str, size: float) -> Plate:
         link: name of the link.
         size: the robot's.
     """
-    frame = next(each for each in mechanism.links if each.name == link)
-    centres: list[FloatArray] = []
-    names: list[list[str]] = []
-    for joint in mechanism.joints:
-        if link in (joint.inner, joint.outer):
-            place = frame.rotation.T @ (joint.point - frame.position)
-            same = [k for k, one in enumerate(centres) if np.linalg.norm(one - place) <= _FLAT * size]
-            if same:
-                names[same[0]].append(joint.name)
-            else:
-                centres.append(place)
-                names.append([joint.name])
-    points = np.array(centres).reshape(-1, 3)
+    frame, centres = mechanism.link(link), joint_centres(mechanism, link, size)
+    points = np.array([frame.local(point) for point, _ in centres]).reshape(-1, 3)
     middle = points.mean(axis=0) if len(points) else np.zeros(3)
     normal = _normal(points - middle, size)
     x = np.eye(3)[0] - normal * normal[0]
@@ -78,7 +80,7 @@ def plate_of(mechanism: Mechanism, link: str, size: float) -> Plate:
     origin = normal * float(middle @ normal)
     flat = (points - origin) @ axes
     corners = tuple(outline(points)) if len(points) else ()
-    return Plate(link, tuple(map(tuple, names)), origin, axes, flat[:, :2], flat[:, 2], corners)
+    return Plate(link, tuple(tuple(names) for _, names in centres), origin, axes, flat[:, :2], flat[:, 2], corners)
 
 
 def _normal(points: FloatArray, size: float) -> FloatArray:
@@ -107,3 +109,54 @@ def plates_csv(plates: tuple[Plate, ...], units: Units) -> str:
         for names, place, offset in zip(plate.joints, plate.places, plate.offsets, strict=True)
     ]
     return csv_text(head, rows)
+
+
+def required_dxf() -> Any:  # noqa: ANN401 - a module
+    """Return the library that writes drawings.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    return required("ezdxf", "drawings in DXF")
+
+
+def dxf_text(plate: Plate, unit: str) -> str:
+    """Return the drawing of a plate, the same text for the same plate.
+
+    Args:
+        plate: the plate.
+        unit: label of the length unit.
+
+    Raises:
+        InputError: ezdxf is not installed.
+    """
+    ezdxf, alignment = required_dxf(), import_module("ezdxf.enums").TextEntityAlignment
+    # Dates and identifiers of the document would make two drawings of one plate differ.
+    fixed = ezdxf.options.write_fixed_meta_data_for_testing
+    ezdxf.options.write_fixed_meta_data_for_testing = True
+    try:
+        document = ezdxf.new("R2010")
+        document.units = _UNITS.get(unit, 0)
+        for name, colour in (("OUTLINE", 7), ("JOINTS", 1), ("NAMES", 3), ("FRAME", 5)):
+            document.layers.add(name, color=colour)
+        space = document.modelspace()
+        extent = float(np.ptp(plate.places, axis=0).max(initial=0.0)) if len(plate.places) else 0.0
+        extent = extent or 1.0
+        corners = [tuple(plate.places[k]) for k in plate.corners]
+        if len(corners) > 1:
+            space.add_lwpolyline(corners, close=len(corners) > 2, dxfattribs={"layer": "OUTLINE"})
+        for names, place in zip(plate.joints, plate.places, strict=True):
+            x, y = (float(value) for value in place)
+            space.add_circle((x, y), _CIRCLE * extent, dxfattribs={"layer": "JOINTS"})
+            space.add_point((x, y), dxfattribs={"layer": "JOINTS"})
+            label = space.add_text(" ".join(names), height=_LETTERS * extent, dxfattribs={"layer": "NAMES"})
+            label.set_placement((x + 1.5 * _CIRCLE * extent, y), align=alignment.MIDDLE_LEFT)
+        for end, name in (((0.15 * extent, 0.0), "x"), ((0.0, 0.15 * extent), "y")):
+            space.add_line((0.0, 0.0), end, dxfattribs={"layer": "FRAME"})
+            letter = space.add_text(name, height=_LETTERS * extent, dxfattribs={"layer": "FRAME"})
+            letter.set_placement(end, align=alignment.BOTTOM_LEFT)
+        stream = io.StringIO()
+        document.write(stream)
+    finally:
+        ezdxf.options.write_fixed_meta_data_for_testing = fixed
+    return stream.getvalue()

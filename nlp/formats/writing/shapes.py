@@ -45,6 +45,17 @@ def extent(mechanism: Mechanism) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
 
 
+def joint_centres(mechanism: Mechanism, link: str, size: float) -> list[tuple[FloatArray, list[str]]]:
+    """Return the different places (3,) of a link's joints in the world, each with the names of the joints there."""
+    found: list[tuple[FloatArray, list[str]]] = []
+    for joint in mechanism.joints:
+        if link in (joint.inner, joint.outer):
+            known = (names for point, names in found if np.linalg.norm(joint.point - point) <= _NEAR * size)
+            names = next(known, None)
+            found.append((joint.point, [joint.name])) if names is None else names.append(joint.name)
+    return found
+
+
 def shape_of(mechanism: Mechanism, link: str, size: float) -> Shape:
     """Return a link as it is shown: the line between two joints, or the outline of more with lines to those inside.
 
@@ -53,12 +64,7 @@ def shape_of(mechanism: Mechanism, link: str, size: float) -> Shape:
         link: name of the link.
         size: the robot's.
     """
-    points: list[FloatArray] = []
-    for joint in mechanism.joints:
-        if link in (joint.inner, joint.outer) and all(
-            np.linalg.norm(joint.point - one) > _NEAR * size for one in points
-        ):
-            points.append(joint.point)
+    points = [point for point, _ in joint_centres(mechanism, link, size)]
     lines = _lines(points)
     mass = MASS if lines else SMALL_MASS
     return Shape(tuple(points), tuple(lines), mass, mass * (_GYRATION * size) ** 2)

@@ -6,9 +6,7 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 
-import numpy as np
-
-from ....models import Dimension, FloatArray
+from ....models import Dimension
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
 from ...units import Units
 from ..solved.words import ExportedJoint
@@ -25,7 +23,6 @@ def joints_csv(mechanism: Mechanism, joints: Iterable[ExportedJoint], units: Uni
         joints: its joints in the words of the case; those that are missing have none.
         units: of the table.
     """
-    links = {link.name: link for link in mechanism.links}
     words = {joint.name: joint for joint in joints}
     frames = ("base", "platform", "inner", "outer")
     length = units.label(Dimension.LENGTH)
@@ -41,7 +38,7 @@ def joints_csv(mechanism: Mechanism, joints: Iterable[ExportedJoint], units: Uni
         row += _coordinates(joint, None if said is None else said.coordinate, units)
         row.append(number(joint.pitch) if joint.kind == "H" else "")
         for frame in (mechanism.base, mechanism.platform, joint.inner, joint.outer):
-            row += _place(joint, links[frame])
+            row += _place(joint, mechanism.link(frame))
         rows.append(row)
     return csv_text(head, rows)
 
@@ -49,12 +46,12 @@ def joints_csv(mechanism: Mechanism, joints: Iterable[ExportedJoint], units: Uni
 def links_csv(mechanism: Mechanism, units: Units) -> str:
     """Return the frames of all links in the frame of the base: origin, and axes."""
     length = units.label(Dimension.LENGTH)
-    base = next(link for link in mechanism.links if link.name == mechanism.base)
+    base = mechanism.link(mechanism.base)
     head = ["link", *(f"{c} [{length}]" for c in _COORDINATES)]
     head += [f"{own} axis {c}" for own in _COORDINATES for c in _COORDINATES]
     rows = []
     for link in mechanism.links:
-        origin = base.rotation.T @ (link.position - base.position)
+        origin = base.local(link.position)
         axes = base.rotation.T @ link.rotation
         rows.append([link.name, *map(number, origin), *map(number, axes.T.ravel())])
     return csv_text(head, rows)
@@ -83,10 +80,5 @@ def _place(joint: MechanismJoint, link: MechanismLink) -> list[str]:
     """Return the centre and the axis of a joint in the frame of a link; no axis for a ball."""
     axis: list[str] = [""] * 3
     if joint.kind not in ("S", "weld"):
-        axis = [number(value) for value in in_frame(joint.axis, link)]
-    return [*(number(value) for value in link.rotation.T @ (joint.point - link.position)), *axis]
-
-
-def in_frame(direction: FloatArray, link: MechanismLink) -> FloatArray:
-    """Return a direction (3,) of the world in the frame of a link."""
-    return np.asarray(link.rotation.T @ direction)
+        axis = [number(value) for value in link.rotation.T @ joint.axis]
+    return [*(number(value) for value in link.local(joint.point)), *axis]

@@ -14,7 +14,8 @@ from typing import Literal
 import numpy as np
 
 from ....models import FloatArray
-from ....models.mechanism import Mechanism, MechanismError, MechanismJoint, MechanismLink
+from ....models.mechanism import Mechanism, MechanismError, MechanismJoint, MechanismLink, topology
+from ..solved.words import unique_names
 
 #: Order in which joints come into the tree.
 _WEIGHTS = {"weld": 0, "R": 1, "P": 1, "H": 1, "S": 2}
@@ -64,7 +65,7 @@ class Tree:
 
     Attributes:
         mechanism: the mechanism.
-        edges: joints of the tree, each behind that of its parent.
+        edges: joints of the tree, in their order below each link.
         closings: constraints that close the loops.
     """
 
@@ -75,11 +76,7 @@ class Tree:
     @property
     def base(self) -> MechanismLink:
         """The base."""
-        return self.link(self.mechanism.base)
-
-    def link(self, name: str) -> MechanismLink:
-        """Return a link of the mechanism by its name."""
-        return next(link for link in self.mechanism.links if link.name == name)
+        return self.mechanism.link(self.mechanism.base)
 
     def below(self, link: str) -> Iterator[Edge]:
         """Return the edges from a link to its children."""
@@ -92,39 +89,25 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     Raises:
         MechanismError: a link is not connected with the base.
     """
-    links = {link.name: link for link in mechanism.links}
-    reached = {mechanism.base}
-    rest = list(enumerate(mechanism.joints))
-    edges: list[Edge] = []
-    while True:
-        near = [(k, joint) for k, joint in rest if (joint.inner in reached) != (joint.outer in reached)]
-        if not near:
-            break
-        k, joint = min(near, key=lambda each: (_WEIGHTS[each[1].kind], each[0]))
-        forward = joint.inner in reached
-        parent, child = (joint.inner, joint.outer) if forward else (joint.outer, joint.inner)
-        edges.append(Edge(joint, parent, links[child], joint.axis if forward else -joint.axis))
-        reached.add(child)
-        rest.remove((k, joint))
-    for name in links:
-        if name not in reached:
-            raise MechanismError(f"link {name}", "is not connected with the base")
+    links, joints = {link.name: link for link in mechanism.links}, mechanism.joints
+    order = [(_WEIGHTS[joint.kind], k) for k, joint in enumerate(joints)]
+    ends = [(joint.inner, joint.outer) for joint in joints]
+    branches, chords = topology.spanning_tree([mechanism.base], ends, lambda k: order[k][0])
+    apart = next((name for name in links if name not in {mechanism.base, *(each.child for each in branches)}), None)
+    if apart is not None:
+        raise MechanismError(f"link {apart}", "is not connected with the base")
+    edges = [
+        Edge(joints[k], parent, links[child], joints[k].axis if joints[k].inner == parent else -joints[k].axis)
+        for k, parent, child in sorted(branches, key=lambda each: order[each.edge])
+    ]
     closings = []
-    for _, joint in rest:
+    for joint in (joints[k] for k in chords):
         if joint.kind == "S":
             closings.append(Closing(joint.name, "connect", joint.outer, joint.inner, joint.point))
         elif joint.kind == "weld":
             closings.append(Closing(joint.name, "weld", joint.outer, joint.inner, joint.point))
         else:
-            copy = replace(links[joint.outer], name=_copy_name(joint.name, links))
+            copy = replace(links[joint.outer], name=unique_names([f"end_of_{joint.name}"], links)[0])
             edges.append(Edge(joint, joint.inner, copy, np.array(joint.axis), is_copy=True))
             closings.append(Closing(joint.name, "weld", copy.name, joint.outer, joint.point))
     return Tree(mechanism, tuple(edges), tuple(closings))
-
-
-def _copy_name(joint: str, links: dict[str, MechanismLink]) -> str:
-    """Return a name for the copy of a link behind a joint that no link has."""
-    name = f"end_of_{joint}"
-    while name in links:
-        name += "_"
-    return name

@@ -6,7 +6,6 @@ hinges about the axes of the frame behind it. A screw is a hinge and a slide tha
 
 from __future__ import annotations
 
-import math
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,7 +15,8 @@ import numpy as np
 from ....models import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
 from ...errors import InputError
-from .numbers import direction, number, numbers, roll_pitch_yaw
+from ..frames import axis_frame, roll_pitch_yaw_of
+from .numbers import direction, number, numbers, plain_name
 from .shapes import ROD, SMALL_MASS, Shape, extent, shape_of
 from .tree import Edge, spanning_tree
 
@@ -91,8 +91,7 @@ class _Writer:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism, self._tree, self._size = mechanism, spanning_tree(mechanism), extent(mechanism)
-        name = "".join(char if char.isprintable() else "_" for char in mechanism.name)
-        self._root = ET.Element("robot", name=name)
+        self._root = ET.Element("robot", name=plain_name(mechanism.name))
         self._root.append(ET.Comment(_COMMENT))
         #: Follower of each coupled joint: the joint that it mimics, and the factor.
         self._mimics: dict[str, tuple[str, float]] = {}
@@ -222,7 +221,7 @@ class _Writer:
         inertial = ET.SubElement(element, "inertial")
         middle = np.zeros(3)
         if frame is not None and shape.points:
-            middle = frame.rotation.T @ (np.mean(shape.points, axis=0) - frame.position)
+            middle = frame.local(np.mean(shape.points, axis=0))
         ET.SubElement(inertial, "origin", xyz=numbers(middle), rpy="0 0 0")
         ET.SubElement(inertial, "mass", value=number(shape.mass))
         moments = {"ixx": shape.inertia, "iyy": shape.inertia, "izz": shape.inertia, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
@@ -230,9 +229,9 @@ class _Writer:
         for start, end in shape.lines:
             if frame is None:
                 break
-            one, other = (frame.rotation.T @ (shape.points[k] - frame.position) for k in (start, end))
+            one, other = (frame.local(shape.points[k]) for k in (start, end))
             visual = ET.SubElement(element, "visual")
-            turn = numbers(roll_pitch_yaw(_turn_to(other - one)))
+            turn = numbers(roll_pitch_yaw_of(axis_frame(one, other - one).rotation))
             ET.SubElement(visual, "origin", xyz=numbers((one + other) / 2), rpy=turn)
             geometry = ET.SubElement(visual, "geometry")
             length = float(np.linalg.norm(other - one))
@@ -250,14 +249,6 @@ def _quoted(text: str) -> str:
 
 def _origin(link: MechanismLink, parent: MechanismLink) -> dict[str, str]:
     """Return the attributes of a frame's place in another one."""
-    place = parent.rotation.T @ (link.position - parent.position)
-    turn = roll_pitch_yaw(parent.rotation.T @ link.rotation)
+    place = parent.local(link.position)
+    turn = roll_pitch_yaw_of(parent.rotation.T @ link.rotation)
     return {"xyz": numbers(place), "rpy": direction(turn)}
-
-
-def _turn_to(way: FloatArray) -> FloatArray:
-    """Return a rotation (3, 3) that turns the z axis to the direction of a vector (3,) other than zero."""
-    z = way / math.sqrt(float(way @ way))
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x = x / np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from ...errors import InputError
+from ..errors import InputError
 
 
 def required(library: str, purpose: str, package: str = "") -> Any:  # noqa: ANN401 - a module

@@ -1,4 +1,4 @@
-"""Places of bodies: position and rotation, composed and inverted, and rotations from the words of URDF."""
+"""Places of bodies, composed and inverted, and rotations in the words of MJCF and URDF, both ways."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ....models.arrays import FloatArray
+from ...models.arrays import FloatArray
 
 #: Rotation below which the axis of a small rotation is taken from its skew part alone, rad.
 _SMALL = 1e-9
@@ -76,3 +76,46 @@ def perpendiculars(axis: FloatArray) -> FloatArray:
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
     return np.array([first, np.cross(axis, first)])
+
+
+def axis_frame(point: FloatArray, axis: FloatArray) -> Frame:
+    """Return a frame at a point (3,) with z along an axis (3,) of any length but zero."""
+    z = axis / np.linalg.norm(axis)
+    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return Frame(point, np.column_stack([x, np.cross(z, x), z]))
+
+
+def quaternion_of(R: FloatArray) -> FloatArray:
+    """Return the unit quaternion (4,), scalar part first and not negative, of a rotation matrix (3, 3).
+
+    The largest component is found from the diagonal, the others by division by it (S. W. Shepperd, "Quaternion from
+    rotation matrix", 1978), so that no digits are lost.
+    """
+    squares = np.array(
+        [
+            1 + R[0, 0] + R[1, 1] + R[2, 2],
+            1 + R[0, 0] - R[1, 1] - R[2, 2],
+            1 - R[0, 0] + R[1, 1] - R[2, 2],
+            1 - R[0, 0] - R[1, 1] + R[2, 2],
+        ]
+    )
+    w, x, y = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    a, b, c = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
+    rows = np.array([[squares[0], w, x, y], [w, squares[1], a, b], [x, a, squares[2], c], [y, b, c, squares[3]]])
+    q = rows[int(np.argmax(squares))]
+    q = q / np.linalg.norm(q)
+    return np.asarray(-q if q[0] < 0 else q)
+
+
+def roll_pitch_yaw_of(R: FloatArray) -> FloatArray:
+    """Return the angles (3,), radians, with which ``R = Rz(yaw) Ry(pitch) Rx(roll)``, as URDF has them.
+
+    The roll is computed after the yaw is taken out, so that the three together stay accurate at a pitch of 90 degrees.
+    """
+    pitch = np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
+    yaw = np.arctan2(R[1, 0], R[0, 0]) if np.hypot(R[0, 0], R[1, 0]) > 0 else 0.0
+    s, c = np.sin(yaw), np.cos(yaw)
+    roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return np.array([roll, pitch, yaw])
