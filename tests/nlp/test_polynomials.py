@@ -142,6 +142,9 @@ def test_no_point_of_a_box_is_above_the_model_of_a_sum_or_outside_of_the_part_th
     assert reaches.any()
     assert (inside | ~reaches).all()
     assert ((low > lower) | (high < upper)).any()
+    # Far above the model nothing is left, and the ends are crossed.
+    low, high = reaching_part(model, model.bound() + 10 * size, lower, upper)
+    assert (low > high).all()
 
 
 def test_a_proof_whose_cuts_are_within_rounding_of_loop_equations_is_accepted() -> None:
