@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from .jsondata import JsonObject, Vector
 from .parts import SCHEMA
-from .regression import CaseCheck, ExpectedCheck, PublishedCheck
+from .regression import CaseCheck, PublishedCheck
 
 
 class ExpectedData(JsonObject):
@@ -95,12 +95,10 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
         schema=SCHEMA,
         passed=all(check.passed for check in checks),
         cases=tuple(
-            CaseCheckData(
+            CaseCheckData.of(
+                check,
                 case=check.name,
-                title=check.title,
-                passed=check.passed,
-                seconds=check.seconds,
-                expected=tuple(_expected_data(row) for row in check.expected),
+                expected=tuple(ExpectedData.of(row) for row in check.expected),
                 published=tuple(_published_data(row) for row in check.published),
             )
             for check in checks
@@ -108,30 +106,6 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
     )
 
 
-def _expected_data(row: ExpectedCheck) -> ExpectedData:
-    """Return the check of an expected number as data."""
-    return ExpectedData(
-        quantity=row.quantity,
-        expected=row.expected,
-        computed=row.computed,
-        tolerance=row.tolerance,
-        passed=row.passed,
-    )
-
-
 def _published_data(row: PublishedCheck) -> PublishedData:
     """Return the check of a published number as data."""
-    said = row.published
-    return PublishedData(
-        quantity=said.quantity,
-        value=said.value,
-        source=said.source,
-        reproduced=said.reproduced,
-        because=said.because,
-        decimals=said.decimals,
-        over=said.over,
-        computed=row.computed,
-        verdict=row.verdict,
-        rule=row.rule,
-        passed=row.passed,
-    )
+    return PublishedData.of(row.published, computed=row.computed, verdict=row.verdict, rule=row.rule, passed=row.passed)

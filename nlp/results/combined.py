@@ -37,14 +37,11 @@ def combined_result(
             task_result(outcome.own, j, certificates[j] if certificates else None)
             for j, outcome in enumerate(solution.outcomes)
         ),
-        combined=CombinedData(
-            method=combination.method,
-            value=combination.value,
+        combined=CombinedData.of(
+            combination,
             method_point=point if solution.all_solved else None,
             reached=None if solution.all_solved else point,
             tasks=tuple(_outcome(outcome, is_answer=solution.all_solved) for outcome in solution.outcomes),
-            violated=combination.violated,
-            notices=combination.notices,
             optimality=None if combined is None else optimality_data(combined.nlp, combined.evidence),
             starts=None if combined is None else starts_data(combined),
             certificate=certificate_data(combined_certificate),
@@ -71,10 +68,8 @@ def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:
     best = outcome.own.F if outcome.own.status.is_answer else None
     state = outcome.state if is_answer else None
     loss = outcome.loss if state is not None and best is not None else math.nan
-    return OutcomeData(
-        name=outcome.task.name,
-        sense=outcome.task.sense,
-        weight=outcome.task.weight,
+    return OutcomeData.of(
+        outcome.task,
         F=None if state is None else outcome.F,
         best=best,
         loss=finite_or_none(loss),

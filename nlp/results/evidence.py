@@ -13,7 +13,7 @@ from ..program.nlp import Nlp
 from ..proof.certificate.certificate import Certificate
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
-from .jsondata import finite_or_none, vector
+from .jsondata import vector
 
 
 def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | None:
@@ -21,16 +21,11 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
     if evidence is None:
         return None
     units = nlp.case.units
-    return OptimalityData(
-        kind=evidence.kind,
-        stationarity=finite_or_none(evidence.stationarity),
-        feasibility=finite_or_none(evidence.feasibility),
-        complementarity=finite_or_none(evidence.complementarity),
-        licq=evidence.licq,
+    return OptimalityData.of(
+        evidence,
         active=tuple(
-            ActiveData(
-                name=side.name,
-                bound=side.bound,
+            ActiveData.of(
+                side,
                 value=units.shown(side.value, side.dimension),
                 unit=unit_of_side(nlp.case, side.name, side.dimension) or None,
                 multiplier=units.per_unit(side.multiplier, side.dimension),
@@ -53,21 +48,7 @@ def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
 
 def certificate_data(certificate: Certificate | None) -> CertificateData | None:
     """Return a proven bound; None without a certificate."""
-    if certificate is None:
-        return None
-    return CertificateData(
-        status=certificate.status,
-        bound=finite_or_none(certificate.bound),
-        incumbent=finite_or_none(certificate.incumbent),
-        gap=finite_or_none(certificate.gap),
-        relative_gap=certificate.relative_gap,
-        engine=certificate.engine,
-        boxes=certificate.boxes,
-        open=certificate.open,
-        seconds=certificate.seconds,
-        statement=certificate.statement,
-        history=certificate.history,
-    )
+    return None if certificate is None else CertificateData.of(certificate)
 
 
 def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | None:

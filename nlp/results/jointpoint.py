@@ -32,8 +32,8 @@ def joints_data(
     if found is None:
         return None
     assembly = assembly_of(nlp, x, state)
-    return JointsData(
-        freedoms=found.freedoms,
+    return JointsData.of(
+        found,
         feasible=found.constrained == 0 if with_task else None,
         actuators=_actuators(nlp, found) if with_task else None,
         constrained=found.constrained if with_task else None,
@@ -47,8 +47,8 @@ def joints_data(
 def _actuators(nlp: Nlp, found: Mobility) -> tuple[ActuatorData, ...]:
     """Return the actuators with their rates."""
     return tuple(
-        ActuatorData(
-            name=each.name,
+        ActuatorData.of(
+            each,
             kind="angle" if each.dimension is Dimension.ANGLE else "length",
             rate=finite_or_none(found.actuator_rates.get(each.name, math.inf)),
         )

@@ -38,10 +38,10 @@ def task_result(
     answer = solution.status.is_answer
     margins = () if state is None else margins_data(nlp, x, optimal=answer)
     solved = answer and state is not None
-    return SolveResult(
+    return SolveResult.of(
+        solution,
         head=head_data(nlp.case),
         sense=nlp.sense,
-        status=solution.status,
         F=objective(nlp, x, state) if solved else None,
         reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
         relaxation=relaxation_data(nlp, solution.relaxation),
@@ -54,9 +54,7 @@ def task_result(
         starts=starts_data(solution),
         certificate=certificate_data(certificate),
         workspace=None if workspace is None else _proof_data(workspace),
-        seed=solution.seed,
         versions=versions(),
-        seconds=solution.seconds,
     )
 
 
@@ -81,6 +79,4 @@ def starts_data(solution: ProgramSolution) -> StartsData:
 
 def _optimum_data(found: Optimum) -> OptimumData:
     """Return a distinct optimum."""
-    assembly = found.assembly
-    words = None if assembly is None else assembly.brief
-    return OptimumData(F=found.F, count=found.count, spread=found.spread, assembly=words)
+    return OptimumData.of(found, assembly=None if found.assembly is None else found.assembly.brief)

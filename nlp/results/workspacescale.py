@@ -13,9 +13,8 @@ if TYPE_CHECKING:
 
 def scale_data(found: Scale, units: Units) -> ScaleData:
     """Return the largest proven workspace in a case's units."""
-    return ScaleData(
-        factor=found.factor,
+    return ScaleData.of(
+        found,
         refuted=found.failed if found.refuted else None,
-        claim=found.claim,
         pose=None if found.pose is None else pose_data(found.pose, units),
     )

@@ -121,7 +121,8 @@ def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
         found: the answers.
     """
     is_proved = any(found.certificate)
-    return SweepResult(
+    return SweepResult.of(
+        found,
         head=head_data(case),
         notice=stated_pose_note(case, found.note),
         unit=unit_of_objective(case),
@@ -130,7 +131,6 @@ def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
         F=_column(found.F),
         design=MappingProxyType({name: _column(values) for name, values in found.design.items()}),
         actives=found.active,
-        multipliers=found.multipliers,
         verdicts=found.verdict,
         stationarity=_column(found.stationarity),
         feasibility=_column(found.feasibility),
