@@ -8,7 +8,7 @@ from ...results.comparisonwording import comparison_table
 from ...results.text import TextTable
 from ..pictures.comparisons import comparison_drawings, comparison_picture
 from .markup import Markup, html_table, join_markup, paragraphs, tag
-from .plainpage import picture_figure, plain_page
+from .pages import answer_box, picture_figure, whole_page
 
 
 def comparison_page(found: Comparison, result: ComparisonResult) -> str:
@@ -24,10 +24,10 @@ def comparison_page(found: Comparison, result: ComparisonResult) -> str:
     if ranked and ranked[0].value is not None:
         words = f"{ranked[0].name} has the best value, {ranked[0].value:.7g}; {words}"
     names = ", ".join(each.name for each in result.robots)
-    return plain_page(
+    return whole_page(
         f"{title} - comparison",
         f"{result.case}, robots {names}",
-        tag("div", paragraphs([f"{words}."]), class_="answer" if ranked else "answer none", id="answer"),
+        answer_box([f"{words}."], is_answer=bool(ranked)),
         tag("section", _body(found, result)),
     )
 

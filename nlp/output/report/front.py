@@ -6,7 +6,7 @@ from ...front.front import Front
 from ..fronttable import front_table, front_words
 from ..pictures.fronts import front_picture
 from .markup import html_table, join_markup, paragraphs, tag
-from .plainpage import picture_figure, plain_page
+from .pages import answer_box, picture_figure, whole_page
 
 
 def front_page(front: Front) -> str:
@@ -27,9 +27,9 @@ def front_page(front: Front) -> str:
             html_table(front_table(front), "points of the front"),
         ]
     )
-    return plain_page(
+    return whole_page(
         f"{title} - front",
         f"{front.case.name}, robot {front.case.model.name}",
-        tag("div", paragraphs([f"{words[0]}."]), class_="answer", id="answer"),
+        answer_box([f"{words[0]}."]),
         tag("section", body),
     )

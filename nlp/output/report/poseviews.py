@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from base64 import b64encode
 
 from ..pictures.figures import picture
 from .frames import ViewData
 from .markup import Markup, join_markup, tag
+from .pages import image_source
 from .report import Report
 
 #: So many drawings stand in a page at most; the other views have their tables only.
@@ -48,9 +48,9 @@ def drawings(report: Report) -> Markup:
     ]
     stills = []
     for index, view, drawing in found[:_DRAWINGS]:
-        source = b64encode(_with_fewer_digits(picture([drawing], ".svg"))).decode("ascii")
+        source = image_source(_with_fewer_digits(picture([drawing], ".svg")))
         words = f"The robot, {view['pose_words']}; the table below has its numbers."
         kind = "still" if index else "still chosen"
-        stills.append(tag("img", src=f"data:image/svg+xml;base64,{source}", alt=words, class_=kind, data_view=index))
+        stills.append(tag("img", src=source, alt=words, class_=kind, data_view=index))
     words = "This browser has no WebGL: the robot is drawn flat and does not move, but the numbers follow the sliders."
     return join_markup([tag("p", words, class_="flat-words", role="status"), *stills])

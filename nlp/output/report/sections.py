@@ -32,8 +32,8 @@ from .robotview import robot_section
 
 
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
-    """Return the anchor, heading and content of every section that has content."""
-    found = [
+    """Return the anchor, heading and content of every section; some have no content."""
+    return [
         ("case", "The case in words", _case(report)),
         ("robot", "The robot and its motion", robot_section(report)),
         ("result", "Result", _result(report)),
@@ -46,7 +46,6 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
         ("published", "Published and computed", published_section(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
-    return [(anchor, title, content) for anchor, title, content in found if content]
 
 
 def answer(report: Report) -> Markup:

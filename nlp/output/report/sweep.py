@@ -15,7 +15,7 @@ from ...sweeps.points import Points
 from ..pictures.sweeps import sweep_picture
 from ..sweeptable import TablePoint
 from .markup import html_table, join_markup, paragraphs, tag
-from .plainpage import picture_figure, plain_page
+from .pages import answer_box, picture_figure, whole_page
 
 #: Rows of the table on a page; a browser is slow with many more, and the table's file has all.
 _ROWS = 500
@@ -47,10 +47,10 @@ def sweep_page(case: Case, points: Points, found: SweepColumns) -> str:
     if len(found) > _ROWS:
         parts.append(paragraphs([f"The first {_ROWS} points; the table's file has all {len(found):,}."]))
     parts.append(html_table(_table(case, found), "points", id="swept"))
-    return plain_page(
+    return whole_page(
         f"{title} - sweep",
         f"{case.name}, robot {case.model.name}, over {', '.join(points.names)}",
-        tag("div", paragraphs([f"{words}."]), class_="answer" if answers else "answer none", id="answer"),
+        answer_box([f"{words}."], is_answer=bool(answers)),
         tag("section", join_markup(parts)),
     )
 
