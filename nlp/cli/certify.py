@@ -7,7 +7,18 @@ from typing import Annotated
 import typer
 
 from .numbers import Number, WholeNumber
-from .options import AllAssemblies, CaseName, Jobs, JsonFile, SettingTexts, Time, console, read_settings, write_json
+from .options import (
+    AllAssemblies,
+    CaseName,
+    Jobs,
+    JsonFile,
+    Outputs,
+    SettingTexts,
+    Time,
+    console,
+    read_settings,
+    write_json,
+)
 
 
 def certify(
@@ -39,7 +50,7 @@ def certify(
     from ..case.reader import read_case
     from ..errors import InputError, one_line
     from ..interruption import Milestone, answer_after
-    from ..output.files import check_outputs, write_text
+    from ..output.files import write_text
     from ..output.terminal import show
     from ..results.certified import certified_of
     from ..results.unknownwording import unknown_lines
@@ -50,11 +61,10 @@ def certify(
         answer_after(Milestone.START)
         answer_after(Milestone.BOUND)
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
-        if proof == "-" and json_file == "-":
-            raise InputError("standard output can take one of --json - and --proof - only")
+        files = Outputs(json=json_file, proof=proof)
         loaded, text, inputs = read_case(case, read_settings(settings))
-        check_outputs(inputs, {"--json": json_file, "--proof": proof})
-        if "-" not in (json_file, proof):
+        files.check(inputs)
+        if not files.is_piped:
             show(console(), unknown_lines(loaded.model, all_assemblies=all_assemblies))
         certified = certify_with_progress(
             loaded,
@@ -75,9 +85,8 @@ def certify(
         else:
             # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
             typer.echo(f"--proof {one_line(proof)}: not written, as there is no complete proof", err=True)
-    if json_file is not None:
-        write_json(json_file, result)
-    if "-" not in (json_file, proof):
+    write_json(json_file, result)
+    if not files.is_piped:
         from ..results.summary import certified_summary
 
         show(console(), certified_summary(loaded, result))

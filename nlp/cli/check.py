@@ -35,8 +35,7 @@ def check(
     checks = check_cases(cases)
     if is_requested():
         typer.echo(f"interrupted: {len(checks)} of {len(cases or shipped_cases())} cases are checked", err=True)
-    if json_file is not None:
-        write_json(json_file, checks_of(checks))
+    write_json(json_file, checks_of(checks))
     if junit is not None:
         write_text(junit, checks_as_junit(checks))
     if markdown:

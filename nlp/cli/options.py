@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and checks of the files for results."""
+"""Arguments and options that several commands share, and the files that a command writes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import typer
 from .numbers import Number, WholeNumber
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable, Mapping
+    from pathlib import Path
 
     from rich.console import Console
 
@@ -19,13 +20,11 @@ if TYPE_CHECKING:
     from ..results.jsondata import JsonObject
     from ..results.text import TextTable
 
-#: Leaves the cursor at the beginning of an empty line.
-CLEAR_LINE = "\r\033[K"
-
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
     str | None, typer.Option("--plot", metavar="FILE", help="Draw the robot: a .png, .svg or .pdf file.")
 ]
+PageFile = Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")]
 CurveFile = Annotated[
     str | None, typer.Option("--plot", metavar="FILE", help="Draw the curve: a .png, .svg or .pdf file.")
 ]
@@ -119,20 +118,73 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
     return name, numbers[0] if len(numbers) == 1 else numbers
 
 
-def check_picture(target: str | None) -> None:
-    """Refuse a picture that cannot be drawn, before the work begins.
+#: Options of files for which ``-`` is a name: pictures, and the table of a sweep.
+_PICTURES, _TABLE = ("plot", "picture"), "out"
+
+
+class Outputs:
+    """The files that a command writes; it refuses those that cannot be made, before the work begins.
+
+    Args:
+        targets: file by the option that names it, such as ``json``; None for one that is not asked for. All but
+            pictures and the table of a sweep are standard output for ``-``, one of them at most.
 
     Raises:
-        InputError: its ending is no picture's, or Matplotlib is not installed.
+        InputError: several are standard output, a picture's ending is none, or Matplotlib is not installed.
     """
-    if target is not None:
-        from ..output.pictures.requirements import check_picture as check
 
-        check(target)
+    def __init__(self, **targets: str | None) -> None:
+        self._targets = targets
+        pictures = [target for name in _PICTURES if (target := targets.get(name)) is not None]
+        texts = {name: target for name, target in targets.items() if name not in (*_PICTURES, _TABLE)}
+        #: Whether a file is standard output.
+        self.is_piped = "-" in texts.values()
+        if list(texts.values()).count("-") > 1:
+            from ..errors import InputError
+
+            *names, last = (f"--{name} -" for name in texts)
+            raise InputError(f"standard output can take one of {', '.join(names)} and {last} only")
+        if pictures or targets.get("html") is not None:
+            from ..output.pictures.requirements import check_library, check_picture
+
+            for target in pictures:
+                check_picture(target)
+            if targets.get("html") is not None:
+                check_library("matplotlib", "pages")
+
+    def __getitem__(self, name: str) -> str | None:
+        """Return the file of an option; None where it is not asked for."""
+        return self._targets[name]
+
+    def check(self, inputs: Mapping[Path, str]) -> None:
+        """Refuse files that cannot be written, that are an input, or that are each other.
+
+        Args:
+            inputs: files that are read, and the words for each in messages.
+
+        Raises:
+            InputError: a file is refused.
+        """
+        from ..output.files import check_outputs
+
+        check_outputs(inputs, {f"--{name}": target for name, target in self._targets.items()})
+
+    def draw(self, name: str, picture: Callable[[str], bytes]) -> None:
+        """Write a picture that a function returns for the ending of its file's name.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from ..output.files import write_bytes
+        from ..output.pictures.requirements import ending_of
+
+        target = self._targets[name]
+        if target is not None:
+            write_bytes(target, picture(ending_of(target)))
 
 
-def write_json(target: str, result: JsonObject) -> None:
-    """Write a result as JSON, to standard output for ``-``.
+def write_json(target: str | None, result: JsonObject) -> None:
+    """Write a result as JSON where it is asked for, to standard output for ``-``.
 
     Raises:
         InputError: the file cannot be written.
@@ -142,16 +194,16 @@ def write_json(target: str, result: JsonObject) -> None:
     from ..output.files import write_text
     from ..results.jsondata import json_data
 
-    write_text(target, json.dumps(json_data(result), indent=2, allow_nan=False) + "\n")
+    if target is not None:
+        write_text(target, json.dumps(json_data(result), indent=2, allow_nan=False) + "\n")
 
 
-def check_csv(target: str | None, table: str | None, json_file: str | None, case: Case, *, at_point: bool) -> None:
-    """Refuse a file that cannot be written, or a table that the command has none of, before the work begins.
+def check_csv(target: str | None, table: str | None, case: Case, *, at_point: bool) -> None:
+    """Refuse a table that the command has none of, before the work begins.
 
     Args:
         target: of the tables.
         table: name of the only table to write.
-        json_file: target of the result.
         case: the case.
         at_point: whether the case is evaluated at a point, and not solved.
 
@@ -163,15 +215,13 @@ def check_csv(target: str | None, table: str | None, json_file: str | None, case
 
     if target is None and table is not None:
         raise InputError(f"--table {table}: needs --csv FILE")
-    if target == "-" and json_file == "-":
-        raise InputError("standard output can take one of --json - and --csv - only")
     names = table_names(case, at_point=at_point)
     if table is not None and table not in names:
         raise InputError(f"--table {table}: must be one of {listing(names)}")
 
 
-def write_csv(target: str, tables: Iterable[TextTable], name: str | None) -> None:
-    """Write tables as comma-separated values, to standard output for ``-``.
+def write_csv(target: str | None, tables: Iterable[TextTable], name: str | None) -> None:
+    """Write tables as comma-separated values where they are asked for, to standard output for ``-``.
 
     Raises:
         InputError: it cannot be written, or the result has no table of this name.
@@ -179,7 +229,8 @@ def write_csv(target: str, tables: Iterable[TextTable], name: str | None) -> Non
     from ..output.csvtables import tables_as_csv
     from ..output.files import write_text
 
-    write_text(target, tables_as_csv(tables, name))
+    if target is not None:
+        write_text(target, tables_as_csv(tables, name))
 
 
 def console() -> Console:
