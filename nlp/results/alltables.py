@@ -47,18 +47,12 @@ def case_tables(case: Case, result: CaseResult) -> Iterator[TextTable]:
     yield from _tables(case_summary(case, result))
     if not isinstance(result, CombinedResult) and result.robot is not None:
         yield from _limb_parts(case, result.robot, is_shown=result.reached is None)
-    if not isinstance(result, CombinedResult):
-        yield from _margins(result.margins)
-        return
-    point = result.combined.point
-    if point is None:
-        return
-    if point.robot is not None:
+    if isinstance(result, CombinedResult) and result.robot is not None:
         if result.combined.method_point is None:
             # The summary shows no design without an answer.
-            yield combined_design_table(case, result.combined, point.robot)
-        yield from robot_tables(case, point.robot)
-    yield from _margins(point.margins or ())
+            yield combined_design_table(case, result.combined, result.robot)
+        yield from robot_tables(case, result.robot)
+    yield from _margins(result.margins)
 
 
 def evaluation_tables(case: Case, result: EvaluationResult) -> Iterator[TextTable]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..system.csvtext import csv_text
 from .rounding import number
 from .text import Line, TextTable, Tone
 
@@ -78,15 +77,13 @@ def dimension_words(robot: ComparedRobotData) -> str:
 def comparison_csv(result: ComparisonResult) -> str:
     """Return a comparison as CSV, one row for each robot; what has no value is an empty cell."""
     tasks = next((each.tasks for each in result.robots if each.tasks), ())
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
     head = ["robot", "model", "part", "freedoms", "status", "value"]
     for each in tasks:
         head += [f"F of {each.name}", f"can move {each.name}", f"constraint part of {each.name}"]
         head += [f"rates for {each.name}"]
     head += ["factor", "size", "final_size", "dimensions", "active", "limits_kept", "limits_left_out"]
     head += ["singularities", "workspace", "strokes", "certificate", "proven_bound", "gap", "sentences", "seconds"]
-    writer.writerow(head)
+    rows = []
     for robot in result.robots:
         proof = robot.certificate
         row: list[object] = [robot.name, robot.model, robot.part, robot.freedoms]
@@ -101,8 +98,8 @@ def comparison_csv(result: ComparisonResult) -> str:
         row += [_SEPARATOR.join(f"{name}={each.stroke!r}" for name, each in robot.strokes.items())]
         row += [None] * 3 if proof is None else [proof.status.value, proof.bound, proof.gap]
         row += [" ".join(robot.sentences), robot.seconds]
-        writer.writerow(row)
-    return stream.getvalue()
+        rows.append(row)
+    return csv_text(head, rows)
 
 
 def _headed(name: str, unit: str) -> str:

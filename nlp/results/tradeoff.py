@@ -8,9 +8,9 @@ from ..case.task import Sense
 from ..solver.solution import Solution
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff, TradeoffPoint
-from .data import CaseResult, CombinedResult, SolveResult
+from .data import CaseResult, SolveResult
 from .jsondata import Absent, Inline, JsonObject, Vector, finite_or_none
-from .parts import HeadData, LimitData, PoseData, RobotData, VersionsData
+from .parts import HeadData, LimitData, PoseData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 from .result import result_of
 
@@ -78,7 +78,7 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
     return TradeoffResult(
         head=head_data(case),
         over=found.name,
-        unit=unit_of_number(found.name, case, [row for result in results for row in _limits(result)]),
+        unit=unit_of_number(found.name, case, [row for result in results for row in result.limits]),
         senses=tuple(task.sense for task in case.tasks),
         tasks=tuple(task.name for task in case.tasks),
         points=(
@@ -113,11 +113,11 @@ def unit_of_number(name: str, case: Case, limits: Sequence[LimitData] = ()) -> s
 
 def _point(name: str, point: TradeoffPoint, result: CaseResult) -> TradeoffPointData:
     is_answer = result.status.is_answer
-    robot = _robot(result) if is_answer else None
+    robot = result.robot if is_answer else None
     return TradeoffPointData(
         value=point.value,
         status=result.status,
-        F=_value(result) if is_answer else None,
+        F=result.F if is_answer else None,
         slope=_slope(name, result) if is_answer else None,
         tasks=tuple(finite_or_none(each.F) if is_answer else None for each in point.solution.outcomes),
         active=_active(point.solution, result) if is_answer else (),
@@ -140,22 +140,6 @@ def _unsolved(value: float, tasks: int) -> TradeoffPointData:
     )
 
 
-def _value(result: CaseResult) -> float | None:
-    return result.combined.value if isinstance(result, CombinedResult) else result.F
-
-
-def _robot(result: CaseResult) -> RobotData | None:
-    if isinstance(result, SolveResult):
-        return result.robot
-    return None if result.combined.point is None else result.combined.point.robot
-
-
-def _limits(result: CaseResult) -> tuple[LimitData, ...]:
-    if isinstance(result, SolveResult):
-        return result.limits
-    return () if result.combined.point is None else result.combined.point.limits or ()
-
-
 def _is_key(name: str, key: str) -> bool:
     """Return whether a setting's name is that of a limit's number, whose key may leave out ``max``."""
     dotted = name.removeprefix(_LIMITS)
@@ -165,7 +149,7 @@ def _is_key(name: str, key: str) -> bool:
 def _slope(name: str, result: CaseResult) -> float | None:
     """Return the derivative of F by the number: a limit's cost, or the sensitivity to a fixed number."""
     if name.startswith(_LIMITS):
-        return next((row.cost for row in _limits(result) if _is_key(name, row.key)), None)
+        return next((row.cost for row in result.limits if _is_key(name, row.key)), None)
     if not isinstance(result, SolveResult):
         return None
     whole, _, end = name.rpartition(".")
@@ -179,7 +163,7 @@ def _slope(name: str, result: CaseResult) -> float | None:
 
 def _active(solution: Solution, result: CaseResult) -> tuple[str, ...]:
     """Return the names of the active bounds, and the keys of the active limits."""
-    keys = tuple(f"{_LIMITS}{row.key}" for row in _limits(result) if row.active)
+    keys = tuple(f"{_LIMITS}{row.key}" for row in result.limits if row.active)
     own = solution.decided_by
     if own is None or own.evidence is None:
         return keys

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ...models import component_names, frozen_array
 from ..case.case import Case
 from ..solver.status import Status
+from ..system.csvtext import csv_text
 from ..units import objective_unit, slope_unit
 from .rounding import number
 from .text import Line, TextTable, Tone
@@ -112,16 +111,14 @@ def tradeoff_csv(result: TradeoffResult) -> str:
     answer = next((point for point in result.points if point.parameters is not None), None)
     names = [] if answer is None else list(_design(answer))
     several = len(result.tasks) > 1
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
     own = [f"F {name}" for name in result.tasks] if several else []
-    writer.writerow([result.over, "F", *own, "slope", "status", "active", *names])
+    head, rows = [result.over, "F", *own, "slope", "status", "active", *names], []
     for point in result.points:
         design = _design(point)
         cells: list[object] = [point.F, *(point.tasks if several else ()), point.slope]
         others = [design.get(name) for name in names]
-        writer.writerow([point.value, *cells, point.status.value, " ".join(point.active), *others])
-    return stream.getvalue()
+        rows.append([point.value, *cells, point.status.value, " ".join(point.active), *others])
+    return csv_text(head, rows)
 
 
 def _number(value: float | None) -> str:

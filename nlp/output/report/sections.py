@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from ...case.case import Case
 from ...case.pose import sizes_of_turn
 from ...results.data import CombinedResult, SolveResult
 from ...results.designtable import combined_design_table, solved_design_table
 from ...results.jointwording import limb_part_table
-from ...results.parts import LimitData, MarginData, RobotData
 from ...results.point import task_data
 from ...results.robottables import robot_tables
 from ...results.rounding import number, size_of_F
@@ -61,7 +58,7 @@ def answer(report: Report) -> Markup:
         if not report.is_answer:
             lines.append("This is no answer: what was reached is shown below.")
     kind = "answer" if report.is_answer else "answer none"
-    robot = _robot_of(report)
+    robot = report.result.robot
     if report.is_answer and is_unasked_singularity(robot, report.case):
         kind = "answer singular"
         if robot is not None and isinstance(result, CombinedResult):
@@ -101,7 +98,7 @@ def _case(report: Report) -> Markup:
             f"The robot works at {case.pose_count} poses; F is their {case.over_poses.value}. "
             "The picture and its rates begin with the first; a slider shows each."
         )
-    limits = _limits_of(report)
+    limits = report.result.limits
     if limits:
         listed = ", ".join(f"{row.key} {row.limit:g} {row.unit}".strip() for row in limits)
         lines.append(f"Limits: {listed}.")
@@ -124,7 +121,7 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
     """Return the design at the combined point, then each task by itself."""
     case, combined = report.case, result.combined
     parts: list[Markup] = []
-    robot = None if combined.point is None else combined.point.robot
+    robot = result.robot
     if robot is not None:
         words = "The combined robot" if report.is_answer else "What was reached; this is no answer"
         parts.append(html_table(combined_design_table(case, combined, robot), words, id="design"))
@@ -165,15 +162,15 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
 
 def _limits(report: Report) -> Markup:
     """Return the limits with their costs, and every margin."""
-    limits, margins = _limits_of(report), _margins_of(report)
+    limits, margins = report.result.limits, report.result.margins
     if not limits:
         return Markup("")
     caption = "How near the robot comes to each limit, and what the limit costs"
     proof = report.result.workspace if isinstance(report.result, SolveResult) else None
     held = limits_title(report.case, proof)
     caption += f": {held}" if held else ""
-    robot = _robot_of(report)
-    size = 0.0 if robot is None else size_of_F(robot, _F_of(report))
+    robot = report.result.robot
+    size = 0.0 if robot is None else size_of_F(robot, report.result.F or 0.0)
     parts = [html_table(limit_table(limits, size), caption, id="limit")]
     costliest = costliest_words(limits)
     if costliest is not None:
@@ -201,33 +198,3 @@ def _origin(report: Report) -> Markup:
     return join_markup(
         [html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
     )
-
-
-def _robot_of(report: Report) -> RobotData | None:
-    """Return the robot that the report is about; None where it does not exist."""
-    result = report.result
-    if isinstance(result, SolveResult):
-        return result.robot
-    return None if result.combined.point is None else result.combined.point.robot
-
-
-def _F_of(report: Report) -> float:  # noqa: N802 - the objective's name
-    """Return the objective, of one task or combined; 0 without an answer."""
-    result = report.result
-    return (result.F if isinstance(result, SolveResult) else result.combined.value) or 0.0
-
-
-def _limits_of(report: Report) -> Sequence[LimitData]:
-    """Return the limits of the case at the report's point."""
-    result = report.result
-    if isinstance(result, SolveResult):
-        return result.limits
-    return () if result.combined.point is None else result.combined.point.limits or ()
-
-
-def _margins_of(report: Report) -> Sequence[MarginData]:
-    """Return the margins at the report's point."""
-    result = report.result
-    if isinstance(result, SolveResult):
-        return result.margins
-    return () if result.combined.point is None else result.combined.point.margins or ()
