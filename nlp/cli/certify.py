@@ -53,7 +53,7 @@ def certify(
     from ..output.files import write_text
     from ..output.terminal import show
     from ..results.certified import certified_of
-    from ..results.unknownwording import unknown_lines
+    from ..results.robotwording import unknown_lines
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
 

@@ -48,8 +48,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from heading_lines(case, result)
     if result.workspace is not None:
         # Few cases have a proof, and what shows it loads the room of proofs.
-        from .workspacedigest import proof_digest  # noqa: PLC0415
-        from .workspacewording import proof_lines  # noqa: PLC0415
+        from .workspacewording import proof_digest, proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
         yield from proof_digest(case, result.workspace)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..evidence.kkt import ACTIVE
 from ..units import Units, slope_unit
 from .data import CombinedData
-from .motionwording import motion_words
+from .jointwording import motion_words
 from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
 from .text import TextTable
 from .wording import SET, counted

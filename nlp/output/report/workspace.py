@@ -11,9 +11,8 @@ from ...proof.workspace.slices.slices import Slice
 from ...results.jsondata import json_data
 from ...results.text import Line, TextTable
 from ...results.workspace import WorkspacePose, WorkspaceResult
-from ...results.workspacedigest import verdict_words
 from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
-from ...results.workspacewording import pose_words, workspace_summary
+from ...results.workspacewording import pose_words, verdict_words, workspace_summary
 from ..pictures.figures import picture
 from ..pictures.workspacepose import drawing_at
 from ..pictures.workspaceslices import Kind, slice_images, slices_legend, slices_notes
