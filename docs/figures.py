@@ -19,7 +19,7 @@ from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.output.pictures.drawing import drawing_of_model
 from screwsynth.nlp.output.pictures.painting import Panel
 from screwsynth.nlp.output.pictures.view import clearest_view
-from screwsynth.nlp.output.pictures.workspaceslices import slices_picture
+from screwsynth.nlp.output.pictures.workspaces import slices_picture
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 
 FOLDER = Path(__file__).parent / "figures"

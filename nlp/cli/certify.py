@@ -6,15 +6,16 @@ from typing import Annotated
 
 import typer
 
-from .numbers import Number, WholeNumber
 from .options import (
     AllAssemblies,
     CaseName,
     Jobs,
     JsonFile,
+    Number,
     Outputs,
     SettingTexts,
     Time,
+    WholeNumber,
     console,
     read_settings,
     write_json,

@@ -42,7 +42,7 @@ def check(
         typer.echo(checks_as_markdown(checks), nl=False)
     elif "-" not in (json_file, junit):
         from ..output.terminal import show
-        from ..results.checkwording import checks_summary
+        from ..results.checks import checks_summary
 
         show(console(), checks_summary(checks))
     raise typer.Exit(0 if all(each.passed for each in checks) else 1)

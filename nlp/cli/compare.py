@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import Number
 from .options import (
     CaseName,
     Jobs,
     JsonFile,
+    Number,
     Outputs,
     PageFile,
     Seed,
@@ -101,7 +101,7 @@ def _write(found: Comparison, files: Outputs) -> None:
     """Write a comparison into its files, and onto the terminal where standard output takes no file."""
     from ..comparison.data import comparison_result
     from ..output.files import write_text
-    from ..results.comparisonwording import comparison_csv, comparison_summary
+    from ..results.comparison import comparison_csv, comparison_summary
 
     result = comparison_result(found)
     write_json(files["json"], result)

@@ -47,7 +47,7 @@ def evaluate(
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     write_json(json_file, result)
     if csv_file is not None:
-        from ..results.alltables import evaluation_tables
+        from ..results.summary import evaluation_tables
 
         write_csv(csv_file, evaluation_tables(loaded, result), table)
     if not files.is_piped:

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .numbers import WholeNumber
-from .options import CaseName, Jobs, Seed, SettingTexts, Starts, read_settings
+from .options import CaseName, Jobs, Seed, SettingTexts, Starts, WholeNumber, read_settings
 
 
 def export(

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from .numbers import Number
-from .options import console
+from .options import Number, console
 
 
 class SeveralValues(TyperCommand):

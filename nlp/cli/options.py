@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and the files that a command writes."""
+"""Arguments and options that several commands share, readers of numbers, and the files that a command writes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import sys
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-
-from .numbers import Number, WholeNumber
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -19,6 +17,63 @@ if TYPE_CHECKING:
     from ..case.overrides import Settings
     from ..results.jsondata import JsonObject
     from ..results.text import TextTable
+
+
+class WholeNumber:
+    """Reader of an option that is a whole number.
+
+    Attributes:
+        option: name of the option.
+        least, most: smallest and largest allowed number; no largest one for None.
+    """
+
+    def __init__(self, option: str, least: int, most: int | None = None) -> None:
+        self.option, self.least, self.most = option, least, most
+        # The command line names the type of an option by its reader.
+        self.__name__ = "N"
+
+    def __call__(self, text: str | int) -> int:
+        """Return the number.
+
+        Raises:
+            InputError: the text is no whole number, or the number is not allowed.
+        """
+        from ..errors import InputError
+
+        try:
+            number = int(text)
+        except ValueError:
+            number = self.least - 1
+        if number < self.least or (self.most is not None and number > self.most):
+            allowed = f"of at least {self.least}" if self.most is None else f"from {self.least} to {self.most}"
+            raise InputError(f"{self.option} {text}: must be a whole number {allowed}")
+        return number
+
+
+class Number:
+    """Reader of an option that is a number; the command checks whether it is allowed.
+
+    Attributes:
+        option: name of the option.
+    """
+
+    def __init__(self, option: str) -> None:
+        self.option = option
+        self.__name__ = "NUMBER"
+
+    def __call__(self, text: str | float) -> float:
+        """Return the number.
+
+        Raises:
+            InputError: the text is no number.
+        """
+        from ..errors import InputError
+
+        try:
+            return float(text)
+        except ValueError:
+            raise InputError(f"{self.option} {text}: must be a number") from None
+
 
 CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
 PlotFile = Annotated[
@@ -211,7 +266,7 @@ def check_csv(target: str | None, table: str | None, case: Case, *, at_point: bo
         InputError: it is refused.
     """
     from ..errors import InputError, listing
-    from ..results.alltables import table_names
+    from ..results.summary import table_names
 
     if target is None and table is not None:
         raise InputError(f"--table {table}: needs --csv FILE")

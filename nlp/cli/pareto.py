@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import WholeNumber
 from .options import (
     CaseName,
     CurveFile,
@@ -19,6 +18,7 @@ from .options import (
     SettingTexts,
     Starts,
     Time,
+    WholeNumber,
     console,
     read_settings,
     write_json,
@@ -98,7 +98,7 @@ def _write(found: Front, files: Outputs) -> None:
 
         write_text(html, front_page(found))
     if files["plot"] is not None:
-        from ..output.pictures.fronts import front_picture
+        from ..output.pictures.curves import front_picture
 
         files.draw("plot", partial(front_picture, found))
     if not files.is_piped:

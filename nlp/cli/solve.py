@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from .numbers import WholeNumber
 from .options import (
     CaseName,
     CsvFile,
@@ -20,6 +19,7 @@ from .options import (
     SettingTexts,
     Starts,
     Time,
+    WholeNumber,
     check_csv,
     console,
     read_settings,
@@ -71,7 +71,7 @@ def solve(
     result = result_of(found)
     write_json(json_file, result)
     if csv_file is not None:
-        from ..results.alltables import case_tables
+        from ..results.summary import case_tables
 
         write_csv(csv_file, case_tables(loaded, result), table)
     if plot is not None:

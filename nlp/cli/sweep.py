@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import WholeNumber
 from .options import (
     CaseName,
     JsonFile,
@@ -16,6 +15,7 @@ from .options import (
     PageFile,
     Seed,
     SettingTexts,
+    WholeNumber,
     read_settings,
     time_option,
     write_json,

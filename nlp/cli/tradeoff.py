@@ -49,8 +49,7 @@ def tradeoff(
     from ..case.reader import read_case
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..output.files import write_text
-    from ..results.tradeoff import tradeoff_result
-    from ..results.tradeoffwording import tradeoff_csv, tradeoff_summary
+    from ..results.tradeoff import tradeoff_csv, tradeoff_result, tradeoff_summary
     from ..solver.status import Status
     from ..solver.tradeoff import tradeoff as solve_along
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import Number
-from .options import AllAssemblies, LegError, ResultFile, SettingTexts, read_settings
+from .options import AllAssemblies, LegError, Number, ResultFile, SettingTexts, read_settings
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -38,8 +37,7 @@ def verify_proof(
     from ..errors import InputError
     from ..output.files import read_text
     from ..proof.checker.proof_file import Statement, read_proof
-    from .dimensions import read_machine
-    from .paper import verify_paper
+    from .paper import read_machine, verify_paper
 
     options = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
     given = read_proof(read_text(proof), proof)

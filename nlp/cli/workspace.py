@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import Number
 from .options import (
     CaseName,
     Jobs,
     JsonFile,
     LegError,
+    Number,
     Outputs,
     ResultFile,
     SettingTexts,
@@ -66,8 +66,7 @@ def workspace(
     from ..proof.statement.machine import workspace_of_case
     from ..results.workspace import workspace_of
     from ..results.workspaceposes import evaluate_command
-    from .dimensions import read_machine
-    from .paper import paper_record, write_paper
+    from .paper import paper_record, read_machine, write_paper
 
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
@@ -93,7 +92,7 @@ def workspace(
 
     write_json(json_file, result)
     if plot is not None:
-        from ..output.pictures.workspaceslices import slices_picture
+        from ..output.pictures.workspaces import slices_picture
 
         files.draw("plot", partial(slices_picture, loaded, slices))
     if picture is not None:
@@ -168,7 +167,7 @@ def _worst(case: Case, result: WorkspaceResult, target: str, ending: str) -> byt
     """
     from ..errors import InputError
     from ..output.pictures.figures import picture
-    from ..output.pictures.workspacepose import drawing_at
+    from ..output.pictures.workspaces import drawing_at
     from ..results.workspaceposes import worst_claim
 
     worst = worst_claim(result, case.tasks[0].sense)

@@ -10,7 +10,7 @@ from ..results.evidence import certificate_data
 from ..results.front import FrontGoalData, FrontPointData, FrontResult
 from ..results.jsondata import finite_or_none
 from ..results.point import head_data, stated_pose_notice, versions
-from ..results.tradeoffwording import unit_of_objective
+from ..results.tradeoff import unit_of_objective
 from .front import Front, FrontPoint
 
 

@@ -11,7 +11,7 @@ from ..errors import InputError
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .parts import PoseData, RobotData
-from .reading import load_result
+from .schema import load_result
 
 Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
 

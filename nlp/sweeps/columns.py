@@ -14,7 +14,7 @@ from ..case.case import Case
 from ..results.jsondata import finite_or_none, vector
 from ..results.point import head_data, stated_pose_notice, versions
 from ..results.sweep import Column, SweepResult
-from ..results.tradeoffwording import unit_of_objective
+from ..results.tradeoff import unit_of_objective
 from .journal import Row
 from .sweep import Sweep
 

@@ -16,8 +16,7 @@ from ...errors import InputError
 from ...program.formulation import formulate_each
 from ...results.design import limits_data, margins_data
 from ...results.parts import LimitData
-from ...results.tradeoff import unit_of_number
-from ...results.tradeoffwording import objective_label
+from ...results.tradeoff import objective_label, unit_of_number
 from ...sweeps.points import Points
 from ..sweeptable import TablePoint
 from .canvas import INK, MUTED

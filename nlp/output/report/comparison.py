@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from ...comparison.compare import Comparison
-from ...results.comparison import ComparisonResult
-from ...results.comparisonwording import comparison_table
+from ...results.comparison import ComparisonResult, comparison_table
 from ...results.text import TextTable
 from ..pictures.comparisons import comparison_drawings, comparison_picture
 from .markup import Markup, html_table, join_markup, paragraphs, tag

@@ -6,8 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ...case.case import Case
-from ...results.tradeoff import TradeoffResult
-from ...results.tradeoffwording import objective_label, over_words, throughout_words, tradeoff_table, tradeoff_words
+from ...results.tradeoff import (
+    TradeoffResult,
+    objective_label,
+    over_words,
+    throughout_words,
+    tradeoff_table,
+    tradeoff_words,
+)
 from .charts import Curve, Spot, line_chart
 from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .pages import answer_box, whole_page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...front.front import Front
 from ..fronttable import front_table, front_words
-from ..pictures.fronts import front_picture
+from ..pictures.curves import front_picture
 from .markup import html_table, join_markup, paragraphs, tag
 from .pages import answer_box, picture_figure, whole_page
 

@@ -9,7 +9,7 @@ from ...program.formulation import formulate
 from ...results.rounding import number
 from ...results.tables import sizes_of_variables
 from ...results.text import TextTable
-from ...results.tradeoffwording import unit_of_objective
+from ...results.tradeoff import unit_of_objective
 from ...sweeps.columns import SweepColumns, stated_pose_note
 from ...sweeps.points import Points
 from ..pictures.sweeps import sweep_picture

@@ -14,8 +14,7 @@ from ...results.workspace import WorkspacePose, WorkspaceResult
 from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
 from ...results.workspacewording import pose_words, verdict_words, workspace_summary
 from ..pictures.figures import picture
-from ..pictures.workspacepose import drawing_at
-from ..pictures.workspaceslices import Kind, slice_images, slices_legend, slices_notes
+from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
 from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .pages import answer_box, contents_and_body, image_source, whole_page
 

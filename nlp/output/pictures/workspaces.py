@@ -1,4 +1,4 @@
-"""Pictures of the slices of a workspace."""
+"""Pictures of a workspace: the robot at one of its poses, and slices."""
 
 from __future__ import annotations
 
@@ -16,15 +16,50 @@ from numpy.typing import NDArray
 
 from ....models import Dimension, FloatArray
 from ...case.case import Case
+from ...case.pose import Rotation
+from ...errors import CaseError, EvaluationError
+from ...evidence.closing import closed_start
+from ...evidence.state import evaluate
+from ...program.formulation import formulate_each
+from ...proof.statement.posed_layout import at_one_pose
 from ...proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from ...proof.workspace.slices.slices import Region, Slice
+from ...proof.workspace.verdict import Outcome
 from ...results.rounding import number
+from ...results.workspaceposes import PosedClaim
 from .canvas import INK, MUTED
+from .drawing import Drawing, drawing_of
 from .figures import picture_of
 from .fonts import legible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
+    """Return the robot at the pose of a claim, with the case's first task.
+
+    Args:
+        case: with fixed dimensions.
+        claim: the claim and the pose, in the case's units.
+
+    Raises:
+        EvaluationError: the robot does not exist at the pose, or it is that of another machine within the tolerance.
+    """
+    pose = claim.pose
+    angle = case.units.to_internal(pose.angle, Dimension.ANGLE)
+    posed = at_one_pose(case, tuple(pose.position), Rotation(tuple(pose.axis), angle))
+    try:
+        nlp = formulate_each(posed)[0]
+    except CaseError:
+        if case.joint_centre_tolerance is None:
+            raise
+        # Numbers of the pose that follow from others are those of the machine: the design's loops do not close there.
+        raise EvaluationError("the worst pose is that of a machine within the tolerance, not of the design") from None
+    x = closed_start(nlp)
+    headline = f"{claim.outcome.value}: {claim.words}"
+    return drawing_of(nlp, x, evaluate(nlp, x), headline=headline, is_answer=claim.outcome is not Outcome.REFUTED)
+
 
 #: Width and height of one slice, and height of a line of the legend, inches.
 _SIZE, _LINE = (3.2, 3.02), 0.185
