@@ -82,7 +82,7 @@ from .output.notebook import picture_of as picture_of
 from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
 from .output.report.webpage import report as report
-from .output.sweepfunction import sweep as sweep
+from .output.sweeptable import sweep as sweep
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program

@@ -11,13 +11,13 @@ from .options import (
     CaseName,
     Jobs,
     JsonFile,
-    Number,
     Outputs,
     SettingTexts,
     Time,
-    WholeNumber,
     console,
+    number_option,
     read_settings,
+    starts_option,
     write_json,
 )
 
@@ -25,24 +25,13 @@ from .options import (
 def certify(
     case: CaseName,
     settings: SettingTexts = None,
-    gap: Annotated[
-        float,
-        typer.Option(parser=Number("--gap"), metavar="PART", help="Part of the best F that the bound may be off by."),
-    ] = 1e-4,
+    gap: Annotated[float, number_option("--gap", "PART", "Part of the best F that the bound may be off by.")] = 1e-4,
     time: Time = None,
     above: Annotated[
-        float | None,
-        typer.Option(parser=Number("--above"), metavar="F", help="Prove that F is above this value on the whole box."),
+        float | None, number_option("--above", "F", "Prove that F is above this value on the whole box.")
     ] = None,
     proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
-    starts: Annotated[
-        int | None,
-        typer.Option(
-            parser=WholeNumber("--starts", 1, 100_000),
-            metavar="N",
-            help="Starting points for the incumbent instead of the case's.",
-        ),
-    ] = None,
+    starts: Annotated[int | None, starts_option("Starting points for the incumbent instead of the case's.")] = None,
     all_assemblies: AllAssemblies = False,
     jobs: Jobs = None,
     json_file: JsonFile = None,
@@ -53,7 +42,7 @@ def certify(
     from ..interruption import Milestone, answer_after
     from ..output.files import write_text
     from ..output.terminal import show
-    from ..results.certified import certified_of
+    from ..results.evidence import certified_of
     from ..results.robotwording import unknown_lines
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress

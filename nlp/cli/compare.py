@@ -11,7 +11,6 @@ from .options import (
     CaseName,
     Jobs,
     JsonFile,
-    Number,
     Outputs,
     PageFile,
     Seed,
@@ -19,6 +18,7 @@ from .options import (
     Starts,
     Time,
     console,
+    number_option,
     read_settings,
     write_json,
 )
@@ -34,17 +34,9 @@ def compare(
         list[str],
         typer.Argument(metavar="ROBOT...", help="Names of robots, robot files, or 'case' for the case's own robot."),
     ],
-    size: Annotated[
-        float | None,
-        typer.Option(parser=Number("--size"), metavar="LENGTH", help="Common size; that of the case's robot."),
-    ] = None,
+    size: Annotated[float | None, number_option("--size", "LENGTH", "Common size; that of the case's robot.")] = None,
     no_scale: Annotated[bool, typer.Option("--no-scale", help="Take typical lengths as they are.")] = False,
-    part: Annotated[
-        float,
-        typer.Option(
-            "--range", parser=Number("--range"), metavar="PART", help="Part by which dimensions are free; 0: fixed."
-        ),
-    ] = 0.25,
+    part: Annotated[float, number_option("--range", "PART", "Part by which dimensions are free; 0: fixed.")] = 0.25,
     certified: Annotated[bool, typer.Option("--certify", help="Prove each optimum too.")] = False,
     time: Time = None,
     settings: SettingTexts = None,

@@ -90,21 +90,31 @@ CsvFile = Annotated[
 CsvTable = Annotated[
     str | None, typer.Option("--table", metavar="NAME", help="Write this table only, such as design, limbs or limits.")
 ]
-Starts = Annotated[
-    int | None,
-    typer.Option(
-        parser=WholeNumber("--starts", 1, 100_000), metavar="N", help="Starting points instead of the case's."
-    ),
-]
-Seed = Annotated[
-    int | None, typer.Option(parser=WholeNumber("--seed", 0), metavar="N", help="Seed instead of the case's.")
-]
-Jobs = Annotated[
-    int | None,
-    typer.Option(
-        parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads; what a search finds does not depend on them."
-    ),
-]
+
+
+def number_option(name: str, metavar: str, words: str) -> Any:  # noqa: ANN401 - typer's own type is not public
+    """Return an option that is a number, with what the help says of it."""
+    return typer.Option(name, parser=Number(name), metavar=metavar, help=words)
+
+
+def whole_option(name: str, words: str, least: int, most: int | None = None) -> Any:  # noqa: ANN401 - as above
+    """Return an option that is a whole number within ends, with what the help says of it."""
+    return typer.Option(name, parser=WholeNumber(name, least, most), metavar="N", help=words)
+
+
+def starts_option(words: str) -> Any:  # noqa: ANN401 - as above
+    """Return the option ``--starts``, with what the help says of it."""
+    return whole_option("--starts", words, 1, 100_000)
+
+
+def jobs_option(words: str) -> Any:  # noqa: ANN401 - as above
+    """Return the option ``--jobs``, with what the help says of it."""
+    return whole_option("--jobs", words, 1, 256)
+
+
+Starts = Annotated[int | None, starts_option("Starting points instead of the case's.")]
+Seed = Annotated[int | None, whole_option("--seed", "Seed instead of the case's.", 0)]
+Jobs = Annotated[int | None, jobs_option("Threads; what a search finds does not depend on them.")]
 
 
 def _begin(context: typer.Context, seconds: float | None) -> float | None:
@@ -132,13 +142,7 @@ AllAssemblies = Annotated[
     typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),
 ]
 LegError = Annotated[
-    float,
-    typer.Option(
-        "--leg-error",
-        parser=Number("--leg-error"),
-        metavar="LENGTH",
-        help="Largest error of a leg's length: bounds the errors of the pose.",
-    ),
+    float, number_option("--leg-error", "LENGTH", "Largest error of a leg's length: bounds the errors of the pose.")
 ]
 ResultFile = Annotated[
     str | None,

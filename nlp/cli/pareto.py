@@ -18,9 +18,9 @@ from .options import (
     SettingTexts,
     Starts,
     Time,
-    WholeNumber,
     console,
     read_settings,
+    whole_option,
     write_json,
 )
 from .progress import counting_line
@@ -35,9 +35,7 @@ def pareto(
         list[str],
         typer.Option(metavar="GOAL", help="Twice or more: max or min, then F:TASK or limits.KEY, as in 'max F:drive'."),
     ],
-    points: Annotated[
-        int, typer.Option(parser=WholeNumber("--points", 2, 1000), metavar="N", help="Points of the front.")
-    ] = 16,
+    points: Annotated[int, whole_option("--points", "Points of the front.", 2, 1000)] = 16,
     settings: SettingTexts = None,
     starts: Starts = None,
     seed: Seed = None,

@@ -19,10 +19,10 @@ from .options import (
     SettingTexts,
     Starts,
     Time,
-    WholeNumber,
     check_csv,
     console,
     read_settings,
+    whole_option,
     write_csv,
     write_json,
 )
@@ -42,12 +42,7 @@ def solve(
     csv_file: CsvFile = None,
     table: CsvTable = None,
     plot: PlotFile = None,
-    pose: Annotated[
-        int,
-        typer.Option(
-            parser=WholeNumber("--pose", 1), metavar="N", help="Pose that --plot draws, where the case has several."
-        ),
-    ] = 1,
+    pose: Annotated[int, whole_option("--pose", "Pose that --plot draws, where the case has several.", 1)] = 1,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
     ] = False,

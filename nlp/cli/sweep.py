@@ -15,8 +15,9 @@ from .options import (
     PageFile,
     Seed,
     SettingTexts,
-    WholeNumber,
+    jobs_option,
     read_settings,
+    starts_option,
     time_option,
     write_json,
 )
@@ -41,19 +42,9 @@ def sweep(
         typer.Option("--points", metavar="FILE", help="A CSV file of points instead, names in its first row."),
     ] = None,
     settings: SettingTexts = None,
-    starts: Annotated[
-        int | None,
-        typer.Option(
-            parser=WholeNumber("--starts", 1, 100_000),
-            metavar="N",
-            help="Starting points at each point; 8 if left out.",
-        ),
-    ] = None,
+    starts: Annotated[int | None, starts_option("Starting points at each point; 8 if left out.")] = None,
     seed: Seed = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads, or processes of Ipopt."),
-    ] = None,
+    jobs: Annotated[int | None, jobs_option("Threads, or processes of Ipopt.")] = None,
     engine: Annotated[
         str | None, typer.Option("--engine", metavar="WORD", help="compiled or ipopt; compiled where that covers it.")
     ] = None,
@@ -73,16 +64,13 @@ def sweep(
 ) -> None:
     """Solve at thousands of values of fixed numbers."""
     from ..case.reader import read_case
-    from ..errors import InputError
     from ..interruption import say_on_leaving
     from ..output.sweeptable import check_table, is_written, write_table
     from ..sweeps.engines import EngineKind
     from ..sweeps.points import CaseSource
     from ..sweeps.sweep import Sweep, run_sweep
 
-    kinds = {kind.value: kind for kind in EngineKind}
-    if engine is not None and engine not in kinds:
-        raise InputError(f"--engine {engine}: must be compiled or ipopt")
+    kind = EngineKind.of(engine)
     chosen = _read_points(over, points)
     files = Outputs(out=out, json=json_file, html=html, plot=plot)
     if plot is not None:
@@ -111,7 +99,7 @@ def sweep(
                 run_sweep(
                     found,
                     journal,
-                    engine=None if engine is None else kinds[engine],
+                    engine=kind,
                     jobs=jobs,
                     dask=dask,
                     progress=lambda *counts: show(_progress_words(*counts)),

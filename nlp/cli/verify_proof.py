@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import AllAssemblies, LegError, Number, ResultFile, SettingTexts, read_settings
+from .options import AllAssemblies, LegError, ResultFile, SettingTexts, number_option, read_settings
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -23,8 +23,7 @@ def verify_proof(
     settings: SettingTexts = None,
     of: ResultFile = None,
     above: Annotated[
-        float | None,
-        typer.Option(parser=Number("--above"), metavar="F", help="The proof must show that F is above this value."),
+        float | None, number_option("--above", "F", "The proof must show that F is above this value.")
     ] = None,
     all_assemblies: AllAssemblies = False,
     leg_error: LegError = 0.0,

@@ -12,12 +12,12 @@ from .options import (
     Jobs,
     JsonFile,
     LegError,
-    Number,
     Outputs,
     ResultFile,
     SettingTexts,
     Time,
     console,
+    number_option,
     read_settings,
     write_json,
 )
@@ -38,10 +38,7 @@ def workspace(
     of_quantity: Annotated[
         list[str] | None, typer.Option("--of-quantity", metavar="NAME", help="Bound this measure of the robot too.")
     ] = None,
-    gap: Annotated[
-        float,
-        typer.Option(parser=Number("--gap"), metavar="PART", help="Part of a value that its bound may be off by."),
-    ] = 1e-3,
+    gap: Annotated[float, number_option("--gap", "PART", "Part of a value that its bound may be off by.")] = 1e-3,
     time: Time = None,
     leg_error: LegError = 0.0,
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,

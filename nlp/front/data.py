@@ -7,7 +7,7 @@ from types import MappingProxyType
 from ..program.places import Scalar
 from ..program.program import design_indices
 from ..results.evidence import certificate_data
-from ..results.front import FrontGoalData, FrontPointData, FrontResult
+from ..results.explorations import FrontGoalData, FrontPointData, FrontResult
 from ..results.jsondata import finite_or_none
 from ..results.point import head_data, stated_pose_notice, versions
 from ..results.tradeoff import unit_of_objective

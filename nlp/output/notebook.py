@@ -31,8 +31,7 @@ from ..solver.solution import Solution
 from .pictures.drawing import Drawing, drawing_of, drawing_of_model
 from .pictures.requirements import check_library
 from .pictures.solutions import drawings_of
-from .report.markup import html_table, join_markup, paragraphs, tag
-from .report.pages import image_source
+from .report.markup import html_table, image_source, join_markup, paragraphs, tag
 from .terminal import show
 
 #: Width of a text without a terminal, as the command line writes into a file.

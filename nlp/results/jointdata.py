@@ -1,17 +1,79 @@
-"""Joints of a robot given joint by joint: freedoms, rates, singularities, F by limb and assembly, at a point too."""
+"""Motions and wrenches as data; joints of a robot given joint by joint: freedoms, rates, singularities, assembly."""
 
 import math
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
-from ...models import Dimension, FloatArray
+import numpy as np
+
+from ...models import Dimension, FloatArray, axis_from_screw
 from ..evidence.assembly import assembly_of
 from ..evidence.conventions import Dependence
 from ..evidence.mobility import Mobility, mobility_of
 from ..evidence.singularities import Singularity, SingularityKey, clause_of
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
-from .jsondata import Absent, JsonObject, finite_or_none
-from .motiondata import MotionData, WrenchData, motion_data, wrench_data
+from .jsondata import Absent, JsonObject, Vector3, Vector6, finite_or_none, vector
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+class MotionData(JsonObject):
+    """An instantaneous motion of the platform.
+
+    Attributes:
+        twist: angular velocity, then velocity at the world origin.
+        axis: unit direction of the screw axis.
+        point: the axis's point nearest to the world origin; null for a translation.
+        pitch: length per radian; "inf" for a translation.
+    """
+
+    twist: Vector6
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+class WrenchData(JsonObject):
+    """A wrench of unit force, or a unit couple.
+
+    Attributes:
+        wrench: force, then moment about the world origin.
+        axis: unit direction of the screw axis.
+        point: the axis's point nearest to the world origin; null for a couple.
+        pitch: moment along the axis per unit of force, length; "inf" for a couple.
+    """
+
+    wrench: Vector6
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+def motion_data(twist: "ArrayLike") -> MotionData:
+    """Return a twist (6,) with its axis, point and pitch; a pure translation has no point."""
+    return MotionData(twist=vector(np.asarray(twist, dtype=np.float64)), **_axis_of(twist))
+
+
+def wrench_data(wrench: "ArrayLike") -> WrenchData:
+    """Return a wrench (6,) with its axis, point and pitch; a pure couple has no point."""
+    return WrenchData(wrench=vector(np.asarray(wrench, dtype=np.float64)), **_axis_of(wrench))
+
+
+class _Axis(TypedDict):
+    """Axis, point and pitch of a screw, as the data have them."""
+
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+def _axis_of(coordinates: "ArrayLike") -> _Axis:
+    """Return axis, point and pitch of a screw (6,); one of infinite pitch has no point."""
+    screw = axis_from_screw(coordinates)
+    infinite = math.isinf(screw.pitch)
+    point = None if infinite else vector(screw.point)
+    return {"axis": vector(screw.axis), "point": point, "pitch": "inf" if infinite else screw.pitch}
 
 
 class ActuatorData(JsonObject):

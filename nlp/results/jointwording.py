@@ -13,8 +13,7 @@ from .rounding import NOISE, number, robot_size, settled
 from .text import Figure, Line, TextTable, Tone
 
 if TYPE_CHECKING:
-    from .jointdata import JointsData, SingularityData
-    from .motiondata import MotionData, WrenchData
+    from .jointdata import JointsData, MotionData, SingularityData, WrenchData
     from .parts import RobotData
 
 

@@ -18,9 +18,8 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from .jointdata import joints_data
+from .jointdata import joints_data, motion_data
 from .jsondata import Vector, matrix, vector
-from .motiondata import motion_data
 from .parts import (
     SCHEMA,
     ByOwner,

@@ -13,15 +13,14 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, Union, get_ar
 from ..errors import InputError, listing
 from ..system.reading import read_limited
 from ..system.strictjson import Size, WrongValueError, below, json_tree, value_of
-from .certified import CertifiedResult
 from .checks import ChecksResult
 from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
-from .front import FrontResult
+from .evidence import CertifiedResult
+from .explorations import FrontResult, SweepResult
 from .jsondata import JsonObject, JsonValue, Mark, kinds_of
 from .parts import SCHEMA
-from .sweep import SweepResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 

@@ -36,9 +36,9 @@ from .wording import (
 )
 
 if TYPE_CHECKING:
-    from .certified import CertifiedResult
     from .data import CaseResult, SolveResult
     from .evaluation import EvaluationResult
+    from .evidence import CertifiedResult
     from .parts import MarginData, RobotData
 
 Summary: TypeAlias = Iterator[Line | TextTable]

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
+from ..results.explorations import Column, SweepResult
 from ..results.jsondata import finite_or_none, vector
 from ..results.point import head_data, stated_pose_notice, versions
-from ..results.sweep import Column, SweepResult
 from ..results.tradeoff import unit_of_objective
 from .journal import Row
 from .sweep import Sweep

@@ -16,17 +16,20 @@ from ...front.data import goal_units, goal_values
 from ...front.front import Front
 from ...results.tradeoff import TradeoffResult, objective_label, tradeoff_words
 from ..fronttable import goal_names
-from .canvas import INK, MUTED, RED
+from .canvas import INK, RED, draw_edges
 from .figures import picture_of
+
+
+def draw_grid(axes: Axes) -> None:
+    """Draw grid, ticks and edges of axes."""
+    axes.grid(color="#e3e6e8", linewidth=0.7)
+    axes.set_axisbelow(True)
+    draw_edges(axes)
 
 
 def draw_frame(axes: Axes, title: str) -> None:
     """Draw grid, ticks and edges of axes, and a title of at most two lines."""
-    axes.grid(color="#e3e6e8", linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.tick_params(colors=INK, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_edgecolor(MUTED)
+    draw_grid(axes)
     axes.ticklabel_format(useOffset=False)
     lines = textwrap.wrap(title, 66, max_lines=2, placeholder=" …")
     axes.set_title("\n".join(lines), loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
@@ -133,10 +136,6 @@ def _pairs(labels: list[str], values: FloatArray, title: str) -> Figure:
             axes.scatter(values[:, i], values[:, j], color="#08519c", s=18, gid="front")
         axes.set_xlabel(labels[i], color=INK, parse_math=False)
         axes.set_ylabel(labels[j], color=INK, parse_math=False)
-        axes.tick_params(colors=INK, labelsize=9)
-        axes.grid(color="#e3e6e8", linewidth=0.7)
-        axes.set_axisbelow(True)
-        for spine in axes.spines.values():
-            spine.set_edgecolor(MUTED)
+        draw_grid(axes)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
     return figure

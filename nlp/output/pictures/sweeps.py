@@ -19,7 +19,7 @@ from ...results.parts import LimitData
 from ...results.tradeoff import objective_label, unit_of_number
 from ...sweeps.points import Points
 from ..sweeptable import TablePoint
-from .canvas import INK, MUTED
+from .canvas import INK, MUTED, draw_edges
 from .figures import picture_of
 from .fonts import legible
 
@@ -68,9 +68,7 @@ def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Fig
         _draw_map(figure, axes, [axis for _, axis in changing], F, sets, names, objective_label(case))
         axes.set_ylabel(_label(case, changing[1][0]), color=INK, parse_math=False)
     axes.set_xlabel(_label(case, changing[0][0]), color=INK, parse_math=False)
-    axes.tick_params(colors=INK, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_edgecolor(MUTED)
+    draw_edges(axes)
     title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
     note = (

@@ -27,7 +27,7 @@ from ...proof.workspace.slices.slices import Region, Slice
 from ...proof.workspace.verdict import Outcome
 from ...results.rounding import number
 from ...results.workspaceposes import PosedClaim
-from .canvas import INK, MUTED
+from .canvas import INK, draw_edges
 from .drawing import Drawing, drawing_of
 from .figures import picture_of
 from .fonts import legible
@@ -247,9 +247,7 @@ def _frame(axes: Axes, case: Case, each: Slice) -> None:
     labels = [f"{name}, {case.units.label(part)}" for name, part in zip(each.names, dimensions, strict=True)]
     axes.set_xlabel(legible(labels[0]), color=INK, fontsize=9, parse_math=False)
     axes.set_ylabel(legible(labels[1]), color=INK, fontsize=9, parse_math=False)
-    axes.tick_params(colors=INK, labelsize=8)
-    for spine in axes.spines.values():
-        spine.set_edgecolor(MUTED)
+    draw_edges(axes, 8)
 
 
 def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from ...comparison.compare import Comparison
-from ...results.comparison import ComparisonResult, comparison_table
+from ...results.comparison import ComparedRobotData, ComparisonResult, comparison_table
 from ...results.text import TextTable
 from ..pictures.comparisons import comparison_drawings, comparison_picture
-from .markup import Markup, html_table, join_markup, paragraphs, tag
-from .pages import answer_box, picture_figure, whole_page
+from .markup import Markup, answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 
 def comparison_page(found: Comparison, result: ComparisonResult) -> str:
@@ -46,13 +45,12 @@ def _body(found: Comparison, result: ComparisonResult) -> Markup:
     for robot in result.robots:
         parts += [tag("h3", robot.name), paragraphs([f"{robot.description}.", *robot.sentences])]
         if robot.dimensions:
-            parts.append(html_table(_dimension_table(result, robot.name), f"dimensions of {robot.name}"))
+            parts.append(html_table(_dimension_table(robot), f"dimensions of {robot.name}"))
     return join_markup(parts)
 
 
-def _dimension_table(result: ComparisonResult, name: str) -> TextTable:
+def _dimension_table(robot: ComparedRobotData) -> TextTable:
     """Return the dimensions of a robot's design, with their ranges."""
-    robot = next(each for each in result.robots if each.name == name)
     rows = tuple(
         (
             each.name,

@@ -15,8 +15,7 @@ from ...results.tradeoff import (
     tradeoff_words,
 )
 from .charts import Curve, Spot, line_chart
-from .markup import Markup, html_table, join_markup, paragraphs, tag
-from .pages import answer_box, whole_page
+from .markup import Markup, answer_box, html_table, join_markup, paragraphs, tag, whole_page
 
 
 def tradeoff_figures(case: Case, results: Sequence[TradeoffResult], here: Mapping[str, float] | None = None) -> Markup:

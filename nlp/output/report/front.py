@@ -5,8 +5,7 @@ from __future__ import annotations
 from ...front.front import Front
 from ..fronttable import front_table, front_words
 from ..pictures.curves import front_picture
-from .markup import html_table, join_markup, paragraphs, tag
-from .pages import answer_box, picture_figure, whole_page
+from .markup import answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 
 def front_page(front: Front) -> str:

@@ -7,8 +7,7 @@ import re
 from ..pictures.figures import picture
 from ..pictures.style import RATE_COLOURS
 from .frames import ViewData
-from .markup import Markup, join_markup, paragraphs, script_frame, tag
-from .pages import image_source
+from .markup import Markup, image_source, join_markup, paragraphs, script_frame, tag
 from .report import Report
 
 #: So many drawings stand in a page at most; the other views have their tables only.

@@ -14,8 +14,7 @@ from ...sweeps.columns import SweepColumns, stated_pose_note
 from ...sweeps.points import Points
 from ..pictures.sweeps import sweep_picture
 from ..sweeptable import TablePoint
-from .markup import html_table, join_markup, paragraphs, tag
-from .pages import answer_box, picture_figure, whole_page
+from .markup import answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 #: Rows of the table on a page; a browser is slow with many more, and the table's file has all.
 _ROWS = 500

@@ -17,7 +17,7 @@ from ...solver.certified import Certified
 from ...solver.solution import Solution
 from ..files import check_target, write_bytes
 from ..pictures.requirements import check_library
-from .pages import contents_and_body, whole_page
+from .markup import contents_and_body, whole_page
 from .report import Report, report_of
 from .sections import answer, sections
 

@@ -15,8 +15,17 @@ from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
 from ...results.workspacewording import pose_words, verdict_words, workspace_summary
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
-from .markup import Markup, html_table, join_markup, paragraphs, tag
-from .pages import answer_box, contents_and_body, image_source, whole_page
+from .markup import (
+    Markup,
+    answer_box,
+    contents_and_body,
+    html_table,
+    image_source,
+    join_markup,
+    paragraphs,
+    tag,
+    whole_page,
+)
 
 
 @dataclass(frozen=True, eq=False)
