@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -104,9 +103,9 @@ def _write(found: Comparison, files: Outputs) -> None:
 
         write_text(html, comparison_page(found, result))
     if files["plot"] is not None:
-        from ..output.pictures.comparisons import comparison_picture
+        from ..output.pictures.comparisons import comparison_figure
 
-        files.draw("plot", partial(comparison_picture, found))
+        files.draw("plot", comparison_figure, found)
     if not files.is_piped:
         from ..output.terminal import show
 

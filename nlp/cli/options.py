@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec
 
 import typer
 
@@ -11,12 +11,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
 
+    from matplotlib.figure import Figure
     from rich.console import Console
 
     from ..case.case import Case
     from ..case.overrides import Settings
     from ..results.jsondata import JsonObject
     from ..results.text import TextTable
+
+
+_P = ParamSpec("_P")
 
 
 class WholeNumber:
@@ -228,18 +232,19 @@ class Outputs:
 
         check_outputs(inputs, {f"--{name}": target for name, target in self._targets.items()})
 
-    def draw(self, name: str, picture: Callable[[str], bytes]) -> None:
-        """Write a picture that a function returns for the ending of its file's name.
+    def draw(self, name: str, make: Callable[_P, Figure], *values: _P.args, **options: _P.kwargs) -> None:
+        """Write the picture of an option, of the figure that a function returns for arguments.
 
         Raises:
             InputError: the file cannot be written.
         """
         from ..output.files import write_bytes
+        from ..output.pictures.figures import picture_of
         from ..output.pictures.requirements import ending_of
 
         target = self._targets[name]
         if target is not None:
-            write_bytes(target, picture(ending_of(target)))
+            write_bytes(target, picture_of(ending_of(target), make, *values, **options))
 
 
 def write_json(target: str | None, result: JsonObject) -> None:

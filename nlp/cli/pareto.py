@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -96,9 +95,9 @@ def _write(found: Front, files: Outputs) -> None:
 
         write_text(html, front_page(found))
     if files["plot"] is not None:
-        from ..output.pictures.curves import front_picture
+        from ..output.pictures.curves import front_figure
 
-        files.draw("plot", partial(front_picture, found))
+        files.draw("plot", front_figure, found)
     if not files.is_piped:
         for line in front_words(found):
             typer.echo(line)

@@ -112,7 +112,7 @@ def sweep(
             journal.remove()
     if json_file is not None or html is not None:
         _write(found, out, json_file, html)
-    raise typer.Exit(_show(found, out, plot, is_silent=files.is_piped))
+    raise typer.Exit(_show(found, out, files))
 
 
 def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> None:
@@ -161,20 +161,17 @@ def _read_points(over: list[str] | None, file: str | None) -> Points:
     return points_of_csv(read_text(file), file) if file is not None else grid(over or [])
 
 
-def _show(found: Sweep, out: str, plot: str | None, *, is_silent: bool) -> int:
+def _show(found: Sweep, out: str, files: Outputs) -> int:
     """Draw the picture, print a line about the table, and return the exit status."""
     import math
 
     from ..output.sweeptable import table_points
 
     rows = table_points(out)
-    if plot is not None:
-        from ..output.files import write_bytes
-        from ..output.pictures.requirements import ending_of
-        from ..output.pictures.sweeps import sweep_picture
+    if files["plot"] is not None:
+        from ..output.pictures.sweeps import sweep_figure
 
-        case = found.source.case_at(found.points.settings(0))
-        write_bytes(plot, sweep_picture(case, found.points, rows, ending_of(plot)))
+        files.draw("plot", sweep_figure, found.source.case_at(found.points.settings(0)), found.points, rows)
     values = [row.F for row in rows if not math.isnan(row.F)]
     regions = len({row.active for row in rows if not math.isnan(row.F)})
     ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
@@ -183,7 +180,7 @@ def _show(found: Sweep, out: str, plot: str | None, *, is_silent: bool) -> int:
 
         proved = sum(row.certificate == "proved" for row in table_rows(out, found))
         ends += f", {proved:,} are proved"
-    if not is_silent:
+    if not files.is_piped:
         typer.echo(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")
         notice = _notice(found, out)
         if notice is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated, NamedTuple
 
 import typer
@@ -80,9 +79,9 @@ def tradeoff(
 
         write_text(page, tradeoff_page(loaded, result))
     if plot is not None:
-        from ..output.pictures.curves import tradeoff_picture
+        from ..output.pictures.curves import tradeoff_figure
 
-        files.draw("plot", partial(tradeoff_picture, loaded, result))
+        files.draw("plot", tradeoff_figure, loaded, result)
     if not files.is_piped:
         from ..output.terminal import show
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -24,6 +23,8 @@ from .options import (
 from .progress import spinner
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..case.case import Case
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.proof_writer import PaperRecord
@@ -61,7 +62,7 @@ def workspace(
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..proof.statement.machine import workspace_of_case
-    from ..results.workspace import workspace_of
+    from ..results.workspace import scale_data, workspace_of
     from ..results.workspaceposes import evaluate_command
     from .paper import paper_record, read_machine, write_paper
 
@@ -78,7 +79,6 @@ def workspace(
     largest = None
     if scale:
         from ..proof.workspace.scale import largest_scale
-        from ..results.workspacescale import scale_data
 
         largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs), loaded.units)
     result = workspace_of(judged, largest)
@@ -89,11 +89,11 @@ def workspace(
 
     write_json(json_file, result)
     if plot is not None:
-        from ..output.pictures.workspaces import slices_picture
+        from ..output.pictures.workspaces import slices_figure
 
-        files.draw("plot", partial(slices_picture, loaded, slices))
+        files.draw("plot", slices_figure, loaded, slices)
     if picture is not None:
-        files.draw("picture", partial(_worst, loaded, result, picture))
+        files.draw("picture", _worst, loaded, result, picture)
     if page is not None:
         from ..output.files import write_text
         from ..output.report.workspace import WorkspaceReport, workspace_page
@@ -156,18 +156,18 @@ def _slices(case: Case, files: Outputs) -> tuple[Slice, ...]:
         return ()
 
 
-def _worst(case: Case, result: WorkspaceResult, target: str, ending: str) -> bytes:
+def _worst(case: Case, result: WorkspaceResult, target: str) -> Figure:
     """Return a picture of the robot at its worst pose.
 
     Raises:
         InputError: no pose is known.
     """
     from ..errors import InputError
-    from ..output.pictures.figures import picture
+    from ..output.pictures.figures import figure_of
     from ..output.pictures.workspaces import drawing_at
     from ..results.workspaceposes import worst_claim
 
     worst = worst_claim(result, case.tasks[0].sense)
     if worst is None:
         raise InputError(f"--picture {target}: no pose of the workspace is known at which a number is reached")
-    return picture([drawing_at(case, worst)], ending)
+    return figure_of([drawing_at(case, worst)])

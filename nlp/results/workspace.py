@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.numbers.extremes import Extreme
     from ..proof.workspace.robot.pose_box import PoseNumbers
+    from ..proof.workspace.scale import Scale
     from ..proof.workspace.verdict import RankVerdict
     from ..solver.semi_infinite import WorkspaceProof
 
@@ -252,6 +253,15 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
         extremes=tuple(_extreme_data(each, case) for each in judged.extremes),
         scale=scale,
         versions=versions(),
+    )
+
+
+def scale_data(found: "Scale", units: Units) -> ScaleData:
+    """Return the largest proven workspace in a case's units."""
+    return ScaleData.of(
+        found,
+        refuted=found.failed if found.refuted else None,
+        pose=None if found.pose is None else pose_data(found.pose, units),
     )
 
 

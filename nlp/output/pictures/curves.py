@@ -17,7 +17,6 @@ from ...front.front import Front
 from ...results.tradeoff import TradeoffResult, objective_label, tradeoff_words
 from ..fronttable import goal_names
 from .canvas import INK, RED, draw_edges
-from .figures import picture_of
 
 
 def draw_grid(axes: Axes) -> None:
@@ -39,17 +38,6 @@ def draw_frame(axes: Axes, title: str) -> None:
 _SIZE = (7.2, 4.6)
 #: A colour and a mark for each task; more tasks begin again.
 _LOOKS = (("#08519c", "o"), ("#b34700", "s"), ("#3f86c4", "^"), ("#e08a3c", "D"))
-
-
-def tradeoff_picture(case: Case, result: TradeoffResult, ending: str) -> bytes:
-    """Return the content of a picture file of a trade-off.
-
-    Args:
-        case: the case.
-        result: its trade-off.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
-    """
-    return picture_of(lambda: tradeoff_figure(case, result), ending)
 
 
 def tradeoff_figure(case: Case, result: TradeoffResult) -> Figure:
@@ -83,16 +71,6 @@ def tradeoff_figure(case: Case, result: TradeoffResult) -> Figure:
 _FRONT_SIZE = (6.4, 5.0)
 #: Width and height of a panel of a pair of goals, in inches, and panels in a row.
 _PANEL, _ACROSS = (4.6, 3.7), 3
-
-
-def front_picture(front: Front, ending: str) -> bytes:
-    """Return the content of a picture file of a front.
-
-    Args:
-        front: the front.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
-    """
-    return picture_of(lambda: front_figure(front), ending)
 
 
 def front_figure(front: Front) -> Figure:

@@ -20,7 +20,6 @@ from ...results.tradeoff import objective_label, unit_of_number
 from ...sweeps.points import Points
 from ..sweeptable import TablePoint
 from .canvas import INK, MUTED, draw_edges
-from .figures import picture_of
 from .fonts import legible
 
 _SIZE = (7.2, 5.0)
@@ -41,20 +40,14 @@ def check_axes(points: Points) -> None:
         raise InputError(f"--plot: draws F over one or two numbers of --over, and {fault}")
 
 
-def sweep_picture(case: Case, points: Points, found: Sequence[TablePoint], ending: str) -> bytes:
-    """Return the content of a picture file of a sweep.
+def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Figure:
+    """Return F over one or two numbers as a Matplotlib figure.
 
     Args:
         case: the case, for the title and the unit of F.
         points: a grid over one or two numbers.
         found: objective and active sides at each point.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
     """
-    return picture_of(lambda: sweep_figure(case, points, found), ending)
-
-
-def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Figure:
-    """Return F over one or two numbers as a Matplotlib figure."""
     figure = Figure(figsize=_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     changing = [(name, axis) for name, axis in zip(points.names, points.axes, strict=True) if len(axis) > 1]

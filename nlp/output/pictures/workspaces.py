@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import textwrap
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -88,17 +87,6 @@ class Kind(NamedTuple):
     hatch: str = ""
 
 
-def slices_picture(case: Case, slices: Sequence[Slice], ending: str) -> bytes:
-    """Return the content of a picture file of a workspace's slices.
-
-    Args:
-        case: the case.
-        slices: of its workspace.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
-    """
-    return picture_of(lambda: slices_figure(case, slices), ending)
-
-
 def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
     """Return the slices as a Matplotlib figure; the boxes of each kind carry its words as ``gid``."""
     columns = min(_COLUMNS, len(slices))
@@ -143,7 +131,7 @@ def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
         _paint(figure.add_axes(_PLACE), case, each, _kinds(case, slices))
         return figure
 
-    return [picture_of(partial(alone, each), ".png") for each in slices]
+    return [picture_of(".png", alone, each) for each in slices]
 
 
 def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from ...comparison.compare import Comparison
 from ...results.comparison import ComparedRobotData, ComparisonResult, comparison_table
 from ...results.text import TextTable
-from ..pictures.comparisons import comparison_drawings, comparison_picture
+from ..pictures.comparisons import comparison_drawings, comparison_figure
+from ..pictures.figures import picture_of
 from .markup import Markup, answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 
@@ -38,7 +39,7 @@ def _body(found: Comparison, result: ComparisonResult) -> Markup:
     ]
     if comparison_drawings(found):
         picture = picture_figure(
-            comparison_picture(found, ".svg"),
+            picture_of(".svg", comparison_figure, found),
             "Each robot at its design, all in one scale; colours are rates of the limbs.",
         )
         parts += [tag("h2", "Designs"), picture]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ...front.front import Front
 from ..fronttable import front_table, front_words
-from ..pictures.curves import front_picture
+from ..pictures.curves import front_figure
+from ..pictures.figures import picture_of
 from .markup import answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 
@@ -22,7 +23,7 @@ def front_page(front: Front) -> str:
         [
             tag("h2", "The front"),
             paragraphs([rule, *(f"{line}." for line in words[1:])]),
-            picture_figure(front_picture(front, ".svg"), picture),
+            picture_figure(picture_of(".svg", front_figure, front), picture),
             html_table(front_table(front), "points of the front"),
         ]
     )

@@ -12,7 +12,8 @@ from ...results.text import TextTable
 from ...results.tradeoff import unit_of_objective
 from ...sweeps.columns import SweepColumns, stated_pose_note
 from ...sweeps.points import Points
-from ..pictures.sweeps import sweep_picture
+from ..pictures.figures import picture_of
+from ..pictures.sweeps import sweep_figure
 from ..sweeptable import TablePoint
 from .markup import answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
@@ -39,7 +40,7 @@ def sweep_page(case: Case, points: Points, found: SweepColumns) -> str:
     changing = [axis for axis in points.axes if len(axis) > 1]
     if 1 <= len(changing) <= 2 and answers:
         sides = [TablePoint(float(F), "; ".join(active)) for F, active in zip(found.F, found.active, strict=True)]
-        picture = sweep_picture(case, points, sides, ".svg")
+        picture = picture_of(".svg", sweep_figure, case, points, sides)
         parts.append(picture_figure(picture, "F at each point; a line where the active limits change."))
     else:
         parts.append(paragraphs(["A picture needs a grid over one or two numbers."]))
