@@ -28,11 +28,12 @@ from ..evidence.optimality import Evidence, PointKind, examine
 from ..interruption import within
 from ..program.program import design_indices
 from ..proof.enclosure.engine import kernel
+from ..results.jsondata import finite_or_none
 from ..solver.certified import Certified, certify
 from ..solver.solution import Solution
 from ..solver.solve import solve
 from ..solver.status import Status
-from .journal import REFUSED, Row, finite, with_evidence
+from .journal import REFUSED, Row, with_evidence
 from .places import Block, NotPlacedError, Places, place
 from .points import CaseSource, PointBlock, Points
 
@@ -83,7 +84,9 @@ def _with_certificate(row: Row, found: Certified) -> Row:
         note = "tasks that are averaged have no one program: no one bound"
         return row._replace(note=note)
     return row._replace(
-        certificate=certificate.status.value, bound=finite(certificate.bound), gap=finite(certificate.gap)
+        certificate=certificate.status.value,
+        bound=finite_or_none(certificate.bound),
+        gap=finite_or_none(certificate.gap),
     )
 
 
@@ -101,7 +104,7 @@ def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
     )
     if solution.status.is_answer:
         value = solution.F if solution.combination is None else solution.combination.value
-        row = row._replace(F=None if value is None else finite(value))
+        row = row._replace(F=None if value is None else finite_or_none(value))
     if decided is not None:
         converged = sum(optimum.count for optimum in decided.optima)
         row = row._replace(starts=len(decided.starts), converged=converged)
@@ -223,9 +226,9 @@ class CompiledEngine:
             active=tuple(self._side_names[j] for j in sides),
             multipliers=tuple(self._multiplier(verdicts, block, k, int(j)) for j in sides),
             verdict=kind.value,
-            stationarity=finite(verdicts.stationarity[k]),
-            feasibility=finite(verdicts.feasibility[k]),
-            curvature=finite(verdicts.curvature[k]),
+            stationarity=finite_or_none(verdicts.stationarity[k]),
+            feasibility=finite_or_none(verdicts.feasibility[k]),
+            curvature=finite_or_none(verdicts.curvature[k]),
         )
 
     def _with_evidence(self, row: Row, block: Block, x: FloatArray, k: int) -> Row | None:

@@ -7,7 +7,6 @@ leaves of its last line is cut off when the journal is opened again. One process
 from __future__ import annotations
 
 import json
-import math
 import os
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -19,6 +18,7 @@ import numpy as np
 from ..errors import InputError
 from ..evidence.optimality import Evidence
 from ..interruption import WRITING
+from ..results.jsondata import finite_or_none
 from ..system.strictjson import json_tree, value_of
 
 if TYPE_CHECKING:
@@ -79,15 +79,10 @@ def with_evidence(row: Row, evidence: Evidence) -> Row:
         active=tuple(f"{side.name} {side.bound}" for side in evidence.active),
         multipliers=tuple(side.multiplier for side in evidence.active),
         verdict=evidence.kind.value,
-        stationarity=finite(evidence.stationarity),
-        feasibility=finite(evidence.feasibility),
-        curvature=finite(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
+        stationarity=finite_or_none(evidence.stationarity),
+        feasibility=finite_or_none(evidence.feasibility),
+        curvature=finite_or_none(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
     )
-
-
-def finite(value: float) -> float | None:
-    """Return a number as a row has it: None where it is not finite."""
-    return float(value) if math.isfinite(value) else None
 
 
 def line_of(row: Row) -> str:

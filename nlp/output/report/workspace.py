@@ -9,7 +9,8 @@ from ...case.case import Case
 from ...errors import EvaluationError
 from ...proof.workspace.slices.slices import Slice
 from ...results.jsondata import json_data
-from ...results.text import Line, TextTable
+from ...results.tables import origin_table
+from ...results.text import Line
 from ...results.workspace import WorkspacePose, WorkspaceResult
 from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
 from ...results.workspacewording import pose_words, verdict_words, workspace_summary
@@ -153,8 +154,6 @@ def _swatch(kind: Kind) -> Markup:
 
 def _origin(report: WorkspaceReport) -> Markup:
     """Return versions, and the text of the case."""
-    versions = report.result.versions
-    rows = tuple((name, str(getattr(versions, name))) for name in versions.marks)
-    table = html_table(TextTable(("", ""), rows, "versions"), "What the numbers depend on", id="versions")
+    table = html_table(origin_table(report.result.versions), "What the numbers depend on", id="versions")
     text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case text")
     return join_markup([table, tag("h3", "Case file"), text])
