@@ -17,9 +17,10 @@ from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import build_model, case_from_tables, load_case, plot, solve
 from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.output.pictures.drawing import drawing_of_model
+from screwsynth.nlp.output.pictures.figures import picture_of
 from screwsynth.nlp.output.pictures.painting import Panel
 from screwsynth.nlp.output.pictures.view import clearest_view
-from screwsynth.nlp.output.pictures.workspaceslices import slices_picture
+from screwsynth.nlp.output.pictures.workspaces import slices_figure
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 
 FOLDER = Path(__file__).parent / "figures"
@@ -68,9 +69,9 @@ FOLDER.mkdir(exist_ok=True)
 draw_gallery()
 plot(solve(case_from_tables(case_of_page("robots.md", 0), name="delta", source="robots.md")), FOLDER / "delta.png")
 machine = load_case("hexapod-linuxcnc")
-(FOLDER / "hexapod-linuxcnc-slices.png").write_bytes(slices_picture(machine, slices_of(machine), ".png"))
+(FOLDER / "hexapod-linuxcnc-slices.png").write_bytes(picture_of(".png", slices_figure, machine, slices_of(machine)))
 head = load_case("reachy-mini-envelope")
-(FOLDER / "reachy-mini-slices.png").write_bytes(slices_picture(head, slices_of(head), ".png"))
+(FOLDER / "reachy-mini-slices.png").write_bytes(picture_of(".png", slices_figure, head, slices_of(head)))
 for name, case in CASES.items():
     plot(solve(load_case(case)), FOLDER / f"{name}.png")
 for model in (name for name in model_names() if name not in gallery_names()):

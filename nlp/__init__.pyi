@@ -81,8 +81,8 @@ from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of
 from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
-from .output.report.html import report as report
-from .output.sweepfunction import sweep as sweep
+from .output.report.webpage import report as report
+from .output.sweeptable import sweep as sweep
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
@@ -97,10 +97,10 @@ from .proof.workspace.scale import largest_scale as largest_scale
 from .proof.workspace.verdict import Outcome as Outcome
 from .proof.workspace.verdict import RankVerdict as RankVerdict
 from .results.jsondata import json_data as json_data
-from .results.reading import load_result as load_result
 from .results.regression import CaseCheck as CaseCheck
 from .results.regression import check as check
 from .results.result import result_of as result_of
+from .results.schema import load_result as load_result
 from .results.tradeoff import tradeoff_result as tradeoff_result
 from .solver.certified import Certified as Certified
 from .solver.certified import certify as certify

@@ -6,31 +6,32 @@ from typing import Annotated
 
 import typer
 
-from .numbers import Number, WholeNumber
-from .options import AllAssemblies, CaseName, Jobs, JsonFile, SettingTexts, Time, console, read_settings, write_json
+from .options import (
+    AllAssemblies,
+    CaseName,
+    Jobs,
+    JsonFile,
+    Outputs,
+    SettingTexts,
+    Time,
+    console,
+    number_option,
+    read_settings,
+    starts_option,
+    write_json,
+)
 
 
 def certify(
     case: CaseName,
     settings: SettingTexts = None,
-    gap: Annotated[
-        float,
-        typer.Option(parser=Number("--gap"), metavar="PART", help="Part of the best F that the bound may be off by."),
-    ] = 1e-4,
+    gap: Annotated[float, number_option("--gap", "PART", "Part of the best F that the bound may be off by.")] = 1e-4,
     time: Time = None,
     above: Annotated[
-        float | None,
-        typer.Option(parser=Number("--above"), metavar="F", help="Prove that F is above this value on the whole box."),
+        float | None, number_option("--above", "F", "Prove that F is above this value on the whole box.")
     ] = None,
     proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
-    starts: Annotated[
-        int | None,
-        typer.Option(
-            parser=WholeNumber("--starts", 1, 100_000),
-            metavar="N",
-            help="Starting points for the incumbent instead of the case's.",
-        ),
-    ] = None,
+    starts: Annotated[int | None, starts_option("Starting points for the incumbent instead of the case's.")] = None,
     all_assemblies: AllAssemblies = False,
     jobs: Jobs = None,
     json_file: JsonFile = None,
@@ -39,10 +40,10 @@ def certify(
     from ..case.reader import read_case
     from ..errors import InputError, one_line
     from ..interruption import Milestone, answer_after
-    from ..output.files import check_outputs, write_text
+    from ..output.files import write_text
     from ..output.terminal import show
-    from ..results.certified import certified_of
-    from ..results.unknownwording import unknown_lines
+    from ..results.evidence import certified_of
+    from ..results.robotwording import unknown_lines
     from ..solver.certified import CertifyOptions, OptionError, proof_of
     from .progress import certify_with_progress
 
@@ -50,11 +51,10 @@ def certify(
         answer_after(Milestone.START)
         answer_after(Milestone.BOUND)
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
-        if proof == "-" and json_file == "-":
-            raise InputError("standard output can take one of --json - and --proof - only")
+        files = Outputs(json=json_file, proof=proof)
         loaded, text, inputs = read_case(case, read_settings(settings))
-        check_outputs(inputs, {"--json": json_file, "--proof": proof})
-        if "-" not in (json_file, proof):
+        files.check(inputs)
+        if not files.is_piped:
             show(console(), unknown_lines(loaded.model, all_assemblies=all_assemblies))
         certified = certify_with_progress(
             loaded,
@@ -75,9 +75,8 @@ def certify(
         else:
             # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
             typer.echo(f"--proof {one_line(proof)}: not written, as there is no complete proof", err=True)
-    if json_file is not None:
-        write_json(json_file, result)
-    if "-" not in (json_file, proof):
+    write_json(json_file, result)
+    if not files.is_piped:
         from ..results.summary import certified_summary
 
         show(console(), certified_summary(loaded, result))

@@ -35,15 +35,14 @@ def check(
     checks = check_cases(cases)
     if is_requested():
         typer.echo(f"interrupted: {len(checks)} of {len(cases or shipped_cases())} cases are checked", err=True)
-    if json_file is not None:
-        write_json(json_file, checks_of(checks))
+    write_json(json_file, checks_of(checks))
     if junit is not None:
         write_text(junit, checks_as_junit(checks))
     if markdown:
         typer.echo(checks_as_markdown(checks), nl=False)
     elif "-" not in (json_file, junit):
         from ..output.terminal import show
-        from ..results.checkwording import checks_summary
+        from ..results.checks import checks_summary
 
         show(console(), checks_summary(checks))
     raise typer.Exit(0 if all(each.passed for each in checks) else 1)

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import Number
 from .options import (
-    CLEAR_LINE,
     CaseName,
     Jobs,
     JsonFile,
+    Outputs,
+    PageFile,
     Seed,
     SettingTexts,
     Starts,
     Time,
-    check_picture,
     console,
+    number_option,
     read_settings,
     write_json,
 )
+from .progress import counting_line
 
 if TYPE_CHECKING:
     from ..comparison.compare import Comparison
@@ -33,17 +33,9 @@ def compare(
         list[str],
         typer.Argument(metavar="ROBOT...", help="Names of robots, robot files, or 'case' for the case's own robot."),
     ],
-    size: Annotated[
-        float | None,
-        typer.Option(parser=Number("--size"), metavar="LENGTH", help="Common size; that of the case's robot."),
-    ] = None,
+    size: Annotated[float | None, number_option("--size", "LENGTH", "Common size; that of the case's robot.")] = None,
     no_scale: Annotated[bool, typer.Option("--no-scale", help="Take typical lengths as they are.")] = False,
-    part: Annotated[
-        float,
-        typer.Option(
-            "--range", parser=Number("--range"), metavar="PART", help="Part by which dimensions are free; 0: fixed."
-        ),
-    ] = 0.25,
+    part: Annotated[float, number_option("--range", "PART", "Part by which dimensions are free; 0: fixed.")] = 0.25,
     certified: Annotated[bool, typer.Option("--certify", help="Prove each optimum too.")] = False,
     time: Time = None,
     settings: SettingTexts = None,
@@ -52,7 +44,7 @@ def compare(
     jobs: Jobs = None,
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write a row for each robot.")] = None,
-    html: Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")] = None,
+    html: PageFile = None,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="FILE", help="Draw the designs in one scale: .png, .svg or .pdf.")
     ] = None,
@@ -63,31 +55,17 @@ def compare(
     from ..case.reader import read_case
     from ..comparison.compare import compare as compare_robots
     from ..comparison.robots import read_robots
-    from ..errors import InputError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
-    from ..output.files import check_outputs
 
-    if [json_file, csv_file, html].count("-") > 1:
-        raise InputError("standard output can take one of --json -, --csv - and --html - only")
-    check_picture(plot)
-    if html is not None:
-        from ..output.pictures.requirements import check_library
-
-        check_library("matplotlib", "pages")
+    files = Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
     read = read_case(case, read_settings(settings))
     inputs = dict(read.inputs)
     for each in read_robots(robots, read.case):
         if each.file is not None:
             inputs[Path(each.file)] = "a robot file"
-    check_outputs(inputs, {"--json": json_file, "--csv": csv_file, "--html": html, "--plot": plot})
-    show_progress = sys.stderr.isatty()
-
-    def write_progress(label: str, done: int, total: int) -> None:
-        sys.stderr.write(f"{CLEAR_LINE}{done} of {total} robots done: {label}")
-        sys.stderr.flush()
-
+    files.check(inputs)
     answer_after(Milestone.ROBOT)
-    try:
+    with counting_line() as show:
         found = compare_robots(
             read.case,
             robots,
@@ -99,43 +77,36 @@ def compare(
             starts=starts,
             seed=seed,
             jobs=jobs,
-            progress=write_progress if show_progress else None,
+            progress=lambda label, done, total: show(f"{done} of {total} robots done: {label}"),
         )
-    finally:
-        if show_progress:
-            sys.stderr.write(CLEAR_LINE)
     is_stopped = is_requested()
     if is_stopped:
         begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
         typer.echo(f"{why_stopped()}: {begun}", err=True)
-    _write(found, json_file=json_file, csv_file=csv_file, html=html, plot=plot)
+    _write(found, files)
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
     raise typer.Exit(0 if found.ranked and is_proved and not is_stopped else 1)
 
 
-def _write(
-    found: Comparison, *, json_file: str | None, csv_file: str | None, html: str | None, plot: str | None
-) -> None:
+def _write(found: Comparison, files: Outputs) -> None:
     """Write a comparison into its files, and onto the terminal where standard output takes no file."""
     from ..comparison.data import comparison_result
-    from ..output.files import write_bytes, write_text
-    from ..results.comparisonwording import comparison_csv, comparison_summary
+    from ..output.files import write_text
+    from ..results.comparison import comparison_csv, comparison_summary
 
     result = comparison_result(found)
-    if json_file is not None:
-        write_json(json_file, result)
-    if csv_file is not None:
+    write_json(files["json"], result)
+    if (csv_file := files["csv"]) is not None:
         write_text(csv_file, comparison_csv(result))
-    if html is not None:
+    if (html := files["html"]) is not None:
         from ..output.report.comparison import comparison_page
 
         write_text(html, comparison_page(found, result))
-    if plot is not None:
-        from ..output.pictures.comparisons import comparison_picture
-        from ..output.pictures.requirements import ending_of
+    if files["plot"] is not None:
+        from ..output.pictures.comparisons import comparison_figure
 
-        write_bytes(plot, comparison_picture(found, ending_of(plot)))
-    if "-" not in (json_file, csv_file, html):
+        files.draw("plot", comparison_figure, found)
+    if not files.is_piped:
         from ..output.terminal import show
 
         show(console(), comparison_summary(result))

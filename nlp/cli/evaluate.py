@@ -9,6 +9,7 @@ from .options import (
     CsvFile,
     CsvTable,
     JsonFile,
+    Outputs,
     SettingTexts,
     check_csv,
     console,
@@ -32,25 +33,24 @@ def evaluate(
     from ..case.reader import read_case
     from ..evidence import state
     from ..evidence.closing import closed_start
-    from ..output.files import check_outputs
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
     given = read_case(case, read_settings(settings))
     loaded = given.case
-    check_outputs(given.inputs, {"--json": json_file, "--csv": csv_file})
-    check_csv(csv_file, table, json_file, loaded, at_point=True)
+    files = Outputs(json=json_file, csv=csv_file)
+    files.check(given.inputs)
+    check_csv(csv_file, table, loaded, at_point=True)
     nlps = formulate_each(loaded)
     x = with_exact_level(nlps[0], closed_start(nlps[0]))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
-    if json_file is not None:
-        write_json(json_file, result)
+    write_json(json_file, result)
     if csv_file is not None:
-        from ..results.alltables import evaluation_tables
+        from ..results.summary import evaluation_tables
 
         write_csv(csv_file, evaluation_tables(loaded, result), table)
-    if "-" not in (json_file, csv_file):
+    if not files.is_piped:
         from ..output.terminal import show
         from ..results.summary import evaluation_summary
 

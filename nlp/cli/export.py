@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from .numbers import WholeNumber
-from .options import CaseName, Jobs, Seed, SettingTexts, Starts, read_settings
+from .options import CaseName, Jobs, Seed, SettingTexts, Starts, read_settings, whole_option
 
 
 def export(
@@ -22,9 +21,7 @@ def export(
     of: Annotated[
         str | None, typer.Option("--of", metavar="FILE", help="Result that --json wrote, instead of solving again.")
     ] = None,
-    pose: Annotated[
-        int, typer.Option(parser=WholeNumber("--pose", 1), metavar="N", help="Pose, where the case has several.")
-    ] = 1,
+    pose: Annotated[int, whole_option("--pose", "Pose, where the case has several.", 1)] = 1,
     starts: Starts = None,
     seed: Seed = None,
     jobs: Jobs = None,

@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from .numbers import Number
-from .options import console
+from .options import console, number_option
 
 
 class SeveralValues(TyperCommand):
@@ -46,12 +45,7 @@ def import_(
         str, typer.Option(metavar="NAME", help="Configuration of an MJCF file: one of its keyframes.")
     ] = "",
     snap: Annotated[
-        float,
-        typer.Option(
-            parser=Number("--snap"),
-            metavar="LENGTH",
-            help="Move axes by up to this, so that they meet or are parallel.",
-        ),
+        float, number_option("--snap", "LENGTH", "Move axes by up to this, so that they meet or are parallel.")
     ] = 0.0,
     loops: Annotated[
         str | None, typer.Option(metavar="YAML", help="Loops of a URDF, instead of the .yaml file beside it.")

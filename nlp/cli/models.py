@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import PlotFile, check_picture, console
+from .options import Outputs, PlotFile, console
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,12 +28,10 @@ def models(
     from ...models import model_names
     from ..case.robots import build_model, model_options
     from ..errors import InputError
-    from ..output.files import check_outputs
     from ..output.terminal import show
     from ..results.robotwording import model_words, models_table
 
-    check_picture(plot)
-    check_outputs({}, {"--plot": plot})
+    Outputs(plot=plot).check({})
     if name is None:
         if plot is not None:
             raise InputError(f"--plot {plot}: needs the name of a robot")

@@ -1,17 +1,56 @@
-"""Solves and certificates with a line of progress on standard error, where standard error is a terminal."""
+"""Progress of commands on standard error, where standard error is a terminal; and solves and certificates with it."""
 
 from __future__ import annotations
 
 import sys
+from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from ..case.case import Case
     from ..solver.certified import Certified
     from ..solver.solution import Solution
+
+#: Leaves the cursor at the beginning of an empty line.
+_CLEAR_LINE = "\r\033[K"
+
+
+@contextmanager
+def counting_line() -> Iterator[Callable[[str], None]]:
+    """Give a function that shows a text in the place of the last one; the line is empty at the end."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+
+    def show(text: str) -> None:
+        sys.stderr.write(f"{_CLEAR_LINE}{text}")
+        sys.stderr.flush()
+
+    try:
+        yield show
+    finally:
+        sys.stderr.write(_CLEAR_LINE)
+
+
+@contextmanager
+def spinner(first: str) -> Iterator[Callable[[str], None]]:
+    """Give a function that shows a text beside a spinner; at the beginning there is a first text."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+
+    from ..errors import one_line
+
+    columns = SpinnerColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        line = bar.add_task(first, total=None)
+        yield lambda text: bar.update(line, description=escape(one_line(text)))
 
 
 class SolveOutcome(NamedTuple):
@@ -74,25 +113,10 @@ def certify_with_progress(case: Case, **options: Any) -> Certified:  # noqa: ANN
     """
     from ..solver.certified import certify
 
-    if not sys.stderr.isatty():
-        return certify(case, **options)
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import Progress, SpinnerColumn, TextColumn
+    with spinner("solving for an incumbent") as show:
 
-    from ..errors import one_line
+        def show_search(name: str, seconds: float, bound: float, incumbent: float, boxes: int, left: int) -> None:
+            text = f"{name}: bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
+            show(f"{text}, {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
 
-    columns = SpinnerColumn(), TextColumn("{task.description}")
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        line = bar.add_task("solving for an incumbent", total=None)
-
-        def show(name: str, seconds: float, bound: float, incumbent: float, boxes: int, left: int) -> None:
-            text = (
-                f"{escape(one_line(name))}: bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
-            )
-            bar.update(line, description=f"{text}, {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
-
-        def progress_of(name: str) -> Callable[[float, float, float, int, int], None]:
-            return partial(show, name)
-
-        return certify(case, **options, progress=progress_of)
+        return certify(case, **options, progress=lambda name: partial(show_search, name))

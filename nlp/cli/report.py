@@ -41,9 +41,9 @@ def report(
     check_library("matplotlib", "reports")
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
-    from ..results.limitcurves import limit_curves
     from ..results.regression import check_case
     from ..results.result import result_of
+    from ..results.tradeoff import limit_curves
 
     answer_after(Milestone.START)
     refusal = ""

@@ -7,22 +7,22 @@ from typing import Annotated
 
 import typer
 
-from .numbers import WholeNumber
 from .options import (
     CaseName,
     CsvFile,
     CsvTable,
     Jobs,
     JsonFile,
+    Outputs,
     PlotFile,
     Seed,
     SettingTexts,
     Starts,
     Time,
     check_csv,
-    check_picture,
     console,
     read_settings,
+    whole_option,
     write_csv,
     write_json,
 )
@@ -42,12 +42,7 @@ def solve(
     csv_file: CsvFile = None,
     table: CsvTable = None,
     plot: PlotFile = None,
-    pose: Annotated[
-        int,
-        typer.Option(
-            parser=WholeNumber("--pose", 1), metavar="N", help="Pose that --plot draws, where the case has several."
-        ),
-    ] = 1,
+    pose: Annotated[int, whole_option("--pose", "Pose that --plot draws, where the case has several.", 1)] = 1,
     certify: Annotated[
         bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
     ] = False,
@@ -56,31 +51,29 @@ def solve(
     from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
-    from ..output.files import check_outputs
     from ..results.result import result_of
     from .progress import solve_with_progress
 
     answer_after(Milestone.START)
     given = read_case(case, read_settings(settings))
     loaded = replace(given.case, search=given.case.search.but(starts, seed, compiled=compiled))
-    check_csv(csv_file, table, json_file, loaded, at_point=False)
-    check_picture(plot)
-    check_outputs(given.inputs, {"--json": json_file, "--plot": plot, "--csv": csv_file})
+    files = Outputs(json=json_file, plot=plot, csv=csv_file)
+    check_csv(csv_file, table, loaded, at_point=False)
+    files.check(given.inputs)
     if pose > loaded.pose_count:
         raise InputError(f"--pose {pose}: the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}")
     solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
     result = result_of(found)
-    if json_file is not None:
-        write_json(json_file, result)
+    write_json(json_file, result)
     if csv_file is not None:
-        from ..results.alltables import case_tables
+        from ..results.summary import case_tables
 
         write_csv(csv_file, case_tables(loaded, result), table)
     if plot is not None:
         from ..output.pictures.plot import plot as draw
 
         draw(solution, plot, pose=pose)
-    if "-" not in (json_file, csv_file):
+    if not files.is_piped:
         from ..output.terminal import show
         from ..results.summary import case_summary
 

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import WholeNumber
 from .options import (
-    CLEAR_LINE,
     CaseName,
     JsonFile,
+    Outputs,
+    PageFile,
     Seed,
     SettingTexts,
-    check_picture,
+    jobs_option,
     read_settings,
+    starts_option,
     time_option,
     write_json,
 )
+from .progress import counting_line
 
 if TYPE_CHECKING:
     from ..sweeps.points import Points
@@ -41,19 +42,9 @@ def sweep(
         typer.Option("--points", metavar="FILE", help="A CSV file of points instead, names in its first row."),
     ] = None,
     settings: SettingTexts = None,
-    starts: Annotated[
-        int | None,
-        typer.Option(
-            parser=WholeNumber("--starts", 1, 100_000),
-            metavar="N",
-            help="Starting points at each point; 8 if left out.",
-        ),
-    ] = None,
+    starts: Annotated[int | None, starts_option("Starting points at each point; 8 if left out.")] = None,
     seed: Seed = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(parser=WholeNumber("--jobs", 1, 256), metavar="N", help="Threads, or processes of Ipopt."),
-    ] = None,
+    jobs: Annotated[int | None, jobs_option("Threads, or processes of Ipopt.")] = None,
     engine: Annotated[
         str | None, typer.Option("--engine", metavar="WORD", help="compiled or ipopt; compiled where that covers it.")
     ] = None,
@@ -66,26 +57,26 @@ def sweep(
         float | None, time_option("Seconds for the whole command; the same one then goes on where it was.")
     ] = None,
     json_file: JsonFile = None,
-    html: Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")] = None,
+    html: PageFile = None,
     plot: Annotated[
         str | None, typer.Option("--plot", metavar="FILE", help="Draw F over one or two numbers: .png, .svg or .pdf.")
     ] = None,
 ) -> None:
     """Solve at thousands of values of fixed numbers."""
     from ..case.reader import read_case
-    from ..errors import InputError
     from ..interruption import say_on_leaving
-    from ..output.files import check_outputs
     from ..output.sweeptable import check_table, is_written, write_table
     from ..sweeps.engines import EngineKind
     from ..sweeps.points import CaseSource
     from ..sweeps.sweep import Sweep, run_sweep
 
-    kinds = {kind.value: kind for kind in EngineKind}
-    if engine is not None and engine not in kinds:
-        raise InputError(f"--engine {engine}: must be compiled or ipopt")
+    kind = EngineKind.of(engine)
     chosen = _read_points(over, points)
-    _check_files(chosen, plot, html, json_file)
+    files = Outputs(out=out, json=json_file, html=html, plot=plot)
+    if plot is not None:
+        from ..output.pictures.sweeps import check_axes
+
+        check_axes(chosen)
     check_table(out)
     read = read_case(case, read_settings(settings))
     inputs = dict(read.inputs)
@@ -93,29 +84,27 @@ def sweep(
         from pathlib import Path
 
         inputs[Path(points)] = "the file of the points"
-    check_outputs(inputs, {"--out": out, "--json": json_file, "--html": html, "--plot": plot})
+    files.check(inputs)
     with _named_points(chosen, points):
         found = Sweep.of(CaseSource.from_file(read), chosen, starts, seed, certified=certified)
     if is_written(out, found):
         typer.echo(f"{out}: holds all {len(chosen):,} points already", err=True)
     else:
-        show = sys.stderr.isatty()
         with found.journal_of(out) as journal:
             before = len(chosen) - len(journal.missing)
             if before:
                 typer.echo(f"{before:,} of {len(chosen):,} points are in {journal.path} already", err=True)
             say_on_leaving(lambda: journal.words)
-            run_sweep(
-                found,
-                journal,
-                engine=None if engine is None else kinds[engine],
-                jobs=jobs,
-                dask=dask,
-                progress=_show_progress if show else None,
-                notice=lambda text: typer.echo(text, err=True),
-            )
-            if show:
-                sys.stderr.write(CLEAR_LINE)
+            with counting_line() as show:
+                run_sweep(
+                    found,
+                    journal,
+                    engine=kind,
+                    jobs=jobs,
+                    dask=dask,
+                    progress=lambda *counts: show(_progress_words(*counts)),
+                    notice=lambda text: typer.echo(text, err=True),
+                )
             if len(journal.missing):
                 typer.echo(f"the time is over: {journal.words}", err=True)
                 raise typer.Exit(1)
@@ -123,7 +112,7 @@ def sweep(
             journal.remove()
     if json_file is not None or html is not None:
         _write(found, out, json_file, html)
-    raise typer.Exit(_show(found, out, plot, is_silent="-" in (json_file, html)))
+    raise typer.Exit(_show(found, out, files))
 
 
 def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> None:
@@ -133,33 +122,11 @@ def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> N
     from ..sweeps.columns import columns_of, sweep_result
 
     case, columns = found.source.case_at(found.points.settings(0)), columns_of(found, table_rows(out, found))
-    if json_file is not None:
-        write_json(json_file, sweep_result(case, columns))
+    write_json(json_file, sweep_result(case, columns))
     if html is not None:
         from ..output.report.sweep import sweep_page
 
         write_text(html, sweep_page(case, found.points, columns))
-
-
-def _check_files(chosen: Points, plot: str | None, html: str | None, json_file: str | None) -> None:
-    """Refuse a picture, a page or JSON that cannot be made, before the work begins.
-
-    Raises:
-        InputError: a file is refused.
-    """
-    from ..errors import InputError
-
-    check_picture(plot)
-    if plot is not None:
-        from ..output.pictures.sweeps import check_axes
-
-        check_axes(chosen)
-    if html is not None:
-        from ..output.pictures.requirements import check_library
-
-        check_library("matplotlib", "pages")
-    if json_file == html == "-":
-        raise InputError("standard output can take one of --json - and --html - only")
 
 
 @contextmanager
@@ -194,20 +161,17 @@ def _read_points(over: list[str] | None, file: str | None) -> Points:
     return points_of_csv(read_text(file), file) if file is not None else grid(over or [])
 
 
-def _show(found: Sweep, out: str, plot: str | None, *, is_silent: bool) -> int:
+def _show(found: Sweep, out: str, files: Outputs) -> int:
     """Draw the picture, print a line about the table, and return the exit status."""
     import math
 
     from ..output.sweeptable import table_points
 
     rows = table_points(out)
-    if plot is not None:
-        from ..output.files import write_bytes
-        from ..output.pictures.requirements import ending_of
-        from ..output.pictures.sweeps import sweep_picture
+    if files["plot"] is not None:
+        from ..output.pictures.sweeps import sweep_figure
 
-        case = found.source.case_at(found.points.settings(0))
-        write_bytes(plot, sweep_picture(case, found.points, rows, ending_of(plot)))
+        files.draw("plot", sweep_figure, found.source.case_at(found.points.settings(0)), found.points, rows)
     values = [row.F for row in rows if not math.isnan(row.F)]
     regions = len({row.active for row in rows if not math.isnan(row.F)})
     ends = f", F from {min(values):.7g} to {max(values):.7g}, {regions} sets of active limits" if values else ""
@@ -216,7 +180,7 @@ def _show(found: Sweep, out: str, plot: str | None, *, is_silent: bool) -> int:
 
         proved = sum(row.certificate == "proved" for row in table_rows(out, found))
         ends += f", {proved:,} are proved"
-    if not is_silent:
+    if not files.is_piped:
         typer.echo(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")
         notice = _notice(found, out)
         if notice is not None:
@@ -235,9 +199,8 @@ def _notice(found: Sweep, out: str) -> str | None:
     return stated_pose_note(case, [row.note for row in table_rows(out, found)])
 
 
-def _show_progress(before: int, done: int, total: int, seconds: float) -> None:
-    """Write how far the sweep is, and the time left, on one line of standard error."""
+def _progress_words(before: int, done: int, total: int, seconds: float) -> str:
+    """Return how far the sweep is, and the time left."""
     left = seconds * (total - done) / done
     words = f"{left / 3600:.1f} h" if left >= 3600 else f"{left / 60:.0f} min" if left >= 100 else f"{left:.0f} s"
-    sys.stderr.write(f"{CLEAR_LINE}{before + done:,} of {before + total:,} points, {words} left")
-    sys.stderr.flush()
+    return f"{before + done:,} of {before + total:,} points, {words} left"

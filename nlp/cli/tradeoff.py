@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Annotated, NamedTuple
 
 import typer
 
 from .options import (
-    CLEAR_LINE,
     CaseName,
     CurveFile,
     Jobs,
     JsonFile,
+    Outputs,
     Seed,
     SettingTexts,
     Starts,
     Time,
-    check_picture,
     console,
     read_settings,
     write_json,
 )
+from .progress import counting_line
 
 #: Largest number of values.
 _MOST = 200
@@ -47,39 +46,32 @@ def tradeoff(
 ) -> None:
     """Solve along one limit or number, and show F against it."""
     from ..case.reader import read_case
-    from ..errors import InputError
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
-    from ..output.files import check_outputs, write_bytes, write_text
-    from ..results.tradeoff import tradeoff_result
-    from ..results.tradeoffwording import tradeoff_csv, tradeoff_summary
+    from ..output.files import write_text
+    from ..results.tradeoff import tradeoff_csv, tradeoff_result, tradeoff_summary
     from ..solver.status import Status
     from ..solver.tradeoff import tradeoff as solve_along
 
     answer_after(Milestone.VALUE)
     name, values = _read_range(over)
     fixed = read_settings(settings)
-    if [json_file, csv_file, page].count("-") > 1:
-        raise InputError("standard output can take one of --json -, --csv - and --page - only")
-    check_picture(plot)
+    files = Outputs(json=json_file, csv=csv_file, page=page, plot=plot)
     read = {value: read_case(case, {**fixed, name: value}) for value in values}
-    check_outputs(read[values[0]].inputs, {"--json": json_file, "--csv": csv_file, "--page": page, "--plot": plot})
-    show_progress = sys.stderr.isatty()
-    found = solve_along(
-        lambda value: read[value].case,
-        values,
-        name=name,
-        starts=starts,
-        seed=seed,
-        jobs=jobs,
-        progress=_write_progress if show_progress else None,
-    )
-    if show_progress:
-        sys.stderr.write(CLEAR_LINE)
+    files.check(read[values[0]].inputs)
+    with counting_line() as write:
+        found = solve_along(
+            lambda value: read[value].case,
+            values,
+            name=name,
+            starts=starts,
+            seed=seed,
+            jobs=jobs,
+            progress=lambda done, total: write(f"{done} of {total} values solved"),
+        )
     if is_requested() and not found.unsolved:
         typer.echo(f"{why_stopped()}: every value is solved, but not all from the optima beside it", err=True)
     loaded, result = found.points[0].solution.case, tradeoff_result(found)
-    if json_file is not None:
-        write_json(json_file, result)
+    write_json(json_file, result)
     if csv_file is not None:
         write_text(csv_file, tradeoff_csv(result))
     if page is not None:
@@ -87,11 +79,10 @@ def tradeoff(
 
         write_text(page, tradeoff_page(loaded, result))
     if plot is not None:
-        from ..output.pictures.curves import tradeoff_picture
-        from ..output.pictures.requirements import ending_of
+        from ..output.pictures.curves import tradeoff_figure
 
-        write_bytes(plot, tradeoff_picture(loaded, result, ending_of(plot)))
-    if "-" not in (json_file, csv_file, page):
+        files.draw("plot", tradeoff_figure, loaded, result)
+    if not files.is_piped:
         from ..output.terminal import show
 
         show(console(), tradeoff_summary(loaded, result))
@@ -132,9 +123,3 @@ def _read_range(text: str) -> _Range:
     # Exact at both ends.
     values = [(first * (count - 1 - k) + last * k) / (count - 1) for k in range(count)]
     return _Range(name, [first, *values[1:-1], last])
-
-
-def _write_progress(done: int, total: int) -> None:
-    """Write how far the solves are, on one line of standard error."""
-    sys.stderr.write(f"\r{done} of {total} values solved")
-    sys.stderr.flush()

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import Number
-from .options import AllAssemblies, LegError, ResultFile, SettingTexts, read_settings
+from .options import AllAssemblies, LegError, ResultFile, SettingTexts, number_option, read_settings
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -24,8 +23,7 @@ def verify_proof(
     settings: SettingTexts = None,
     of: ResultFile = None,
     above: Annotated[
-        float | None,
-        typer.Option(parser=Number("--above"), metavar="F", help="The proof must show that F is above this value."),
+        float | None, number_option("--above", "F", "The proof must show that F is above this value.")
     ] = None,
     all_assemblies: AllAssemblies = False,
     leg_error: LegError = 0.0,
@@ -38,8 +36,7 @@ def verify_proof(
     from ..errors import InputError
     from ..output.files import read_text
     from ..proof.checker.proof_file import Statement, read_proof
-    from .dimensions import read_machine
-    from .paper import verify_paper
+    from .paper import read_machine, verify_paper
 
     options = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
     given = read_proof(read_text(proof), proof)

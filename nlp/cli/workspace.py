@@ -6,15 +6,30 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .numbers import Number
-from .options import CaseName, Jobs, JsonFile, LegError, ResultFile, SettingTexts, Time, console, read_settings
-from .workspacefiles import WorkspaceFiles
+from .options import (
+    CaseName,
+    Jobs,
+    JsonFile,
+    LegError,
+    Outputs,
+    ResultFile,
+    SettingTexts,
+    Time,
+    console,
+    number_option,
+    read_settings,
+    write_json,
+)
+from .progress import spinner
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from ..case.case import Case
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.proof_writer import PaperRecord
-    from ..results.workspace import WorkspacePose
+    from ..proof.workspace.slices.slices import Slice
+    from ..results.workspace import WorkspacePose, WorkspaceResult
 
 
 def workspace(
@@ -24,10 +39,7 @@ def workspace(
     of_quantity: Annotated[
         list[str] | None, typer.Option("--of-quantity", metavar="NAME", help="Bound this measure of the robot too.")
     ] = None,
-    gap: Annotated[
-        float,
-        typer.Option(parser=Number("--gap"), metavar="PART", help="Part of a value that its bound may be off by."),
-    ] = 1e-3,
+    gap: Annotated[float, number_option("--gap", "PART", "Part of a value that its bound may be off by.")] = 1e-3,
     time: Time = None,
     leg_error: LegError = 0.0,
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
@@ -50,10 +62,9 @@ def workspace(
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..proof.statement.machine import workspace_of_case
-    from ..results.workspace import workspace_of
+    from ..results.workspace import scale_data, workspace_of
     from ..results.workspaceposes import evaluate_command
-    from .dimensions import read_machine
-    from .paper import paper_record, write_paper
+    from .paper import paper_record, read_machine, write_paper
 
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
@@ -61,14 +72,13 @@ def workspace(
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
     workspace_of_case(loaded)
-    files = WorkspaceFiles(json_file, plot, picture, page, proof)
+    files = Outputs(json=json_file, plot=plot, picture=picture, html=page, proof=proof)
     files.check(inputs)
-    slices = files.slices(loaded)
+    slices = _slices(loaded, files)
     judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs, record)
     largest = None
     if scale:
         from ..proof.workspace.scale import largest_scale
-        from ..results.workspacescale import scale_data
 
         largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs), loaded.units)
     result = workspace_of(judged, largest)
@@ -77,7 +87,18 @@ def workspace(
         """Return the command that shows a pose."""
         return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
 
-    files.write(loaded, text, result, slices, command)
+    write_json(json_file, result)
+    if plot is not None:
+        from ..output.pictures.workspaces import slices_figure
+
+        files.draw("plot", slices_figure, loaded, slices)
+    if picture is not None:
+        files.draw("picture", _worst, loaded, result, picture)
+    if page is not None:
+        from ..output.files import write_text
+        from ..output.report.workspace import WorkspaceReport, workspace_page
+
+        write_text(page, workspace_page(WorkspaceReport(loaded, text, result, slices, command)))
     if proof is not None:
         write_paper(proof, judged, record, text, of_quantity or (), leg_error)
     if not files.is_piped:
@@ -98,40 +119,55 @@ def _judge_with_progress(
     paper: PaperRecord | None,
 ) -> Judgement:
     """Judge a machine with a line of progress on standard error, where standard error is a terminal."""
-    import sys
-
     from ..proof.workspace.judge import TIME_LIMIT, judge_workspace
 
-    time = TIME_LIMIT if time is None else time
-
-    if not sys.stderr.isatty():
-        return judge_workspace(
-            case, quantities=quantities, gap=gap, time_limit=time, leg_error=leg_error, jobs=jobs, paper=paper
-        )
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.progress import Progress, SpinnerColumn, TextColumn
-
-    from ..errors import one_line
-
-    columns = SpinnerColumn(), TextColumn("{task.description}")
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        line = bar.add_task("formulating", total=None)
-
-        def show_boxes(seconds: float, boxes: int, left: int) -> None:
-            bar.update(line, description=f"regular poses: {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
-
-        def show_number(name: str, done: int, total: int) -> None:
-            bar.update(line, description=f"{escape(one_line(name))}: {done} of {total} numbers done")
-
+    with spinner("formulating") as show:
         return judge_workspace(
             case,
             quantities=quantities,
             gap=gap,
-            time_limit=time,
+            time_limit=TIME_LIMIT if time is None else time,
             leg_error=leg_error,
             jobs=jobs,
-            rank_progress=show_boxes,
-            progress=show_number,
+            rank_progress=lambda seconds, boxes, left: show(
+                f"regular poses: {boxes:,} boxes, {left:,} left, {seconds:.0f} s"
+            ),
+            progress=lambda name, done, total: show(f"{name}: {done} of {total} numbers done"),
             paper=paper,
         )
+
+
+def _slices(case: Case, files: Outputs) -> tuple[Slice, ...]:
+    """Return the slices that the files show; a page has none of a robot without slices.
+
+    Raises:
+        CaseError: a picture of slices is asked for, of a robot that has none.
+    """
+    from ..errors import CaseError
+    from ..proof.workspace.slices.slices import slices_of
+
+    if files["plot"] is None and files["html"] is None:
+        return ()
+    try:
+        return slices_of(case)
+    except CaseError:
+        if files["plot"] is not None:
+            raise
+        return ()
+
+
+def _worst(case: Case, result: WorkspaceResult, target: str) -> Figure:
+    """Return a picture of the robot at its worst pose.
+
+    Raises:
+        InputError: no pose is known.
+    """
+    from ..errors import InputError
+    from ..output.pictures.figures import figure_of
+    from ..output.pictures.workspaces import drawing_at
+    from ..results.workspaceposes import worst_claim
+
+    worst = worst_claim(result, case.tasks[0].sense)
+    if worst is None:
+        raise InputError(f"--picture {target}: no pose of the workspace is known at which a number is reached")
+    return figure_of([drawing_at(case, worst)])

@@ -124,10 +124,12 @@ def compare(
             if progress is not None:
                 progress(contender.label, done, len(contenders))
             with within(seconds_left() / (len(contenders) - done)):
+                started = time.perf_counter()
                 entry = _solved(case, contender, common, part, length, (starts, seed, jobs))
                 if certified:
                     entry = _with_certificate(entry, jobs)
-                entries.append(_with_judgement(entry, jobs))
+                entry = _with_judgement(entry, jobs)
+                entries.append(replace(entry, seconds=time.perf_counter() - started))
             reached(Milestone.ROBOT)
         is_stopped = is_requested()
     answers = [each for each in entries if each.has_answer]
@@ -170,7 +172,6 @@ def _solved(
     search: tuple[int | None, int | None, int | None],
 ) -> Entry:
     """Return a robot solved in the place of the case's own."""
-    began = time.perf_counter()
     factor, own = 1.0, size_at_start(case) if contender.is_own else size_of_home(contender.model)
     if common is not None and not contender.is_own:
         factor = common / own
@@ -181,16 +182,14 @@ def _solved(
         solution = solve(place.case, starts=starts, seed=seed, jobs=jobs)
     except ScrewsynthError as error:
         fault = f"{error.key}: {error.fault}" if isinstance(error, CaseError) else str(error)
-        return replace(entry, fault=fault, seconds=time.perf_counter() - began)
+        return replace(entry, fault=fault)
     entry = replace(entry, placed=place, solution=solution)
-    if entry.has_answer:
-        entry = _with_fits(entry, contender)
-    return replace(entry, seconds=time.perf_counter() - began)
+    return _with_fits(entry) if entry.has_answer else entry
 
 
-def _with_fits(entry: Entry, contender: Contender) -> Entry:
+def _with_fits(entry: Entry) -> Entry:
     """Return a robot with an answer with its freedoms, its tasks and its singularities at the design."""
-    solution = entry.solution
+    contender, solution = entry.contender, entry.solution
     if solution is None:
         return entry
     fits, singularities, freedoms = [], [], entry.freedoms
@@ -228,22 +227,20 @@ def _with_certificate(entry: Entry, jobs: int | None) -> Entry:
     """Return a robot with the certificate of its answer, or the reason why it has none."""
     if entry.solution is None or not entry.has_answer:
         return entry
-    began = time.perf_counter()
     try:
         found = certify(entry.solution, time_limit=_proof_seconds(), jobs=jobs)
     except (UncoveredError, InputError) as error:
         return replace(entry, certificate_fault=str(error))
     if found.certificate is not None and found.certificate.was_beaten:
         # The search of the whole box found a better design.
-        entry = _with_fits(replace(entry, solution=found.solution), entry.contender)
-    return replace(entry, certified=found, seconds=entry.seconds + time.perf_counter() - began)
+        entry = _with_fits(replace(entry, solution=found.solution))
+    return replace(entry, certified=found)
 
 
 def _with_judgement(entry: Entry, jobs: int | None) -> Entry:
     """Return a robot with the verdict on its design over the case's workspace, where the case has one."""
     if entry.placed is None or entry.solution is None or entry.placed.case.workspace is None or not entry.has_answer:
         return entry
-    began = time.perf_counter()
     outcome, proof = entry.solution.outcomes[0], entry.solution.workspace
     names = _measures(entry.contender)
     # Lengths of straight legs are among the claims already.
@@ -257,9 +254,7 @@ def _with_judgement(entry: Entry, jobs: int | None) -> Entry:
             judged = judge_workspace(design, quantities=asked, time_limit=limit, jobs=jobs, with_objective=False)
         except ScrewsynthError as error:
             return replace(entry, workspace_fault=str(error))
-    seconds = entry.seconds + time.perf_counter() - began
-    strokes = proven_strokes(judged, names)
-    return replace(entry, judgement=judged, outcome=outcome_of(judged), strokes=strokes, seconds=seconds)
+    return replace(entry, judgement=judged, outcome=outcome_of(judged), strokes=proven_strokes(judged, names))
 
 
 def part_of(entry: Entry) -> Part:

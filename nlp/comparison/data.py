@@ -190,44 +190,35 @@ def _conventions(found: Comparison) -> list[str]:
 def comparison_result(found: Comparison) -> ComparisonResult:
     """Return a comparison as a result."""
     case = found.case
-    return ComparisonResult(
+    return ComparisonResult.of(
+        found,
         schema=SCHEMA,
         case=case.name,
         title=case.title,
-        units=UnitsData(length=case.units.length, angle=case.units.angle),
+        units=UnitsData.of(case.units),
         limits=len(case.limits),
-        size=found.size,
         range=found.part,
-        characteristic_length=found.characteristic_length,
         robots=tuple(_robot(case, each) for each in found.entries),
         sentences=tuple(comparison_sentences(found)),
         versions=versions(),
-        seconds=found.seconds,
     )
 
 
 def _robot(case: Case, entry: Entry) -> ComparedRobotData:
-    model, solution, units = entry.contender.model, entry.solution, case.units
-    placed = entry.placed
+    model, placed, units = entry.contender.model, entry.placed, case.units
     left_out = () if placed is None else placed.left_out
-    return ComparedRobotData(
+    return ComparedRobotData.of(
+        entry,
         name=entry.contender.label,
         model=model.name,
         description=model.description,
         part=part_of(entry),
-        factor=entry.factor,
-        size=entry.size,
-        final_size=entry.final_size,
-        freedoms=entry.freedoms,
-        status=None if solution is None else solution.status,
-        value=entry.value,
-        sense=entry.sense,
+        status=None if entry.solution is None else entry.solution.status,
         tasks=tuple(_task(case, k, each) for k, each in enumerate(entry.tasks)),
         dimensions=_dimensions(entry),
         active=_active(entry),
-        singularities=entry.singularities,
         limits_kept=0 if placed is None else len(placed.case.limits),
-        limits_left_out=tuple(ComparedLimitData(key=each.key, reason=each.reason) for each in left_out),
+        limits_left_out=tuple(ComparedLimitData.of(each) for each in left_out),
         certificate=certificate_data(entry.certificate),
         certificate_fault=entry.certificate_fault or None,
         workspace=entry.outcome,
@@ -241,24 +232,16 @@ def _robot(case: Case, entry: Entry) -> ComparedRobotData:
         ),
         sentences=tuple(entry_sentences(entry)),
         case=_text(entry),
-        seconds=entry.seconds,
     )
 
 
 def _task(case: Case, index: int, fit: TaskFit) -> ComparedTaskData:
     units, twist = case.units, frozen_array(case.tasks[index].twist, (6,))
-    return ComparedTaskData(
-        name=fit.name,
-        F=None if fit.F is None else finite_or_none(fit.F),
+    return ComparedTaskData.of(
+        fit,
         unit=objective_unit([twist], units),
-        can_move=fit.can_move,
-        constraint=fit.constraint,
         rates=tuple(
-            ComparedRateData(
-                actuator=rate.actuator,
-                unit=rate_unit(twist, units, rate.dimension),
-                rate=finite_or_none(rate.value),
-            )
+            ComparedRateData.of(rate, unit=rate_unit(twist, units, rate.dimension), rate=finite_or_none(rate.value))
             for rate in fit.rates
         ),
     )

@@ -7,28 +7,26 @@ from types import MappingProxyType
 from ..program.places import Scalar
 from ..program.program import design_indices
 from ..results.evidence import certificate_data
-from ..results.front import FrontGoalData, FrontPointData, FrontResult
+from ..results.explorations import FrontGoalData, FrontPointData, FrontResult
 from ..results.jsondata import finite_or_none
 from ..results.point import head_data, stated_pose_notice, versions
-from ..results.tradeoffwording import unit_of_objective
+from ..results.tradeoff import unit_of_objective
 from .front import Front, FrontPoint
 
 
 def front_result(front: Front) -> FrontResult:
     """Return a front as a result."""
     goals = tuple(
-        FrontGoalData(name=goal.label, sense=goal.sense, unit=unit)
+        FrontGoalData.of(goal, name=goal.label, unit=unit)
         for goal, unit in zip(front.goals, goal_units(front), strict=True)
     )
-    return FrontResult(
+    return FrontResult.of(
+        front,
         head=head_data(front.case),
         notice=stated_pose_notice(front.case),
         front=goals,
         points=tuple(_point(front, each) for each in front.points),
-        gaps=front.gaps,
-        failed=front.failed,
         versions=versions(),
-        seconds=front.seconds,
     )
 
 

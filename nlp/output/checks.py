@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 from ..errors import one_line
-from ..results.checkwording import published_words, reproduction_table
+from ..results.checks import published_words, reproduction_table
 from ..results.regression import CaseCheck
 from ..results.text import Line, TextTable
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable
 
 from ..errors import InputError, listing
 from ..results.text import Figure, Line, TextTable
+from ..system.csvtext import csv_text
 
 
 def tables_as_csv(tables: Iterable[TextTable], name: str | None = None) -> str:
@@ -31,11 +30,8 @@ def tables_as_csv(tables: Iterable[TextTable], name: str | None = None) -> str:
 
 def _as_csv(table: TextTable) -> str:
     """Return one table, its headers in the first line."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([header.replace("\n", ", ") or ("note" if k else "name") for k, header in enumerate(table.headers)])
-    writer.writerows([_cell(cell) for cell in row] for row in table.rows)
-    return text.getvalue()
+    head = [header.replace("\n", ", ") or ("note" if k else "name") for k, header in enumerate(table.headers)]
+    return csv_text(head, ([_cell(cell) for cell in row] for row in table.rows))
 
 
 def _cell(cell: str | Line) -> str:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 
+from ..evidence.optimality import Evidence
 from ..front.data import design_places, goal_bounds, goal_units, goal_values
 from ..front.front import Front, FrontPoint
 from ..front.goals import Goal
@@ -13,6 +12,7 @@ from ..program.program import design_names
 from ..proof.certificate.certificate import CertificateStatus
 from ..results.point import stated_pose_notice
 from ..results.text import TextTable
+from ..system.csvtext import csv_text
 
 _SEPARATOR = "; "
 #: Begins the name of the constraint that bounds F of a task.
@@ -24,37 +24,30 @@ def front_csv(front: Front) -> str:
     units, places = front.case.units, design_places(front)
     # With two goals, one alone has a bound.
     bounds = ["bound"] if len(front.goals) == 2 else [f"bound of {goal.label}" for goal in front.goals]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([
+    head = [
         *(goal.label for goal in front.goals),
         *("optimised", *bounds, "status", *(each.name for _, each in places), "active", "multipliers", "verdict"),
         *("stationarity", "feasibility", "curvature", "certificate", "proven_bound", "starts", "seconds"),
-    ])  # fmt: skip
+    ]
+    rows: list[list[object]] = []
     for point in front.points:
         evidence, certificate = point.solution.evidence, point.certificate
         design = [units.shown(float(point.solution.x[place]), each.dimension) for place, each in places]
         given = goal_bounds(front, point)
         if len(given) == 2:
             given = [given[1 - point.program.optimised]]
-        writer.writerow([
+        rows.append([
             *map(repr, goal_values(front, point)),
             front.goals[point.program.optimised].label,
-            *("" if bound is None else bound for bound in given),
+            *given,
             point.solution.status.value,
             *design,
-            "" if evidence is None else _SEPARATOR.join(_active(point)),
-            "" if evidence is None else _SEPARATOR.join(repr(side.multiplier) for side in evidence.active),
-            "" if evidence is None else evidence.kind.value,
-            "" if evidence is None else evidence.stationarity,
-            "" if evidence is None else evidence.feasibility,
-            "" if evidence is None or not len(evidence.eigenvalues) else float(evidence.eigenvalues[0]),
-            "" if certificate is None else certificate.status.value,
-            "" if certificate is None else certificate.bound,
+            *([None] * 6 if evidence is None else _evidence_cells(evidence)),
+            *([None] * 2 if certificate is None else [certificate.status.value, certificate.bound]),
             len(point.solution.starts),
             point.solution.seconds,
         ])  # fmt: skip
-    return text.getvalue()
+    return csv_text(head, rows)
 
 
 def front_words(front: Front) -> list[str]:
@@ -104,9 +97,14 @@ def goal_names(front: Front) -> list[str]:
     return [_words(goal) for goal in front.goals]
 
 
-def _active(point: FrontPoint) -> list[str]:
-    evidence = point.solution.evidence
-    return [] if evidence is None else [f"{side.name} {side.bound}" for side in evidence.active]
+def _evidence_cells(evidence: Evidence) -> list[object]:
+    """Return the active sides, their multipliers, the verdict and the numbers that it rests on."""
+    return [
+        _SEPARATOR.join(f"{side.name} {side.bound}" for side in evidence.active),
+        _SEPARATOR.join(repr(side.multiplier) for side in evidence.active),
+        *(evidence.kind.value, evidence.stationarity, evidence.feasibility),
+        float(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
+    ]
 
 
 def _counted(point: FrontPoint) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -32,7 +31,7 @@ from ..solver.solution import Solution
 from .pictures.drawing import Drawing, drawing_of, drawing_of_model
 from .pictures.requirements import check_library
 from .pictures.solutions import drawings_of
-from .report.markup import html_table, join_markup, paragraphs, tag
+from .report.markup import html_table, image_source, join_markup, paragraphs, tag
 from .terminal import show
 
 #: Width of a text without a terminal, as the command line writes into a file.
@@ -111,8 +110,8 @@ def _html(items: Iterable[Line | TextTable], drawings: Callable[[], Sequence[Dra
     parts = [paragraphs([item]) if isinstance(item, Line) else html_table(item, "") for item in items]
     try:
         found = drawings()
-        image = "" if not found else base64.b64encode(_picture(found).svg.encode("utf-8")).decode("ascii")
-        parts.append(tag("img", src=f"data:image/svg+xml;base64,{image}", alt="the robot") if image else tag("p"))
+        source = image_source(_picture(found).svg.encode("utf-8")) if found else ""
+        parts.append(tag("img", src=source, alt="the robot") if found else tag("p"))
     except (InputError, EvaluationError) as error:
         parts.append(tag("p", str(error)))
     return tag("div", join_markup(parts))

@@ -1,10 +1,11 @@
-"""Checks of cases as a result: the types and their construction."""
+"""Checks of cases as a result, and as lines and tables of text."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from .jsondata import JsonObject, Vector
 from .parts import SCHEMA
-from .regression import CaseCheck, ExpectedCheck, PublishedCheck
+from .regression import CaseCheck, PublishedCheck, decimals_of
+from .text import Line, TextTable, Tone
 
 
 class ExpectedData(JsonObject):
@@ -95,12 +96,10 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
         schema=SCHEMA,
         passed=all(check.passed for check in checks),
         cases=tuple(
-            CaseCheckData(
+            CaseCheckData.of(
+                check,
                 case=check.name,
-                title=check.title,
-                passed=check.passed,
-                seconds=check.seconds,
-                expected=tuple(_expected_data(row) for row in check.expected),
+                expected=tuple(ExpectedData.of(row) for row in check.expected),
                 published=tuple(_published_data(row) for row in check.published),
             )
             for check in checks
@@ -108,30 +107,93 @@ def checks_of(checks: Sequence[CaseCheck]) -> ChecksResult:
     )
 
 
-def _expected_data(row: ExpectedCheck) -> ExpectedData:
-    """Return the check of an expected number as data."""
-    return ExpectedData(
-        quantity=row.quantity,
-        expected=row.expected,
-        computed=row.computed,
-        tolerance=row.tolerance,
-        passed=row.passed,
-    )
-
-
 def _published_data(row: PublishedCheck) -> PublishedData:
     """Return the check of a published number as data."""
+    return PublishedData.of(row.published, computed=row.computed, verdict=row.verdict, rule=row.rule, passed=row.passed)
+
+
+def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
+    """Yield the count of numbers that hold in each case, and every number that does not."""
+    yield TextTable(("case", "expected", "published", "seconds"), tuple(_summary_row(check) for check in checks))
+    faults = [fault for check in checks for fault in _faults(check)]
+    yield from (Line(fault, tone=Tone.FAULT) for fault in faults)
+    yield Line(f"{len(faults)} do not hold", tone=Tone.NO_ANSWER) if faults else Line("all hold", tone=Tone.HOLDS)
+
+
+def _summary_row(check: CaseCheck) -> tuple[str | Line, ...]:
+    """Return a case's row: its name, counts and seconds."""
+    reproduced = sum(row.reproduced for row in check.published)
+    held = sum(row.passed for row in check.expected)
+    published = f"{reproduced} reproduced, {len(check.published) - reproduced} not" if check.published else ""
+    name = Line(check.name, tone=Tone.PLAIN if check.passed else Tone.NO_ANSWER)
+    return name, f"{held} of {len(check.expected)} hold", published, f"{check.seconds:.1f}"
+
+
+def _faults(check: CaseCheck) -> Iterator[str]:
+    """Yield a sentence for each number of a case that does not hold."""
+    for row in check.expected:
+        if not row.passed:
+            yield f"{check.name}: {row.quantity} is {row.computed}, expected {row.expected} within {row.tolerance:g}"
+    for published in check.published:
+        if not published.passed:
+            yield f"{check.name}: newly changed: {published_words(published)}"
+
+
+def reproduction_table(checks: Iterable[CaseCheck]) -> TextTable:
+    """Return the published numbers of cases: printed, computed, verdict and reason."""
+    rows = []
+    for check in checks:
+        for row in check.published:
+            said = row.published
+            reason = said.because if not row.reproduced else row.rule.partition(":")[0]
+            rows.append((check.name, said.source, _quantity(row), _printed(row), _computed(row), row.verdict, reason))
+    return TextTable(("case", "where", "quantity", "printed", "computed", "verdict", "rule or reason"), tuple(rows))
+
+
+def published_table(check: CaseCheck) -> TextTable:
+    """Return the published numbers of one case beside the computed ones."""
+    rows = [
+        (
+            row.published.quantity,
+            ", ".join(f"{value:g}" for value in row.published.value),
+            ", ".join(f"{value:.7g}" for value in row.computed) or "none",
+            row.verdict,
+            row.published.source,
+            row.published.because or row.rule,
+        )
+        for row in check.published
+    ]
+    return TextTable(("quantity", "published", "computed", "", "where", "how it is known"), tuple(rows))
+
+
+def published_words(row: PublishedCheck) -> str:
+    """Return a published number, the computed one and the rule, in one line."""
+    return f"{_quantity(row)}: printed {_printed(row)}, computed {_computed(row)} ({row.rule})"
+
+
+def _quantity(row: PublishedCheck) -> str:
+    """Return the name of a published quantity."""
     said = row.published
-    return PublishedData(
-        quantity=said.quantity,
-        value=said.value,
-        source=said.source,
-        reproduced=said.reproduced,
-        because=said.because,
-        decimals=said.decimals,
-        over=said.over,
-        computed=row.computed,
-        verdict=row.verdict,
-        rule=row.rule,
-        passed=row.passed,
-    )
+    return said.quantity if said.over is None else f"gain over {said.over}, %"
+
+
+def _printed(row: PublishedCheck) -> str:
+    """Return a published number with the digits that were printed."""
+    return _tuple(f"{value:.{_decimals(row, value)}f}" for value in row.published.value)
+
+
+def _computed(row: PublishedCheck) -> str:
+    """Return the computed number with two digits more than were printed."""
+    if not row.computed:
+        return "none"
+    shown = zip(row.computed, row.published.value, strict=True)
+    return _tuple(f"{value + 0.0:.{_decimals(row, said) + 2}f}" for value, said in shown)
+
+
+def _decimals(row: PublishedCheck, value: float) -> int:
+    return decimals_of(value) if row.published.decimals is None else row.published.decimals
+
+
+def _tuple(texts: Iterable[str]) -> str:
+    parts = list(texts)
+    return parts[0] if len(parts) == 1 else f"({', '.join(parts)})"

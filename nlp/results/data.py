@@ -285,6 +285,26 @@ class CombinedResult(JsonObject):
     versions: VersionsData
     seconds: float
 
+    @property
+    def F(self) -> float | None:  # noqa: N802 - the objective's name
+        """Value of the combined objective."""
+        return self.combined.value
+
+    @property
+    def robot(self) -> RobotData | None:
+        """The robot at the combined point, an answer or merely reached; None where it does not exist."""
+        return None if self.combined.point is None else self.combined.point.robot
+
+    @property
+    def margins(self) -> tuple[MarginData, ...]:
+        """Every limit at every leg, joint and pose of the combined point."""
+        return () if self.combined.point is None else self.combined.point.margins or ()
+
+    @property
+    def limits(self) -> tuple[LimitData, ...]:
+        """One row for each limiting number of the case at the combined point."""
+        return () if self.combined.point is None else self.combined.point.limits or ()
+
 
 #: Result of solving a case, of one task or of several.
 CaseResult: TypeAlias = SolveResult | CombinedResult

@@ -29,16 +29,12 @@ def margins_data(nlp: Nlp, x: FloatArray, *, optimal: bool) -> tuple[MarginData,
 def _margin(case: Case, row: Margin) -> MarginData:
     """Return a margin in the case's units."""
     units = case.units
-    return MarginData(
-        name=row.name,
-        key=row.key,
-        bound=row.bound,
+    return MarginData.of(
+        row,
         value=finite_or_none(units.shown(row.value, row.dimension)),
         limit=units.shown(row.limit, row.dimension),
         margin=finite_or_none(units.shown(row.margin, row.dimension)),
         unit=unit_of_side(case, row.name, row.dimension),
-        active=row.active,
-        violated=row.violated,
         cost=None if row.cost is None else units.per_unit(row.cost, row.dimension),
     )
 
@@ -62,23 +58,19 @@ def unit_of_side(case: Case, name: str, dimension: Dimension) -> str:
 def limits_data(margins: Sequence[MarginData]) -> tuple[LimitData, ...]:
     """Return one row for each limiting number of the case: its least margin, where it is active, and its whole cost."""
     keys = dict.fromkeys(row.key for row in margins)
-    return tuple(_limit(key, [row for row in margins if row.key == key]) for key in keys)
+    return tuple(_limit([row for row in margins if row.key == key]) for key in keys)
 
 
-def _limit(key: str, margins: Sequence[MarginData]) -> LimitData:
+def _limit(margins: Sequence[MarginData]) -> LimitData:
     """Return one limiting number from all its margins."""
     sizes = [-math.inf if row.margin is None else row.margin for row in margins]
     # The first of equally near ones: rounding must not choose among legs that are images of each other.
     near = min(sizes) + NOISE * max(abs(margins[0].limit), abs(margins[0].value or 0.0))
     least = next(row for row, size in zip(margins, sizes, strict=True) if size <= near)
     costs = [row.cost for row in margins if row.cost is not None]
-    return LimitData(
-        key=key,
-        limit=least.limit,
-        unit=least.unit,
+    return LimitData.of(
+        least,
         nearest=least.name,
-        value=least.value,
-        margin=least.margin,
         active=tuple(row.name for row in margins if row.active),
         violated=tuple(row.name for row in margins if row.violated),
         cost=sum(costs) if costs else None,
@@ -89,8 +81,8 @@ def relaxation_data(nlp: Nlp, relaxation: Sequence[RelaxedLimit]) -> tuple[Relax
     """Return the numbers of the case that must be moved for it to be feasible, all at once; None without any."""
     units = nlp.case.units
     rows = tuple(
-        RelaxationData(
-            key=row.key,
+        RelaxationData.of(
+            row,
             limit=units.shown(row.limit, row.dimension),
             needed=units.shown(row.needed, row.dimension),
             unit=units.label(row.dimension),
@@ -104,8 +96,8 @@ def sensitivity_data(nlp: Nlp, x: FloatArray) -> tuple[SensitivityData, ...]:
     """Return the sensitivities of the optimal F at an optimum (n,) to the numbers that the case fixes."""
     units = nlp.case.units
     return tuple(
-        SensitivityData(
-            name=row.name,
+        SensitivityData.of(
+            row,
             value=units.shown(row.value, row.dimension),
             unit=units.label(row.dimension),
             derivative=None if row.derivative is None else units.per_unit(row.derivative, row.dimension),
@@ -121,10 +113,9 @@ def tolerance_data(nlp: Nlp, x: FloatArray) -> ToleranceData | None:
     if tolerance is None or not nlp.case.model.built:
         return None
     lost = tolerance_loss(nlp, x, tolerance)
-    return ToleranceData(
+    return ToleranceData.of(
+        lost,
         joint_centre=lost.tolerance,
-        loss=lost.loss,
-        loss_there=lost.loss_there,
         joints=tuple(
             JointGradientData(limb=limb, plate=plate, gradient=vector(gradient))
             for (limb, plate), gradient in zip(lost.joints, lost.gradients, strict=True)

@@ -7,8 +7,8 @@ from ..evidence.principal_motions import PrincipalMotion, analyse_tasks
 from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from .design import limits_data, margins_data
+from .jointdata import MotionData, motion_data
 from .jsondata import Inline, JsonObject, Vector, vector
-from .motiondata import MotionData, motion_data
 from .parts import HeadData, LimitData, MarginData, RobotData, TaskData, VersionsData, ViolationData
 from .point import head_data, objective, robot_data, task_data, versions, violations
 

@@ -1,19 +1,24 @@
-"""Evidence of optimality and proven bounds as data."""
-
-from __future__ import annotations
+"""Evidence of optimality and proven bounds as data, and the certificates of a case as a result."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...models.arrays import first_largest
+from ..case.task import Sense
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
 from ..proof.certificate.certificate import Certificate
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
-from .jsondata import finite_or_none, vector
+from .jsondata import Absent, Inline, JsonObject, vector
+from .parts import HeadData, VersionsData
+from .point import head_data, stated_pose_notice, versions
+
+if TYPE_CHECKING:
+    from ..solver.certified import Certified
 
 
 def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | None:
@@ -21,16 +26,11 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
     if evidence is None:
         return None
     units = nlp.case.units
-    return OptimalityData(
-        kind=evidence.kind,
-        stationarity=finite_or_none(evidence.stationarity),
-        feasibility=finite_or_none(evidence.feasibility),
-        complementarity=finite_or_none(evidence.complementarity),
-        licq=evidence.licq,
+    return OptimalityData.of(
+        evidence,
         active=tuple(
-            ActiveData(
-                name=side.name,
-                bound=side.bound,
+            ActiveData.of(
+                side,
                 value=units.shown(side.value, side.dimension),
                 unit=unit_of_side(nlp.case, side.name, side.dimension) or None,
                 multiplier=units.per_unit(side.multiplier, side.dimension),
@@ -53,21 +53,7 @@ def _flat(nlp: Nlp, direction: Mapping[str, float]) -> Mapping[str, float]:
 
 def certificate_data(certificate: Certificate | None) -> CertificateData | None:
     """Return a proven bound; None without a certificate."""
-    if certificate is None:
-        return None
-    return CertificateData(
-        status=certificate.status,
-        bound=finite_or_none(certificate.bound),
-        incumbent=finite_or_none(certificate.incumbent),
-        gap=finite_or_none(certificate.gap),
-        relative_gap=certificate.relative_gap,
-        engine=certificate.engine,
-        boxes=certificate.boxes,
-        open=certificate.open,
-        seconds=certificate.seconds,
-        statement=certificate.statement,
-        history=certificate.history,
-    )
+    return None if certificate is None else CertificateData.of(certificate)
 
 
 def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | None:
@@ -78,4 +64,59 @@ def incumbent_data(certificate: Certificate | None) -> Mapping[str, float] | Non
     variables = zip(nlp.program.variables, certificate.x, strict=True)
     return MappingProxyType(
         {each.name: nlp.case.units.shown(float(value), each.dimension) for each, value in variables}
+    )
+
+
+class CertifiedTaskData(JsonObject):
+    """A task by itself and its certificate.
+
+    Attributes:
+        name: of the task.
+        sense: whether F is maximised or minimised.
+        certificate: the proven bound.
+        point: the best point known, by the names of the program's variables; null where there is none.
+    """
+
+    name: str
+    sense: Sense
+    certificate: CertificateData | None
+    point: Mapping[str, float] | None
+
+
+class CertifiedResult(JsonObject):
+    """Result of certifying a case.
+
+    Attributes:
+        head: the case.
+        certificate: of the one task, or of the program that combines several; null where there is no such program.
+        point: the best point known, by the names of the program's variables; null where there is none.
+        tasks: each task by itself.
+        notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
+            absent.
+        versions: of the programs.
+    """
+
+    head: Inline[HeadData]
+    certificate: CertificateData | None
+    point: Mapping[str, float] | None
+    tasks: tuple[CertifiedTaskData, ...]
+    notice: Absent[str]
+    versions: VersionsData
+
+
+def certified_of(certified: "Certified") -> CertifiedResult:
+    """Return the proven bounds of a case: of every task, and of the combined program where there is one."""
+    case = certified.tasks[0].nlp.case
+    return CertifiedResult(
+        head=head_data(case),
+        certificate=certificate_data(certified.certificate),
+        point=incumbent_data(certified.certificate),
+        tasks=tuple(
+            CertifiedTaskData(
+                name=task.name, sense=each.nlp.sense, certificate=certificate_data(each), point=incumbent_data(each)
+            )
+            for task, each in zip(case.tasks, certified.tasks, strict=True)
+        ),
+        notice=stated_pose_notice(case),
+        versions=versions(),
     )

@@ -1,10 +1,79 @@
-"""Joints of a robot given joint by joint as a part of results: freedoms, rates, singularities, F by limb, assembly."""
+"""Motions and wrenches as data; joints of a robot given joint by joint: freedoms, rates, singularities, assembly."""
 
-from typing import Literal
+import math
+from typing import TYPE_CHECKING, Literal, TypedDict
 
-from ..evidence.singularities import SingularityKey
-from .jsondata import Absent, JsonObject
-from .motiondata import MotionData, WrenchData
+import numpy as np
+
+from ...models import Dimension, FloatArray, axis_from_screw
+from ..evidence.assembly import assembly_of
+from ..evidence.conventions import Dependence
+from ..evidence.mobility import Mobility, mobility_of
+from ..evidence.singularities import Singularity, SingularityKey, clause_of
+from ..evidence.state import RobotState
+from ..program.nlp import Nlp
+from .jsondata import Absent, JsonObject, Vector3, Vector6, finite_or_none, vector
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+class MotionData(JsonObject):
+    """An instantaneous motion of the platform.
+
+    Attributes:
+        twist: angular velocity, then velocity at the world origin.
+        axis: unit direction of the screw axis.
+        point: the axis's point nearest to the world origin; null for a translation.
+        pitch: length per radian; "inf" for a translation.
+    """
+
+    twist: Vector6
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+class WrenchData(JsonObject):
+    """A wrench of unit force, or a unit couple.
+
+    Attributes:
+        wrench: force, then moment about the world origin.
+        axis: unit direction of the screw axis.
+        point: the axis's point nearest to the world origin; null for a couple.
+        pitch: moment along the axis per unit of force, length; "inf" for a couple.
+    """
+
+    wrench: Vector6
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+def motion_data(twist: "ArrayLike") -> MotionData:
+    """Return a twist (6,) with its axis, point and pitch; a pure translation has no point."""
+    return MotionData(twist=vector(np.asarray(twist, dtype=np.float64)), **_axis_of(twist))
+
+
+def wrench_data(wrench: "ArrayLike") -> WrenchData:
+    """Return a wrench (6,) with its axis, point and pitch; a pure couple has no point."""
+    return WrenchData(wrench=vector(np.asarray(wrench, dtype=np.float64)), **_axis_of(wrench))
+
+
+class _Axis(TypedDict):
+    """Axis, point and pitch of a screw, as the data have them."""
+
+    axis: Vector3
+    point: Vector3 | None
+    pitch: float | Literal["inf"]
+
+
+def _axis_of(coordinates: "ArrayLike") -> _Axis:
+    """Return axis, point and pitch of a screw (6,); one of infinite pitch has no point."""
+    screw = axis_from_screw(coordinates)
+    infinite = math.isinf(screw.pitch)
+    point = None if infinite else vector(screw.point)
+    return {"axis": vector(screw.axis), "point": point, "pitch": "inf" if infinite else screw.pitch}
 
 
 class ActuatorData(JsonObject):
@@ -83,3 +152,65 @@ class JointsData(JsonObject):
     centre_dependence: Absent[float]
     singularities: tuple[SingularityData, ...]
     assembly: tuple[str, ...]
+
+
+def joints_data(
+    nlp: Nlp, x: FloatArray, state: RobotState, dependence: Dependence | None, *, with_task: bool
+) -> JointsData | None:
+    """Return the joints of a robot given joint by joint; None for others.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        state: the robot there, at the first pose.
+        dependence: of F on conventions; None where it is not known.
+        with_task: whether the state's rates belong to a task.
+    """
+    found = mobility_of(nlp, x, state)
+    if found is None:
+        return None
+    assembly = assembly_of(nlp, x, state)
+    return JointsData.of(
+        found,
+        feasible=found.constrained == 0 if with_task else None,
+        actuators=_actuators(nlp, found) if with_task else None,
+        constrained=found.constrained if with_task else None,
+        limb_parts=_limb_parts(found) if with_task else None,
+        centre_dependence=None if dependence is None else dependence.centre,
+        singularities=tuple(_singularity(each) for each in found.singularities),
+        assembly=() if assembly is None else assembly.sentences,
+    )
+
+
+def _actuators(nlp: Nlp, found: Mobility) -> tuple[ActuatorData, ...]:
+    """Return the actuators with their rates."""
+    return tuple(
+        ActuatorData.of(
+            each,
+            kind="angle" if each.dimension is Dimension.ANGLE else "length",
+            rate=finite_or_none(found.actuator_rates.get(each.name, math.inf)),
+        )
+        for each in nlp.program.model.actuators
+    )
+
+
+def _limb_parts(found: Mobility) -> tuple[LimbPartData, ...]:
+    """Return actuation and constraints in F, limb by limb."""
+    return tuple(
+        LimbPartData(
+            limb=limb, F=part.actuation + part.constraint, actuation=part.actuation, constraints=part.constraint
+        )
+        for limb, part in found.parts.items()
+    )
+
+
+def _singularity(each: Singularity) -> SingularityData:
+    """Return a singularity."""
+    return SingularityData(
+        kind=each.kind.key,
+        limb=each.limb,
+        joints=None if each.limb is None else each.joints,
+        words=clause_of(each.kind, each.limb, each.joints),
+        gained=None if each.gained is None else tuple(motion_data(row) for row in each.gained),
+        locking=None if each.locking is None else tuple(wrench_data(row) for row in each.locking),
+    )

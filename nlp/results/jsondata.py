@@ -8,12 +8,24 @@ short command a thirtieth slower.
 import enum
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, TypeAlias, TypeVar, dataclass_transform, get_origin, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    ClassVar,
+    TypeAlias,
+    TypeVar,
+    dataclass_transform,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 
 from ...models import FloatArray
 from ..system.strictjson import Size
+
+if TYPE_CHECKING:
+    from typing import Self
 
 _T = TypeVar("_T")
 JsonValue: TypeAlias = "bool | int | float | str | list[JsonValue] | dict[str, JsonValue] | None"
@@ -58,6 +70,17 @@ class JsonObject:
             wrong = ", ".join(sorted(values.keys() ^ self.marks.keys()))
             raise TypeError(f"{type(self).__name__}: missing or unknown fields: {wrong}")
         self.__dict__.update(values)
+
+    @classmethod
+    def of(cls, row: object, **given: object) -> "Self":
+        """Return an object whose fields are the attributes of the same names of another value.
+
+        Args:
+            row: the other value; its arrays become tuples, and its numbers that are not finite None.
+            given: fields that it has not, or not as they are.
+        """
+        copied = {name: _plain(getattr(row, name)) for name in cls.marks if name not in given}
+        return cls(**copied, **given)
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"{type(self).__name__} is frozen: {name} cannot be set")
@@ -117,6 +140,13 @@ def _json_value(value: object) -> JsonValue:
     if isinstance(value, enum.Enum):
         return _json_value(value.value)
     raise TypeError(f"JSON has no type for {value!r}")
+
+
+def _plain(value: object) -> object:
+    """Return an array as a tuple, a number that JSON cannot hold as None, and anything else as it is."""
+    if isinstance(value, np.ndarray):
+        return vector(value) if value.ndim == 1 else matrix(value)
+    return finite_or_none(value) if isinstance(value, float) else value
 
 
 def finite_or_none(value: float) -> float | None:

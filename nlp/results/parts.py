@@ -9,9 +9,8 @@ from typing import Annotated, Literal, TypeAlias
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from ..system.strictjson import Size
-from .jointdata import JointsData
+from .jointdata import JointsData, MotionData
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, Vector6
-from .motiondata import MotionData
 
 #: Version of the format.
 SCHEMA = 1

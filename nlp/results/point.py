@@ -6,7 +6,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -19,9 +18,8 @@ from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
-from .jointpoint import joints_data
+from .jointdata import joints_data, motion_data
 from .jsondata import Vector, matrix, vector
-from .motiondata import motion_data
 from .parts import (
     SCHEMA,
     ByOwner,
@@ -37,17 +35,13 @@ from .parts import (
 )
 from .rounding import TURNED
 
-if TYPE_CHECKING:
-    pass
-
 #: Violations of less than this part of the worst are left out: a failed solve leaves them beside the worst.
 _SMALL = 1e-3
 
 
 def head_data(case: Case) -> HeadData:
     """Return the case that a result is about."""
-    units = UnitsData(length=case.units.length, angle=case.units.angle)
-    return HeadData(schema=SCHEMA, case=case.name, title=case.title, model=case.model.name, units=units)
+    return HeadData.of(case, schema=SCHEMA, case=case.name, model=case.model.name, units=UnitsData.of(case.units))
 
 
 def stated_pose_notice(case: Case) -> str | None:
@@ -82,17 +76,15 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
     limited = _limited_quantities(nlp, x)
     several = _poses_data(nlp, x, limited)
     dependence = None if task is None else dependence_of(nlp, x)
-    return RobotData(
+    return RobotData.of(
+        state,
         parameters=parameters_data(case, state),
         pose=pose_data(case, state) if several is None else several.stated_poses[0],
         task=None if task is None else task_data(case, task),
         limbs=tuple(row.limb for row in case.model.rows),
         members=tuple(row.member for row in case.model.rows),
-        jacobian=matrix(state.jacobian),
         rates=None if task is None else vector(state.rates),
-        rank=state.rank,
         singular=state.is_singular,
-        singular_values=vector(state.singular_values),
         free_motions=tuple(motion_data(twist) for twist in state.free_twists),
         task_is_free=None if task is None else state.is_zero,
         quantities=_quantities(case, state),
@@ -148,14 +140,10 @@ def _poses_data(nlp: Nlp, x: FloatArray, limited: Sequence[Mapping[str, ByOwner]
 
 
 def _pose_state(case: Case, state: RobotState, limited: Mapping[str, ByOwner] | None) -> PoseStateData:
-    return PoseStateData(
-        F=state.F,
+    return PoseStateData.of(
+        state,
         pose=pose_data(case, state),
-        jacobian=matrix(state.jacobian),
-        rates=vector(state.rates),
-        rank=state.rank,
         singular=state.is_singular,
-        singular_values=vector(state.singular_values),
         quantities=_quantities(case, state),
         limited_quantities=limited,
     )
@@ -175,9 +163,8 @@ def pose_data(case: Case, pose: RobotState | StatedPose) -> PoseData:
 def task_data(case: Case, task: int) -> TaskData:
     """Return a task of the case, by its index."""
     chosen = case.tasks[task]
-    return TaskData(
-        name=chosen.name,
-        sense=chosen.sense,
+    return TaskData.of(
+        chosen,
         motion=motion_data(chosen.twist),
         stated_point=None if chosen.point is None else vector(np.asarray(chosen.point, dtype=np.float64)),
     )

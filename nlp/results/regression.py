@@ -31,7 +31,7 @@ from ..interruption import Milestone, is_requested, reached
 from ..program.formulation import formulate_each
 from ..solver.multistart import solve_program
 from ..solver.solve import solve
-from .data import CaseResult, CombinedResult
+from .data import CaseResult
 from .jsondata import JsonValue, json_data
 from .parts import RobotData
 from .result import result_of
@@ -250,7 +250,7 @@ def _flat_difference(name: str, case: Case, row: Published, result: CaseResult) 
     printed: dict[str, float | list[float]] = {}
     for each in case.published:
         printed.update(_argument_settings(case, each.quantity, each.value))
-    own, robot = _argument_settings(case, row.quantity, row.value), _answer_robot(result)
+    own, robot = _argument_settings(case, row.quantity, row.value), result.robot
     if not own or robot is None:
         return None
     settings = {**_computed_settings(case, robot), **printed}
@@ -277,13 +277,6 @@ def _argument_settings(case: Case, quantity: str, value: Sequence[float]) -> Set
     if path.startswith("parameters.") and name in case.parameters:
         return {case.parameter_name(name): value[0] if len(value) == 1 else list(value)}
     return {}
-
-
-def _answer_robot(result: CaseResult) -> RobotData | None:
-    """Return the robot of an answer, or None where its equations have no value."""
-    if isinstance(result, CombinedResult):
-        return None if result.combined.method_point is None else result.combined.method_point.robot
-    return result.robot
 
 
 def _computed_settings(case: Case, robot: RobotData) -> Settings:

@@ -1,16 +1,164 @@
-"""The result of a solve, of one task or of several."""
+"""A solution as a result: of the program of one task, or of several tasks combined."""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+from collections.abc import Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from ..solver.solution import Solution
-from .combined import combined_result
-from .data import CaseResult
-from .solution import task_result
+from ..proof.certificate.certificate import Certificate
+from ..solver.multistart import ProgramSolution
+from ..solver.solution import Combination, Solution, TaskOutcome
+from ..solver.starts import Optimum, StartStatus
+from .data import (
+    CaseResult,
+    CombinedData,
+    CombinedPointData,
+    CombinedResult,
+    OptimumData,
+    OutcomeData,
+    ReachedData,
+    SolveResult,
+    StartsData,
+)
+from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
+from .evidence import certificate_data, optimality_data
+from .jsondata import finite_or_none, vector
+from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
     from ..solver.certified import Certified
+    from ..solver.semi_infinite import WorkspaceProof
+    from .workspace import WorkspaceProofData
+
+
+def task_result(
+    solution: ProgramSolution,
+    task: int = 0,
+    certificate: Certificate | None = None,
+    workspace: WorkspaceProof | None = None,
+) -> SolveResult:
+    """Return the whole result of the program of one task.
+
+    Args:
+        solution: of the program.
+        task: index of that task in the case.
+        certificate: of the same program.
+        workspace: proof over the workspace.
+    """
+    nlp, x, state = solution.nlp, solution.x, solution.state
+    answer = solution.status.is_answer
+    margins = () if state is None else margins_data(nlp, x, optimal=answer)
+    solved = answer and state is not None
+    return SolveResult.of(
+        solution,
+        head=head_data(nlp.case),
+        sense=nlp.sense,
+        F=objective(nlp, x, state) if solved else None,
+        reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
+        relaxation=relaxation_data(nlp, solution.relaxation),
+        robot=None if state is None else robot_data(nlp, x, state, task),
+        optimality=optimality_data(nlp, solution.evidence),
+        margins=margins,
+        limits=limits_data(margins),
+        sensitivity=sensitivity_data(nlp, x) if solved else None,
+        tolerance=tolerance_data(nlp, x) if solved else None,
+        starts=starts_data(solution),
+        certificate=certificate_data(certificate),
+        workspace=None if workspace is None else _proof_data(workspace),
+        versions=versions(),
+    )
+
+
+def _proof_data(workspace: WorkspaceProof) -> WorkspaceProofData | None:
+    """Return the proof over the workspace."""
+    from .workspace import proof_data  # noqa: PLC0415 - few cases have one, and it loads the room of proofs
+
+    return proof_data(workspace)
+
+
+def starts_data(solution: ProgramSolution) -> StartsData:
+    """Return how the starts of a solve ended, and the distinct optima."""
+    ended = Counter(start.status for start in solution.starts)
+    reasons = [status for status in StartStatus if status is not StartStatus.CONVERGED and ended[status]]
+    return StartsData(
+        run=len(solution.starts),
+        converged=ended[StartStatus.CONVERGED],
+        failed=MappingProxyType({status.value: ended[status] for status in reasons}),
+        optima=tuple(_optimum_data(found) for found in solution.optima),
+    )
+
+
+def _optimum_data(found: Optimum) -> OptimumData:
+    """Return a distinct optimum."""
+    return OptimumData.of(found, assembly=None if found.assembly is None else found.assembly.brief)
+
+
+def combined_result(
+    solution: Solution,
+    combination: Combination,
+    certificates: Sequence[Certificate] = (),
+    combined_certificate: Certificate | None = None,
+) -> CombinedResult:
+    """Return the whole result of several tasks.
+
+    Args:
+        solution: of the case.
+        combination: the combination of the tasks.
+        certificates: of each task by itself; empty without certification.
+        combined_certificate: of the combined program.
+    """
+    combined, point = combination.combined, _point(solution, combination)
+    return CombinedResult(
+        head=head_data(solution.case),
+        status=solution.status,
+        tasks=tuple(
+            task_result(outcome.own, j, certificates[j] if certificates else None)
+            for j, outcome in enumerate(solution.outcomes)
+        ),
+        combined=CombinedData.of(
+            combination,
+            method_point=point if solution.all_solved else None,
+            reached=None if solution.all_solved else point,
+            tasks=tuple(_outcome(outcome, is_answer=solution.all_solved) for outcome in solution.outcomes),
+            optimality=None if combined is None else optimality_data(combined.nlp, combined.evidence),
+            starts=None if combined is None else starts_data(combined),
+            certificate=certificate_data(combined_certificate),
+        ),
+        versions=versions(),
+        seconds=solution.seconds,
+    )
+
+
+def _point(solution: Solution, combination: Combination) -> CombinedPointData:
+    """Return the combined point; without the robot, where its equations have no value there."""
+    own, combined = solution.outcomes[0], combination.combined
+    if own.state is None:
+        return CombinedPointData(robot=None, margins=None, limits=None)
+    # Only a combined program gives a limit a cost, which is that of the program's value.
+    nlp, x = (own.own.nlp, solution.x) if combined is None else (combined.nlp, combined.x)
+    margins = margins_data(nlp, x, optimal=combined is not None and solution.all_solved)
+    robot = robot_data(own.own.nlp, solution.x, own.state, None)
+    return CombinedPointData(robot=robot, margins=margins, limits=limits_data(margins))
+
+
+def _outcome(outcome: TaskOutcome, *, is_answer: bool) -> OutcomeData:
+    """Return a task at the combined point; ``F`` is absent without an answer, ``best`` without an own optimum."""
+    best = outcome.own.F if outcome.own.status.is_answer else None
+    state = outcome.state if is_answer else None
+    loss = outcome.loss if state is not None and best is not None else math.nan
+    return OutcomeData.of(
+        outcome.task,
+        F=None if state is None else outcome.F,
+        best=best,
+        loss=finite_or_none(loss),
+        relative_loss=finite_or_none(loss / best) if best else None,
+        unique=outcome.unique,
+        verdict=None if outcome.evidence is None else outcome.evidence.kind,
+        rates=None if state is None else vector(state.rates),
+    )
 
 
 def result_of(found: Solution | Certified) -> CaseResult:

@@ -11,7 +11,7 @@ from ..errors import InputError
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .parts import PoseData, RobotData
-from .reading import load_result
+from .schema import load_result
 
 Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
 
@@ -48,11 +48,7 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
     if (units.length, units.angle) != (case.units.length, case.units.angle):
         own = f"{case.units.length!r} and {case.units.angle!r}"
         raise InputError(f"{source}: has the units {units.length!r} and {units.angle!r}, and the case {own}")
-    if isinstance(result, CombinedResult):
-        point = result.combined.method_point
-        robot = None if point is None else point.robot
-    else:
-        robot = result.robot
+    robot = result.robot
     if robot is None or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
         raise InputError(f"{source}: holds no answer: its solve gave none")
     return robot

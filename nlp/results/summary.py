@@ -1,19 +1,25 @@
-"""Results as sequences of lines and tables for a terminal."""
+"""Results as sequences of lines and tables for a terminal, and every table of a result, by name."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.case import Case
 from ..evidence.state import ZERO_F
 from ..units import objective_unit
 from .data import CombinedResult
-from .designtable import combined_design_table, design_table, solved_design_table
 from .jointwording import limb_part_table
-from .robottables import jacobian_table, robot_tables
+from .robottables import (
+    combined_design_table,
+    design_table,
+    jacobian_table,
+    plural_name,
+    robot_tables,
+    solved_design_table,
+)
 from .rounding import listed, number, robot_size, size_of_F
-from .tables import limit_table, limits_title, outcome_table, principal_table
+from .tables import limit_table, limits_title, margin_table, outcome_table, principal_table
 from .text import Line, TextTable, Tone
 from .wording import (
     certificate_lines,
@@ -30,10 +36,10 @@ from .wording import (
 )
 
 if TYPE_CHECKING:
-    from .certified import CertifiedResult
     from .data import CaseResult, SolveResult
     from .evaluation import EvaluationResult
-    from .parts import RobotData
+    from .evidence import CertifiedResult
+    from .parts import MarginData, RobotData
 
 Summary: TypeAlias = Iterator[Line | TextTable]
 
@@ -48,8 +54,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from heading_lines(case, result)
     if result.workspace is not None:
         # Few cases have a proof, and what shows it loads the room of proofs.
-        from .workspacedigest import proof_digest  # noqa: PLC0415
-        from .workspacewording import proof_lines  # noqa: PLC0415
+        from .workspacewording import proof_digest, proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
         yield from proof_digest(case, result.workspace)
@@ -148,3 +153,61 @@ def _remark_lines(case: Case) -> Summary:
     """Yield remarks on what may be a mistake in the robot."""
     for remark in case.model.remarks:
         yield Line(remark, label="note")
+
+
+def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
+    """Return the names of the tables that a result of a case can have.
+
+    Args:
+        case: the case.
+        at_point: whether it is evaluated at a point, and not solved.
+    """
+    names = ["design"]
+    if case.pose_count == 1:
+        names.append("limbs")
+    else:
+        names += ["poses", *(["rates"] if at_point or len(case.tasks) == 1 else [])]
+        names += [plural_name(item.name) for item in case.model.quantities]
+    if case.model.generic is not None and (at_point or len(case.tasks) == 1):
+        names.append("actuation")
+    if case.limits:
+        names += ["limits", "margins"]
+    if at_point:
+        return (*names, "jacobian", "motions")
+    return tuple(names) if len(case.tasks) == 1 else (*names, "tasks")
+
+
+def case_tables(case: Case, result: CaseResult) -> Iterator[TextTable]:
+    """Yield the tables of a solve: those of its summary, then every margin."""
+    yield from _tables(case_summary(case, result))
+    if not isinstance(result, CombinedResult) and result.robot is not None:
+        yield from _limb_parts_left_out(case, result.robot, is_shown=result.reached is None)
+    if isinstance(result, CombinedResult) and result.robot is not None:
+        if result.combined.method_point is None:
+            # The summary shows no design without an answer.
+            yield combined_design_table(case, result.combined, result.robot)
+        yield from robot_tables(case, result.robot)
+    yield from _margins(result.margins)
+
+
+def evaluation_tables(case: Case, result: EvaluationResult) -> Iterator[TextTable]:
+    """Yield the tables of an evaluation: those of its summary, then every margin."""
+    yield from _tables(evaluation_summary(case, result))
+    yield from _limb_parts_left_out(case, result.robot, is_shown=True)
+    yield from _margins(result.margins)
+
+
+def _limb_parts_left_out(case: Case, robot: RobotData, *, is_shown: bool) -> Iterator[TextTable]:
+    """Yield actuation and constraints by limb, unless a summary that may show them does so."""
+    table = limb_part_table(case, robot)
+    if table is not None and not (is_shown and robot.joints is not None and robot.joints.constrained):
+        yield table
+
+
+def _tables(items: Iterator[object]) -> Iterator[TextTable]:
+    return (item for item in items if isinstance(item, TextTable))
+
+
+def _margins(margins: Sequence[MarginData]) -> Iterator[TextTable]:
+    if margins:
+        yield margin_table(margins)

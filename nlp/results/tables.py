@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..evidence.kkt import ACTIVE
 from ..units import Units, slope_unit
 from .data import CombinedData
-from .motionwording import motion_words
+from .jointwording import motion_words
 from .rounding import NOISE, number, rate_sizes, settled, settled_F, task_F
 from .text import TextTable
 from .wording import SET, counted
@@ -203,8 +203,9 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
     return TextTable(headers, tuple(rows), "optima")
 
 
-def origin_table(versions: VersionsData, search: Search, seconds: float) -> TextTable:
-    """Return versions, seed, starts and time: all that the numbers depend on."""
+def origin_table(versions: VersionsData, search: Search | None = None, seconds: float = 0.0) -> TextTable:
+    """Return versions, and of a search seed, starts and time: all that the numbers depend on."""
     rows = [(name, str(getattr(versions, name))) for name in versions.marks]
-    rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]
+    if search is not None:
+        rows += [("seed", str(search.seed)), ("starts", str(search.starts)), ("seconds", f"{seconds:.3g}")]
     return TextTable(("", ""), tuple(rows), "versions")

@@ -1,18 +1,28 @@
-"""Trade-off curves as a result: the types, and how they are made."""
+"""Trade-off curves as a result, over the active limits of a solution, and in words: lines, tables, and rows of CSV."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
+from ...models import component_names, frozen_array
 from ..case.case import Case
 from ..case.task import Sense
+from ..errors import CaseError
+from ..interruption import is_requested
 from ..solver.solution import Solution
 from ..solver.status import Status
-from ..solver.tradeoff import Tradeoff, TradeoffPoint
-from .data import CaseResult, CombinedResult, SolveResult
+from ..solver.tradeoff import Tradeoff, TradeoffPoint, tradeoff
+from ..system.csvtext import csv_text
+from ..units import objective_unit, slope_unit
+from .data import CaseResult, SolveResult
 from .jsondata import Absent, Inline, JsonObject, Vector, finite_or_none
-from .parts import HeadData, LimitData, PoseData, RobotData, VersionsData
+from .parts import HeadData, LimitData, PoseData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 from .result import result_of
+from .rounding import number, ordered
+from .text import Line, TextTable, Tone
+from .wording import title_line
 
 #: Stands before the dotted key of a limit.
 _LIMITS = "limits."
@@ -78,7 +88,7 @@ def tradeoff_result(found: Tradeoff) -> TradeoffResult:
     return TradeoffResult(
         head=head_data(case),
         over=found.name,
-        unit=unit_of_number(found.name, case, [row for result in results for row in _limits(result)]),
+        unit=unit_of_number(found.name, case, [row for result in results for row in result.limits]),
         senses=tuple(task.sense for task in case.tasks),
         tasks=tuple(task.name for task in case.tasks),
         points=(
@@ -113,11 +123,11 @@ def unit_of_number(name: str, case: Case, limits: Sequence[LimitData] = ()) -> s
 
 def _point(name: str, point: TradeoffPoint, result: CaseResult) -> TradeoffPointData:
     is_answer = result.status.is_answer
-    robot = _robot(result) if is_answer else None
+    robot = result.robot if is_answer else None
     return TradeoffPointData(
         value=point.value,
         status=result.status,
-        F=_value(result) if is_answer else None,
+        F=result.F if is_answer else None,
         slope=_slope(name, result) if is_answer else None,
         tasks=tuple(finite_or_none(each.F) if is_answer else None for each in point.solution.outcomes),
         active=_active(point.solution, result) if is_answer else (),
@@ -140,22 +150,6 @@ def _unsolved(value: float, tasks: int) -> TradeoffPointData:
     )
 
 
-def _value(result: CaseResult) -> float | None:
-    return result.combined.value if isinstance(result, CombinedResult) else result.F
-
-
-def _robot(result: CaseResult) -> RobotData | None:
-    if isinstance(result, SolveResult):
-        return result.robot
-    return None if result.combined.point is None else result.combined.point.robot
-
-
-def _limits(result: CaseResult) -> tuple[LimitData, ...]:
-    if isinstance(result, SolveResult):
-        return result.limits
-    return () if result.combined.point is None else result.combined.point.limits or ()
-
-
 def _is_key(name: str, key: str) -> bool:
     """Return whether a setting's name is that of a limit's number, whose key may leave out ``max``."""
     dotted = name.removeprefix(_LIMITS)
@@ -165,7 +159,7 @@ def _is_key(name: str, key: str) -> bool:
 def _slope(name: str, result: CaseResult) -> float | None:
     """Return the derivative of F by the number: a limit's cost, or the sensitivity to a fixed number."""
     if name.startswith(_LIMITS):
-        return next((row.cost for row in _limits(result) if _is_key(name, row.key)), None)
+        return next((row.cost for row in result.limits if _is_key(name, row.key)), None)
     if not isinstance(result, SolveResult):
         return None
     whole, _, end = name.rpartition(".")
@@ -179,10 +173,191 @@ def _slope(name: str, result: CaseResult) -> float | None:
 
 def _active(solution: Solution, result: CaseResult) -> tuple[str, ...]:
     """Return the names of the active bounds, and the keys of the active limits."""
-    keys = tuple(f"{_LIMITS}{row.key}" for row in _limits(result) if row.active)
+    keys = tuple(f"{_LIMITS}{row.key}" for row in result.limits if row.active)
     own = solution.decided_by
     if own is None or own.evidence is None:
         return keys
     variables = {variable.name for variable in own.nlp.program.variables}
     sides = ((side.name, side.bound) for side in own.evidence.active if side.name in variables)
     return (*(f"{name}.{bound}" if bound in ("min", "max") else name for name, bound in sides), *keys)
+
+
+#: Range of a curve to each side of the limit, as a part of it; number of values, odd so that the limit is among them.
+_REACH, _VALUES = 0.1, 7
+#: Curves of one solution at most, those of the costliest limits; starting points of each solve beside its neighbours'.
+_CURVES, _STARTS = 3, 4
+
+
+def limit_curves(
+    solution: Solution, result: CaseResult, case_at: Callable[[str, float], Case], jobs: int | None = None
+) -> tuple[TradeoffResult, ...]:
+    """Solve again along the costliest active limits of an answer to a case with one task.
+
+    Args:
+        solution: the answer.
+        result: of the same solve.
+        case_at: returns the case with a number by name, such as ``limits.leg_length.max``, and its value.
+        jobs: number of threads; the result does not depend on it.
+
+    Returns:
+        A curve for each of these limits; none where there is no answer, or where there are several tasks.
+    """
+    if not isinstance(result, SolveResult) or not solution.status.is_answer:
+        return ()
+    active = [row for row in result.limits if row.active and row.cost]
+    active.sort(key=lambda row: -ordered(abs((row.cost or 0.0) * row.limit)))
+    curves = []
+    for row in active[:_CURVES]:
+        name = f"limits.{row.key}"
+
+        def at(value: float, name: str = name) -> Case:
+            return case_at(name, value)
+
+        values = [value for value in _values_about(row.limit) if _is_allowed(at, value)]
+        if len(values) > 1:
+            starts = min(_STARTS, solution.case.search.starts)
+            found = tradeoff(at, values, name=name, starts=starts, jobs=jobs, first=[solution.x])
+            if is_requested():  # only whole curves are shown
+                break
+            curves.append(tradeoff_result(found))
+    return tuple(curves)
+
+
+def _values_about(limit: float) -> list[float]:
+    """Return values about a limit, the limit itself among them and without its rounding."""
+    steps = np.linspace(-_REACH, _REACH, _VALUES)
+    return [limit if k == _VALUES // 2 else float(limit * (1 + step)) for k, step in enumerate(steps)]
+
+
+def _is_allowed(case_at: Callable[[float], Case], value: float) -> bool:
+    """Return whether there is a case with a value: some limits cannot be this large, or cross others."""
+    try:
+        case_at(value)
+    except CaseError:
+        return False
+    return True
+
+
+def tradeoff_summary(case: Case, result: TradeoffResult) -> Iterator[Line | TextTable]:
+    """Yield a trade-off: what is varied, then a row for each value."""
+    yield title_line(case)
+    yield Line(over_words(result), label="over")
+    if result.notice is not None:
+        yield Line(result.notice, label="note", tone=Tone.CAUTION)
+    yield tradeoff_table(result)
+    if throughout_words(result):
+        yield Line(throughout_words(result), label="active throughout")
+    for line in tradeoff_words(result):
+        yield Line(line, tone=Tone.CAUTION)
+
+
+def over_words(result: TradeoffResult) -> str:
+    """Return the number that is varied, with its range and unit."""
+    first, last = result.points[0].value, result.points[-1].value
+    count = len(result.points)
+    return f"{result.over} from {first:g} to {last:g} {result.unit}".rstrip() + f", {count} value{'s'[: count != 1]}"
+
+
+def tradeoff_table(result: TradeoffResult) -> TextTable:
+    """Return a row for each value: F, its slope and what is active there only; with several tasks F of each."""
+    several = len(result.tasks) > 1
+    header = f"{result.over}\n{result.unit}" if result.unit else result.over
+    per = f"slope\n{slope_unit(result.unit)}"
+    names = tuple(f"F of {name}" for name in result.tasks) if several else ()
+    throughout = _active_throughout(result)
+    last = "also active" if throughout else "active"
+    headers = (header, "F" if not several else "combined F", *names, per, "status", last)
+    rows = tuple(
+        (
+            f"{point.value:.7g}",
+            _number_text(point.F),
+            *(_number_text(F) for F in (point.tasks if several else ())),
+            "" if point.slope is None else _signed(point.slope),
+            point.status.value,
+            _listed(name for name in point.active if name not in throughout),
+        )
+        for point in result.points
+    )
+    return TextTable(headers, rows)
+
+
+def throughout_words(result: TradeoffResult) -> str:
+    """Return the bounds and limits that are active at every value with an answer; an empty text for none."""
+    return _listed(_active_throughout(result))
+
+
+def _active_throughout(result: TradeoffResult) -> list[str]:
+    sets = [point.active for point in result.points if point.status.is_answer]
+    return [name for name in sets[0] if all(name in active for active in sets)] if len(sets) > 1 else []
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name.removeprefix("limits.") for name in names)
+
+
+def tradeoff_words(result: TradeoffResult) -> list[str]:
+    """Return sentences about values without an answer."""
+    missing = [point for point in result.points if not point.status.is_answer]
+    return [_status_words(result, status) for status in dict.fromkeys(point.status for point in missing)]
+
+
+def _status_words(result: TradeoffResult, status: Status) -> str:
+    """Return the values of a status; of those that an interrupted command has not solved, the last ones, the number."""
+    own = [point.value for point in result.points if point.status is status]
+    if status is Status.INTERRUPTED:
+        return f"stopped before the end: {len(result.points) - len(own)} of {len(result.points)} values are solved"
+    return f"{status.value} at {', '.join(f'{value:.5g}' for value in own)} {result.unit}".rstrip()
+
+
+def unit_of_objective(case: Case, task: int | None = None) -> str:
+    """Return the unit of F.
+
+    Args:
+        case: the case.
+        task: index of the task whose F it is; all tasks together for None, which have a unit where they agree in it.
+    """
+    tasks = case.tasks if task is None else [case.tasks[task]]
+    return objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
+
+
+def objective_label(case: Case, task: int | None = None) -> str:
+    """Return F with its unit, for an axis; arguments are those of :func:`unit_of_objective`."""
+    unit = unit_of_objective(case, task)
+    return f"F, {unit}" if unit else "F"
+
+
+def tradeoff_csv(result: TradeoffResult) -> str:
+    """Return a trade-off as CSV, one row for each value; what has no value is an empty cell."""
+    answer = next((point for point in result.points if point.parameters is not None), None)
+    names = [] if answer is None else list(_design(answer))
+    several = len(result.tasks) > 1
+    own = [f"F {name}" for name in result.tasks] if several else []
+    head, rows = [result.over, "F", *own, "slope", "status", "active", *names], []
+    for point in result.points:
+        design = _design(point)
+        cells: list[object] = [point.F, *(point.tasks if several else ()), point.slope]
+        others = [design.get(name) for name in names]
+        rows.append([point.value, *cells, point.status.value, " ".join(point.active), *others])
+    return csv_text(head, rows)
+
+
+def _number_text(value: float | None) -> str:
+    return "none" if value is None else number(value)
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.4g}" if value else "0"
+
+
+def _design(point: TradeoffPointData) -> dict[str, float]:
+    """Return the numbers of a design by name: components of its parameters, then position, axis and angle."""
+    if point.parameters is None or point.pose is None:
+        return {}
+
+    def parts(name: str, value: float | Sequence[float]) -> dict[str, float]:
+        if not isinstance(value, Sequence):
+            return {name: value}
+        return dict(zip(component_names(name, len(value)), value, strict=True))
+
+    found = {key: part for name, value in point.parameters.items() for key, part in parts(name, value).items()}
+    return {**found, **parts("p", point.pose.position), **parts("axis", point.pose.axis), "angle": point.pose.angle}

@@ -11,8 +11,7 @@ from ..evidence.optimality import CURVED, PointKind
 from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
 from ..units import Units, objective_unit, slope_unit
-from .jointwording import convention_lines, joint_lines
-from .motionwording import motion_words, reach_of, screw_words, triple
+from .jointwording import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
 from .rounding import number, ordered, residual, robot_size, settled, task_F
 from .text import Line, Tone
 

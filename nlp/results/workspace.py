@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.numbers.extremes import Extreme
     from ..proof.workspace.robot.pose_box import PoseNumbers
+    from ..proof.workspace.scale import Scale
     from ..proof.workspace.verdict import RankVerdict
     from ..solver.semi_infinite import WorkspaceProof
 
@@ -255,11 +256,18 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
     )
 
 
+def scale_data(found: "Scale", units: Units) -> ScaleData:
+    """Return the largest proven workspace in a case's units."""
+    return ScaleData.of(
+        found,
+        refuted=found.failed if found.refuted else None,
+        pose=None if found.pose is None else pose_data(found.pose, units),
+    )
+
+
 def pose_data(pose: "PoseNumbers", units: Units) -> WorkspacePose:
     """Return a pose in a case's units."""
-    return WorkspacePose(
-        position=vector(pose.position), axis=vector(pose.axis), angle=units.shown(pose.angle, Dimension.ANGLE)
-    )
+    return WorkspacePose.of(pose, angle=units.shown(pose.angle, Dimension.ANGLE))
 
 
 def _fixed(value: object) -> float:
@@ -274,15 +282,10 @@ def _regular_data(found: "RankVerdict", case: "Case") -> RegularData:
     sides = None
     if found.sides is not None:
         sides = tuple(pose_data(found.box.pose(y), case.units) for y in found.sides)
-    return RegularData(
-        outcome=found.outcome,
+    return RegularData.of(
+        found,
         pose=None if found.pose is None else pose_data(found.pose, case.units),
         between=sides,
-        boxes=found.boxes,
-        open=found.open,
-        share=found.share,
-        seconds=found.seconds,
-        engine=found.engine,
         reason=found.reason or None,
         machine=_machine_data(found.errors, case),
     )
@@ -306,18 +309,14 @@ def _extreme_data(each: "Extreme", case: "Case") -> ExtremeData:
     def shown(value: float) -> float | None:
         return units.shown(value, each.dimension) if math.isfinite(value) else finite_or_none(value)
 
-    return ExtremeData(
-        name=each.name,
+    return ExtremeData.of(
+        each,
         unit=units.label(each.dimension),
-        sense=each.sense,
         bound=shown(each.bound),
         reached=shown(each.reached),
         key=each.key or None,
         limit=None if each.limit is None else units.shown(each.limit, each.dimension),
-        outcome=each.outcome,
         pose=None if each.pose is None else pose_data(each.pose, units),
-        boxes=each.boxes,
-        seconds=each.seconds,
         reason=each.reason or None,
         machine=_machine_data(each.errors, case),
     )

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ...models import FloatArray, frozen_array
 from ..case.case import Case
+from ..results.explorations import Column, SweepResult
 from ..results.jsondata import finite_or_none, vector
 from ..results.point import head_data, stated_pose_notice, versions
-from ..results.sweep import Column, SweepResult
-from ..results.tradeoffwording import unit_of_objective
+from ..results.tradeoff import unit_of_objective
 from .journal import Row, row_kinds
 from .sweep import Sweep
 
@@ -109,7 +109,8 @@ def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
         found: the answers.
     """
     is_proved = any(found.certificate)
-    return SweepResult(
+    return SweepResult.of(
+        found,
         head=head_data(case),
         notice=stated_pose_note(case, found.note),
         unit=unit_of_objective(case),
@@ -118,7 +119,6 @@ def sweep_result(case: Case, found: SweepColumns) -> SweepResult:
         F=_column(found.F),
         design=MappingProxyType({name: _column(values) for name, values in found.design.items()}),
         actives=found.active,
-        multipliers=found.multipliers,
         verdicts=found.verdict,
         stationarity=_column(found.stationarity),
         feasibility=_column(found.feasibility),

@@ -278,6 +278,17 @@ class EngineKind(enum.Enum):
     COMPILED = "compiled"
     IPOPT = "ipopt"
 
+    @classmethod
+    def of(cls, word: str | None) -> EngineKind | None:
+        """Return the kind of a word; None where none is given.
+
+        Raises:
+            InputError: there is no such kind.
+        """
+        if word not in (None, *(kind.value for kind in cls)):
+            raise InputError(f"--engine {word}: must be compiled or ipopt")
+        return None if word is None else cls(word)
+
 
 class Job(NamedTuple):
     """A sweep without its points.

@@ -12,8 +12,7 @@ from screwsynth.nlp import Case, Free, Nlp, Task, evaluate, formulate, report, r
 from screwsynth.nlp.evidence.conventions import dependence_of
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.paths import velocities_at
-from screwsynth.nlp.results.alltables import case_tables, table_names
-from screwsynth.nlp.results.summary import case_summary
+from screwsynth.nlp.results.summary import case_summary, case_tables, table_names
 from screwsynth.nlp.results.text import Line, TextTable
 
 GENERAL = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])

@@ -27,7 +27,7 @@ from screwsynth.nlp import (
     tradeoff,
     tradeoff_result,
 )
-from screwsynth.nlp.results.front import FrontResult
+from screwsynth.nlp.results.explorations import FrontResult
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.tradeoff import TradeoffResult
 

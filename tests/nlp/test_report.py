@@ -41,7 +41,7 @@ from screwsynth.nlp import Case, Solution, Task, evaluate, formulate, load_case,
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.cli.main import run as command_line
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
-from screwsynth.nlp.output.report import judgement
+from screwsynth.nlp.output.report import sections
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import planes_of, slices_of
@@ -445,7 +445,7 @@ def test_charts_put_points_where_they_belong() -> None:
 
 def test_bound_against_time() -> None:
     history = [[0.5, 12.0, 9.0], [1.0, 11.0, 10.0], [2.0, 10.1, 10.0]]
-    chart, words = (str(part) for part in judgement.bound_chart(history)[0].split("<figcaption>"))
+    chart, words = (str(part) for part in sections.bound_chart(history)[0].split("<figcaption>"))
     bound, best = (points_of(path)[0] for path in re.findall(r'd="([^"]*)" class="curve(?: best)?"', chart))
     # Level up to each point, then down: a bound holds until a better one is there.
     assert [x for x, _ in bound] == [x for x, _ in best]

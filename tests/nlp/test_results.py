@@ -31,9 +31,8 @@ from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
 from screwsynth.nlp.results.jsondata import Absent, Inline, JsonObject
-from screwsynth.nlp.results.reading import result_from_json
 from screwsynth.nlp.results.regression import check_case
-from screwsynth.nlp.results.schema import RESULTS, result_schema
+from screwsynth.nlp.results.schema import RESULTS, result_from_json, result_schema
 from screwsynth.nlp.results.summary import case_summary
 from screwsynth.nlp.results.text import Line, TextTable, Tone
 from screwsynth.nlp.solver import multistart, starts
@@ -299,7 +298,7 @@ def test_values_are_frozen_and_whole() -> None:
 
 def test_words_need_neither_terminal_nor_page() -> None:
     loaded = "print(*(name for name in ('rich', 'html', 'pydantic') if name in sys.modules))"
-    words = "import sys; import screwsynth.nlp.results.summary, screwsynth.nlp.results.checkwording; " + loaded
+    words = "import sys; import screwsynth.nlp.results.summary, screwsynth.nlp.results.checks; " + loaded
     page = "import sys; import screwsynth.nlp.output.report.webpage; " + loaded
     for code, expected in ((words, {"pydantic"}), (page, {"html", "pydantic"})):
         done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)

@@ -19,7 +19,7 @@ from screwsynth.nlp.evidence.many import Numbers, judge_many
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.results.sweep import SweepResult
+from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
 from screwsynth.nlp.sweeps.journal import Journal, Row, line_of, row_of

@@ -23,7 +23,7 @@ from screwsynth.nlp.interruption import (
     stop_if_requested,
     within,
 )
-from screwsynth.nlp.output.sweepfunction import sweep
+from screwsynth.nlp.output.sweeptable import sweep
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus

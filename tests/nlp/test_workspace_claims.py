@@ -23,8 +23,8 @@ from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
-from screwsynth.nlp.results.workspacedigest import verdict_words
 from screwsynth.nlp.results.workspaceposes import refuted_claims, seeing_lines
+from screwsynth.nlp.results.workspacewording import verdict_words
 
 Value = TypeVar("Value")
 Run = Callable[..., tuple[int, str, str]]

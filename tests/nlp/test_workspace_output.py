@@ -22,7 +22,7 @@ from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.output.pictures.workspaceslices import slices_legend
+from screwsynth.nlp.output.pictures.workspaces import slices_legend
 from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace.ranks.krawczyk import Coordinates, no_relation
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import LoopBoxes

@@ -16,11 +16,11 @@ import numpy as np
 from ....models import Dimension, FloatArray
 from ....models.drawing import outline
 from ....models.mechanism import Mechanism
+from ...system.csvtext import csv_text
 from ...units import Units
 from ..extra import required
 from .numbers import number
 from .shapes import joint_centres
-from .tables import csv_text
 
 #: Extents of points across a plane, sines of angles, and distances in parts of the robot's size, that count as zero.
 _FLAT = 1e-9

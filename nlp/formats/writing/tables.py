@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from ....models import Dimension
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
+from ...system.csvtext import csv_text
 from ...units import Units
 from ..solved.words import ExportedJoint
 from .numbers import number
@@ -55,15 +54,6 @@ def links_csv(mechanism: Mechanism, units: Units) -> str:
         axes = base.rotation.T @ link.rotation
         rows.append([link.name, *map(number, origin), *map(number, axes.T.ravel())])
     return csv_text(head, rows)
-
-
-def csv_text(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as comma-separated values."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
-    return text.getvalue()
 
 
 def _coordinates(joint: MechanismJoint, coordinate: float | None, units: Units) -> list[str]:

@@ -142,6 +142,13 @@ class Canvas:
         place_labels(self._axes, renderer, ordered, Obstacles(np.vstack(self._segments), tuple(self._owners)))
 
 
+def draw_edges(axes: Axes, size: float = 9) -> None:
+    """Draw ticks, with labels of a size in points, and edges of axes in the colours of all pictures."""
+    axes.tick_params(colors=INK, labelsize=size)
+    for spine in axes.spines.values():
+        spine.set_edgecolor(MUTED)
+
+
 def arc(centre: FloatArray, through: FloatArray, normal: FloatArray, last: FloatArray | None = None) -> FloatArray:
     """Return points (k, 3) of a circle, or of its arc up to the direction ``last`` (3,)."""
     axis, ray = normal / np.linalg.norm(normal), through - centre

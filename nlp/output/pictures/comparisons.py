@@ -15,7 +15,6 @@ from ...comparison.entry import Entry
 from ...errors import EvaluationError
 from .canvas import INK, MUTED
 from .drawing import Drawing, drawing_of
-from .figures import picture_of
 from .fonts import legible
 from .painting import Panel
 from .view import View
@@ -26,22 +25,6 @@ _WIDTH, _HEIGHT, _HEADING, _ACROSS = 4.2, 4.2, 0.65, 3
 _VIEW = View(-60.0)
 #: Part of a panel's width that the bar of the scale may have.
 _BAR = 0.4
-
-
-def comparison_picture(found: Comparison, ending: str) -> bytes:
-    """Return the content of a picture file of the robots of a comparison at their designs.
-
-    Args:
-        found: the comparison.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
-
-    Raises:
-        EvaluationError: no robot has an answer that exists.
-    """
-    drawings = comparison_drawings(found)
-    if not drawings:
-        raise EvaluationError(f"{found.case.source or found.case.name}: no robot has a design to draw")
-    return picture_of(lambda: _figure(found, drawings), ending)
 
 
 def comparison_drawings(found: Comparison) -> list[tuple[Entry, Drawing]]:
@@ -58,8 +41,15 @@ def comparison_drawings(found: Comparison) -> list[tuple[Entry, Drawing]]:
     return drawings
 
 
-def _figure(found: Comparison, drawings: list[tuple[Entry, Drawing]]) -> Figure:
-    """Return the robots as a Matplotlib figure, all in one scale, with a bar that states it."""
+def comparison_figure(found: Comparison) -> Figure:
+    """Return the robots of a comparison at their designs, all in one scale, with a bar that states it.
+
+    Raises:
+        EvaluationError: no robot has an answer that exists.
+    """
+    drawings = comparison_drawings(found)
+    if not drawings:
+        raise EvaluationError(f"{found.case.source or found.case.name}: no robot has a design to draw")
     across = min(len(drawings), _ACROSS)
     down = -(-len(drawings) // across)
     row = _HEIGHT + _HEADING

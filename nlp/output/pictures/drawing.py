@@ -24,8 +24,7 @@ from ...errors import EvaluationError
 from ...evidence.kkt import close_equations
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
-from .poses import state_at_pose
-from .posture import Linkage, Posture
+from .posture import Linkage, Posture, state_at_pose
 
 #: The path around the axis: turns at most, part of the axis at most, and radius in parts of the robot's size.
 _TURNS = 3.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
@@ -24,6 +24,7 @@ from .joints import Handles
 from .painting import Panel, rate_colour_map
 from .view import View, clearest_view
 
+_P = ParamSpec("_P")
 #: Without these, two files of one picture would differ, or depend on the user's own settings.
 _SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "screwsynth",
@@ -54,20 +55,22 @@ def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = Non
         ending: ``.png``, ``.svg`` or ``.pdf``.
         view: the projection; the clearest for the first drawing when left out.
     """
-    return picture_of(lambda: figure_of(drawings, view=view), ending)
+    return picture_of(ending, figure_of, drawings, view=view)
 
 
-def picture_of(make: Callable[[], Figure], ending: str) -> bytes:
+def picture_of(ending: str, make: Callable[_P, Figure], *values: _P.args, **options: _P.kwargs) -> bytes:
     """Return the content of the picture file of any figure.
 
     Args:
-        make: returns the figure; called with the settings of this package's pictures.
         ending: ``.png``, ``.svg`` or ``.pdf``.
+        make: returns the figure; called with the settings of this package's pictures.
+        values: arguments of this function.
+        options: the same, by name.
     """
     content = io.BytesIO()
     settings = {**mpl.rcParamsDefault, **_SETTINGS, "font.family": list(families())}
     with mpl.rc_context(settings):
-        figure = make()
+        figure = make(*values, **options)
         if any(needs_other_font(text.get_text()) for text in figure.findobj(Text)):
             # Fonts of this kind hold outlines that only Type 3 embeds.
             mpl.rcParams["pdf.fonttype"] = 3

@@ -8,7 +8,7 @@ from ...solver.solution import Solution, TaskOutcome
 from ...solver.status import Status
 from ...units import objective_unit
 from .drawing import Drawing, drawing_of
-from .poses import pose_index, states_at_poses, worst_pose
+from .posture import pose_index, states_at_poses, worst_pose
 
 
 def drawings_of(found: Solution, pose: int = 1) -> list[Drawing]:

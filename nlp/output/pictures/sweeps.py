@@ -16,12 +16,10 @@ from ...errors import InputError
 from ...program.formulation import formulate_each
 from ...results.design import limits_data, margins_data
 from ...results.parts import LimitData
-from ...results.tradeoff import unit_of_number
-from ...results.tradeoffwording import objective_label
+from ...results.tradeoff import objective_label, unit_of_number
 from ...sweeps.points import Points
 from ..sweeptable import TablePoint
-from .canvas import INK, MUTED
-from .figures import picture_of
+from .canvas import INK, MUTED, draw_edges
 from .fonts import legible
 
 _SIZE = (7.2, 5.0)
@@ -42,20 +40,14 @@ def check_axes(points: Points) -> None:
         raise InputError(f"--plot: draws F over one or two numbers of --over, and {fault}")
 
 
-def sweep_picture(case: Case, points: Points, found: Sequence[TablePoint], ending: str) -> bytes:
-    """Return the content of a picture file of a sweep.
+def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Figure:
+    """Return F over one or two numbers as a Matplotlib figure.
 
     Args:
         case: the case, for the title and the unit of F.
         points: a grid over one or two numbers.
         found: objective and active sides at each point.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
     """
-    return picture_of(lambda: sweep_figure(case, points, found), ending)
-
-
-def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Figure:
-    """Return F over one or two numbers as a Matplotlib figure."""
     figure = Figure(figsize=_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     changing = [(name, axis) for name, axis in zip(points.names, points.axes, strict=True) if len(axis) > 1]
@@ -69,9 +61,7 @@ def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Fig
         _draw_map(figure, axes, [axis for _, axis in changing], F, sets, names, objective_label(case))
         axes.set_ylabel(_label(case, changing[1][0]), color=INK, parse_math=False)
     axes.set_xlabel(_label(case, changing[0][0]), color=INK, parse_math=False)
-    axes.tick_params(colors=INK, labelsize=9)
-    for spine in axes.spines.values():
-        spine.set_edgecolor(MUTED)
+    draw_edges(axes)
     title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
     note = (

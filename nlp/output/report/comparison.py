@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from ...comparison.compare import Comparison
-from ...results.comparison import ComparisonResult
-from ...results.comparisonwording import comparison_table
+from ...results.comparison import ComparedRobotData, ComparisonResult, comparison_table
 from ...results.text import TextTable
-from ..pictures.comparisons import comparison_drawings, comparison_picture
-from .markup import Markup, html_table, join_markup, paragraphs, tag
-from .plainpage import picture_figure, plain_page
+from ..pictures.comparisons import comparison_drawings, comparison_figure
+from ..pictures.figures import picture_of
+from .markup import Markup, answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 
 def comparison_page(found: Comparison, result: ComparisonResult) -> str:
@@ -24,10 +23,10 @@ def comparison_page(found: Comparison, result: ComparisonResult) -> str:
     if ranked and ranked[0].value is not None:
         words = f"{ranked[0].name} has the best value, {ranked[0].value:.7g}; {words}"
     names = ", ".join(each.name for each in result.robots)
-    return plain_page(
+    return whole_page(
         f"{title} - comparison",
         f"{result.case}, robots {names}",
-        tag("div", paragraphs([f"{words}."]), class_="answer" if ranked else "answer none", id="answer"),
+        answer_box([f"{words}."], is_answer=bool(ranked)),
         tag("section", _body(found, result)),
     )
 
@@ -40,20 +39,19 @@ def _body(found: Comparison, result: ComparisonResult) -> Markup:
     ]
     if comparison_drawings(found):
         picture = picture_figure(
-            comparison_picture(found, ".svg"),
+            picture_of(".svg", comparison_figure, found),
             "Each robot at its design, all in one scale; colours are rates of the limbs.",
         )
         parts += [tag("h2", "Designs"), picture]
     for robot in result.robots:
         parts += [tag("h3", robot.name), paragraphs([f"{robot.description}.", *robot.sentences])]
         if robot.dimensions:
-            parts.append(html_table(_dimension_table(result, robot.name), f"dimensions of {robot.name}"))
+            parts.append(html_table(_dimension_table(robot), f"dimensions of {robot.name}"))
     return join_markup(parts)
 
 
-def _dimension_table(result: ComparisonResult, name: str) -> TextTable:
+def _dimension_table(robot: ComparedRobotData) -> TextTable:
     """Return the dimensions of a robot's design, with their ranges."""
-    robot = next(each for each in result.robots if each.name == name)
     rows = tuple(
         (
             each.name,

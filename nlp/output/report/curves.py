@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
-from string import Template
 
 from ...case.case import Case
-from ...results.tradeoff import TradeoffResult
-from ...results.tradeoffwording import objective_label, over_words, throughout_words, tradeoff_table, tradeoff_words
+from ...results.tradeoff import (
+    TradeoffResult,
+    objective_label,
+    over_words,
+    throughout_words,
+    tradeoff_table,
+    tradeoff_words,
+)
 from .charts import Curve, Spot, line_chart
-from .markup import Markup, html_table, join_markup, paragraphs, tag
+from .markup import Markup, answer_box, html_table, join_markup, paragraphs, tag, whole_page
 
 
 def tradeoff_figures(case: Case, results: Sequence[TradeoffResult], here: Mapping[str, float] | None = None) -> Markup:
@@ -54,19 +58,13 @@ def tradeoff_page(case: Case, result: TradeoffResult) -> str:
             tradeoff_rows(result),
         ]
     )
-    parts = {
-        "title": tag("title", f"{title} - trade-off - screwsynth"),
-        "heading": tag("h1", title),
-        "subtitle": tag("p", f"{case.name}, robot {case.model.name}: {over_words(result)}", class_="subtitle"),
-        "answer": tag("div", paragraphs([answer]), class_="answer" if solved else "answer none", id="answer"),
-        "contents": "",
-        "body": tag("section", body),
-        "style": Markup(_file("style.css")),
-        "script": Markup(_file("tables.js")),
-        "data": "{}",
-        "plotly": "",
-    }
-    return Template(_file("report.html.in")).substitute(parts)
+    return whole_page(
+        f"{title} - trade-off",
+        f"{case.name}, robot {case.model.name}: {over_words(result)}",
+        answer_box([answer], is_answer=bool(solved)),
+        tag("section", body),
+        heading=title,
+    )
 
 
 def _chart(case: Case, result: TradeoffResult, task: int, here: float | None) -> Markup:
@@ -92,7 +90,3 @@ def _chart(case: Case, result: TradeoffResult, task: int, here: float | None) ->
         labels=(f"{result.over}, {result.unit}" if result.unit else result.over, objective_label(case)),
     )
     return tag("figure", chart, tag("figcaption", words))
-
-
-def _file(name: str) -> str:
-    return (files("screwsynth.nlp.output.report") / "page" / name).read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from ...results.data import SolveResult
 from ...results.parts import LimitData, RobotData
 from ...results.rounding import number, settled, task_F
 from ...results.tables import MOST_OPTIMA, optimum_table
-from ...results.tradeoffwording import objective_label, unit_of_objective
+from ...results.tradeoff import objective_label, unit_of_objective
 from ...results.wording import counted
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus

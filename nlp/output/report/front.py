@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from ...front.front import Front
 from ..fronttable import front_table, front_words
-from ..pictures.fronts import front_picture
-from .markup import html_table, join_markup, paragraphs, tag
-from .plainpage import picture_figure, plain_page
+from ..pictures.curves import front_figure
+from ..pictures.figures import picture_of
+from .markup import answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 
 def front_page(front: Front) -> str:
@@ -23,13 +23,13 @@ def front_page(front: Front) -> str:
         [
             tag("h2", "The front"),
             paragraphs([rule, *(f"{line}." for line in words[1:])]),
-            picture_figure(front_picture(front, ".svg"), picture),
+            picture_figure(picture_of(".svg", front_figure, front), picture),
             html_table(front_table(front), "points of the front"),
         ]
     )
-    return plain_page(
+    return whole_page(
         f"{title} - front",
         f"{front.case.name}, robot {front.case.model.name}",
-        tag("div", paragraphs([f"{words[0]}."]), class_="answer", id="answer"),
+        answer_box([f"{words[0]}."]),
         tag("section", body),
     )

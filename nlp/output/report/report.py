@@ -18,12 +18,11 @@ from ...results.data import CaseResult
 from ...results.jsondata import json_data
 from ...results.regression import CaseCheck
 from ...results.rounding import number
-from ...results.tradeoff import TradeoffResult
-from ...results.tradeoffwording import objective_label, unit_of_objective
+from ...results.tradeoff import TradeoffResult, objective_label, unit_of_objective
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution, TaskOutcome
 from ..pictures.drawing import Drawing, drawing_of
-from ..pictures.poses import states_at_poses, worst_pose
+from ..pictures.posture import states_at_poses, worst_pose
 from .frames import PoseView, ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from ...case.case import Case
 from ...case.pose import sizes_of_turn
-from ...results.data import CombinedResult, SolveResult
-from ...results.designtable import combined_design_table, solved_design_table
+from ...evidence.optimality import CURVED
+from ...results.checks import published_table
+from ...results.data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult
 from ...results.jointwording import limb_part_table
-from ...results.parts import LimitData, MarginData, RobotData
 from ...results.point import task_data
-from ...results.robottables import robot_tables
+from ...results.robottables import combined_design_table, robot_tables, solved_design_table
 from ...results.rounding import number, size_of_F
-from ...results.tables import limit_table, limits_title, margin_table, origin_table, outcome_table
+from ...results.tables import active_table, limit_table, limits_title, margin_table, origin_table, outcome_table
 from ...results.wording import (
+    certificate_lines,
     costliest_words,
     counted,
+    evidence_lines,
     headline,
     is_unasked_singularity,
     relaxation_words,
@@ -24,16 +26,123 @@ from ...results.wording import (
     task_words,
     tolerance_line,
 )
+from ...results.workspacewording import proof_lines, proof_tables
+from .charts import Curve, Spot, line_chart
 from .exploration import optima, surroundings
-from .judgement import certificate_section, evidence_section, published_section, workspace_section
 from .markup import Markup, html_table, join_markup, paragraphs, tag
 from .report import Report
 from .robotview import robot_section
 
 
+def evidence_section(report: Report) -> Markup:
+    """Return the evidence of optimality, from the program alone."""
+    result = report.result
+    if isinstance(result, SolveResult):
+        return join_markup(_evidence_of(result))
+    parts: list[Markup] = []
+    for part, own in zip(report.parts, result.tasks, strict=True):
+        parts += [tag("h3", f"“{part.name}” by itself"), *_evidence_of(own)]
+    optimality = result.combined.optimality
+    if optimality is not None:
+        parts += [tag("h3", "The combined program"), tag("p", f"Verdict: {optimality.kind.value}.")]
+        parts.append(
+            _active_table(result.combined, optimality, result.combined.value or 0.0, is_answer=result.status.is_answer)
+        )
+    return join_markup(parts)
+
+
+def _evidence_of(result: SolveResult) -> Iterator[Markup]:
+    """Yield the evidence about one program's point."""
+    yield paragraphs(evidence_lines(result))
+    optimality = result.optimality
+    if optimality is None:
+        return
+    size = 0.0 if result.robot is None else size_of_F(result.robot)
+    yield _active_table(result, optimality, size, is_answer=result.status.is_answer)
+    if optimality.reduced_hessian_eigenvalues and result.reached is None:
+        values = optimality.reduced_hessian_eigenvalues
+        listed = ", ".join(number(value, 1.0, digits=4, part=CURVED) for value in values)
+        yield tag("p", f"Curvatures along the directions that are left, in scaled variables: {listed}.")
+
+
+def _active_table(
+    result: SolveResult | CombinedData, optimality: OptimalityData, size: float, *, is_answer: bool
+) -> Markup:
+    if not optimality.active:
+        return tag("p", "No bound or limit is active.")
+    table = active_table(result, size, is_answer=is_answer)
+    words = {cell for row in table.rows for cell in row}
+    caption = " and ".join(word for word in ("violated", "active") if word in words).capitalize()
+    return html_table(table, f"{caption} bounds and limits")
+
+
+def certificate_section(report: Report) -> Markup:
+    """Return the proven bounds, and the course of each search."""
+    result = report.result
+    found: list[tuple[str, CertificateData | None]] = []
+    if isinstance(result, CombinedResult):
+        pairs = zip(report.parts, result.tasks, strict=True)
+        found += [(f"“{part.name}” by itself", own.certificate) for part, own in pairs]
+        found.append(("The combined program", result.combined.certificate))
+    else:
+        found.append(("", result.certificate))
+    parts: list[Markup] = []
+    if report.refusal:
+        parts.append(tag("p", f"Refused: {report.refusal}.", class_="warning"))
+    for name, certificate in found:
+        if certificate is None:
+            continue
+        if name:
+            parts.append(tag("h3", name))
+        parts.append(paragraphs(certificate_lines(certificate)))
+        parts += bound_chart(certificate.history)
+    return join_markup(parts)
+
+
+def workspace_section(report: Report) -> Markup:
+    """Return the proof of the design over its workspace; empty where no limit holds there."""
+    result = report.result
+    if isinstance(result, CombinedResult) or result.workspace is None:
+        return Markup("")
+    tables = (
+        html_table(each, each.title, id=f"workspace-{each.name}")
+        for each in proof_tables(report.case, result.workspace)
+    )
+    return join_markup([paragraphs(proof_lines(result.workspace)), *tables])
+
+
+def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
+    """Return a chart of the bound and the incumbent against time, from a history of (seconds, bound, incumbent)."""
+    if not history:
+        return []
+    if len(history) == 1:
+        ((after, bound, found),) = history
+        return [tag("p", f"It took one round: after {after:.3g} s the bound was {bound:.7g}, the best F {found:.7g}.")]
+    seconds, bounds, best = ([row[k] for row in history] for k in range(3))
+    words = (
+        f"The bound goes from {bounds[0]:.7g} after {seconds[0]:.3g} s to {bounds[-1]:.7g} after {seconds[-1]:.3g} s; "
+        f"the best F known from {best[0]:.7g} to {best[-1]:.7g}."
+    )
+    chart = line_chart(
+        [Curve(seconds, bounds, "curve", steps=True), Curve(seconds, best, "curve best", steps=True)],
+        [Spot(seconds[-1], bounds[-1], "spot", f"bound {bounds[-1]:.7g}")],
+        words=words,
+        labels=("seconds", "F"),
+    )
+    return [tag("figure", chart, tag("figcaption", f"Bound (blue) and best point known (orange). {words}"))]
+
+
+def published_section(report: Report) -> Markup:
+    """Return the published numbers beside the computed ones."""
+    if report.check is None:
+        return Markup("")
+    caption = "What the literature prints beside what is computed here"
+    return html_table(published_table(report.check), caption, id="compared")
+
+
 def sections(report: Report) -> list[tuple[str, str, Markup]]:
-    """Return the anchor, heading and content of every section that has content."""
-    found = [
+    """Return the anchor, heading and content of every section; some have no content."""
+    return [
         ("case", "The case in words", _case(report)),
         ("robot", "The robot and its motion", robot_section(report)),
         ("result", "Result", _result(report)),
@@ -46,7 +155,6 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
         ("published", "Published and computed", published_section(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
-    return [(anchor, title, content) for anchor, title, content in found if content]
 
 
 def answer(report: Report) -> Markup:
@@ -62,7 +170,7 @@ def answer(report: Report) -> Markup:
         if not report.is_answer:
             lines.append("This is no answer: what was reached is shown below.")
     kind = "answer" if report.is_answer else "answer none"
-    robot = _robot_of(report)
+    robot = report.result.robot
     if report.is_answer and is_unasked_singularity(robot, report.case):
         kind = "answer singular"
         if robot is not None and isinstance(result, CombinedResult):
@@ -102,7 +210,7 @@ def _case(report: Report) -> Markup:
             f"The robot works at {case.pose_count} poses; F is their {case.over_poses.value}. "
             "The picture and its rates begin with the first; a slider shows each."
         )
-    limits = _limits_of(report)
+    limits = report.result.limits
     if limits:
         listed = ", ".join(f"{row.key} {row.limit:g} {row.unit}".strip() for row in limits)
         lines.append(f"Limits: {listed}.")
@@ -125,7 +233,7 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
     """Return the design at the combined point, then each task by itself."""
     case, combined = report.case, result.combined
     parts: list[Markup] = []
-    robot = None if combined.point is None else combined.point.robot
+    robot = result.robot
     if robot is not None:
         words = "The combined robot" if report.is_answer else "What was reached; this is no answer"
         parts.append(html_table(combined_design_table(case, combined, robot), words, id="design"))
@@ -166,15 +274,15 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
 
 def _limits(report: Report) -> Markup:
     """Return the limits with their costs, and every margin."""
-    limits, margins = _limits_of(report), _margins_of(report)
+    limits, margins = report.result.limits, report.result.margins
     if not limits:
         return Markup("")
     caption = "How near the robot comes to each limit, and what the limit costs"
     proof = report.result.workspace if isinstance(report.result, SolveResult) else None
     held = limits_title(report.case, proof)
     caption += f": {held}" if held else ""
-    robot = _robot_of(report)
-    size = 0.0 if robot is None else size_of_F(robot, _F_of(report))
+    robot = report.result.robot
+    size = 0.0 if robot is None else size_of_F(robot, report.result.F or 0.0)
     parts = [html_table(limit_table(limits, size), caption, id="limit")]
     costliest = costliest_words(limits)
     if costliest is not None:
@@ -202,33 +310,3 @@ def _origin(report: Report) -> Markup:
     return join_markup(
         [html_table(origin, "What the numbers depend on", id="versions"), tag("h3", "Case file"), copy, text]
     )
-
-
-def _robot_of(report: Report) -> RobotData | None:
-    """Return the robot that the report is about; None where it does not exist."""
-    result = report.result
-    if isinstance(result, SolveResult):
-        return result.robot
-    return None if result.combined.point is None else result.combined.point.robot
-
-
-def _F_of(report: Report) -> float:  # noqa: N802 - the objective's name
-    """Return the objective, of one task or combined; 0 without an answer."""
-    result = report.result
-    return (result.F if isinstance(result, SolveResult) else result.combined.value) or 0.0
-
-
-def _limits_of(report: Report) -> Sequence[LimitData]:
-    """Return the limits of the case at the report's point."""
-    result = report.result
-    if isinstance(result, SolveResult):
-        return result.limits
-    return () if result.combined.point is None else result.combined.point.limits or ()
-
-
-def _margins_of(report: Report) -> Sequence[MarginData]:
-    """Return the margins at the report's point."""
-    result = report.result
-    if isinstance(result, SolveResult):
-        return result.margins
-    return () if result.combined.point is None else result.combined.point.margins or ()

@@ -9,13 +9,13 @@ from ...program.formulation import formulate
 from ...results.rounding import number
 from ...results.tables import sizes_of_variables
 from ...results.text import TextTable
-from ...results.tradeoffwording import unit_of_objective
+from ...results.tradeoff import unit_of_objective
 from ...sweeps.columns import SweepColumns, stated_pose_note
 from ...sweeps.points import Points
-from ..pictures.sweeps import sweep_picture
+from ..pictures.figures import picture_of
+from ..pictures.sweeps import sweep_figure
 from ..sweeptable import TablePoint
-from .markup import html_table, join_markup, paragraphs, tag
-from .plainpage import picture_figure, plain_page
+from .markup import answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
 #: Rows of the table on a page; a browser is slow with many more, and the table's file has all.
 _ROWS = 500
@@ -40,17 +40,17 @@ def sweep_page(case: Case, points: Points, found: SweepColumns) -> str:
     changing = [axis for axis in points.axes if len(axis) > 1]
     if 1 <= len(changing) <= 2 and answers:
         sides = [TablePoint(float(F), "; ".join(active)) for F, active in zip(found.F, found.active, strict=True)]
-        picture = sweep_picture(case, points, sides, ".svg")
+        picture = picture_of(".svg", sweep_figure, case, points, sides)
         parts.append(picture_figure(picture, "F at each point; a line where the active limits change."))
     else:
         parts.append(paragraphs(["A picture needs a grid over one or two numbers."]))
     if len(found) > _ROWS:
         parts.append(paragraphs([f"The first {_ROWS} points; the table's file has all {len(found):,}."]))
     parts.append(html_table(_table(case, found), "points", id="swept"))
-    return plain_page(
+    return whole_page(
         f"{title} - sweep",
         f"{case.name}, robot {case.model.name}, over {', '.join(points.names)}",
-        tag("div", paragraphs([f"{words}."]), class_="answer" if answers else "answer none", id="answer"),
+        answer_box([f"{words}."], is_answer=bool(answers)),
         tag("section", join_markup(parts)),
     )
 

@@ -1,14 +1,24 @@
-"""A report as one page of HTML that needs no network and no other file."""
+"""The page about a solved case as one text of HTML that needs no network and no other file."""
 
 from __future__ import annotations
 
 import gzip
 from base64 import b64encode
-from importlib.resources import files
-from string import Template
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
-from .markup import Markup, join_markup, script_json, tag
-from .report import Report
+from ...case.case import Case
+from ...errors import CaseError
+from ...results.regression import CaseCheck
+from ...results.result import result_of
+from ...results.tradeoff import TradeoffResult
+from ...solver.certified import Certified
+from ...solver.solution import Solution
+from ..files import check_target, write_bytes
+from ..pictures.requirements import check_library
+from .markup import contents_and_body, whole_page
+from .report import Report, report_of
 from .sections import answer, sections
 
 
@@ -20,39 +30,64 @@ def page_of(report: Report) -> str:
     """
     from plotly.offline import get_plotlyjs  # noqa: PLC0415 - only a report needs it
 
-    found = sections(report)
-    title = report.case.title or report.case.name
-    contents = tag("ul", *(tag("li", tag("a", heading, href=f"#{anchor}")) for anchor, heading, _ in found))
-    body = join_markup(
-        tag(
-            "section",
-            tag("h2", heading, id=f"{anchor}-heading"),
-            content,
-            id=anchor,
-            aria_labelledby=f"{anchor}-heading",
-        )
-        for anchor, heading, content in found
+    contents, body = contents_and_body(sections(report))
+    return whole_page(
+        report.case.title or report.case.name,
+        f"{report.case.name}, robot {report.case.model.name}",
+        answer(report),
+        body,
+        contents=contents,
+        scripts=("tools.js", "joints.js", "page.js"),
+        data=report.as_data(),
+        plotly=_packed(get_plotlyjs()),
     )
-    parts = {
-        "title": tag("title", f"{title} - screwsynth"),
-        "heading": tag("h1", title),
-        "subtitle": tag("p", f"{report.case.name}, robot {report.case.model.name}", class_="subtitle"),
-        "answer": answer(report),
-        "contents": contents,
-        "body": body,
-        "style": Markup(_file("style.css")),
-        "script": Markup(_file("tables.js") + _file("tools.js") + _file("joints.js") + _file("page.js")),
-        "data": script_json(report.as_data()),
-        "plotly": _packed(get_plotlyjs()),
-    }
-    return Template(_file("report.html.in")).substitute(parts)
 
 
-def _packed(text: str) -> Markup:
+def _packed(text: str) -> str:
     """Return a text compressed for a script element: the library, most of a page, shrinks to two fifths."""
     # Without a time in its head, the same text is always the same bytes.
-    return Markup(b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode("ascii"))
+    return b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode("ascii")
 
 
-def _file(name: str) -> str:
-    return (files("screwsynth.nlp.output.report") / "page" / name).read_text(encoding="utf-8")
+_WRITTEN = "# The case as Case.to_toml() writes it.\n"
+_NO_CASE_FILE = "This case has no case file: "
+
+
+def report(
+    found: Solution | Certified,
+    *,
+    text: str | None = None,
+    check: CaseCheck | None = None,
+    curves: Sequence[TradeoffResult] = (),
+    file: str | Path | None = None,
+) -> str:
+    """Return a page about a solved case as one text of HTML, which opens without a network.
+
+    Args:
+        found: a solution, or a solution with certificates.
+        text: text of the case file; left out, as :meth:`.Case.to_toml` writes it.
+        check: published and expected numbers beside the computed ones; left out, the page does not show them.
+        curves: results of trade-offs, which stand in the place of the slices.
+        file: file that the page is written to; None for none.
+
+    Raises:
+        InputError: Plotly or Matplotlib is not installed, or the file cannot be written.
+    """
+    check_library("plotly", "reports")
+    check_library("matplotlib", "reports")
+    solution = found if isinstance(found, Solution) else found.solution
+    if file is not None:
+        check_target(str(file))
+    shown = _written(solution.case) if text is None else text
+    page = page_of(replace(report_of(shown, solution, result_of(found), check), curves=tuple(curves)))
+    if file is not None:
+        write_bytes(str(file), page.encode("utf-8"))
+    return page
+
+
+def _written(case: Case) -> str:
+    """Return a case as a case file; a sentence where no file can state it."""
+    try:
+        return _WRITTEN + case.to_toml()
+    except CaseError as error:
+        return f"{_NO_CASE_FILE}{error}"

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
-from string import Template
 
 from ...case.case import Case
 from ...errors import EvaluationError
 from ...proof.workspace.slices.slices import Slice
 from ...results.jsondata import json_data
-from ...results.text import Line, TextTable
+from ...results.tables import origin_table
+from ...results.text import Line
 from ...results.workspace import WorkspacePose, WorkspaceResult
-from ...results.workspacedigest import verdict_words
 from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
-from ...results.workspacewording import pose_words, workspace_summary
+from ...results.workspacewording import pose_words, verdict_words, workspace_summary
 from ..pictures.figures import picture
-from ..pictures.workspacepose import drawing_at
-from ..pictures.workspaceslices import Kind, slice_images, slices_legend, slices_notes
-from .markup import Markup, html_table, join_markup, paragraphs, script_json, tag
+from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
+from .markup import (
+    Markup,
+    answer_box,
+    contents_and_body,
+    html_table,
+    image_source,
+    join_markup,
+    paragraphs,
+    tag,
+    whole_page,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,38 +52,25 @@ def workspace_page(report: WorkspaceReport) -> str:
     """Return the whole page, which opens without a network and needs no script for its content."""
     case, result = report.case, report.result
     title = case.title or case.name
-    found = [
+    sections = [
         ("verdicts", "Verdicts", _verdicts(report)),
         ("robot", "The robot at its worst pose", _robot(report)),
         ("slices", "Slices of the workspace", _slices(report)),
         ("refuted", "Poses that refute a claim", _refuted(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
-    sections = [each for each in found if each[2]]
-    parts = {
-        "title": tag("title", f"{title} - workspace - screwsynth"),
-        "heading": tag("h1", title),
-        "subtitle": tag("p", f"{case.name}, robot {case.model.name}: the whole workspace", class_="subtitle"),
-        "answer": tag(
-            "div", paragraphs([_answer(result)]), class_="answer" if result.proved else "answer none", id="answer"
-        ),
-        "contents": tag("ul", *(tag("li", tag("a", heading, href=f"#{key}")) for key, heading, _ in sections)),
-        "body": join_markup(
-            tag("section", tag("h2", heading, id=f"{key}-heading"), content, id=key, aria_labelledby=f"{key}-heading")
-            for key, heading, content in sections
-        ),
-        "style": Markup(_file("style.css") + _file("workspace.css")),
-        "script": Markup(_file("tables.js")),
-        "data": script_json({"result": json_data(result)}),
-        "plotly": "",
-    }
-    return Template(_file("report.html.in")).substitute(parts)
-
-
-def _answer(result: WorkspaceResult) -> str:
-    """Return the verdict in one sentence."""
+    contents, body = contents_and_body(sections)
     words = verdict_words(result)
-    return f"{words[0].upper()}{words[1:]}."
+    return whole_page(
+        f"{title} - workspace",
+        f"{case.name}, robot {case.model.name}: the whole workspace",
+        answer_box([f"{words[0].upper()}{words[1:]}."], is_answer=result.proved),
+        body,
+        heading=title,
+        contents=contents,
+        styles=("workspace.css",),
+        data={"result": json_data(result)},
+    )
 
 
 def _verdicts(report: WorkspaceReport) -> Markup:
@@ -117,7 +110,7 @@ def _robot(report: WorkspaceReport) -> Markup:
     except EvaluationError as error:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
-    image = tag("img", src=_source(content, "svg+xml"), alt=f"The robot at {at}: {worst.words}", class_="posed")
+    image = tag("img", src=image_source(content), alt=f"The robot at {at}: {worst.words}", class_="posed")
     return join_markup([tag("figure", image, tag("figcaption", f"{worst.words}, at {at}.")), _see(report, worst)])
 
 
@@ -141,7 +134,7 @@ def _slices(report: WorkspaceReport) -> Markup:
     legend.append(tag("li", tag("span", class_="swatch outline"), "workspace"))
     notes = [f"{note[0].upper()}{note[1:]}." for note in slices_notes(slices)]
     images = [
-        tag("img", src=_source(content, "png"), alt=f"Slice of {each.names[0]} and {each.names[1]}")
+        tag("img", src=image_source(content, "png"), alt=f"Slice of {each.names[0]} and {each.names[1]}")
         for each, content in zip(slices, slice_images(report.case, slices), strict=True)
     ]
     return join_markup(
@@ -161,17 +154,6 @@ def _swatch(kind: Kind) -> Markup:
 
 def _origin(report: WorkspaceReport) -> Markup:
     """Return versions, and the text of the case."""
-    versions = report.result.versions
-    rows = tuple((name, str(getattr(versions, name))) for name in versions.marks)
-    table = html_table(TextTable(("", ""), rows, "versions"), "What the numbers depend on", id="versions")
+    table = html_table(origin_table(report.result.versions), "What the numbers depend on", id="versions")
     text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case text")
     return join_markup([table, tag("h3", "Case file"), text])
-
-
-def _source(content: bytes, kind: str) -> str:
-    """Return an image as the address of a page's element."""
-    return f"data:image/{kind};base64,{b64encode(content).decode('ascii')}"
-
-
-def _file(name: str) -> str:
-    return (files("screwsynth.nlp.output.report") / "page" / name).read_text(encoding="utf-8")

@@ -1,11 +1,10 @@
-"""Pictures of the slices of a workspace."""
+"""Pictures of a workspace: the robot at one of its poses, and slices."""
 
 from __future__ import annotations
 
 import itertools
 import textwrap
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -16,15 +15,50 @@ from numpy.typing import NDArray
 
 from ....models import Dimension, FloatArray
 from ...case.case import Case
+from ...case.pose import Rotation
+from ...errors import CaseError, EvaluationError
+from ...evidence.closing import closed_start
+from ...evidence.state import evaluate
+from ...program.formulation import formulate_each
+from ...proof.statement.posed_layout import at_one_pose
 from ...proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from ...proof.workspace.slices.slices import Region, Slice
+from ...proof.workspace.verdict import Outcome
 from ...results.rounding import number
-from .canvas import INK, MUTED
+from ...results.workspaceposes import PosedClaim
+from .canvas import INK, draw_edges
+from .drawing import Drawing, drawing_of
 from .figures import picture_of
 from .fonts import legible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+def drawing_at(case: Case, claim: PosedClaim) -> Drawing:
+    """Return the robot at the pose of a claim, with the case's first task.
+
+    Args:
+        case: with fixed dimensions.
+        claim: the claim and the pose, in the case's units.
+
+    Raises:
+        EvaluationError: the robot does not exist at the pose, or it is that of another machine within the tolerance.
+    """
+    pose = claim.pose
+    angle = case.units.to_internal(pose.angle, Dimension.ANGLE)
+    posed = at_one_pose(case, tuple(pose.position), Rotation(tuple(pose.axis), angle))
+    try:
+        nlp = formulate_each(posed)[0]
+    except CaseError:
+        if case.joint_centre_tolerance is None:
+            raise
+        # Numbers of the pose that follow from others are those of the machine: the design's loops do not close there.
+        raise EvaluationError("the worst pose is that of a machine within the tolerance, not of the design") from None
+    x = closed_start(nlp)
+    headline = f"{claim.outcome.value}: {claim.words}"
+    return drawing_of(nlp, x, evaluate(nlp, x), headline=headline, is_answer=claim.outcome is not Outcome.REFUTED)
+
 
 #: Width and height of one slice, and height of a line of the legend, inches.
 _SIZE, _LINE = (3.2, 3.02), 0.185
@@ -51,17 +85,6 @@ class Kind(NamedTuple):
     words: str
     colour: str
     hatch: str = ""
-
-
-def slices_picture(case: Case, slices: Sequence[Slice], ending: str) -> bytes:
-    """Return the content of a picture file of a workspace's slices.
-
-    Args:
-        case: the case.
-        slices: of its workspace.
-        ending: ``.png``, ``.svg`` or ``.pdf``.
-    """
-    return picture_of(lambda: slices_figure(case, slices), ending)
 
 
 def slices_figure(case: Case, slices: Sequence[Slice]) -> Figure:
@@ -108,7 +131,7 @@ def slice_images(case: Case, slices: Sequence[Slice]) -> list[bytes]:
         _paint(figure.add_axes(_PLACE), case, each, _kinds(case, slices))
         return figure
 
-    return [picture_of(partial(alone, each), ".png") for each in slices]
+    return [picture_of(".png", alone, each) for each in slices]
 
 
 def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:
@@ -212,9 +235,7 @@ def _frame(axes: Axes, case: Case, each: Slice) -> None:
     labels = [f"{name}, {case.units.label(part)}" for name, part in zip(each.names, dimensions, strict=True)]
     axes.set_xlabel(legible(labels[0]), color=INK, fontsize=9, parse_math=False)
     axes.set_ylabel(legible(labels[1]), color=INK, fontsize=9, parse_math=False)
-    axes.tick_params(colors=INK, labelsize=8)
-    for spine in axes.spines.values():
-        spine.set_edgecolor(MUTED)
+    draw_edges(axes, 8)
 
 
 def _shown(case: Case, each: Slice, points: FloatArray) -> FloatArray:
