@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from screwsynth.models import Model, robot, robot_function
+from screwsynth.models import Dimension, Model, robot, robot_function
 from screwsynth.nlp import Case, Free, Task, evaluate, formulate, json_data, result_of, solve
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.mobility import mobility_of
@@ -102,6 +102,18 @@ def test_stretched_planar_limbs_lock_the_line_of_their_links_and_meet_in_the_cen
     # An actuator that does not drive the platform has no rate, and its limb resists by constraints alone.
     assert set(mobility.actuator_rates.values()) == {float("inf")}
     assert {part.actuation for part in mobility.parts.values()} == {0.0}
+
+
+def test_what_rounding_leaves_of_constraints_is_nothing_in_any_unit() -> None:
+    model, size = robot_function("planar-3-rrr")(), 1e6
+    values = {
+        item.name: item.typical[0] * (size if item.dimension is Dimension.LENGTH else 1) for item in model.parameters
+    }
+    task = Task([0, 0, 1, 0.3 * size, 0.2 * size, 0])
+    nlp = formulate(Case(model, values, [size * each for each in model.home], [task]))
+    mobility = mobility_of(nlp, nlp.start, evaluate(nlp, nlp.start))
+    assert mobility is not None
+    assert mobility.constrained == 0
 
 
 def test_constraint_singularities_gain_motions_that_are_known() -> None:
