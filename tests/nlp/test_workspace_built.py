@@ -294,6 +294,13 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
     # one axis no pose of this machine is near a singular one.
     assert changed or kind is TurnKind.AXIS
     assert found.is_regular.any()
+    # Errors are moved into the tolerance along themselves, those within it nowhere.
+    far = np.tile(family.start, (20, 1))
+    far[:, family.of_errors] += rng.normal(0, robot.tolerance / 2, (20, 36))
+    before, after = (z[:, family.of_errors].reshape(20, 12, 3) for z in (far, family.within(far)))
+    shrunk = np.minimum(1, robot.tolerance / np.linalg.norm(before, axis=2, keepdims=True))
+    np.testing.assert_allclose(after, shrunk * before, rtol=1e-9)
+    assert 0 < (shrunk < 1).mean() < 1
 
 
 def test_a_machine_within_the_tolerance_that_is_singular_refutes(case: Case) -> None:
