@@ -13,7 +13,7 @@ from screwsynth.nlp import Case, Free, Task, evaluate, formulate, json_data, res
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.optimality import PointKind
-from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind
+from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists
 from screwsynth.nlp.solver.status import Status
 
 TURN = [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)]
@@ -115,6 +115,11 @@ def test_constraint_singularities_gain_motions_that_are_known() -> None:
     turn, x, y, z = np.eye(6)[2:]
     assert_same_span(delta.gained, [turn, x, y, z])
     assert_same_span(locked.gained, [turn, x, y])
+    # Wrenches of no special place: they do no work in the twists.
+    wrenches = np.random.default_rng(0).normal(size=(4, 6))
+    twists = _null_twists(wrenches, np.array([3.0, -2.0, 5.0]))
+    assert np.linalg.matrix_rank(twists) == len(twists) == 2
+    np.testing.assert_allclose(twists[:, 3:] @ wrenches[:, :3].T, -twists[:, :3] @ wrenches[:, 3:].T, atol=1e-12)
 
 
 def test_a_five_bar_with_links_in_line_turns_about_an_elbow() -> None:

@@ -31,6 +31,7 @@ from screwsynth.nlp.proof.workspace.ranks import rank_rule
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import EntryChange, RankTest
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import DeterminantSigns
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_model import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
@@ -96,6 +97,16 @@ def test_the_kernel_agrees_with_the_reference_box_by_box(tolerance: float) -> No
     assert (ours.is_regular == theirs.is_regular).mean() > 0.98
     assert (ours.signs == theirs.signs).mean() > 0.98
     assert 0.1 < theirs.is_regular.mean() < 0.9
+
+
+def test_a_few_steps_find_poses_with_extreme_determinants() -> None:
+    problem = hexapod(TURNS, 45)
+    signs = DeterminantSigns(problem, problem.locked)
+    poses = problem.box.random(5000, np.random.default_rng(0))[:, list(problem.free)]
+    found, sampled = (signs.computed(each) for each in (signs.extremes(), problem.exact(poses)))
+    # The largest is at the ends of the box, the smallest near its middle.
+    assert found.max() > 1.1 * sampled.max() > 0
+    assert found.min() < 0.97 * sampled.min() < 0
 
 
 def test_a_matrix_may_have_many_columns() -> None:
