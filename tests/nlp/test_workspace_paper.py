@@ -459,6 +459,10 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
         good = least > sign * bound + 0.06 * bound
         assert good.any()
         assert holds[good].mean() > 0.8
+    # A distance that is the claimed one up to rounding is no counterexample.
+    (distance,) = values_of(numbers[3][0], lower[:1])
+    for off, is_wrong in ((-1e-9, False), (1e-9, False), (1e-3, True)):
+        assert ClearanceClaim(legs, (0, 2), distance * (1 + off)).attempt(lower[:1], lower[:1]).is_wrong == is_wrong
 
 
 def test_inverses_hold_those_at_samples(robot: Legs) -> None:
