@@ -61,6 +61,7 @@ def test_another_mode_of_a_three_upu_is_reached_past_a_singularity() -> None:
     for each in found:
         assert each is not None
         assert each.nearness < NEAR_SINGULAR
+        assert each.brief
         assert each.sentences[0].startswith("not reached from home without passing near a singularity")
 
 
@@ -77,6 +78,7 @@ def test_poses_near_home_are_reached_from_there() -> None:
         assert found is not None
         assert found.is_home
         assert found.nearness > 0.5
+        assert not found.brief
 
 
 def test_results_say_that_an_answer_is_in_another_assembly() -> None:

@@ -31,7 +31,7 @@ from screwsynth.nlp.proof.workspace.ranks import rank_rule
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import EntryChange, RankTest
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.ranks.singular_pose import DeterminantSigns
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import DeterminantSigns, _sign_of_determinant
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_model import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
@@ -107,6 +107,11 @@ def test_a_few_steps_find_poses_with_extreme_determinants() -> None:
     # The largest is at the ends of the box, the smallest near its middle.
     assert found.max() > 1.1 * sampled.max() > 0
     assert found.min() < 0.97 * sampled.min() < 0
+
+
+def test_signs_of_determinants_are_exact() -> None:
+    for each in np.random.default_rng(4).integers(-1, 2, (100, 6, 6)).astype(float):
+        assert _sign_of_determinant(each) == np.sign(np.round(np.linalg.det(each)))
 
 
 def test_a_matrix_may_have_many_columns() -> None:
