@@ -278,6 +278,14 @@ def test_limbs_that_share_the_pose_are_bounded_soon() -> None:
     assert values.max() <= found.bound
 
 
+def test_limbs_that_share_the_pose_take_the_same_boxes_at_any_size_of_the_motion() -> None:
+    case = machine(2.0, pose_is_free=True)
+    slow = replace(case, tasks=[replace(case.tasks[0], twist=case.tasks[0].twist * 2.0**-10)])
+    one, other = (certify_program(formulate(each), gap=3.0) for each in (case, slow))
+    assert one.boxes == other.boxes
+    assert one.bound == other.bound * 2.0**20
+
+
 def test_an_inherited_bound_says_nothing_of_single_limbs() -> None:
     """Trap: the bound that a box has from its parent is no sum of limbs, so nothing of a limb follows from it."""
     form, found = separated(poses(0))
