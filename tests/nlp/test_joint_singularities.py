@@ -140,6 +140,16 @@ def test_a_crank_and_its_rod_in_line_lock_their_line() -> None:
     assert_same_span(each.locking, force_along([1, 0, 0], [-0.4, 0, 1]))
 
 
+def test_a_joint_that_takes_part_by_rounding_alone_is_not_named() -> None:
+    text = """
+        points = { B = [1, 0.3, 0.1], A = [0.6, 0.4, 1.1], C = [0.9, 0.5, 0.4], E = "(A + C)/2 + 0.3*x" }
+        joints = [{ type = "R", at = "C", axis = "A - C" }, { type = "R", at = "B", axis = [1, 4, 0.3] },
+                  { type = "R", at = "E", axis = [1, 4, 0.3], actuated = true }, { type = "S", at = "A" }]
+    """
+    (each,) = found_at_home(with_first_limb(text))
+    assert (each.kind, each.limb, each.joints) == (SingularityKind.PASSIVE, "1", ("1:1", "1:4"))
+
+
 @pytest.mark.parametrize("is_bent", [True, False])
 def test_a_leg_along_the_first_axis_of_its_universal_joint_resists_across_too(is_bent: bool) -> None:
     middle = '{ type = "R", at = "E", axis = "y", actuated = true }'

@@ -426,6 +426,13 @@ def test_the_root_holds_the_searched_box(kind: TurnKind) -> None:
         kept = ((points[:, None] >= low) & (points[:, None] <= high)).all(axis=2)
         assert (kept == held).all()
         assert (low > lower).any()
+        # Points just within the ball, in fractions: two components of nearly its size leave little for the third.
+        assert root.inner_ball is not None
+        for angle in np.linspace(0.1, 1.4, 50):
+            a, b = (math.sqrt(root.ball * (1 - 1e-9)) * each for each in (math.cos(angle), math.sin(angle)))
+            c = math.sqrt(root.inner_ball - Fraction(a) ** 2 - Fraction(b) ** 2) * (1 - 1e-15)
+            low, high = (np.array([[1.5, 0, 20, a, b, end]]) for end in (0, 1))
+            assert root.contracted(low, high)[1][0, 5] >= c
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))
