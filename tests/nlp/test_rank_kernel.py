@@ -131,6 +131,14 @@ def test_the_errors_of_a_centre_are_a_vector_of_unit_length() -> None:
     assert found.is_regular.tolist() == [True, False]
 
 
+def test_a_sum_that_overflows_shows_nothing() -> None:
+    x = ca.SX.sym("x", 1)
+    test = RankTest(RankMatrix(x * (ca.SX.eye(2) + 0.5 * ca.SX.ones(2, 2)), 0), x, np.ones(1))
+    for rest, is_regular in ((0.1, 1), (1e308, 0)):
+        forms = Forms(np.array([[1.0, 0.0, 0.0, 1.0]]), np.zeros((1, 4, 1)), np.full((1, 4), rest))
+        assert test.examine(forms, 1, 0).is_regular.tolist() == [is_regular]
+
+
 #: One wrong rule each: the text of the kernel, and what stands in its place.
 FAULTS = {
     "no fault": ("", ""),
