@@ -244,6 +244,11 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
         errors = number.worst(points[0])
         assert errors is not None
         assert np.linalg.norm(errors, axis=1).max() <= TOLERANCE
+    # Of machines at one pose none that is met by chance is as bad as the worst one.
+    for y in points[:5]:
+        J = Machines(robot, replace(box, lower=y, upper=y), 200).J / [1, 1, 1, LENGTH, LENGTH, LENGTH]
+        assert (values_of(spectra[0], y[None]) <= np.linalg.svd(J, compute_uv=False)[:, -1]).all()
+        assert (values_of(spectra[1], y[None]) <= -np.linalg.cond(J)).all()
 
 
 def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> None:
