@@ -532,3 +532,4 @@ def test_the_smallest_f_at_the_worst_of_several_poses_is_refused(cli: Run, tmp_p
     proof = str(tmp_path / "proof.json")
     assert cli("certify", str(case), "--proof", proof)[0] == 0
     assert "F being that of task 'one', at the worst of 2 poses" in cli("verify-proof", proof)[1]
+    assert cli("verify-proof", proof, "--above", "1")[:2] == (code, out)

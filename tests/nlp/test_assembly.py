@@ -9,7 +9,7 @@ import pytest
 from screwsynth.models import robot_function
 from screwsynth.nlp import Case, Free, Rotation, Search, Task, evaluate, formulate, result_of, solve
 from screwsynth.nlp.evidence.assembly import NEAR_SINGULAR, assembly_of
-from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.closing import closed_in_place, closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
 
@@ -65,6 +65,7 @@ def test_another_mode_of_a_three_upu_is_reached_past_a_singularity() -> None:
     for each in found:
         assert each is not None
         assert each.nearness < NEAR_SINGULAR
+        assert each.brief
         assert each.sentences[0].startswith("not reached from home without passing near a singularity")
 
 
@@ -81,6 +82,23 @@ def test_poses_near_home_are_reached_from_there() -> None:
         assert found is not None
         assert found.is_home
         assert found.nearness > 0.5
+        assert not found.brief
+
+
+def test_joints_are_put_in_place_as_on_the_path_from_home() -> None:
+    nlp, rng, count = formulate(free_pose("6-rus", 0.6)), np.random.default_rng(0), 0
+    (rotation,), own = nlp.program.places.rotations, list(range(3))
+    for _ in range(12):
+        x = nlp.start.copy()
+        x[own] = nlp.lower[own] + (nlp.upper - nlp.lower)[own] * rng.random(3)
+        x[list(rotation.q)] = rng.uniform(-0.15, 0.15, 3)  # type: ignore[union-attr]
+        found = closed_in_place(nlp, x)
+        if found is not None:
+            assembly = assembly_of(nlp, found, evaluate(nlp, found))
+            assert assembly is not None
+            assert assembly.is_home
+            count += 1
+    assert count > 1
 
 
 def test_results_say_that_an_answer_is_in_another_assembly() -> None:

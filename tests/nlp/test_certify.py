@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from builders import case_from, shipped_tables
@@ -23,7 +24,7 @@ from screwsynth.nlp.proof.boxes import optimum
 from screwsynth.nlp.proof.boxes.engine import Engine, Examination, Verdict, search_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.statement.standard_form import standard_form
+from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
 from screwsynth.nlp.results.evidence import certificate_data
 from screwsynth.nlp.results.jsondata import json_data
 
@@ -306,6 +307,17 @@ def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() ->
     best = max(min(program.evaluate(x)[0] for program in each) for x in points)
     assert best <= found.bound
     assert found.incumbent >= best * (1 - 1e-9)
+
+
+def test_no_function_has_a_negative_weight() -> None:
+    """Trap: the weights of functions sum to 1 up to rounding, and one of -1e-16 takes much from a large function."""
+    x, ends, rng = ca.SX.sym("x", 4), np.ones(4), np.random.default_rng(1)
+    slopes, constants = rng.normal(size=(4, 4)), np.array([1e25, 0, 0, 0])
+    functions = tuple(ca.vertsplit(ca.DM(slopes) @ x + ca.DM(constants)))
+    form = StandardForm(formulate(load_case("paper-4.2-rotation")), x, -ends, ends, functions, ())
+    centre, radius = rng.uniform(-0.5, 0.5, (4, 500)), rng.uniform(0, 0.5, (4, 500))
+    found = Engine(form, 1).examine(centre - radius, centre + radius, -math.inf)
+    assert (found.bound >= (slopes @ centre + constants[:, None]).min(axis=0)).all()
 
 
 def test_progress_and_history_shrink_to_the_gap() -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from screwsynth.models import Model, robot, robot_function
+from screwsynth.models import Dimension, Model, robot, robot_function
 from screwsynth.nlp import Case, Free, Task, evaluate, formulate, json_data, result_of, solve
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.optimality import PointKind
-from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind
+from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists
 from screwsynth.nlp.solver.status import Status
 
 TURN = [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)]
@@ -104,6 +104,18 @@ def test_stretched_planar_limbs_lock_the_line_of_their_links_and_meet_in_the_cen
     assert {part.actuation for part in mobility.parts.values()} == {0.0}
 
 
+def test_what_rounding_leaves_of_constraints_is_nothing_in_any_unit() -> None:
+    model, size = robot_function("planar-3-rrr")(), 1e6
+    values = {
+        item.name: item.typical[0] * (size if item.dimension is Dimension.LENGTH else 1) for item in model.parameters
+    }
+    task = Task([0, 0, 1, 0.3 * size, 0.2 * size, 0])
+    nlp = formulate(Case(model, values, [size * each for each in model.home], [task]))
+    mobility = mobility_of(nlp, nlp.start, evaluate(nlp, nlp.start))
+    assert mobility is not None
+    assert mobility.constrained == 0
+
+
 def test_constraint_singularities_gain_motions_that_are_known() -> None:
     (snu,) = found_at_home(robot(**tomllib.loads(SNU)))
     assert snu.kind is SingularityKind.CONSTRAINT
@@ -115,6 +127,11 @@ def test_constraint_singularities_gain_motions_that_are_known() -> None:
     turn, x, y, z = np.eye(6)[2:]
     assert_same_span(delta.gained, [turn, x, y, z])
     assert_same_span(locked.gained, [turn, x, y])
+    # Wrenches of no special place: they do no work in the twists.
+    wrenches = np.random.default_rng(0).normal(size=(4, 6))
+    twists = _null_twists(wrenches, np.array([3.0, -2.0, 5.0]))
+    assert np.linalg.matrix_rank(twists) == len(twists) == 2
+    np.testing.assert_allclose(twists[:, 3:] @ wrenches[:, :3].T, -twists[:, :3] @ wrenches[:, 3:].T, atol=1e-12)
 
 
 def test_similar_plates_are_singular_by_their_architecture() -> None:
@@ -142,6 +159,16 @@ def test_a_crank_and_its_rod_in_line_lock_their_line() -> None:
     (each,) = found_at_home(with_first_limb(text))
     assert (each.kind, each.limb, each.joints) == (SingularityKind.SERIAL, "1", ("1:1", "1:2", "1:3"))
     assert_same_span(each.locking, force_along([1, 0, 0], [-0.4, 0, 1]))
+
+
+def test_a_joint_that_takes_part_by_rounding_alone_is_not_named() -> None:
+    text = """
+        points = { B = [1, 0.3, 0.1], A = [0.6, 0.4, 1.1], C = [0.9, 0.5, 0.4], E = "(A + C)/2 + 0.3*x" }
+        joints = [{ type = "R", at = "C", axis = "A - C" }, { type = "R", at = "B", axis = [1, 4, 0.3] },
+                  { type = "R", at = "E", axis = [1, 4, 0.3], actuated = true }, { type = "S", at = "A" }]
+    """
+    (each,) = found_at_home(with_first_limb(text))
+    assert (each.kind, each.limb, each.joints) == (SingularityKind.PASSIVE, "1", ("1:1", "1:4"))
 
 
 @pytest.mark.parametrize("is_bent", [True, False])

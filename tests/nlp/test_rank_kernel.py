@@ -31,6 +31,7 @@ from screwsynth.nlp.proof.workspace.ranks import rank_rule
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import EntryChange, RankTest
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
+from screwsynth.nlp.proof.workspace.ranks.singular_pose import DeterminantSigns, _sign_of_determinant
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_model import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
@@ -104,6 +105,21 @@ def test_the_kernel_agrees_with_the_reference_box_by_box(tolerance: float) -> No
     assert 0.1 < theirs.is_regular.mean() < 0.9
 
 
+def test_a_few_steps_find_poses_with_extreme_determinants() -> None:
+    problem = hexapod(TURNS, 45)
+    signs = DeterminantSigns(problem, problem.locked)
+    poses = problem.box.random(5000, np.random.default_rng(0))[:, list(problem.free)]
+    found, sampled = (signs.computed(each) for each in (signs.extremes(), problem.exact(poses)))
+    # The largest is at the ends of the box, the smallest near its middle.
+    assert found.max() > 1.1 * sampled.max() > 0
+    assert found.min() < 0.97 * sampled.min() < 0
+
+
+def test_signs_of_determinants_are_exact() -> None:
+    for each in np.random.default_rng(4).integers(-1, 2, (100, 6, 6)).astype(float):
+        assert _sign_of_determinant(each) == np.sign(np.round(np.linalg.det(each)))
+
+
 def test_a_matrix_may_have_many_columns() -> None:
     x = ca.SX.sym("x", 1)
     test = RankTest(RankMatrix(x * ca.SX.eye(100), 0), x, np.ones(1))
@@ -128,6 +144,14 @@ def test_the_errors_of_a_centre_are_a_vector_of_unit_length() -> None:
     a = np.hstack([np.repeat(parts, 3, axis=1), 0 * parts, 0.49 + 0 * parts, 0 * parts])[:, None]
     found = test.examine(Forms(np.ones((2, 1)), a, np.zeros((2, 1))), 0, 6)
     assert found.is_regular.tolist() == [True, False]
+
+
+def test_a_sum_that_overflows_shows_nothing() -> None:
+    x = ca.SX.sym("x", 1)
+    test = RankTest(RankMatrix(x * (ca.SX.eye(2) + 0.5 * ca.SX.ones(2, 2)), 0), x, np.ones(1))
+    for rest, is_regular in ((0.1, 1), (1e308, 0)):
+        forms = Forms(np.array([[1.0, 0.0, 0.0, 1.0]]), np.zeros((1, 4, 1)), np.full((1, 4), rest))
+        assert test.examine(forms, 1, 0).is_regular.tolist() == [is_regular]
 
 
 #: One wrong rule each: the text of the kernel, and what stands in its place.

@@ -15,7 +15,7 @@ from builders import Run, refusal_of, rows_of, starter_tables
 from screwsynth.nlp import InputError, case_from_tables, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
-from screwsynth.nlp.evidence.many import Numbers, judge_many
+from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
 from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.program.formulation import formulate
@@ -62,6 +62,11 @@ def test_many_verdicts_are_those_of_single_points() -> None:
             for name in ("arguments", "lower", "upper", "g_lower", "g_upper")
         )
     )
+    # Where ranges are narrow, changes between the bounds are the scale of F.
+    narrow = [replace(each, lower=each.centre, upper=each.centre + 1e-5 * each.scale) for each in nlps]
+    ends = {name: np.array([getattr(each, name) for each in narrow]) for name in ("lower", "upper")}
+    scales = _scales(narrow[0], numbers.at(np.arange(4))._replace(**ends))
+    assert scales.objective == pytest.approx([each.objective_scale for each in narrow], rel=1e-9)
     # The program is that of another case: the numbers alone tell the points apart.
     found = judge_many(formulate(load_case(CASE)), x, numbers)
     single = [examine(nlp, point) for nlp, point in zip(several, x, strict=True)]

@@ -1,6 +1,7 @@
 """Tangents to the squares of a minimum: against 200-bit ball arithmetic, in both engines, and what they save."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import casadi as ca
 import numpy as np
@@ -142,6 +143,18 @@ def test_a_maximum_has_no_tangents_and_a_quotient_that_may_be_undefined_none_eit
     with np.errstate(all="ignore"):
         usable = tangent_forms(Forms(*(each[1:] for each in vars(every).values())), rows.functions, 1).usable
     assert usable.tolist() == [False, True]
+
+
+def test_a_tangent_keeps_the_rounding_of_numbers_that_cancel() -> None:
+    form, rng = minimum("paper-4.3"), np.random.default_rng(7)
+    x, points = form.x, rng.uniform(0.5, 1, (form.n, 200))
+    form = replace(form, functions=(1e15 * x[1] - (3e7 * (x[0] + x[2])) ** 2 / (x[3] ** 2 + x[4] ** 2),), conditions=())
+    points[1] = 0.9 * (points[0] + points[2]) ** 2 / (points[3] ** 2 + points[4] ** 2)
+    a, b, c, d, e = np.vectorize(Fraction, otypes=[object])(points[:5])
+    values = 10**15 * b - (3 * 10**7 * (a + c)) ** 2 / (d**2 + e**2)
+    bound = Engine(form, 1).examine(points, points, -np.inf).bound
+    assert (bound >= values).all()
+    assert (bound < 100).all()
 
 
 def test_a_minimum_takes_fewer_boxes_than_without_and_has_the_same_bound() -> None:

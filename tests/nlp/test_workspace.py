@@ -482,6 +482,7 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, machine: P
     assert wide.workspace is not None
     slices = slices_of(wide)
     assert [each.names for each in slices][-1] == ("pitch", "yaw")
+    assert {each.limits for each in slices} == {()}  # the case has none
     tilts = next(each for each in slices if each.names == ("roll", "pitch"))
     assert set(tilts.regions) == {Region.REGULAR, Region.BEYOND, Region.OPEN}
     middle = 0.5 * (tilts.boxes[:, :2] + tilts.boxes[:, 2:])

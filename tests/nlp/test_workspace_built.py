@@ -33,6 +33,7 @@ from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMachine
 from screwsynth.nlp.proof.workspace.numbers.pose_error import pose_errors
+from screwsynth.nlp.proof.workspace.numbers.strokes import _better
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
@@ -243,6 +244,11 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
         errors = number.worst(points[0])
         assert errors is not None
         assert np.linalg.norm(errors, axis=1).max() <= TOLERANCE
+    # Of machines at one pose none that is met by chance is as bad as the worst one.
+    for y in points[:5]:
+        J = Machines(robot, replace(box, lower=y, upper=y), 200).J / [1, 1, 1, LENGTH, LENGTH, LENGTH]
+        assert (values_of(spectra[0], y[None]) <= np.linalg.svd(J, compute_uv=False)[:, -1]).all()
+        assert (values_of(spectra[1], y[None]) <= -np.linalg.cond(J)).all()
 
 
 def test_legs_that_errors_could_move_through_each_other_touch(case: Case) -> None:
@@ -294,6 +300,13 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
     # one axis no pose of this machine is near a singular one.
     assert changed or kind is TurnKind.AXIS
     assert found.is_regular.any()
+    # Errors are moved into the tolerance along themselves, those within it nowhere.
+    far = np.tile(family.start, (20, 1))
+    far[:, family.of_errors] += rng.normal(0, robot.tolerance / 2, (20, 36))
+    before, after = (z[:, family.of_errors].reshape(20, 12, 3) for z in (far, family.within(far)))
+    shrunk = np.minimum(1, robot.tolerance / np.linalg.norm(before, axis=2, keepdims=True))
+    np.testing.assert_allclose(after, shrunk * before, rtol=1e-9)
+    assert 0 < (shrunk < 1).mean() < 1
 
 
 def test_a_machine_within_the_tolerance_that_is_singular_refutes(case: Case) -> None:
@@ -399,11 +412,17 @@ def test_a_limit_is_refined_until_it_is_decided_whatever_the_gap_is(case: Case) 
     robot = legs(exact)
     ends = [np.linalg.norm(np.array([0.0, 0.0, z]) + robot.platform - robot.base, axis=1) for z in (18.0, 20.0)]
     stroke, longest = float((ends[1] - ends[0]).max()), float(ends[1].max())
-    for near, outcome in ((1 + 2e-6, Outcome.PROVED), (1 + 1e-10, Outcome.PROVED), (1 - 2e-6, Outcome.REFUTED)):
-        limits = Limits(LegLength(min=10.0, max=longest * near), Actuator(stroke_max=stroke * near))
+    # The last one's lengths have room: it is the limit on strokes that has their values found more finely.
+    nearest = ((1 + 2e-6, 0.0), (1 + 1e-10, 0.0), (1 - 2e-6, 0.0), (1 - 2e-6, 9.0))
+    for near, room in nearest:
+        outcome = Outcome.PROVED if near > 1 else Outcome.REFUTED
+        limits = Limits(LegLength(min=10.0, max=longest * near + room), Actuator(stroke_max=stroke * near))
         judged = judge_workspace(replace(exact, limits=limits), gap=0.05, with_objective=False)
         limited = [each for each in judged.extremes if each.key in ("leg_length.max", "actuator.stroke_max")]
         assert {outcome} <= {each.outcome for each in limited} <= {outcome, Outcome.PROVED}
+    for each in judged.extremes:
+        tight = replace(each, bound=each.bound - 0.001 * each.sense.sign)
+        assert {_better(each, tight).bound, _better(tight, each).bound} == {tight.bound}
     # The searches that are not those of certificates go on too, and end at a value that meets its limit.
     box = pose_box(workspace_of_case(case))
     number = clearance(robot, box, 0, 1)

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hexapods import clearance, hexapod_text, subject_of, values_of
 
-from screwsynth.models import FloatArray, hexapod
+from screwsynth.models import FloatArray, hexapod, three_upu
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
@@ -324,8 +324,27 @@ def test_random_machines_are_accepted() -> None:
         if found.outcome is not Outcome.PROVED:
             continue
         root = pose_root(workspace)
-        show_on_leaves(rank(root, machine), root, record.tree(with_open=True))
+        tree = record.tree(with_open=True)
+        show_on_leaves(rank(root, machine), root, tree)
+        # The checker need not find the cuts again: those of the search are in the tree, 10 bytes and a leaf each.
+        assert len(tree) == 11 * (found.boxes // 2) + 1
         accepted += 1
+
+
+def test_a_robot_is_not_regular_by_the_rounding_of_its_constants() -> None:
+    """Trap: three couples about one line, in constants that are 1e-16 in the place of 0, have full rank."""
+    model, place = three_upu(axes="snu"), (0.0, 0.0, Free(45.0, 55.0))
+    case = Case(model, {"base_radius": 50.0, "platform_radius": 25.0}, [0, 0, 50], [Task([0, 0, 0, 0, 0, 1])])
+    still, turning = (Workspace(place, Turns(TurnKind.AXIS, (each,), (1, 0, 0))) for each in (0.0, Free(-0.1, 0.3)))
+    problem = build_problem(case, model, pose_box(still))
+    assert prove_rank(problem, problem.locked, most_boxes=1).outcome is not Outcome.PROVED
+    root = pose_root(still)
+    with pytest.raises(ProofError, match="could not be shown"):
+        show_on_leaves(rank_claim(case, model, root, "regular"), root, bytes([Node.BOUNDED]))
+    # The couples alone are a matrix of their own, and lose their rank where the platform is level.
+    problem = build_problem(case, model, pose_box(turning))
+    assert problem.unactuated is not None
+    assert prove_rank(problem, problem.unactuated).outcome is Outcome.REFUTED
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))
@@ -417,6 +436,13 @@ def test_the_root_holds_the_searched_box(kind: TurnKind) -> None:
         kept = ((points[:, None] >= low) & (points[:, None] <= high)).all(axis=2)
         assert (kept == held).all()
         assert (low > lower).any()
+        # Points just within the ball, in fractions: two components of nearly its size leave little for the third.
+        assert root.inner_ball is not None
+        for angle in np.linspace(0.1, 1.4, 50):
+            a, b = (math.sqrt(root.ball * (1 - 1e-9)) * each for each in (math.cos(angle), math.sin(angle)))
+            c = math.sqrt(root.inner_ball - Fraction(a) ** 2 - Fraction(b) ** 2) * (1 - 1e-15)
+            low, high = (np.array([[1.5, 0, 20, a, b, end]]) for end in (0, 1))
+            assert root.contracted(low, high)[1][0, 5] >= c
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))
@@ -450,6 +476,10 @@ def test_claims_are_shown_of_boxes_where_they_hold_and_of_no_other(robot: Legs, 
         good = least > sign * bound + 0.06 * bound
         assert good.any()
         assert holds[good].mean() > 0.8
+    # A distance that is the claimed one up to rounding is no counterexample.
+    (distance,) = values_of(numbers[3][0], lower[:1])
+    for off, is_wrong in ((-1e-9, False), (1e-9, False), (1e-3, True)):
+        assert ClearanceClaim(legs, (0, 2), distance * (1 + off)).attempt(lower[:1], lower[:1]).is_wrong == is_wrong
 
 
 def test_inverses_hold_those_at_samples(robot: Legs) -> None:

@@ -110,7 +110,7 @@ position = [0, 0, {{ min = 19, max = 21 }}]
 THREE_UPU = """
 [robot]
 model = "three-upu"
-axes = "snu"
+axes = "tsai"
 characteristic_length = 1
 [robot.parameters]
 base_radius = { min = 30, max = 60 }

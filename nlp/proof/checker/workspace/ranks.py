@@ -42,6 +42,8 @@ from .pose_boxes import COORDINATES, Attempt, PoseRoot
 _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
+#: Part of the size of a row by which its entries may be off: numbers of a robot that should be 0 are rounding error.
+_CONSTANTS = 1e-13
 #: Numbers of parts of the way between two poses that are tried.
 _PARTS = (1, 16, 256, 4096)
 #: Indices after a component, and before it, of a vector.
@@ -120,6 +122,8 @@ class RankClaim:
         self.free = [robot.free[j] for j in assembly.independent if j < len(robot.free)]
         self._errors, self._shape = robot.errors, matrix.shape
         self._at = np.array(matrix.sparsity().get_triplet(), dtype=np.intp)
+        self._off = np.zeros(matrix.shape)
+        self._off[tuple(self._at)] = [0.0 if each.is_zero() else _CONSTANTS for each in ca.vertsplit(matrix.nz[:])]
         # The errors of joint centres change rows of legs by a part of these.
         of_rows = bool(tolerance) and not robot.errors
         parts = [ca.vec(each) for foot, arm in robot.legs * of_rows for each in (robot.position - foot, arm)]
@@ -210,7 +214,7 @@ class RankClaim:
         # Rows are made comparable by a power of two, which rounds nothing.
         sizes = np.sqrt((M * M).sum(axis=2, keepdims=True))
         scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
-        M, E, A = M * scale, E * scale, A * scale[:, None]
+        M, E, A = M * scale, E * scale + self._off, A * scale[:, None]
         if self._freedoms:
             known = np.asarray(np.isfinite(M).all(axis=(1, 2)))
             null = np.linalg.svd(np.where(known[:, None, None], M, 0.0), full_matrices=True)[2][:, -self._freedoms :]

@@ -77,7 +77,9 @@ class _Combined:
                 break
             ends = [_better(one, other) for one, other in zip(ends, finer, strict=True)]
             before, extreme = extreme, self.extreme(ends)
-            if extreme.bound == before.bound:
+            # A bound may be as fine as it gets before a value near it is reached.
+            tighter, nearer = before.bound - extreme.bound, extreme.reached - before.reached
+            if not (self._sign * tighter > 0 or self._sign * nearer > 0):
                 break
         return ends, self.of_one_machine(extreme, ends)
 

@@ -36,6 +36,9 @@ from .krawczyk import ROUNDING
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+#: Part of the size of a row by which its entries may be off: constants of a robot are rounded numbers, and one that
+#: should be 0 would make a robot regular that is singular at every pose.
+_CONSTANTS = 1e-13
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
 #: Operations of polynomials.
@@ -93,10 +96,11 @@ class RankTest:
         sizes = np.linalg.norm(values, axis=1)
         # A power of two, so that scaling rounds nothing.
         scale = 2.0 ** -np.round(np.log2(np.where(sizes > 0, sizes, 1.0)))
-        constant = np.zeros(whole.shape)
+        constant, self._off = np.zeros(whole.shape), np.zeros((whole.shape[0] + matrix.nullity, whole.shape[1]))
         places, entries = [], []
         for k, place in enumerate(zip(*whole.sparsity().get_triplet(), strict=True)):
             entry = whole.nz[k]
+            self._off[place] = 0.0 if entry.is_zero() else _CONSTANTS
             if entry.is_constant():
                 constant[place] = float(entry)
             else:
@@ -116,6 +120,7 @@ class RankTest:
         with np.errstate(all="ignore"):
             C, signs = _left_inverses(M0)
             off = np.abs(C @ M0 - np.eye(columns)) + ROUNDING * (np.abs(C) @ np.abs(M0) + np.eye(columns))
+            off += np.abs(C) @ self._off
         off[~is_known] = np.inf
         regular, shares = np.empty(count, dtype=np.int32), np.zeros((f, count))
         given = (C, off, forms.a.transpose(1, 2, 0), forms.r.T)
