@@ -160,7 +160,7 @@ def test_expansions_enclose_exact_rows_and_a_wrong_one_does_not(case: Case, kind
     half = (box.upper - box.lower) * rng.uniform(0, 0.2, (40, 1))
     lower, upper = centre - half, centre + half
     problem = subject_of(robot, box).problem
-    c, a, r = Encloser(problem.z, ca.vec(ca.densify(problem.scaled.rows).T)).second(lower.T, upper.T)
+    c, a, r = Encloser(problem.z, ca.vec(ca.densify(problem.posed.scaled.rows).T)).second(lower.T, upper.T)
     units = np.array([1.0, 1.0, 1.0, *[problem.length] * 3])
     middle, slopes, rest = (
         c.reshape(-1, 6, 6) * units,

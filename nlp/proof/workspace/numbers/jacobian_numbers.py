@@ -89,10 +89,10 @@ class _RowsNumber(Number):
     """
 
     def __init__(self, problem: Problem, length: float, machines: Problem | None = None) -> None:
-        scaled, of = problem.scaled, machines or problem
+        scaled, of = problem.posed.scaled, machines or problem
         super().__init__(problem, ca.vertcat(ca.vec(ca.densify(scaled.rows)), scaled.sizes))
         self._scale = np.array([1.0, 1.0, 1.0, *[problem.length / length] * 3])
-        self._jacobian = ca.Function("J", [of.z], [ca.densify(of.scaled.jacobian)])
+        self._jacobian = ca.Function("J", [of.z], [ca.densify(of.posed.scaled.jacobian)])
 
     def jacobian(self, z: FloatArray) -> FloatArray:
         """Return J (P, m, 6) at points (P, n) of the machines."""
@@ -101,7 +101,7 @@ class _RowsNumber(Number):
 
     def rows(self, forms: Forms, count: int) -> _Rows:
         """Return the rows over boxes from forms of them, column by column, of their sizes, and of more."""
-        m = self.problem.scaled.rows.shape[0]
+        m = self.problem.posed.scaled.rows.shape[0]
         c, a, r = forms.part(slice(0, 7 * m))
         (B, _, t), sizes = a.shape, c[:, 6 * m :]
         with np.errstate(all="ignore"):
@@ -140,13 +140,13 @@ class SingularValues(_RowsNumber):
         super().__init__(problem, length, machines)
         self._is_condition, self._change, self._machines = is_condition, change, machines
         if is_condition:
-            self.entries = ca.vertcat(self.entries, ca.vec(ca.densify(problem.scaled.jacobian)))
+            self.entries = ca.vertcat(self.entries, ca.vec(ca.densify(problem.posed.scaled.jacobian)))
 
     @cached_property
     def _slopes(self) -> ca.Function:
         """The derivatives of u . J v by the errors of machines."""
         of = self._machines or self.problem
-        J = of.scaled.jacobian * ca.repmat(SX(self._scale.tolist()).T, of.scaled.rows.shape[0], 1)
+        J = of.posed.scaled.jacobian * ca.repmat(SX(self._scale.tolist()).T, of.posed.scaled.rows.shape[0], 1)
         u, v = SX.sym("u", J.shape[0]), SX.sym("v", J.shape[1])
         return ca.Function("slopes", [of.z, u, v], [ca.densify(ca.gradient(ca.dot(u, J @ v), of.errors))])
 

@@ -113,7 +113,7 @@ class SingularPose:
         self._equations = ca.Function(
             "singular", [z, v], [problem.equations, product, ca.jacobian(problem.equations, z), ca.jacobian(product, z)]
         )
-        self._jacobian = ca.Function("J", [z], [ca.densify(problem.scaled.jacobian)])
+        self._jacobian = ca.Function("J", [z], [ca.densify(problem.posed.scaled.jacobian)])
 
     def smallest(self, z: FloatArray) -> float:
         """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import casadi as ca
@@ -219,7 +220,7 @@ class PosedModel:
         """The matrix with free actuators."""
         return ca.sparsify(self.plain(free_matrix(self.limbs)))
 
-    @property
+    @cached_property
     def scaled(self) -> ScaledRows:
         """J with moments about the platform's origin divided by the length of the limbs."""
         L, limbs = SX(self.characteristic_length), self.limbs

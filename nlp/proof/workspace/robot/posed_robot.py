@@ -12,7 +12,6 @@ the error of a centre, a vector, changes it by at most the vector's length times
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -26,7 +25,7 @@ from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .closed_loops import DEPENDENT, Loops, closed_from_home
 from .pose_box import PoseBox
-from .posed_model import Chosen, PosedModel, RankMatrix, ScaledRows, posed_model
+from .posed_model import Chosen, PosedModel, RankMatrix, posed_model
 
 #: Points of the workspace at which the equations that are needed are found, beside its middle, and number of machines
 #: in which those that were left out are tested.
@@ -82,11 +81,6 @@ class Problem:
     def problem(self) -> Problem:
         """The design alone."""
         return self.design or self
-
-    @cached_property
-    def scaled(self) -> ScaledRows:
-        """J, moments divided by the length that is chosen."""
-        return self.posed.scaled
 
     @property
     def length(self) -> float:
@@ -325,9 +319,7 @@ def _independent(values: FloatArray, rank: int, what: str) -> tuple[int, ...]:
 def _length(posed: PosedModel, start: FloatArray) -> float:
     """Return the median arm of rows and screws about the platform's origin; 0 where they have none."""
     lines = [(row.force, row.moment) for row in posed.limbs.wrenches]
-    lines += [
-        (each.screws[:3, j], each.screws[3:, j]) for each in posed.limbs.members for j in range(each.screws.shape[1])
-    ]
+    lines += [(screw[:3], screw[3:]) for each in posed.limbs.members for screw in ca.horzsplit(each.screws)]
     pairs = [
         ca.vertcat(ca.norm_2(moment - ca.cross(posed.limbs.position, along)), ca.norm_2(along))
         for along, moment in lines
