@@ -335,16 +335,21 @@ def test_a_robot_is_not_regular_by_the_rounding_of_its_constants() -> None:
     """Trap: three couples about one line, in constants that are 1e-16 in the place of 0, have full rank."""
     model, place = three_upu(axes="snu"), (0.0, 0.0, Free(45.0, 55.0))
     case = Case(model, {"base_radius": 50.0, "platform_radius": 25.0}, [0, 0, 50], [Task([0, 0, 0, 0, 0, 1])])
-    still, turning = (Workspace(place, Turns(TurnKind.AXIS, (each,), (1, 0, 0))) for each in (0.0, Free(-0.1, 0.3)))
+    angles = (0.0, Free(-0.1, 0.3), Free(-0.2, 0.2))
+    still, *turning = (Workspace(place, Turns(TurnKind.AXIS, (each,), (1, 0, 0))) for each in angles)
     problem = build_problem(case, model, pose_box(still))
     assert prove_rank(problem, problem.locked, most_boxes=1).outcome is not Outcome.PROVED
     root = pose_root(still)
     with pytest.raises(ProofError, match="could not be shown"):
         show_on_leaves(rank_claim(case, model, root, "regular"), root, bytes([Node.BOUNDED]))
-    # The couples alone are a matrix of their own, and lose their rank where the platform is level.
-    problem = build_problem(case, model, pose_box(turning))
-    assert problem.unactuated is not None
-    assert prove_rank(problem, problem.unactuated).outcome is Outcome.REFUTED
+    # The couples alone are a matrix of their own, and lose their rank where the platform is level, also in the middle.
+    for each in turning:
+        problem = build_problem(case, model, pose_box(each))
+        assert problem.unactuated is not None
+        assert prove_rank(problem, problem.unactuated).outcome is Outcome.REFUTED
+        root = pose_root(each)
+        with pytest.raises(ProofError, match="could not be shown"):
+            show_on_leaves(rank_claim(case, model, root, "constraints regular"), root, bytes([Node.BOUNDED]))
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))

@@ -168,8 +168,10 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
     if generic is not None:
         freedoms, idle = 6 - generic.constraints, generic.idle
     else:
-        values = np.linalg.svd(robot.at(matrix, start), compute_uv=False)
-        freedoms, idle = matrix.shape[1] - int(np.count_nonzero(values > _ZERO * values[0])), 0
+        # Where every pose is closed, the rank is that at almost all of them.
+        away = np.random.default_rng(0).uniform(-0.5, 0.5, (4, len(start))) * robot.size * (not robot.model.unknowns)
+        spectra = [np.linalg.svd(robot.at(matrix, start + each), compute_uv=False) for each in away]
+        freedoms, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
     if not 0 < freedoms < 6:
         raise ProofError("the robot has no constraint wrenches of which the rank could be claimed")
     return matrix, freedoms + idle

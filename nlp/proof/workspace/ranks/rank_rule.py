@@ -36,8 +36,7 @@ from .krawczyk import ROUNDING
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Part of the size of a row by which its entries may be off: constants of a robot are rounded numbers, and one that
-#: should be 0 would make a robot regular that is singular at every pose.
+#: Part of the size of a row by which its entries may be off: a constant that should be 0 may be rounding error.
 _CONSTANTS = 1e-13
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12

@@ -97,11 +97,6 @@ class Limbs:
         return scaled_twists(screws, self.position, SX(self.length), 6)
 
 
-def locked_matrix(limbs: Limbs) -> SX:
-    """Return M, with the actuators locked."""
-    return _matrix(limbs, [])
-
-
 def free_matrix(limbs: Limbs) -> SX:
     """Return N, with the actuators free; of a robot given by its rows the couples alone, which are its constraints."""
     if limbs.actuators:
@@ -213,7 +208,7 @@ class PosedModel:
     @property
     def locked(self) -> RankMatrix:
         """The matrix with locked actuators, rows that are linear in the rotation without a division."""
-        return RankMatrix(self.polynomial(locked_matrix(self.limbs)), 0)
+        return RankMatrix(self.polynomial(_matrix(self.limbs, [])), 0)
 
     @property
     def unlocked(self) -> SX:

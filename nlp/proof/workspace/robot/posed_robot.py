@@ -337,9 +337,13 @@ def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatri
     matrix = posed.unlocked
     if not matrix.numel():
         return None
-    freedoms, idle = matrix.shape[1] - _rank_of(posed.values(matrix, start)), 0
     if generic is not None:
         freedoms, idle = 6 - generic.constraints, generic.idle
+    else:
+        # Any pose of a robot given by rows is closed, and the middle may be singular.
+        part = 0.0 if model.unknowns else _SPREAD
+        away = part * posed.loops.size * np.random.default_rng(_SEED).uniform(-1, 1, (_POINTS, len(start)))
+        freedoms, idle = matrix.shape[1] - max(_rank_of(posed.values(matrix, start + each)) for each in away), 0
     return RankMatrix(matrix, freedoms + idle) if 0 < freedoms < 6 else None
 
 
