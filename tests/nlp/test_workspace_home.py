@@ -22,7 +22,7 @@ from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
-from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
+from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot, motion_matrix
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
@@ -257,6 +257,22 @@ def test_a_proof_of_loops_that_are_closed_box_by_box_is_accepted() -> None:
     judged, proof = judged_on_paper(case, with_limits=False)
     assert judged.ranks[0].boxes > 10
     assert len(check_workspace_proof(proof, case).claims) == 2
+
+
+@pytest.mark.parametrize(("name", "arm"), [("3-rps", 0.0), ("tricept", 1.0)])
+def test_freedoms_in_the_check_are_those_that_are_known(name: str, arm: float) -> None:
+    """At home the platform rises, and turns about horizontal lines: through its origin, or an arm below it."""
+    case = about_home(name, 0.05, 10)
+    assert case.workspace is not None
+    robot = PosedRobot(case, case.model, pose_root(case.workspace))
+    start = start_of(robot)
+    matrix, freedoms = motion_matrix(robot, start, is_locked=False)
+    motions = np.linalg.svd(robot.at(matrix, start))[2][-freedoms:, :6]
+    # Velocities of the origin, then rotations times the length.
+    turn = robot.length
+    known = np.array([[0, 0, 1, 0, 0, 0], [0, -arm, 0, turn, 0, 0], [arm, 0, 0, 0, turn, 0]])
+    assert np.linalg.matrix_rank(motions) == 3
+    assert motions == pytest.approx(motions @ np.linalg.pinv(known) @ known, abs=1e-9)
 
 
 def test_the_check_begins_in_the_working_mode_of_home() -> None:
