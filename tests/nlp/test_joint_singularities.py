@@ -13,7 +13,7 @@ from screwsynth.nlp import Case, Free, Task, evaluate, formulate, json_data, res
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.optimality import PointKind
-from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists
+from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, is_passive_singular, _null_twists
 from screwsynth.nlp.solver.status import Status
 
 TURN = [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)]
@@ -114,6 +114,13 @@ def test_what_rounding_leaves_of_constraints_is_nothing_in_any_unit() -> None:
     mobility = mobility_of(nlp, nlp.start, evaluate(nlp, nlp.start))
     assert mobility is not None
     assert mobility.constrained == 0
+
+
+def test_joints_without_a_direction_are_singular() -> None:
+    nlp = formulate(Case(robot(**tomllib.loads(FIVE_BAR)), {}, [0, 1, 0], TURN))
+    point = nlp.start.copy()
+    point[nlp.program.places.unknowns[0][-1]] = np.nan
+    assert is_passive_singular(nlp, point)
 
 
 def test_constraint_singularities_gain_motions_that_are_known() -> None:

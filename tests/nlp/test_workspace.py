@@ -266,7 +266,7 @@ def test_lengths_of_legs_agree_with_samples(case: Case) -> None:
         assert stroke.bound == pytest.approx(long.bound - short.bound)
 
 
-@pytest.mark.parametrize(("away", "outcome"), [(1e-6, Outcome.PROVED), (-1e-6, Outcome.REFUTED)])
+@pytest.mark.parametrize(("away", "outcome"), [(1e-6, Outcome.PROVED), (0.0, Outcome.PROVED), (-1e-6, Outcome.REFUTED)])
 def test_limits_nearer_than_the_gap_are_decided(case: Case, away: float, outcome: Outcome) -> None:
     lengths = [each for each in judge_workspace(case, with_objective=False).extremes if each.key[:4] == "leg_"]
     short, long = (of([each.reached for each in lengths if each.sense.value == of.__name__]) for of in (min, max))
