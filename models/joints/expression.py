@@ -3,18 +3,19 @@
 An expression consists of numbers, names, ``+ - * / ^``, brackets, and the functions of :data:`FUNCTIONS`. Values are
 scalars or vectors; ``x``, ``y`` and ``z`` are the unit vectors of the world frame. Python's parser only makes a tree
 of the text; each node of the tree is accepted here by its type, and anything else is refused, so that a text can
-neither reach an attribute nor call anything but these functions.
+neither reach an attribute nor call anything but these functions. A :class:`Language` gives such a tree its value, also
+for other texts with functions of their own.
 """
 
 from __future__ import annotations
 
 import ast
-import difflib
 import math
 import re
 import warnings
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 from casadi import SX
@@ -23,7 +24,8 @@ from casadi import SX
 _LONGEST = 2000
 #: Deepest nesting of an expression: far below the depth at which Python's own recursion ends.
 _DEEPEST = 60
-_LARGEST_POWER = 100.0
+#: Largest size of a constant power: with larger ones, numbers of any machine leave the range of doubles.
+LARGEST_POWER = 100.0
 #: Characters of expressions. Python would take a text behind # for a comment, and other letters for those of names.
 _CHARACTERS = re.compile(r"[A-Za-z0-9_+\-*/^(),. ]*")
 #: Numbers of Python that are none here: 0x10, 1_000, 1j.
@@ -74,8 +76,10 @@ def _atan2(first: SX, second: SX) -> SX:
     return ca.atan2(first, second)
 
 
-#: The functions by name, each with its number of arguments.
-FUNCTIONS: Mapping[str, tuple[int, Callable[..., SX]]] = MappingProxyType(
+#: Functions by name, each with its number of arguments.
+Functions: TypeAlias = Mapping[str, tuple[int, Callable[..., SX]]]
+#: Those of robot files.
+FUNCTIONS: Functions = MappingProxyType(
     {
         "sin": (1, _scalar(ca.sin)),
         "cos": (1, _scalar(ca.cos)),
@@ -105,7 +109,7 @@ def evaluate(written: str | float, names: Mapping[str, SX]) -> SX:
     Raises:
         ExpressionError: the text is no expression, or its value is a constant that is not finite.
     """
-    value = _value(_tree(written), names, 0) if isinstance(written, str) else _number(written)
+    value = _LANGUAGE.value(_tree(written), {**CONSTANTS, **names}) if isinstance(written, str) else _number(written)
     if value.is_constant() and not value.is_regular():
         raise ExpressionError("has no finite value")
     return ca.densify(value)
@@ -127,28 +131,85 @@ def _tree(text: str) -> ast.expr:
         raise ExpressionError("is no expression of numbers, names, + - * / ^ and functions") from None
 
 
-def _value(node: ast.expr, names: Mapping[str, SX], depth: int) -> SX:  # noqa: PLR0911 - one return a kind of node
-    """Return the value of a node, (1, 1) or (3, 1)."""
-    if depth > _DEEPEST:
-        raise ExpressionError(f"has more than {_DEEPEST} operations in each other")
-    match node:
-        case ast.Constant(value=value):
-            return _number(value)
-        case ast.Name(id=name) if name in names:
-            return names[name]
-        case ast.Name(id=name) if name in CONSTANTS:
-            return CONSTANTS[name]
-        case ast.Name(id=name):
-            raise UnknownNameError(name, _hint(name, [*names, *CONSTANTS]))
-        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-            return _value(operand, names, depth + 1)
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return -_value(operand, names, depth + 1)
-        case ast.BinOp(left=left, op=operator, right=right):
-            return _operation(operator, _value(left, names, depth + 1), _value(right, names, depth + 1))
-        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-            return _call(name, [_value(each, names, depth + 1) for each in arguments])
-    raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
+class Language(NamedTuple):
+    """What expressions may call, and how far they may go.
+
+    Attributes:
+        functions: the functions.
+        deepest: most operations in each other.
+        largest_power: largest size of a constant power.
+    """
+
+    functions: Functions
+    deepest: float = math.inf
+    largest_power: float = math.inf
+
+    def value(self, node: ast.expr, names: Mapping[str, SX], depth: int = 0) -> SX:
+        """Return the value of a node, (1, 1) or (3, 1).
+
+        Args:
+            node: of a syntax tree.
+            names: values of the names that it may use.
+            depth: of the node in the tree.
+
+        Raises:
+            ExpressionError: the node is none of this language.
+        """
+        if depth > self.deepest:
+            raise ExpressionError(f"has more than {self.deepest} operations in each other")
+        match node:
+            case ast.Constant(value=value):
+                return _number(value)
+            case ast.Name(id=name) if name in names:
+                return names[name]
+            case ast.Name(id=name):
+                raise UnknownNameError(name, _hint(name, names))
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.value(operand, names, depth + 1)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return -self.value(operand, names, depth + 1)
+            case ast.BinOp(left=left, op=operator, right=right):
+                first, second = self.value(left, names, depth + 1), self.value(right, names, depth + 1)
+                return self._operation(operator, first, second)
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                return self._call(name, [self.value(each, names, depth + 1) for each in arguments])
+        raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
+
+    def _operation(self, operator: ast.operator, first: SX, second: SX) -> SX:
+        """Return the value of an operation."""
+        match operator:
+            case ast.Add() | ast.Sub():
+                if first.shape != second.shape:
+                    raise ExpressionError("adds or subtracts a number and a vector")
+                return first + second if isinstance(operator, ast.Add) else first - second
+            case ast.Mult():
+                if not (first.is_scalar() or second.is_scalar()):
+                    raise ExpressionError("multiplies two vectors: use dot or cross")
+                return first * second
+            case ast.Div():
+                if not second.is_scalar():
+                    raise ExpressionError("divides by a vector")
+                return first / second
+            case ast.Pow():
+                if not (first.is_scalar() and second.is_scalar()):
+                    raise ExpressionError("has a vector in a power")
+                if second.is_constant() and abs(float(second)) > self.largest_power:
+                    raise ExpressionError(f"has a power larger than {self.largest_power:g}")
+                return first**second
+        raise ExpressionError("may have only the operations + - * / ^")
+
+    def _call(self, name: str, arguments: list[SX]) -> SX:
+        """Return the value of a function."""
+        if name not in self.functions:
+            raise ExpressionError(f"has the function {name!r}, which is unknown; {_hint(name, self.functions)}")
+        count, function = self.functions[name]
+        if len(arguments) != count:
+            raise ExpressionError(f"gives {name} {len(arguments)} arguments instead of {count}")
+        return function(*arguments)
+
+
+#: The language of robot files.
+_LANGUAGE = Language(FUNCTIONS, _DEEPEST, LARGEST_POWER)
 
 
 def _number(value: object) -> SX:
@@ -164,41 +225,9 @@ def _number(value: object) -> SX:
     return SX(number)
 
 
-def _operation(operator: ast.operator, first: SX, second: SX) -> SX:
-    """Return the value of an operation."""
-    match operator:
-        case ast.Add() | ast.Sub():
-            if first.shape != second.shape:
-                raise ExpressionError("adds or subtracts a number and a vector")
-            return first + second if isinstance(operator, ast.Add) else first - second
-        case ast.Mult():
-            if not (first.is_scalar() or second.is_scalar()):
-                raise ExpressionError("multiplies two vectors: use dot or cross")
-            return first * second
-        case ast.Div():
-            if not second.is_scalar():
-                raise ExpressionError("divides by a vector")
-            return first / second
-        case ast.Pow():
-            if not (first.is_scalar() and second.is_scalar()):
-                raise ExpressionError("has a vector in a power")
-            if second.is_constant() and abs(float(second)) > _LARGEST_POWER:
-                raise ExpressionError(f"has a power larger than {_LARGEST_POWER:g}")
-            return first**second
-    raise ExpressionError("may have only the operations + - * / ^")
-
-
-def _call(name: str, arguments: list[SX]) -> SX:
-    """Return the value of a function."""
-    if name not in FUNCTIONS:
-        raise ExpressionError(f"has the function {name!r}, which is unknown; {_hint(name, FUNCTIONS)}")
-    count, function = FUNCTIONS[name]
-    if len(arguments) != count:
-        raise ExpressionError(f"gives {name} {len(arguments)} arguments instead of {count}")
-    return function(*arguments)
-
-
-def _hint(name: str, known: Mapping[str, object] | list[str]) -> str:
+def _hint(name: str, known: Mapping[str, object]) -> str:
     """Return a clause about the names that are known."""
-    near = difflib.get_close_matches(name, list(known), 1)
+    import difflib  # noqa: PLC0415 - only messages need it
+
+    near = difflib.get_close_matches(name, known, 1)
     return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"
