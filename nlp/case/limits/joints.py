@@ -25,6 +25,7 @@ from pydantic import (
 )
 
 from ....models import Dimension, FloatArray, Model, RobotInstance, frozen_array, matrix_from_axis_angle
+from ....models.legs import angle_between
 from ...errors import CaseError
 from ...units import Units
 from ..table import Table, Vector, fault_of
@@ -170,11 +171,11 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
                 if home is None:
                     raise CaseError("limits.home", f'is missing: limits.{cls.key} has about = "home"')
                 angle = written.internal(home.angle, Dimension.ANGLE)
-                return cls(largest, MountingPose(_triple(home.position), _triple(home.axis), angle))
+                return cls(largest, MountingPose(triple(home.position), triple(home.axis), angle))
             case axes:
                 rows = [row for row in axes if isinstance(row, list)]
                 flat = [part for part in axes if not isinstance(part, list)]
-                return cls(largest, tuple(_triple(row) for row in rows or [flat]))
+                return cls(largest, tuple(triple(row) for row in rows or [flat]))
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
         """Return the keys of ``[limits]`` that state this limit, with the home pose that its cones are about."""
@@ -202,8 +203,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         if len(axes) not in (1, legs):
             raise CaseError(key, f"must be one direction, or one for each of the {legs} legs, got {len(axes)}")
         for axis in axes:
-            if len(axis) != 3 or not all(map(math.isfinite, axis)) or not any(axis):
-                raise CaseError(key, "must be three finite numbers that are not all zero", list(axis))
+            check_axis(key, axis)
         home = self.about
         if isinstance(home, MountingPose) and not all(map(math.isfinite, (*home.position, home.angle))):
             raise CaseError(key, "must be a pose of finite numbers")
@@ -219,12 +219,10 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         """Return each joint's angle; None about the plate's normal, where the model's own quantity says the same."""
         if self.about is None or not robot.legs:
             return None
-        pairs = [
-            (self._to_world(axis, robot.rotation), leg.span)
+        angles = [
+            angle_between(self._to_world(axis, robot.rotation), leg.span)
             for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True)
         ]
-        # The arc tangent is accurate for a leg along its axis, where the arc cosine is not.
-        angles = [ca.atan2(ca.norm_2(ca.cross(axis, span)), ca.dot(axis, span)) for axis, span in pairs]
         return Measures(tuple(leg.name for leg in robot.legs), ca.vertcat(*angles), Dimension.ANGLE)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
@@ -339,6 +337,13 @@ def unit_axes(axes: tuple[Triple, ...], count: int) -> FloatArray:
     return frozen_array(rows if len(rows) == count else rows * count, (count, 3))
 
 
-def _triple(values: Sequence[float]) -> Triple:
+def check_axis(key: str, axis: Triple) -> None:
+    """Refuse an axis that gives no direction; the first argument is its dotted key."""
+    if len(axis) != 3 or not all(map(math.isfinite, axis)) or not any(axis):
+        raise CaseError(key, "must be three finite numbers that are not all zero", list(axis))
+
+
+def triple(values: Sequence[float]) -> Triple:
+    """Return three numbers of a case file."""
     x, y, z = (float(value) for value in values)
     return x, y, z
