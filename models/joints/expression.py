@@ -14,6 +14,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -48,45 +49,31 @@ class UnknownNameError(ExpressionError):
         self.name = name
 
 
-def _scalar(function: Callable[[SX], SX]) -> Callable[..., SX]:
-    """Return a function of one scalar that refuses vectors."""
+def _only(function: Callable[..., SX], *, scalars: bool, fault: str) -> Callable[..., SX]:
+    """Return a function that refuses vectors, or scalars, as its arguments."""
 
-    def of_scalar(value: SX) -> SX:
-        if not value.is_scalar():
-            raise ExpressionError("needs a number here, not a vector")
-        return function(value)
-
-    return of_scalar
-
-
-def _of_vectors(function: Callable[..., SX]) -> Callable[..., SX]:
-    """Return a function of vectors that refuses scalars."""
-
-    def of_vectors(*values: SX) -> SX:
-        if any(value.is_scalar() for value in values):
-            raise ExpressionError("needs a vector here, not a number")
+    def checked(*values: SX) -> SX:
+        if any(value.is_scalar() is not scalars for value in values):
+            raise ExpressionError(fault)
         return function(*values)
 
-    return of_vectors
+    return checked
 
 
-def _atan2(first: SX, second: SX) -> SX:
-    if not (first.is_scalar() and second.is_scalar()):
-        raise ExpressionError("needs numbers in atan2, not vectors")
-    return ca.atan2(first, second)
-
+_of_numbers = partial(_only, scalars=True, fault="needs a number here, not a vector")
+_of_vectors = partial(_only, scalars=False, fault="needs a vector here, not a number")
 
 #: Functions by name, each with its number of arguments.
 Functions: TypeAlias = Mapping[str, tuple[int, Callable[..., SX]]]
 #: Those of robot files.
 FUNCTIONS: Functions = MappingProxyType(
     {
-        "sin": (1, _scalar(ca.sin)),
-        "cos": (1, _scalar(ca.cos)),
-        "tan": (1, _scalar(ca.tan)),
-        "sqrt": (1, _scalar(ca.sqrt)),
-        "abs": (1, _scalar(ca.fabs)),
-        "atan2": (2, _atan2),
+        "sin": (1, _of_numbers(ca.sin)),
+        "cos": (1, _of_numbers(ca.cos)),
+        "tan": (1, _of_numbers(ca.tan)),
+        "sqrt": (1, _of_numbers(ca.sqrt)),
+        "abs": (1, _of_numbers(ca.fabs)),
+        "atan2": (2, _of_numbers(ca.atan2, fault="needs numbers in atan2, not vectors")),
         "cross": (2, _of_vectors(ca.cross)),
         "dot": (2, _of_vectors(ca.dot)),
         "norm": (1, _of_vectors(ca.norm_2)),

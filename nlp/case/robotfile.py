@@ -50,7 +50,7 @@ class RepeatTable(Table):
     count: Annotated[int, Field(ge=1, le=_MOST_COPIES)] | None = Field(
         default=None, description="number of copies, evenly spread"
     )
-    angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=24)] | None = Field(
+    angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=_MOST_COPIES)] | None = Field(
         default=None, description="angle of each copy, degrees"
     )
     axis: Vector = Field(default=[0.0, 0.0, 1.0], description="direction of the axis")
