@@ -11,7 +11,7 @@ from casadi import SX
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from screwsynth.models.joints.expression import ExpressionError
+from screwsynth.models.expression import ExpressionError
 from screwsynth.nlp.case.limits.relation import expression, parse
 
 NAMES = {"x1": 3.0, "x2": 2.0, "base_1_x": -1.5, "angle": 30.0}

@@ -20,7 +20,7 @@ from casadi import SX
 from pydantic import Field
 
 from ....models import Dimension, Model
-from ....models.joints.expression import FUNCTIONS, LARGEST_POWER, ExpressionError, Language
+from ....models.expression import FUNCTIONS, LARGEST_POWER, ExpressionError, Language
 from ...errors import CaseError, nearest
 from ...units import Units
 from ..table import Table
