@@ -56,14 +56,14 @@ def legged_platform(legs: Sequence[Leg], pose: PoseSymbols) -> LeggedPlatform:
             Quantity(
                 "base_joint_angle",
                 names,
-                ca.vertcat(*[_angle_between(SX([0, 0, 1]), span) for span in spans]),
+                ca.vertcat(*[angle_between(SX([0, 0, 1]), span) for span in spans]),
                 Dimension.ANGLE,
                 "angle between a leg and the base's normal",
             ),
             Quantity(
                 "platform_joint_angle",
                 names,
-                ca.vertcat(*[_angle_between(R[:, 2], span) for span in spans]),
+                ca.vertcat(*[angle_between(R[:, 2], span) for span in spans]),
                 Dimension.ANGLE,
                 "angle between a leg and the platform's normal",
             ),
@@ -78,12 +78,12 @@ def _leg_rows(legs: Sequence[Leg], pose: PoseSymbols) -> tuple[Wrench, ...]:
     return tuple(force_along(leg.name, leg.base, span) for leg, span in zip(legs, spans, strict=True))
 
 
-def _angle_between(normal: SX, span: SX) -> SX:
-    """Return the angle in radians, (1, 1), of a leg (3, 1) against a plate's normal (3, 1).
+def angle_between(axis: SX, span: SX) -> SX:
+    """Return the angle in radians, (1, 1), of a leg or link (3, 1) against a plate's normal or another axis (3, 1).
 
-    Unlike the arc cosine, the angle is accurate and has a derivative for a leg that is nearly along the normal.
+    Unlike the arc cosine, the angle is accurate and has a derivative for a leg that is nearly along the axis.
     """
-    return ca.atan2(ca.norm_2(ca.cross(normal, span)), ca.dot(normal, span))
+    return ca.atan2(ca.norm_2(ca.cross(axis, span)), ca.dot(axis, span))
 
 
 def _scene(legs: Sequence[Leg], ends: Sequence[SX], pose: PoseSymbols) -> Scene:

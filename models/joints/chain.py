@@ -16,11 +16,11 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
+from ..expression import ExpressionError, UnknownNameError, evaluate
 from ..mechanism.decomposition import GraphJoint, LimbPaths, Step, decompose
 from ..mechanism.topology import bridges_between, reached
 from ..parts import Dimension
 from ..screws import Displacement, Screw, screw_displacement, unit_vector
-from .expression import ExpressionError, UnknownNameError, evaluate
 from .forms import RobotError, VectorExpression
 from .motion import UNIT_VECTORS, AxisKind, JointAxis
 from .words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords

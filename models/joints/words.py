@@ -40,7 +40,8 @@ _JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
 }
 #: Keys of every robot file beside those of its limbs, or of its links and joints.
 _HEAD_KEYS = ("name", "description", "length_unit", "home", "dimensions", "derived")
-_MOST_LIMBS = 24
+#: Most limbs of a robot, with all copies.
+MOST_LIMBS = 24
 #: Most joints from base to platform, and most branches of a limb: no limb of a known robot has more than half of them.
 _MOST_JOINTS = 12
 _MOST_BRANCHES = 6
@@ -51,7 +52,7 @@ NESTED_BRANCH = "is a branch of a branch; allowed are branches of a limb, each w
 #: Copies of a limb nearer than this coincide, degrees.
 _SAME_ANGLE = 1e-6
 #: Keys of a robot file with links and joints beside those of every robot file.
-_GRAPH_KEYS = ("links", "base", "platform", "points", "joint", "coupling")
+GRAPH_KEYS = ("links", "base", "platform", "points", "joint", "coupling")
 _MOST_COUPLINGS = 40
 #: Joints with one coordinate, which a coupling relates and an actuator drives.
 _COUPLED = ("R", "P", "H")
@@ -155,10 +156,10 @@ def read_robot(tables: Mapping[str, object]) -> RobotWords:
     Raises:
         RobotError: a key is unknown or missing, or a value has a form that is not allowed.
     """
-    given = [key for key in _GRAPH_KEYS if tables.get(key) is not None]
+    given = [key for key in GRAPH_KEYS if tables.get(key) is not None]
     if given and tables.get("limb") is not None:
         raise RobotError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")
-    refuse_other_keys("", tables, (*_HEAD_KEYS, *(_GRAPH_KEYS if given else ()), "limb"))
+    refuse_other_keys("", tables, (*_HEAD_KEYS, *(GRAPH_KEYS if given else ()), "limb"))
     head = _head(tables)
     return replace(head, graph=_graph(tables)) if given else replace(head, limbs=_limbs(tables.get("limb")))
 
@@ -173,8 +174,8 @@ def _limbs(limbs: object) -> tuple[LimbWords, ...]:
             _limb(f"limb {index + 1}", table_of(f"limb {index + 1}", each), sum(len(one.names) for one in read))
         )
     names = [limb for each in read for limb in each.names]
-    if len(names) > _MOST_LIMBS:
-        raise RobotError("limb", f"has {len(names)} limbs with all copies; at most {_MOST_LIMBS} are allowed")
+    if len(names) > MOST_LIMBS:
+        raise RobotError("limb", f"has {len(names)} limbs with all copies; at most {MOST_LIMBS} are allowed")
     joints = sum(len(each.names) * (len(each.stem) + sum(map(len, each.branches))) for each in read)
     if joints > _MOST_IN_ALL:
         raise RobotError("limb", f"has {joints} joints with all copies; at most {_MOST_IN_ALL} are allowed")
@@ -321,16 +322,16 @@ def _repeat(place: str, value: object) -> RepeatWords:
         raise RobotError(place, "needs either count or angles")
     if "count" in table:
         count = table["count"]
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= _MOST_LIMBS:
-            raise RobotError(f"{place}, count", f"is {count!r}; allowed are whole numbers from 1 to {_MOST_LIMBS}")
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LIMBS:
+            raise RobotError(f"{place}, count", f"is {count!r}; allowed are whole numbers from 1 to {MOST_LIMBS}")
         angles = tuple(360.0 * k / count for k in range(count))
     else:
         angles = tuple(real_of(f"{place}, angles", each) for each in list_of(f"{place}, angles", table["angles"]))
         for angle in angles:
             if sum(math.isclose(math.remainder(angle - each, 360.0), 0.0, abs_tol=_SAME_ANGLE) for each in angles) > 1:
                 raise RobotError(f"{place}, angles", f"has {angle:g} twice; each copy needs an angle of its own")
-        if not 1 <= len(angles) <= _MOST_LIMBS:
-            raise RobotError(f"{place}, angles", f"has {len(angles)} angles; allowed are 1 to {_MOST_LIMBS}")
+        if not 1 <= len(angles) <= MOST_LIMBS:
+            raise RobotError(f"{place}, angles", f"has {len(angles)} angles; allowed are 1 to {MOST_LIMBS}")
     axis = triple_of(f"{place}, axis", table.get("axis", (0.0, 0.0, 1.0)))
     if not any(axis):
         raise RobotError(f"{place}, axis", "is zero: it needs a direction")

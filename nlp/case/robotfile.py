@@ -16,7 +16,7 @@ from pydantic_core import ErrorDetails
 
 from ...models import Model, ModelError, robot
 from ...models.joints import RobotError
-from ...models.joints.words import NESTED_BRANCH
+from ...models.joints.words import GRAPH_KEYS, MOST_LIMBS, NESTED_BRANCH
 from ..errors import CaseError, InputError
 from ..system.reading import read_limited
 from .table import Table, Vector, case_error
@@ -32,10 +32,6 @@ VectorExpression = Annotated[
 ]
 
 
-#: Most copies of a limb.
-_MOST_COPIES = 24
-
-
 class DimensionTable(Table):
     """A dimension that a case fixes or frees."""
 
@@ -47,10 +43,10 @@ class DimensionTable(Table):
 class RepeatTable(Table):
     """Copies of a limb by rotation about an axis."""
 
-    count: Annotated[int, Field(ge=1, le=_MOST_COPIES)] | None = Field(
+    count: Annotated[int, Field(ge=1, le=MOST_LIMBS)] | None = Field(
         default=None, description="number of copies, evenly spread"
     )
-    angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=24)] | None = Field(
+    angles: Annotated[list[FiniteFloat], Field(min_length=1, max_length=MOST_LIMBS)] | None = Field(
         default=None, description="angle of each copy, degrees"
     )
     axis: Vector = Field(default=[0.0, 0.0, 1.0], description="direction of the axis")
@@ -143,8 +139,6 @@ class LinkFile(HeadTable):
     coupling: list[CouplingTable] = Field(default_factory=list, description="relations of joints' coordinates")
 
 
-#: Keys that only a robot of links and joints has.
-_LINK_KEYS = ("links", "base", "platform", "points", "joint", "coupling")
 #: Keys longer than this are cut in messages.
 _LONGEST_KEY = 60
 #: Words for one entry of a list.
@@ -182,7 +176,7 @@ def check_form(tables: dict[str, Any]) -> None:
     Raises:
         CaseError: the first fault, with limb and joint in words.
     """
-    given = [key for key in _LINK_KEYS if key in tables]
+    given = [key for key in GRAPH_KEYS if key in tables]
     if given and "limb" in tables:
         raise CaseError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")
     try:
@@ -205,7 +199,7 @@ def _error(fault: ErrorDetails, tables: dict[str, Any]) -> CaseError:
     if fault["type"] == "float_type" and location[-1] == "<number>":
         return CaseError(_place(location), "must be a number or an expression in quotes", written.value)
     if fault["type"] in ("greater_than_equal", "less_than_equal") and location[-1] == "count":
-        return CaseError(_place(location), f"must be a whole number from 1 to {_MOST_COPIES}", written.value)
+        return CaseError(_place(location), f"must be a whole number from 1 to {MOST_LIMBS}", written.value)
     if fault["type"] == "unknown_key" and location[-1] == "branch" and "branch" in location[:-1]:
         return CaseError(_place(location), NESTED_BRANCH)
     needed = _NEEDED.get(str(location[-1])) if fault["type"] == "missing" else None

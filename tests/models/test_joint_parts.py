@@ -28,7 +28,7 @@ from screwsynth.models import (
     three_upu,
 )
 from screwsynth.models.basis import basis_of_member
-from screwsynth.models.joints.expression import ExpressionError, evaluate
+from screwsynth.models.expression import ExpressionError, evaluate
 from screwsynth.models.joints.motion import AxisKind, JointAxis, Motion
 from screwsynth.models.member import resisted_parts, scaled_twists
 from screwsynth.models.rows import column_groups

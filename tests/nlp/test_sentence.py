@@ -11,7 +11,8 @@ from casadi import SX
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from screwsynth.nlp.case.limits.relation import SentenceError, expression, parse
+from screwsynth.models.expression import ExpressionError
+from screwsynth.nlp.case.limits.relation import expression, parse
 
 NAMES = {"x1": 3.0, "x2": 2.0, "base_1_x": -1.5, "angle": 30.0}
 
@@ -56,10 +57,10 @@ def test_a_name_may_have_a_dot_where_the_case_has_such_a_name() -> None:
     names = ("p_x", "robot.p_x")
     relation = parse("robot.p_x - 2.5*p_x >= .5", names)
     assert float(expression(relation.left, {"p_x": SX(2), "robot.p_x": SX(7)})) == 2.0
-    with pytest.raises(SentenceError, match=r"'robot.p_y' at position 1 is no number of this case; did you mean"):
+    with pytest.raises(ExpressionError, match=r"'robot.p_y' at position 1 is no number of this case; did you mean"):
         parse("robot.p_y >= 0", names)
     for text in ("p_x.real >= 0", "robot. p_x >= 0", "robot.2 >= 0"):
-        with pytest.raises(SentenceError):
+        with pytest.raises(ExpressionError):
             parse(text, names)
 
 
@@ -91,7 +92,7 @@ REFUSED = {
 
 @pytest.mark.parametrize("text", REFUSED)
 def test_a_wrong_sentence_is_refused_at_its_token(text: str) -> None:
-    with pytest.raises(SentenceError) as refused:
+    with pytest.raises(ExpressionError) as refused:
         parse(text, NAMES)
     for part in REFUSED[text]:
         assert part in str(refused.value)
@@ -109,7 +110,7 @@ pieces = st.lists(
 def test_whatever_is_written_is_a_relation_or_is_refused(text: str) -> None:
     try:
         relation = parse(text, NAMES)
-    except SentenceError:
+    except ExpressionError:
         return
     values = {name: SX.sym(name) for name in NAMES}
     whole = expression(relation.left, values) - expression(relation.right, values)

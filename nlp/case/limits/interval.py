@@ -11,11 +11,10 @@ from typing import ClassVar, Self
 from pydantic import Field, FiniteFloat
 
 from ....models import Dimension, Model, Quantity
-from ...errors import CaseError
 from ...units import Units
 from ..table import Table
 from .constraint import BoundedConstraint, Reading, between
-from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, TableField, Written
+from .limit import Limit, NumberRange, PosedRobot, Ranges, TableField, Written
 
 
 class IntervalTable(Table):
@@ -71,21 +70,6 @@ class IntervalLimit(Limit[IntervalTable], abc.ABC):
 
     table: ClassVar[type[Table]] = IntervalTable
     numbers: ClassVar[Ranges] = two_sided(NumberRange())
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse an interval without sides, with a side out of its range, or with crossed sides.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        key = f"limits.{self.name}"
-        if self.min is None and self.max is None:
-            raise CaseError(key, "must have min, max, or both")
-        super().check(case)
-        if self.min is not None and self.max is not None and not self.min < self.max:
-            dimension = self.ranges(case.model)["min"].dimension
-            fault = f"must be below max = {case.units.text(self.max, dimension)}"
-            raise CaseError(f"{key}.min", fault, case.units.shown(self.min, dimension))
 
 
 def quantity_named(name: str, model: Model) -> Quantity | None:

@@ -25,6 +25,7 @@ from casadi import SX
 from pydantic import Field, FiniteFloat
 
 from ....models import Dimension, Model
+from ....models.legs import angle_between
 from ....models.limbjoints import JointCone as Cone
 from ....models.limbjoints import JointCoordinate, LimbJoint
 from ...errors import CaseError, listing
@@ -33,7 +34,7 @@ from ..table import Table, Vector
 from ..toml import TomlValue
 from .constraint import LENGTH, BoundedConstraint, Reading, between
 from .interval import IntervalTable, two_sided
-from .joints import COSINE_OF_ANGLE, HALF_ANGLE, Triple
+from .joints import COSINE_OF_ANGLE, HALF_ANGLE, Triple, check_axis, triple, unit_axes
 from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, TableField, Written
 
 #: Keys of a table that limit one of several coordinates of a joint.
@@ -188,36 +189,24 @@ class JointMotion(LimitOnJoint):
         return {self.key: {self.joint: {self.part: interval} if self.part else interval}}
 
     def ranges(self, model: Model) -> Ranges:
-        """Return the range of both numbers."""
-        dimension = self._dimension(model)
+        """Return the range of both numbers.
+
+        Raises:
+            CaseError: there is no such joint, a joint lacks the coordinate, or it is an angle of one joint and a length
+                of another.
+        """
+        key = f"limits.{self.name}"
+        found = {_coordinate(each, self.part, key).dimension for each in self.joints(model)}
+        if len(found) > 1:
+            raise CaseError(key, "means joints that turn and joints that slide; name one of them by limb and place")
+        dimension = found.pop()
         largest = math.pi if dimension is Dimension.ANGLE else math.inf
-        return two_sided(NumberRange(dimension, above=-math.inf, most=largest))
+        return two_sided(NumberRange(dimension, above=-math.inf, most=largest, least=-largest))
 
     @property
     def name(self) -> str:
         """Dotted key of this limit in ``[limits]``."""
         return f"joint.{self.joint}{f'.{self.part}' if self.part else ''}"
-
-    def check(self, case: LimitedCase) -> None:
-        """Refuse an unknown joint, a coordinate that a joint lacks, and numbers out of range or crossed.
-
-        Raises:
-            CaseError: in the words of a case file.
-        """
-        key = f"limits.{self.name}"
-        for joint in self.joints(case.model):
-            _coordinate(joint, self.part, key)
-        dimension, _, largest = self.ranges(case.model)["min"]
-        if self.min is None and self.max is None:
-            raise CaseError(key, "must have min, max, or both")
-        for end, value in (("min", self.min), ("max", self.max)):
-            case.check_number(f"{self.name}.{end}", value, NumberRange(dimension, -math.inf, largest))
-            if value is not None and value < -largest:
-                fault = f"must be at least {case.units.text(-largest, dimension)}"
-                raise CaseError(f"{key}.{end}", fault, case.units.shown(value, dimension))
-        if self.min is not None and self.max is not None and not self.min < self.max:
-            fault = f"must be below max = {case.units.text(self.max, dimension)}"
-            raise CaseError(f"{key}.min", fault, case.units.shown(self.min, dimension))
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the coordinate of each joint, or the sine of half of its angle."""
@@ -239,18 +228,6 @@ class JointMotion(LimitOnJoint):
                     upper=self.max,
                     exact=exact,
                 )
-
-    def _dimension(self, model: Model) -> Dimension:
-        """Return the dimension of the coordinate.
-
-        Raises:
-            CaseError: it is an angle of one joint and a length of another.
-        """
-        key = f"limits.{self.name}"
-        found = {_coordinate(each, self.part, key).dimension for each in self.joints(model)}
-        if len(found) > 1:
-            raise CaseError(key, "means joints that turn and joints that slide; name one of them by limb and place")
-        return found.pop()
 
 
 def _coordinate(joint: LimbJoint, part: str, key: str) -> JointCoordinate:
@@ -323,8 +300,7 @@ class JointCone(LimitOnJoint):
         largest = written.internal(table.cone or 0.0, Dimension.ANGLE)
         if table.axis is None:
             return cls(joint, largest)
-        x, y, z = (float(part) for part in table.axis)
-        return cls(joint, largest, (x, y, z))
+        return cls(joint, largest, triple(table.axis))
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
         """Return the keys of ``[limits]`` that state this limit."""
@@ -347,10 +323,8 @@ class JointCone(LimitOnJoint):
                 reason = joint.unknown if joint.type in ("U", "S") else "a cone is for joints U and S"
                 raise CaseError(f"limits.{self.name}", f"joint {joint.label} ({joint.type}) has none: {reason}")
         case.check_number(self.name, self.max, HALF_ANGLE)
-        axis = self.axis
-        if axis is not None and (len(axis) != 3 or not all(map(math.isfinite, axis)) or not any(axis)):
-            key = f"limits.joint.{self.joint}.axis"
-            raise CaseError(key, "must be three finite numbers that are not all zero", list(axis))
+        if self.axis is not None:
+            check_axis(f"limits.joint.{self.joint}.axis", self.axis)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return minus the cosine of the angle of each joint."""
@@ -363,13 +337,12 @@ class JointCone(LimitOnJoint):
                     COSINE_OF_ANGLE,
                     ("", self.name),
                     upper=self.max,
-                    # The arc tangent is accurate for a link along the axis, where the arc cosine is not.
-                    exact=ca.atan2(ca.norm_2(ca.cross(axis, link)), ca.dot(axis, link)),
+                    exact=angle_between(axis, link),
                 )
 
     def _axis(self, cone: Cone) -> SX:
         """Return the current unit axis (3, 1) of a joint's cone."""
         if self.axis is None:
             return cone.other @ cone.home
-        unit = [part / math.hypot(*self.axis) for part in self.axis]
-        return cone.other @ (SX(cone.turn.tolist()) @ SX(unit))
+        (unit,) = unit_axes((self.axis,), 1)
+        return cone.other @ (SX(cone.turn.tolist()) @ SX(unit.tolist()))

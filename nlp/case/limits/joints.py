@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import abc
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
@@ -25,6 +25,7 @@ from pydantic import (
 )
 
 from ....models import Dimension, FloatArray, Model, RobotInstance, frozen_array, matrix_from_axis_angle
+from ....models.legs import angle_between
 from ...errors import CaseError
 from ...units import Units
 from ..table import Table, Vector, fault_of
@@ -36,8 +37,6 @@ from .limit import Limit, LimitedCase, Measures, NumberRange, PosedRobot, TableF
 Triple: TypeAlias = tuple[float, float, float]
 #: Range of the half angle of a cone.
 HALF_ANGLE = NumberRange(Dimension.ANGLE, most=math.pi)
-#: A direction (3, 1) in another frame, with the platform's rotation (3, 3).
-Turn: TypeAlias = Callable[[SX, SX], SX]
 
 
 def _angle(value: float) -> float:
@@ -60,17 +59,21 @@ def _minus_cosine_of_leg(axis_and_span: SX) -> SX:
     return -(ca.dot(axis, span) / ca.norm_2(span))
 
 
-def _minus_cosine_from_home(inputs: SX, to_world: Turn, from_home: Turn) -> SX:
+def _turned(direction: SX, rotation: SX, plate: str) -> SX:
+    """Return a direction (3, 1), rotated (3, 3) for the platform alone: the base's frame is the world's."""
+    return rotation @ direction if plate == "platform" else direction
+
+
+def _minus_cosine_from_home(inputs: SX, plate: str) -> SX:
     """Return minus the cosine, (1, 1), of the angle between a leg and its joint's axis, which is the leg's at home.
 
     Args:
         inputs: rotation column after column and position at home, platform joint, base joint, rotation, span, (30, 1).
-        to_world: of a direction of the joint's plate.
-        from_home: its inverse.
+        plate: of the joint.
     """
     R, p, platform, base = ca.reshape(inputs[:9], 3, 3), inputs[9:12], inputs[12:15], inputs[15:18]
     span = p + R @ platform - base
-    axis = to_world(from_home(span / ca.norm_2(span), R), ca.reshape(inputs[18:27], 3, 3))
+    axis = _turned(_turned(span / ca.norm_2(span), R.T, plate), ca.reshape(inputs[18:27], 3, 3), plate)
     return _minus_cosine_of_leg(ca.vertcat(axis, inputs[27:]))
 
 
@@ -144,11 +147,13 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         max: half angle, radians, above 0 and at most half a turn.
         about: the mounting axes, pointing the way from base to platform: the plate's normal when None, the leg's own
             direction at a :class:`MountingPose`, one direction in the plate's frame for all joints, or one for each.
+        plate: the plate of the joints.
     """
 
     max: float
     about: MountingPose | tuple[Triple, ...] | None = None
 
+    plate: ClassVar[Literal["base", "platform"]]
     table: ClassVar[Any] = NumberOrCone
     needs_legs: ClassVar[bool] = True
 
@@ -170,11 +175,11 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
                 if home is None:
                     raise CaseError("limits.home", f'is missing: limits.{cls.key} has about = "home"')
                 angle = written.internal(home.angle, Dimension.ANGLE)
-                return cls(largest, MountingPose(_triple(home.position), _triple(home.axis), angle))
+                return cls(largest, MountingPose(triple(home.position), triple(home.axis), angle))
             case axes:
                 rows = [row for row in axes if isinstance(row, list)]
                 flat = [part for part in axes if not isinstance(part, list)]
-                return cls(largest, tuple(_triple(row) for row in rows or [flat]))
+                return cls(largest, tuple(triple(row) for row in rows or [flat]))
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
         """Return the keys of ``[limits]`` that state this limit, with the home pose that its cones are about."""
@@ -202,8 +207,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         if len(axes) not in (1, legs):
             raise CaseError(key, f"must be one direction, or one for each of the {legs} legs, got {len(axes)}")
         for axis in axes:
-            if len(axis) != 3 or not all(map(math.isfinite, axis)) or not any(axis):
-                raise CaseError(key, "must be three finite numbers that are not all zero", list(axis))
+            check_axis(key, axis)
         home = self.about
         if isinstance(home, MountingPose) and not all(map(math.isfinite, (*home.position, home.angle))):
             raise CaseError(key, "must be a pose of finite numbers")
@@ -219,12 +223,10 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         """Return each joint's angle; None about the plate's normal, where the model's own quantity says the same."""
         if self.about is None or not robot.legs:
             return None
-        pairs = [
-            (self._to_world(axis, robot.rotation), leg.span)
+        angles = [
+            angle_between(_turned(axis, robot.rotation, self.plate), leg.span)
             for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True)
         ]
-        # The arc tangent is accurate for a leg along its axis, where the arc cosine is not.
-        angles = [ca.atan2(ca.norm_2(ca.cross(axis, span)), ca.dot(axis, span)) for axis, span in pairs]
         return Measures(tuple(leg.name for leg in robot.legs), ca.vertcat(*angles), Dimension.ANGLE)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
@@ -233,11 +235,13 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         for leg, axis in zip(robot.legs, self._mounting_axes(robot), strict=True):
             if isinstance(self.about, MountingPose):
                 R, p = self._home_pose(self.about)
-                form = Form(_minus_cosine_from_home, (self._to_world, self._from_home))
-                cosine = Call(form, ca.veccat(R, p, leg.platform, leg.base, robot.rotation, leg.span))
+                form = Form(_minus_cosine_from_home, (self.plate,))
+                inputs = ca.veccat(R, p, leg.platform, leg.base, robot.rotation, leg.span)
             else:
-                cosine = Call(Form(_minus_cosine_of_leg), ca.vertcat(self._to_world(axis, robot.rotation), leg.span))
-            yield between(f"{self.key} limb {leg.name}{pose.where}", cosine, COSINE_OF_ANGLE, self.key, upper=self.max)
+                form = Form(_minus_cosine_of_leg)
+                inputs = ca.vertcat(_turned(axis, robot.rotation, self.plate), leg.span)
+            name = f"{self.key} limb {leg.name}{pose.where}"
+            yield between(name, Call(form, inputs), COSINE_OF_ANGLE, self.key, upper=self.max)
 
     def _mounting_axes(self, robot: RobotInstance) -> list[SX]:
         """Return the unit mounting axis of each joint, (3, 1), in the frame of its plate."""
@@ -246,7 +250,7 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         if isinstance(self.about, MountingPose):
             R, p = self._home_pose(self.about)
             spans = [p + R @ leg.platform - leg.base for leg in robot.legs]
-            return [self._from_home(span / ca.norm_2(span), R) for span in spans]
+            return [_turned(span / ca.norm_2(span), R.T, self.plate) for span in spans]
         return [SX(axis.tolist()) for axis in unit_axes(self.about, len(robot.legs))]
 
     @staticmethod
@@ -255,26 +259,6 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         (axis,) = unit_axes((home.axis,), 1)
         return matrix_from_axis_angle(SX(axis.tolist()), SX(home.angle)), SX(list(home.position))
 
-    @staticmethod
-    @abc.abstractmethod
-    def _to_world(axis: SX, rotation: SX) -> SX:
-        """Return a direction (3, 1) of the plate's frame in the world frame.
-
-        Args:
-            axis: the direction.
-            rotation: (3, 3) of the platform.
-        """
-
-    @staticmethod
-    @abc.abstractmethod
-    def _from_home(direction: SX, rotation: SX) -> SX:
-        """Return a direction (3, 1) of the world frame in the plate's frame.
-
-        Args:
-            direction: the direction.
-            rotation: (3, 3) of the platform.
-        """
-
 
 @dataclass(frozen=True)
 class BaseJointAngle(JointAngle):
@@ -282,14 +266,7 @@ class BaseJointAngle(JointAngle):
 
     key: ClassVar[str] = "base_joint_angle"
     description: ClassVar[str] = "half angle of the base joints' cones"
-
-    @staticmethod
-    def _to_world(axis: SX, rotation: SX) -> SX:  # noqa: ARG004 - the base's frame is the world's
-        return axis
-
-    @staticmethod
-    def _from_home(direction: SX, rotation: SX) -> SX:  # noqa: ARG004 - the base's frame is the world's
-        return direction
+    plate: ClassVar[Literal["base", "platform"]] = "base"
 
 
 @dataclass(frozen=True)
@@ -298,6 +275,7 @@ class PlatformJointAngle(JointAngle):
 
     key: ClassVar[str] = "platform_joint_angle"
     description: ClassVar[str] = "of the platform joints' cones"
+    plate: ClassVar[Literal["base", "platform"]] = "platform"
 
     @classmethod
     def fields(cls) -> dict[str, TableField]:
@@ -318,14 +296,6 @@ class PlatformJointAngle(JointAngle):
             raise CaseError("limits.home", 'means nothing unless a joint angle has about = "home"')
         yield from super().read(limits, model, units)
 
-    @staticmethod
-    def _to_world(axis: SX, rotation: SX) -> SX:
-        return rotation @ axis
-
-    @staticmethod
-    def _from_home(direction: SX, rotation: SX) -> SX:
-        return rotation.T @ direction
-
 
 def _home(limits: Table) -> HomeTable | None:
     """Return the home pose of a table ``[limits]``."""
@@ -339,6 +309,13 @@ def unit_axes(axes: tuple[Triple, ...], count: int) -> FloatArray:
     return frozen_array(rows if len(rows) == count else rows * count, (count, 3))
 
 
-def _triple(values: Sequence[float]) -> Triple:
+def check_axis(key: str, axis: Triple) -> None:
+    """Refuse an axis that gives no direction; the first argument is its dotted key."""
+    if len(axis) != 3 or not all(map(math.isfinite, axis)) or not any(axis):
+        raise CaseError(key, "must be three finite numbers that are not all zero", list(axis))
+
+
+def triple(values: Sequence[float]) -> Triple:
+    """Return three numbers of a case file."""
     x, y, z = (float(value) for value in values)
     return x, y, z

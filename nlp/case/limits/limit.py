@@ -41,11 +41,12 @@ class TableField(NamedTuple):
 
 
 class NumberRange(NamedTuple):
-    """Range of a number of a limit, radians for an angle: above one number, and at most another."""
+    """Range of a number of a limit, radians for an angle: above one number, from one number on, and at most another."""
 
     dimension: Dimension = Dimension.LENGTH
     above: float = 0.0
     most: float = math.inf
+    least: float = -math.inf
 
 
 #: Numbers of a limit by name.
@@ -111,15 +112,18 @@ class LimitedCase(NamedTuple):
         Raises:
             CaseError: the number is not finite, or out of its range.
         """
-        dimension, above, most = allowed
+        dimension, above, most, least = allowed
         if value is not None:
             value = check_real(value, f"limits.{key}")
-        if value is None or (math.isfinite(value) and above < value <= most):
+        if value is None or (math.isfinite(value) and above < value <= most and value >= least):
             return
-        least = f"above {self.units.text(above, dimension)}" if math.isfinite(above) else "finite"
+        smallest = f"above {self.units.text(above, dimension)}" if math.isfinite(above) else "finite"
         largest = f" and at most {self.units.text(most, dimension)}" if math.isfinite(most) else ""
+        needed = f"{smallest}{largest}"
+        if math.isfinite(value) and value < least:
+            needed = f"at least {self.units.text(least, dimension)}"
         shown = self.units.shown(value, dimension) if math.isfinite(value) else value
-        raise CaseError(f"limits.{key}", f"must be {least}{largest}", shown)
+        raise CaseError(f"limits.{key}", f"must be {needed}", shown)
 
 
 class PlateJoint(NamedTuple):
@@ -275,7 +279,7 @@ class Limit(abc.ABC, Generic[TableT]):
         return self.is_for(model)
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse a limit without a number, one with a number out of its range, and one that contradicts itself.
+        """Refuse a limit without a number, with one out of its range or crossed sides, and one that contradicts itself.
 
         Raises:
             CaseError: in the words of a case file.
@@ -283,8 +287,15 @@ class Limit(abc.ABC, Generic[TableT]):
         ranges = self.ranges(case.model)
         for name, allowed in ranges.items():
             case.check_number(f"{self.name}.{name}", getattr(self, name), allowed)
-        if ranges and all(getattr(self, name) is None for name in ranges):
-            raise CaseError(f"limits.{self.name}", f"must have {' or '.join(ranges)}")
+        given = {name: getattr(self, name) for name in ranges}
+        two_sided = given.keys() == {"min", "max"}
+        if ranges and all(value is None for value in given.values()):
+            needed = "min, max, or both" if two_sided else " or ".join(ranges)
+            raise CaseError(f"limits.{self.name}", f"must have {needed}")
+        if two_sided and None not in given.values() and not given["min"] < given["max"]:
+            dimension = ranges["max"].dimension
+            fault = f"must be below max = {case.units.text(given['max'], dimension)}"
+            raise CaseError(f"limits.{self.name}.min", fault, case.units.shown(given["min"], dimension))
 
     @property
     def reference(self) -> str:

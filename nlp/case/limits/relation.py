@@ -3,23 +3,24 @@
 Numbers are in the case's units in a relation. The language is small: numbers, names, ``+ - * / ^``, brackets, the
 functions ``sqrt``, ``sin``, ``cos`` and ``abs``, and one relation ``>=``, ``<=`` or ``==``. A name may have a dot in
 it, as ``robot.p_x`` has. ``^`` binds tighter than a sign and to the right, as in mathematics. Nothing is ever handed to
-Python's own interpreter: a text becomes a tree, and a tree a CasADi expression.
+Python's own interpreter: a text becomes a tree, and a tree a CasADi expression, as in a robot's own numbers. The reader
+is one of its own, because Python's cannot say what it expects and where.
 """
 
 from __future__ import annotations
 
+import ast
 import math
-import operator
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
-import casadi as ca
 from casadi import SX
 from pydantic import Field
 
 from ....models import Dimension, Model
+from ....models.expression import FUNCTIONS, LARGEST_POWER, ExpressionError, Language
 from ...errors import CaseError, nearest
 from ...units import Units
 from ..table import Table
@@ -30,69 +31,28 @@ from .limit import Design, Limit, LimitedCase, TableField, Written
 #: A text is refused beyond this many characters, and beyond this many brackets, signs and powers in each other.
 LONGEST = 400
 _DEEPEST = 40
-#: Largest size of a constant power: with larger ones, numbers of any machine leave the range of doubles.
-_LARGEST_POWER = 100
 
-#: Functions of expressions, and of numbers; operations of either.
-_FUNCTIONS: dict[str, Callable[[SX], SX]] = {"sqrt": ca.sqrt, "sin": ca.sin, "cos": ca.cos, "abs": ca.fabs}
-_CONSTANT_FUNCTIONS: dict[str, Callable[[float], float]] = {
-    "sqrt": math.sqrt,
-    "sin": math.sin,
-    "cos": math.cos,
-    "abs": abs,
-}
-_OPERATIONS: dict[str, Callable[..., Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "^": operator.pow,
+#: Functions of expressions; those of angles, which take the case's unit; operations.
+_FUNCTIONS = ("sqrt", "sin", "cos", "abs")
+_OF_ANGLES = ("sin", "cos")
+_OPERATIONS: dict[str, type[ast.operator]] = {
+    "+": ast.Add,
+    "-": ast.Sub,
+    "*": ast.Mult,
+    "/": ast.Div,
+    "^": ast.Pow,
 }
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[^\W\d]\w*(?:\.[^\W\d]\w*)*)|(?P<sign>>=|<=|==|[-+*/^()]))"
 )
 
 
-class SentenceError(ValueError):
-    """A text that is no relation; the message shows where."""
-
-
-class Number(NamedTuple):
-    """A number as it stands."""
-
-    value: float
-
-
-class Name(NamedTuple):
-    """A number of the case, by name."""
-
-    name: str
-
-
-class Call(NamedTuple):
-    """A function of one argument; ``-`` is the change of sign."""
-
-    function: str
-    argument: Tree
-
-
-class Operation(NamedTuple):
-    """An arithmetic operation on two trees."""
-
-    sign: str
-    left: Tree
-    right: Tree
-
-
-Tree: TypeAlias = Number | Name | Call | Operation
-
-
 class Relation(NamedTuple):
     """``left >= right`` and the like."""
 
-    left: Tree
+    left: ast.expr
     sign: Literal[">=", "<=", "=="]
-    right: Tree
+    right: ast.expr
 
 
 class _Token(NamedTuple):
@@ -109,10 +69,10 @@ def parse(text: str, names: Collection[str]) -> Relation:
         names: names that may stand in it.
 
     Raises:
-        SentenceError: the text is no relation; the message has the offending token and its place.
+        ExpressionError: the text is no relation; the message has the offending token and its place.
     """
     if len(text) > LONGEST:
-        raise SentenceError(f"is longer than {LONGEST} characters")
+        raise ExpressionError(f"is longer than {LONGEST} characters")
     reader = _Reader(text, names)
     left = reader.sum()
     token = reader.next()
@@ -128,7 +88,7 @@ def parse(text: str, names: Collection[str]) -> Relation:
     return Relation(left, sign, right)
 
 
-def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
+def expression(tree: ast.expr, values: Mapping[str, SX], angle: float = 1.0) -> SX:
     """Return a tree as an expression of the values of its names.
 
     Args:
@@ -136,65 +96,41 @@ def expression(tree: Tree, values: Mapping[str, SX], angle: float = 1.0) -> SX:
         values: an expression (1, 1) for each name.
         angle: unit of the angles that ``sin`` and ``cos`` take, radians.
     """
-    match tree:
-        case Number(value):
-            return SX(value)
-        case Name(name):
-            return values[name]
-        case Call("-", argument):
-            return -expression(argument, values, angle)
-        case Call(function, argument):
-            inner = expression(argument, values, angle)
-            return _FUNCTIONS[function](inner * angle if function in ("sin", "cos") else inner)
-        case Operation("^", left, Number(power)) if power == int(power):
-            return expression(left, values, angle) ** int(power)
-        case Operation(sign, left, right):
-            return SX(_OPERATIONS[sign](expression(left, values, angle), expression(right, values, angle)))
+    functions = {name: FUNCTIONS[name] for name in _FUNCTIONS}
+    for name in _OF_ANGLES:
+        functions[name] = (1, lambda value, of=FUNCTIONS[name][1]: of(value * angle))
+    return Language(functions).value(tree, values)
 
 
-def _constant(tree: Tree) -> float | None:
+def _constant(tree: ast.expr) -> float | None:
     """Return the value of a tree without names; None for a tree with names.
 
     Raises:
-        SentenceError: a part without names has no finite value, or a constant power is too large.
+        ExpressionError: a part without names has no finite value, or a constant power is too large.
     """
+    sign = ""
+    parts: list[ast.expr] = []
     match tree:
-        case Number(value):
-            return value
-        case Name():
+        case ast.Name():
             return None
-        case Call(function, argument):
-            inner = _constant(argument)
-            if inner is None:
-                return None
-            return _finite(lambda: -inner if function == "-" else _CONSTANT_FUNCTIONS[function](inner), function)
-        case Operation(sign, left, right):
-            first, second = _constant(left), _constant(right)
-            if sign == "^" and second is not None and abs(second) > _LARGEST_POWER:
-                raise SentenceError(f"has the power {second:g}, which must be at most {_LARGEST_POWER} in size")
-            if sign == "/" and second == 0:
-                raise SentenceError("divides by zero")
-            if first is None or second is None:
-                return None
-            return _finite(lambda: _OPERATIONS[sign](first, second), sign)
-
-
-def _finite(compute: Callable[[], float], sign: str) -> float:
-    """Return a computed constant.
-
-    Args:
-        compute: computes it.
-        sign: function or operation, for the message.
-
-    Raises:
-        SentenceError: it is not a finite number.
-    """
-    try:
-        value = compute()
-    except (ArithmeticError, ValueError):
-        value = math.nan
-    if isinstance(value, complex) or not math.isfinite(value):
-        raise SentenceError(f"has a constant part, of {sign!r}, without a finite value")
+        case ast.UnaryOp(operand=operand):
+            sign, parts = "-", [operand]
+        case ast.Call(func=ast.Name(id=sign), args=parts):
+            pass
+        case ast.BinOp(left=left, op=operation, right=right):
+            sign = next(each for each, kind in _OPERATIONS.items() if isinstance(operation, kind))
+            parts = [left, right]
+    values = [_constant(each) for each in parts]
+    last = values[-1] if values else None
+    if sign == "^" and last is not None and abs(last) > LARGEST_POWER:
+        raise ExpressionError(f"has the power {last:g}, which must be at most {LARGEST_POWER:g} in size")
+    if sign == "/" and last == 0:
+        raise ExpressionError("divides by zero")
+    if None in values:
+        return None
+    value = float(expression(tree, {}))
+    if not math.isfinite(value):
+        raise ExpressionError(f"has a constant part, of {sign!r}, without a finite value")
     return value
 
 
@@ -207,10 +143,10 @@ class _Reader:
         self._tokens = list(self._split())
         self._at = self._depth = 0
 
-    def wrong(self, token: _Token, expected: str) -> SentenceError:
+    def wrong(self, token: _Token, expected: str) -> ExpressionError:
         """Return the fault at a token, which shows the text with the token marked."""
         found = "the sentence ends" if token.kind == "end" else f"{token.text!r} stands"
-        return SentenceError(f"{expected}, but {found} at position {token.place + 1}: {self._pointed(token.place)}")
+        return ExpressionError(f"{expected}, but {found} at position {token.place + 1}: {self._pointed(token.place)}")
 
     def next(self) -> _Token:
         """Return the next token, and go on; the end stays the next one."""
@@ -218,65 +154,65 @@ class _Reader:
         self._at = min(self._at + 1, len(self._tokens) - 1)
         return token
 
-    def sum(self) -> Tree:
+    def sum(self) -> ast.expr:
         """Read ``product (+|- product)*``."""
         tree = self._product()
         while self._tokens[self._at].text in ("+", "-"):
-            tree = Operation(self.next().text, tree, self._product())
+            tree = ast.BinOp(tree, _OPERATIONS[self.next().text](), self._product())
         return tree
 
-    def _product(self) -> Tree:
+    def _product(self) -> ast.expr:
         """Read ``signed (*|/ signed)*``."""
         tree = self._signed()
         while self._tokens[self._at].text in ("*", "/"):
-            tree = Operation(self.next().text, tree, self._signed())
+            tree = ast.BinOp(tree, _OPERATIONS[self.next().text](), self._signed())
         return tree
 
-    def _signed(self) -> Tree:
+    def _signed(self) -> ast.expr:
         """Read ``(+|-)* power``."""
         self._depth += 1
         if self._depth > _DEEPEST:
-            raise SentenceError(f"has more than {_DEEPEST} brackets, signs and powers in each other")
+            raise ExpressionError(f"has more than {_DEEPEST} brackets, signs and powers in each other")
         if self._tokens[self._at].text in ("+", "-"):
             sign = self.next().text
             tree = self._signed()
-            tree = Call("-", tree) if sign == "-" else tree
+            tree = ast.UnaryOp(ast.USub(), tree) if sign == "-" else tree
         else:
             tree = self._power()
         self._depth -= 1
         return tree
 
-    def _power(self) -> Tree:
+    def _power(self) -> ast.expr:
         """Read ``atom (^ signed)?``."""
         base = self._atom()
         if self._tokens[self._at].text != "^":
             return base
         self.next()
-        return Operation("^", base, self._signed())
+        return ast.BinOp(base, ast.Pow(), self._signed())
 
-    def _atom(self) -> Tree:
+    def _atom(self) -> ast.expr:
         """Read a number, a name, a function with its argument, or a sum in brackets."""
         token = self.next()
         if token.kind == "number":
             value = float(token.text)
             if math.isinf(value):
                 raise self.wrong(token, "expected a finite number")
-            return Number(value)
+            return ast.Constant(value)
         if token.text == "(":
             return self._closed(token)
         if token.kind != "name":
             raise self.wrong(token, "expected a number, a name or a bracket")
         if token.text in self._names:
-            return Name(token.text)
+            return ast.Name(token.text)
         if token.text in _FUNCTIONS:
             bracket = self.next()
             if bracket.text != "(":
                 raise self.wrong(bracket, f"expected a bracket after {token.text}")
-            return Call(token.text, self._closed(bracket))
+            return ast.Call(ast.Name(token.text), [self._closed(bracket)], [])
         hint = nearest(token.text, [*self._names, *_FUNCTIONS])
-        raise SentenceError(f"{token.text!r} at position {token.place + 1} is no number of this case; {hint}")
+        raise ExpressionError(f"{token.text!r} at position {token.place + 1} is no number of this case; {hint}")
 
-    def _closed(self, opened: _Token) -> Tree:
+    def _closed(self, opened: _Token) -> ast.expr:
         tree = self.sum()
         token = self.next()
         if token.text != ")":
@@ -289,7 +225,9 @@ class _Reader:
             found = _TOKEN.match(self._text, at)
             if found is None:
                 at += len(self._text[at:]) - len(self._text[at:].lstrip())
-                raise SentenceError(f"{self._text[at]!r} at position {at + 1} means nothing here: {self._pointed(at)}")
+                raise ExpressionError(
+                    f"{self._text[at]!r} at position {at + 1} means nothing here: {self._pointed(at)}"
+                )
             kind = str(found.lastgroup)
             text, start = found[kind], found.start(kind)
             head = text.partition(".")[0]
@@ -349,7 +287,7 @@ class Relations(Limit[list[str]]):
         for index, text in enumerate(self.texts):
             try:
                 parse(text, case.scalars)
-            except SentenceError as error:
+            except ExpressionError as error:
                 raise CaseError(f"limits.custom[{index}]", str(error), text) from None
 
     def of_design(self, design: Design) -> Iterator[BoundedConstraint]:

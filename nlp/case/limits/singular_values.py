@@ -34,6 +34,7 @@ from pydantic import Field, FiniteFloat
 from ....models import Dimension, FloatArray, homogenised
 from ..table import Table
 from .constraint import SQUARED_NUMBER, BoundedConstraint, End, Reading, Spectral, between
+from .interval import AtLeast, AtMost
 from .limit import Limit, NumberRange, PosedRobot, Ranges
 
 
@@ -58,10 +59,9 @@ _CONDITION = Reading(
 )
 
 
-class SmallestTable(Table):
+class SmallestTable(AtLeast):
     """The smallest singular value of J, homogenised."""
 
-    min: FiniteFloat = Field(description="smallest value")
     length: FiniteFloat = Field(description="by which moments about the platform's origin are divided")
 
 
@@ -96,10 +96,9 @@ class SmallestSingularValue(Limit[SmallestTable]):
         )
 
 
-class ConditionTable(Table):
+class ConditionTable(AtMost):
     """The ratio of the singular values of J, homogenised."""
 
-    max: FiniteFloat = Field(description="largest value")
     length: FiniteFloat = Field(description="by which moments about the platform's origin are divided")
 
 

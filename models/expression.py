@@ -1,0 +1,220 @@
+"""The language of a robot's numbers: ``rb + arm*cos(tilt)``, ``E + w/2*y``, ``cross(y, A - E)``.
+
+An expression consists of numbers, names, ``+ - * / ^``, brackets, and the functions of :data:`FUNCTIONS`. Values are
+scalars or vectors; ``x``, ``y`` and ``z`` are the unit vectors of the world frame. Python's parser only makes a tree
+of the text; each node of the tree is accepted here by its type, and anything else is refused, so that a text can
+neither reach an attribute nor call anything but these functions. A :class:`Language` gives such a tree its value, also
+for other texts with functions of their own.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import MappingProxyType
+from typing import NamedTuple, TypeAlias
+
+import casadi as ca
+from casadi import SX
+
+#: Longest text of an expression. The longest that a person writes has a few hundred letters.
+_LONGEST = 2000
+#: Deepest nesting of an expression: far below the depth at which Python's own recursion ends.
+_DEEPEST = 60
+#: Largest size of a constant power: with larger ones, numbers of any machine leave the range of doubles.
+LARGEST_POWER = 100.0
+#: Characters of expressions. Python would take a text behind # for a comment, and other letters for those of names.
+_CHARACTERS = re.compile(r"[A-Za-z0-9_+\-*/^(),. ]*")
+#: Numbers of Python that are none here: 0x10, 1_000, 1j.
+_OTHER_NUMBERS = re.compile(r"\b[0-9]+(_|[xXbBoOjJ])")
+
+
+class ExpressionError(ValueError):
+    """Error of a text that is no expression; the message is a clause about the text."""
+
+
+class UnknownNameError(ExpressionError):
+    """Error of a name that is not known.
+
+    Attributes:
+        name: the name.
+    """
+
+    def __init__(self, name: str, hint: str) -> None:
+        super().__init__(f"has the name {name!r}, which is unknown; {hint}")
+        self.name = name
+
+
+def _only(function: Callable[..., SX], *, scalars: bool, fault: str) -> Callable[..., SX]:
+    """Return a function that refuses vectors, or scalars, as its arguments."""
+
+    def checked(*values: SX) -> SX:
+        if any(value.is_scalar() is not scalars for value in values):
+            raise ExpressionError(fault)
+        return function(*values)
+
+    return checked
+
+
+_of_numbers = partial(_only, scalars=True, fault="needs a number here, not a vector")
+_of_vectors = partial(_only, scalars=False, fault="needs a vector here, not a number")
+
+#: Functions by name, each with its number of arguments.
+Functions: TypeAlias = Mapping[str, tuple[int, Callable[..., SX]]]
+#: Those of robot files.
+FUNCTIONS: Functions = MappingProxyType(
+    {
+        "sin": (1, _of_numbers(ca.sin)),
+        "cos": (1, _of_numbers(ca.cos)),
+        "tan": (1, _of_numbers(ca.tan)),
+        "sqrt": (1, _of_numbers(ca.sqrt)),
+        "abs": (1, _of_numbers(ca.fabs)),
+        "atan2": (2, _of_numbers(ca.atan2, fault="needs numbers in atan2, not vectors")),
+        "cross": (2, _of_vectors(ca.cross)),
+        "dot": (2, _of_vectors(ca.dot)),
+        "norm": (1, _of_vectors(ca.norm_2)),
+        "unit": (1, _of_vectors(lambda vector: vector / ca.norm_2(vector))),
+    }
+)
+#: Names that every expression knows.
+CONSTANTS: Mapping[str, SX] = MappingProxyType(
+    {"x": SX([1, 0, 0]), "y": SX([0, 1, 0]), "z": SX([0, 0, 1]), "pi": SX(math.pi)}
+)
+
+
+def evaluate(written: str | float, names: Mapping[str, SX]) -> SX:
+    """Return the value of an expression, (1, 1) or (3, 1).
+
+    Args:
+        written: its text, or a number.
+        names: values of the names that it may use, beside those of :data:`CONSTANTS`.
+
+    Raises:
+        ExpressionError: the text is no expression, or its value is a constant that is not finite.
+    """
+    value = _LANGUAGE.value(_tree(written), {**CONSTANTS, **names}) if isinstance(written, str) else _number(written)
+    if value.is_constant() and not value.is_regular():
+        raise ExpressionError("has no finite value")
+    return ca.densify(value)
+
+
+def _tree(text: str) -> ast.expr:
+    """Return the syntax tree of a text, in which ``^`` is a power."""
+    if len(text) > _LONGEST:
+        raise ExpressionError(f"is longer than {_LONGEST} letters")
+    if "**" in text:
+        raise ExpressionError("has '**': a power is written '^'")
+    if not _CHARACTERS.fullmatch(text) or _OTHER_NUMBERS.search(text):
+        raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's advice on texts such as 1if: they are refused below
+            return ast.parse(text.strip().replace("^", "**"), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ExpressionError("is no expression of numbers, names, + - * / ^ and functions") from None
+
+
+class Language(NamedTuple):
+    """What expressions may call, and how far they may go.
+
+    Attributes:
+        functions: the functions.
+        deepest: most operations in each other.
+        largest_power: largest size of a constant power.
+    """
+
+    functions: Functions
+    deepest: float = math.inf
+    largest_power: float = math.inf
+
+    def value(self, node: ast.expr, names: Mapping[str, SX], depth: int = 0) -> SX:
+        """Return the value of a node, (1, 1) or (3, 1).
+
+        Args:
+            node: of a syntax tree.
+            names: values of the names that it may use.
+            depth: of the node in the tree.
+
+        Raises:
+            ExpressionError: the node is none of this language.
+        """
+        if depth > self.deepest:
+            raise ExpressionError(f"has more than {self.deepest} operations in each other")
+        match node:
+            case ast.Constant(value=value):
+                return _number(value)
+            case ast.Name(id=name) if name in names:
+                return names[name]
+            case ast.Name(id=name):
+                raise UnknownNameError(name, _hint(name, names))
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.value(operand, names, depth + 1)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return -self.value(operand, names, depth + 1)
+            case ast.BinOp(left=left, op=operator, right=right):
+                first, second = self.value(left, names, depth + 1), self.value(right, names, depth + 1)
+                return self._operation(operator, first, second)
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                return self._call(name, [self.value(each, names, depth + 1) for each in arguments])
+        raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
+
+    def _operation(self, operator: ast.operator, first: SX, second: SX) -> SX:
+        """Return the value of an operation."""
+        match operator:
+            case ast.Add() | ast.Sub():
+                if first.shape != second.shape:
+                    raise ExpressionError("adds or subtracts a number and a vector")
+                return first + second if isinstance(operator, ast.Add) else first - second
+            case ast.Mult():
+                if not (first.is_scalar() or second.is_scalar()):
+                    raise ExpressionError("multiplies two vectors: use dot or cross")
+                return first * second
+            case ast.Div():
+                if not second.is_scalar():
+                    raise ExpressionError("divides by a vector")
+                return first / second
+            case ast.Pow():
+                if not (first.is_scalar() and second.is_scalar()):
+                    raise ExpressionError("has a vector in a power")
+                if second.is_constant() and abs(float(second)) > self.largest_power:
+                    raise ExpressionError(f"has a power larger than {self.largest_power:g}")
+                return first**second
+        raise ExpressionError("may have only the operations + - * / ^")
+
+    def _call(self, name: str, arguments: list[SX]) -> SX:
+        """Return the value of a function."""
+        if name not in self.functions:
+            raise ExpressionError(f"has the function {name!r}, which is unknown; {_hint(name, self.functions)}")
+        count, function = self.functions[name]
+        if len(arguments) != count:
+            raise ExpressionError(f"gives {name} {len(arguments)} arguments instead of {count}")
+        return function(*arguments)
+
+
+#: The language of robot files.
+_LANGUAGE = Language(FUNCTIONS, _DEEPEST, LARGEST_POWER)
+
+
+def _number(value: object) -> SX:
+    """Return a number as an expression."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ExpressionError("may have only numbers, names, + - * / ^, brackets and functions")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ExpressionError("has a number that is not finite")
+    return SX(number)
+
+
+def _hint(name: str, known: Mapping[str, object]) -> str:
+    """Return a clause about the names that are known."""
+    import difflib  # noqa: PLC0415 - only messages need it
+
+    near = difflib.get_close_matches(name, known, 1)
+    return f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(known))}"
