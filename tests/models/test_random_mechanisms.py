@@ -199,7 +199,7 @@ def test_two_loops_that_leave_one_link_and_come_back_to_it_are_read() -> None:
 def test_each_joint_has_variables_of_its_own_also_where_it_is_soon_forgotten() -> None:
     """Ball joints in nested loops shared their angles where one had the address of another one before it."""
     module = import_module("screwsynth.models.joints.robot")
-    variable = module._Builder(None, None, None)._variables("1", {})
+    variable = module._Builder(frame=None)._variables("1", {})
     axis = JointAxis(AxisKind.ROTATION, SX([0, 0, 1]), SX.zeros(3), False, SX(0), SX.zeros(3))
     symbols = [variable(Joint("", "R", SX.zeros(3), (axis,), actuated=False), 0) for _ in range(20)]
     assert len({each.element_hash() for each in symbols}) == 20

@@ -189,7 +189,7 @@ def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -
 def test_an_interrupted_tradeoff_keeps_what_is_solved(case: str, tmp_path: Path) -> None:
     files = {option: tmp_path / f"curve.{option}" for option in ("json", "csv", "page")}
     outputs = [word for option, path in files.items() for word in (f"--{option}", str(path))]
-    ended = interrupted("\r2 of 200 values solved", "tradeoff", case, *OVER, "--starts", "2", *outputs)
+    ended = interrupted("2 of 200 values solved", "tradeoff", case, *OVER, "--starts", "2", *outputs)
     assert ended.status == 130
     result = load_result(files["json"])
     assert isinstance(result, TradeoffResult)
