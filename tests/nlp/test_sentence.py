@@ -19,7 +19,7 @@ NAMES = {"x1": 3.0, "x2": 2.0, "base_1_x": -1.5, "angle": 30.0}
 
 def difference(text: str, angle: float = 1.0) -> float:
     """Left side less right side at :data:`NAMES`."""
-    relation = parse(text, NAMES)
+    relation = parse(text, NAMES, angle)
     values = {name: SX(value) for name, value in NAMES.items()}
     return float(expression(relation.left, values, angle) - expression(relation.right, values, angle))
 
@@ -51,6 +51,9 @@ def test_sentences_mean_what_they_mean_in_mathematics(text: str) -> None:
 
 def test_sine_and_cosine_take_the_angles_of_the_case() -> None:
     assert difference("sin(angle) >= cos(60)", math.radians(1)) == pytest.approx(0, abs=1e-15)
+    assert difference("x1 >= sqrt(sin(150))", math.radians(1)) == pytest.approx(3 - math.sqrt(0.5), abs=1e-15)
+    with pytest.raises(ExpressionError, match="without a finite value"):
+        parse("x1 >= sqrt(sin(190))", NAMES, math.radians(1))
 
 
 def test_a_name_may_have_a_dot_where_the_case_has_such_a_name() -> None:

@@ -61,12 +61,13 @@ class _Token(NamedTuple):
     place: int
 
 
-def parse(text: str, names: Collection[str]) -> Relation:
+def parse(text: str, names: Collection[str], angle: float = 1.0) -> Relation:
     """Return the relation that a text states.
 
     Args:
         text: the relation as it is written.
         names: names that may stand in it.
+        angle: unit of the angles that ``sin`` and ``cos`` take, radians.
 
     Raises:
         ExpressionError: the text is no relation; the message has the offending token and its place.
@@ -83,7 +84,7 @@ def parse(text: str, names: Collection[str]) -> Relation:
     if last.kind != "end":
         raise reader.wrong(last, "expected an operator or the end")
     for side in (left, right):
-        _constant(side)
+        _constant(side, angle)
     sign: Literal[">=", "<=", "=="] = ">=" if token.text == ">=" else "<=" if token.text == "<=" else "=="
     return Relation(left, sign, right)
 
@@ -102,7 +103,7 @@ def expression(tree: ast.expr, values: Mapping[str, SX], angle: float = 1.0) -> 
     return Language(functions).value(tree, values)
 
 
-def _constant(tree: ast.expr) -> float | None:
+def _constant(tree: ast.expr, angle: float) -> float | None:
     """Return the value of a tree without names; None for a tree with names.
 
     Raises:
@@ -120,7 +121,7 @@ def _constant(tree: ast.expr) -> float | None:
         case ast.BinOp(left=left, op=operation, right=right):
             sign = next(each for each, kind in _OPERATIONS.items() if isinstance(operation, kind))
             parts = [left, right]
-    values = [_constant(each) for each in parts]
+    values = [_constant(each, angle) for each in parts]
     last = values[-1] if values else None
     if sign == "^" and last is not None and abs(last) > LARGEST_POWER:
         raise ExpressionError(f"has the power {last:g}, which must be at most {LARGEST_POWER:g} in size")
@@ -128,7 +129,7 @@ def _constant(tree: ast.expr) -> float | None:
         raise ExpressionError("divides by zero")
     if None in values:
         return None
-    value = float(expression(tree, {}))
+    value = float(expression(tree, {}, angle))
     if not math.isfinite(value):
         raise ExpressionError(f"has a constant part, of {sign!r}, without a finite value")
     return value
@@ -284,9 +285,10 @@ class Relations(Limit[list[str]]):
         Raises:
             CaseError: in the words of a case file.
         """
+        unit = case.units.to_internal(1.0, Dimension.ANGLE)
         for index, text in enumerate(self.texts):
             try:
-                parse(text, case.scalars)
+                parse(text, case.scalars, unit)
             except ExpressionError as error:
                 raise CaseError(f"limits.custom[{index}]", str(error), text) from None
 
@@ -299,7 +301,7 @@ class Relations(Limit[list[str]]):
             for name, dimension in dimensions.items()
         }
         for k, text in enumerate(self.texts):
-            relation = parse(text, dimensions)
+            relation = parse(text, dimensions, unit)
             difference = expression(relation.left, shown, unit) - expression(relation.right, shown, unit)
             lower = -math.inf if relation.sign == "<=" else 0.0
             upper = math.inf if relation.sign == ">=" else 0.0

@@ -121,7 +121,7 @@ def required_dxf() -> Any:  # noqa: ANN401 - a module
 
 
 def dxf_text(plate: Plate, unit: str) -> str:
-    """Return the drawing of a plate, the same text for the same plate.
+    """Return the drawing of a plate: the same text for the same plate, but for the order of entries in sets of ezdxf.
 
     Args:
         plate: the plate.
