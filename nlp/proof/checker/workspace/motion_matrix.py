@@ -127,7 +127,7 @@ class PosedRobot:
         self.signs = stacked(each.value for each in model.signs)
 
     def at(self, expression: SX, z: FloatArray) -> FloatArray:
-        """Return the values of a matrix of expressions at a point (n,)."""
+        """Return the values of a matrix of expressions at a point (n,); at points (n, P) side by side."""
         return np.asarray(ca.Function("values", [self.z], [ca.densify(expression)])(z).full())
 
 
@@ -170,7 +170,7 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
     else:
         # Where every pose is closed, the rank is that at almost all of them.
         away = np.random.default_rng(0).uniform(-0.5, 0.5, (4, len(start))) * robot.size * (not robot.model.unknowns)
-        spectra = [np.linalg.svd(robot.at(matrix, start + each), compute_uv=False) for each in away]
+        spectra = np.linalg.svd(np.hsplit(robot.at(matrix, (start + away).T), len(away)), compute_uv=False)
         freedoms, idle = matrix.shape[1] - max(int(np.count_nonzero(each > _ZERO * each[0])) for each in spectra), 0
     if not 0 < freedoms < 6:
         raise ProofError("the robot has no constraint wrenches of which the rank could be claimed")

@@ -118,8 +118,8 @@ class RankTest:
         M0 = self._middles(np.where(is_known[:, None], forms.c, 0.0))
         with np.errstate(all="ignore"):
             C, signs = _left_inverses(M0)
-            off = np.abs(C @ M0 - np.eye(columns)) + ROUNDING * (np.abs(C) @ np.abs(M0) + np.eye(columns))
-            off += np.abs(C) @ self._off
+            off = np.abs(C @ M0 - np.eye(columns)) + ROUNDING * np.eye(columns)
+            off += np.abs(C) @ (ROUNDING * np.abs(M0) + self._off)
         off[~is_known] = np.inf
         regular, shares = np.empty(count, dtype=np.int32), np.zeros((f, count))
         given = (C, off, forms.a.transpose(1, 2, 0), forms.r.T)

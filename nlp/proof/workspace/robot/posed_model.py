@@ -198,7 +198,7 @@ class PosedModel:
         return ca.substitute(expression, self.rotation, self.turned[0])
 
     def values(self, expression: SX, z: FloatArray) -> FloatArray:
-        """Return a matrix of expressions of the limbs at a point (n,)."""
+        """Return a matrix of expressions of the limbs at a point (n,); at points (n, P) side by side."""
         return np.asarray(ca.Function("values", [self.z], [ca.densify(self.plain(expression))])(z).full())
 
     def reduced(self, chosen: Chosen) -> PosedModel:

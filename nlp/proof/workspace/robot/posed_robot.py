@@ -56,7 +56,7 @@ class Problem:
         start: (n,) closed loops of the design at the middle of the workspace, or near it.
         locked: rows and members with the actuators locked.
         unactuated: the same with free actuators; None for a robot without constraints.
-        posed: all of its limbs.
+        posed: its limbs, with the loops of the design or of the machines.
         chosen: what is kept of the model.
         names: of the m joint centres whose errors are coordinates.
         tolerance: largest size of each error, length.
@@ -341,9 +341,9 @@ def _unactuated(model: Model, posed: PosedModel, start: FloatArray) -> RankMatri
         freedoms, idle = 6 - generic.constraints, generic.idle
     else:
         # Any pose of a robot given by rows is closed, and the middle may be singular.
-        part = 0.0 if model.unknowns else _SPREAD
-        away = part * posed.loops.size * np.random.default_rng(_SEED).uniform(-1, 1, (_POINTS, len(start)))
-        freedoms, idle = matrix.shape[1] - max(_rank_of(posed.values(matrix, start + each)) for each in away), 0
+        away = np.random.default_rng(_SEED).uniform(-_SPREAD, _SPREAD, (_POINTS, len(start))) * (not model.unknowns)
+        every = posed.values(matrix, (start + away * posed.loops.size).T)
+        freedoms, idle = matrix.shape[1] - max(map(_rank_of, np.hsplit(every, _POINTS))), 0
     return RankMatrix(matrix, freedoms + idle) if 0 < freedoms < 6 else None
 
 
