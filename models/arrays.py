@@ -1,10 +1,11 @@
-"""The numeric array type of the package, and read-only arrays for frozen values."""
+"""The numeric array type of the package, read-only arrays for frozen values, and values at many points."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
+import casadi as ca
 import numpy as np
 
 if TYPE_CHECKING:
@@ -44,6 +45,30 @@ def frozen_vector(values: Sequence[float] | FloatArray) -> FloatArray:
         ValueError: the values are no vector.
     """
     return frozen_array(values, (len(values),))
+
+
+def values_at(function: ca.Function, *points: FloatArray) -> list[FloatArray]:
+    """Return the results (P, rows, columns) of a CasADi function, dense, at P points.
+
+    NumPy's memory is read and written: CasADi's own matrices go through lists of Python's numbers.
+
+    Args:
+        function: of vectors, made of ``SX``.
+        points: (P, n) for each of them.
+    """
+    count = len(points[0])
+    arguments = [np.ascontiguousarray(each, dtype=np.float64) for each in points]
+    found = [np.zeros((count, *function.size_out(k)[::-1])) for k in range(function.n_out())]
+    if count:
+        buffer: Any
+        mapped = function.map(count)
+        buffer, evaluate = mapped.buffer()
+        for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, found)):
+            for k, each in enumerate(arrays):
+                if each.size:
+                    place(k, each.data)
+        evaluate()
+    return [each.transpose(0, 2, 1) for each in found]
 
 
 def first_largest(sizes: FloatArray) -> NDArray[np.intp]:

@@ -270,8 +270,9 @@ class Search(Generic[AnyRule]):
         is_cut = boxes.split >= 0
         if not is_cut.any():
             return boxes
-        halves = self.rule.divided(some(boxes, is_cut))
-        return halves if is_cut.all() else joined([some(boxes, ~is_cut), halves])
+        if is_cut.all():
+            return self.rule.divided(boxes)
+        return joined([some(boxes, ~is_cut), self.rule.divided(some(boxes, is_cut))])
 
     def _divisions(self, found: Verdicts[Any]) -> NDArray[np.intp]:
         """Return the coordinates to bisect of the parts that are left: see :meth:`Rule.record`."""

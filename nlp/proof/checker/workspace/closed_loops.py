@@ -23,7 +23,7 @@ import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
 
-from .....models import FloatArray
+from .....models.arrays import FloatArray, values_at
 from .....models.rows import independent_rows
 from ..polynomials import middles
 from ..proof_file import ProofError
@@ -53,16 +53,14 @@ class LoopPoints:
     """Points at which some equations (k, 1) of a robot's loops hold."""
 
     def __init__(self, robot: PosedRobot, equations: SX) -> None:
-        self._size, self._count = robot.size, int(equations.numel())
+        self._size = robot.size
         outputs = [ca.densify(equations), ca.densify(ca.jacobian(equations, robot.z))]
         self._function = ca.Function("loops", [robot.z], outputs)
 
     def at(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return left sides (B, k) and their derivatives (B, k, n) at points (B, n), for coordinates of size 1."""
-        if not len(z):  # a function of no points is evaluated at one
-            return np.zeros((0, self._count)), np.zeros((0, self._count, z.shape[1]))
-        g, J = (each.full() for each in self._function(z.T))
-        return g.T, np.asarray(J.reshape(self._count, *z.shape).transpose(1, 0, 2) * self._size)
+        g, J = values_at(self._function, z)
+        return g[:, :, 0], J * self._size
 
     @np.errstate(all="ignore")
     def closed(

@@ -229,7 +229,7 @@ class SmallestValues(LoopRule):
             every = some(boxes, np.tile(np.arange(len(which)), len(sets)))
             z, problem = sets.reshape(-1, sets.shape[2]), self._problem
             inside = np.isfinite(z).all(axis=1) & are_between(z, every, problem.dependent)
-            inside[inside] = [problem.box.holds(each) for each in problem.pose_of(z[inside])]
+            inside[inside] = problem.box.holds(problem.pose_of(z[inside]))
         self._note(z[inside])
 
     def _start_from_poses(self) -> None:

@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray
+from .....models.arrays import FloatArray, values_at
 from ...enclosure.forms import Forms
 from ...statement.machine import Legs
 from ..robot.pose_box import polynomial_rotation
@@ -58,7 +58,7 @@ class Clearance(Number):
 
     def between(self, z: FloatArray) -> FloatArray:
         """Return the vectors (P, 3) from the nearest point of the second leg to that of the first."""
-        return _between(self._ends(z.T).full().T)
+        return _between(values_at(self._ends, z)[0][:, :, 0])
 
     def worst(self, y: FloatArray) -> FloatArray | None:
         """Return the errors (m, 3) with which the legs are nearest at a pose (6,); None for the design."""

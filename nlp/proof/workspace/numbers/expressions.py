@@ -17,7 +17,7 @@ import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
 
-from .....models import FloatArray
+from .....models.arrays import FloatArray, values_at
 from ...enclosure.forms import Forms
 from ..ranks.krawczyk import ROUNDING, by_centres
 from ..ranks.loop_boxes import LoopBoxes
@@ -67,11 +67,11 @@ class Expressions(Number):
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (P, K) at closed points (P, n)."""
-        return np.asarray(self._values(z.T).full().reshape(self.count, len(z)).T)
+        return values_at(self._values, z)[0][:, :, 0]
 
     def slopes(self, z: FloatArray, which: NDArray[np.intp]) -> FloatArray:
         """Return derivatives (P, n) of an expression each at points; those by dependent coordinates are 0."""
-        found: FloatArray = self._slopes(z.T).full().reshape(self.count, len(z), -1)[which, np.arange(len(z))]
+        found: FloatArray = values_at(self._slopes, z)[0][np.arange(len(z)), which]
         D, size = list(self.problem.dependent), self.problem.size
         if D:
             whole = self.problem.loops.slopes(z.T) * size

@@ -32,7 +32,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray
+from .....models.arrays import FloatArray, values_at
 from ...enclosure.forms import Forms
 from ...statement.machine import LEGS, Legs
 from ..ranks.krawczyk import by_centres
@@ -96,8 +96,7 @@ class _RowsNumber(Number):
 
     def jacobian(self, z: FloatArray) -> FloatArray:
         """Return J (P, m, 6) at points (P, n) of the machines."""
-        flat = self._jacobian(z.T).full()
-        return np.asarray(flat.reshape(len(flat), len(z), 6).transpose(1, 0, 2) * self._scale)
+        return np.asarray(values_at(self._jacobian, z)[0] * self._scale)
 
     def rows(self, forms: Forms, count: int) -> _Rows:
         """Return the rows over boxes from forms of them, column by column, of their sizes, and of more."""
@@ -157,7 +156,7 @@ class SingularValues(_RowsNumber):
         slopes = np.zeros((len(z), len(machines.of_errors)))
         # The logarithm of the condition number falls with that of the smallest one, and grows with that of the largest.
         for k, weight in ((5, -1.0), (0, 1.0)) if self._is_condition else ((5, -1.0),):
-            slopes += weight / s[:, k, None] * self._slopes(z.T, u[:, :, k].T, v[:, k].T).full().T
+            slopes += weight / s[:, k, None] * values_at(self._slopes, z, u[:, :, k], v[:, k])[0][:, :, 0]
         return machines.with_errors(z, slopes)
 
     def values(self, z: FloatArray) -> FloatArray:

@@ -425,7 +425,7 @@ class LoopRule(Rule[Followed]):
             before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
             self._recorder.contractions(before, after, ~kept)
             self._recorder.lacks_boxes |= bool(beyond.any())
-        return some(found, kept)
+        return found if kept.all() else some(found, kept)
 
     def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return boxes by the ends of all six coordinates (B, 6): those that follow from others have their range."""

@@ -28,7 +28,7 @@ import casadi as ca
 import numpy as np
 
 from .....models import FloatArray, frozen_array
-from .....models.arrays import first_largest
+from .....models.arrays import first_largest, values_at
 from ...enclosure.forms import Encloser
 from ...statement.machine import JointErrors
 from ..robot.closed_loops import inverses
@@ -189,7 +189,7 @@ class SingularPose:
         """Return whether a point (n,) is a pose of the workspace, with closed loops, that is singular."""
         problem = self._problem
         closed = np.abs(problem.loops.values(z[:, None])).max(initial=0.0) <= _CLOSED
-        return bool(closed) and problem.box.holds(problem.pose_of(z)) and self.smallest(z) <= SINGULAR
+        return bool(closed and problem.box.holds(problem.pose_of(z))) and self.smallest(z) <= SINGULAR
 
     def machines(self, z: FloatArray) -> Iterator[FloatArray]:
         """Yield points (n,) of machines with smaller and smaller singular values, from a point of the design."""
@@ -222,8 +222,7 @@ class DeterminantSigns:
 
     def computed(self, points: FloatArray) -> FloatArray:
         """Return the determinants (K,) of unit rows at points (K, n): computed numbers, 0 where rows have no value."""
-        flat = self._values(points.T).full()
-        rows = np.nan_to_num(flat.reshape(6, len(points), 6).transpose(1, 0, 2), posinf=0.0, neginf=0.0)
+        rows = np.nan_to_num(values_at(self._values, points)[0], posinf=0.0, neginf=0.0)
         sizes = np.linalg.norm(rows, axis=2).prod(axis=1)
         return np.asarray(np.linalg.det(rows) / np.where(sizes > 0, sizes, 1.0))
 
@@ -288,7 +287,10 @@ class DeterminantSigns:
                 size = np.linalg.norm(slopes[:, 3:], axis=1, keepdims=True)
                 end[:, 3:] = -slopes[:, 3:] / np.maximum(size, np.finfo(float).tiny) * np.sqrt(box.ball)
             tried = np.concatenate([y[None], y + parts * (end - y)])
-            y = tried[np.argmin(sign * values(tried), axis=0), np.arange(len(y))]
+            best = np.argmin(sign * values(tried), axis=0)
+            if not best.any():
+                break
+            y = tried[best, np.arange(len(y))]
         return self._points(y)
 
     def around(self, z: FloatArray) -> FloatArray:
@@ -387,8 +389,7 @@ class SingularSearch:
         problem = self._problem
         for sign, known in self._signed.items():
             new = points[np.sign(values) == sign][:_SIGNED]
-            held = [each for each in new if problem.box.holds(problem.pose_of(each))]
-            known[:] = [*held, *known][:_SIGNED]
+            known[:] = [*new[problem.box.holds(problem.pose_of(new))], *known][:_SIGNED]
         for ends in itertools.product(*self._signed.values()):
             sides = frozen_array(problem.pose_of(np.stack(ends)), (2, 6))
             shown = self._shown(signs.change(*ends), "", sides)

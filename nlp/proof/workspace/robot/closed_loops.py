@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models import FloatArray
+from .....models.arrays import FloatArray, values_at
 
 #: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
 _CLOSED = 1e-10
@@ -53,15 +53,11 @@ class Loops:
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the left sides (B, k) at points (n, B)."""
-        return np.asarray(self._function(z)[0].full().reshape(self.count, z.shape[1]).T)
+        return values_at(self._function, z.T)[0][:, :, 0]
 
     def slopes(self, z: FloatArray) -> FloatArray:
         """Return the derivatives (B, k, n) at points (n, B)."""
-        n, count = z.shape
-        if not self.count:
-            return np.zeros((count, 0, n))
-        found = self._function(z)[1].full()
-        return np.asarray(found.reshape(self.count, count, n).transpose(1, 0, 2))
+        return values_at(self._function, z.T)[1]
 
     def is_closed(self, z: FloatArray) -> bool:
         """Return whether all equations hold at a point (n,), in home's assembly."""
@@ -90,8 +86,9 @@ class Loops:
         for k in range(1, steps + 1):
             left = 1 - k / steps
             for _ in range(2 if left else _STEPS):
-                residual, slopes = self.values(z) - left * first, self.slopes(z)[:, :, moving] * self.size[moving]
-                step = (inverses(slopes, zero) @ residual[:, :, None])[:, :, 0]
+                values, slopes = values_at(self._function, z.T)
+                residual = values - left * first[:, :, None]
+                step = (inverses(slopes[:, :, moving] * self.size[moving], zero) @ residual)[:, :, 0]
                 z[moving] -= (self.size[moving] * step).T
                 if not np.nanmax(np.abs(step), initial=0.0) > _CLOSED:
                     break

@@ -21,6 +21,7 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
+from .....models.arrays import values_at
 from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ...statement.posed_layout import turn_about
@@ -90,16 +91,16 @@ class PoseBox:
         slack = np.where(self.upper > self.lower, 8 * _TANGENT * sizes, 0.0)
         return self.lower + slack, self.upper - slack, self.ball * (1 - 16 * _TANGENT)
 
-    def holds(self, y: FloatArray) -> bool:
-        """Return whether a point (6,) is surely a pose of the workspace, and not only of the box rounded outwards."""
+    def holds(self, y: FloatArray) -> NDArray[np.bool_]:
+        """Return whether points (..., 6) are surely poses of the workspace, not only of the box rounded outwards."""
         lower, upper, ball = self._inner
-        return bool(((y >= lower) & (y <= upper)).all()) and float(y[3:] @ y[3:]) <= ball
+        inside = ((y >= lower) & (y <= upper)).all(axis=-1)
+        return np.asarray(inside & (np.square(y[..., 3:]).sum(axis=-1) <= ball))
 
     def rotations(self, points: FloatArray) -> FloatArray:
         """Return the rotation matrices (K, 3, 3) at points (K, 6)."""
         turn = SX.sym("turn", 3)
-        flat = ca.Function("rotation", [turn], [ca.densify(rotation_of(self, turn))])(points[:, 3:].T).full()
-        return np.asarray(flat.reshape(3, len(points), 3).transpose(1, 0, 2))
+        return values_at(ca.Function("rotation", [turn], [ca.densify(rotation_of(self, turn))]), points[:, 3:])[0]
 
     def pose(self, y: FloatArray) -> PoseNumbers:
         """Return the pose at a point (6,)."""

@@ -18,6 +18,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from .....models import Dimension, FloatArray
+from .....models.arrays import values_at
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
@@ -166,7 +167,7 @@ class SliceLimits:
         """Return whether each limit is violated at points (P, n) with closed loops: (M, P); not where it is NaN."""
         found = np.zeros((len(self.limits), len(z)), dtype=np.bool_)
         with np.errstate(all="ignore"):
-            numbers = self._function(z.T).full().reshape(len(self._leasts), len(z))
+            numbers = values_at(self._function, z)[0][:, :, 0].T
             claims = [
                 *(numbers < self._leasts[:, None])[self._reaches :],
                 *(each.violated(z) for each in self._others),
