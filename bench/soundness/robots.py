@@ -130,7 +130,7 @@ class Robot:
         trunk = turns_of(table["joints"], f"{limb}:", 1)
         branches = table.get("branch") or [{"joints": []}]
         for k, branch in enumerate(branches):
-            own = turns_of(branch["joints"], f"{limb}.{k + 1}:" if branch["joints"] else "", 1)
+            own = turns_of(branch["joints"], f"{limb}.{k + 1}:", 1 + len(table["joints"]))
             turns = trunk + own
             self.chains.append(Chain(turns, limb, self._centre(turns)))
 
