@@ -327,7 +327,9 @@ def test_random_machines_are_accepted() -> None:
         tree = record.tree(with_open=True)
         show_on_leaves(rank(root, machine), root, tree)
         # The checker need not find the cuts again: those of the search are in the tree, 10 bytes and a leaf each.
-        assert len(tree) == 11 * (found.boxes // 2) + 1
+        # Halves that surely fail are divided without a look, so that there may be more cuts than boxes tell.
+        cuts, rest = divmod(len(tree) - 1, 11)
+        assert not rest and cuts >= found.boxes // 2
         accepted += 1
 
 

@@ -35,8 +35,7 @@ class RankVerdict:
         share: part of the box's volume, that of its coordinates, in boxes that are left.
         seconds: wall time.
         reason: for stopping before every box was closed; else empty.
-        errors: of the joint centres of the machine that is singular at ``y``, where that is not the exact machine; else
-            None.
+        errors: of the joint centres of the machine that is singular at ``y``; None for the exact machine.
     """
 
     outcome: Outcome

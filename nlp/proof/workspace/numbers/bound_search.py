@@ -210,7 +210,7 @@ class SmallestValues(LoopRule):
         done = found.boxes.is_known & (found.smallest >= self._levels()).all(axis=1)
         self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
         left = some(found, np.flatnonzero(~done))
-        width = self.widths(left)
+        width = self.widths(left.boxes)
         # Bounds over long and narrow boxes are wide, those of loops above all.
         split = coordinates_to_split(left.shares * np.sqrt(width / width.max(axis=1, keepdims=True)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split)

@@ -73,8 +73,7 @@ def by_centres(slopes: FloatArray) -> FloatArray:
 def no_relation(count: int, of: Coordinates) -> Relation:
     """Return the relation over boxes of which nothing is known."""
     f, k, e = map(len, of)
-    nothing = np.zeros((count, k)), np.zeros((count, k, f)), np.full((count, k), np.inf), np.zeros((count, k, e))
-    return Relation(*nothing)
+    return Relation(np.zeros((count, k)), np.zeros((count, k, f)), np.full((count, k), np.inf), np.zeros((count, k, e)))
 
 
 def relation_of(equations: Forms, of: Coordinates) -> Relation:

@@ -442,10 +442,10 @@ class LoopRule(Rule[Followed]):
         columns = np.array(self._independent)[split]
         return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation))
 
-    def widths(self, found: Examined) -> FloatArray:
+    def widths(self, boxes: LoopBoxes | Boxes[Followed]) -> FloatArray:
         """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""
         own, whole = self._independent, self.whole[self._independent]
-        return (found.boxes.upper - found.boxes.lower)[:, own] / np.where(whole > 0, whole, np.inf)
+        return (boxes.upper - boxes.lower)[:, own] / np.where(whole > 0, whole, np.inf)
 
     def is_one_assembly(self) -> bool:
         """Return whether the boxes surely belong to one assembly."""

@@ -53,8 +53,7 @@ class Tested(NamedTuple):
     Attributes:
         is_regular: (B,) whether the rank is proved to be full.
         shares: (B, f) share of each independent coordinate in the bound.
-        smallest: (B,) smallest singular value at the middle as a part of the largest: a computed number; infinite where
-            the rank is proved, or nothing is known.
+        smallest: (B,) computed smallest singular value at the middle as a part of the largest; infinite where unknown.
         signs: (B,) sign of the determinant of a square matrix at the middle: a computed number; 0 for other matrices.
             Where the rank is proved, it is that at every pose of the box.
     """

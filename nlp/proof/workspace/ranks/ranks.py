@@ -137,19 +137,9 @@ def prove_rank(
         y = problem.pose_of(np.where(np.isfinite(centre), centre, boxes.more.near[widest]))
     elif reason:
         y = problem.pose_of(problem.start)
-    verdict = RankVerdict(
-        outcome=Outcome.PROVED if y is None else Outcome.OPEN,
-        box=problem.box,
-        y=None if y is None else frozen_array(y, (6,)),
-        sides=None,
-        engine=ENGINE,
-        boxes=search.boxes,
-        open=search.left,
-        share=share,
-        seconds=effort.seconds,
-        reason=reason,
-    )
-    return _refuted(verdict, rule.singular)
+    outcome, at = (Outcome.PROVED, None) if y is None else (Outcome.OPEN, frozen_array(y, (6,)))
+    numbers = search.boxes, search.left, share, effort.seconds, reason
+    return _refuted(RankVerdict(outcome, problem.box, at, None, ENGINE, *numbers), rule.singular)
 
 
 class _RankRule(LoopRule):
@@ -167,6 +157,7 @@ class _RankRule(LoopRule):
     def __init__(self, problem: Problem, matrix: RankMatrix, recorder: TreeRecord | None, look: Look) -> None:
         super().__init__(problem, Examiner(problem, RankTest(matrix, problem.z, problem.start)), recorder)
         self.singular: Singular | None = None
+        self._more, self._columns = np.zeros((1, len(self._independent))), matrix.matrix.shape[1]
         self._look, self._examined = look, 0
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
@@ -177,5 +168,21 @@ class _RankRule(LoopRule):
         if count:
             self.singular = self._look(found, self._examined)
         found = some(found, np.flatnonzero(~found.is_regular))
-        split = coordinates_to_split(found.shares, self.widths(found))
-        return Verdicts(self.boxes_of(found, np.zeros(len(split)), split), 0.0, count)
+        split = coordinates_to_split(found.shares, self.widths(found.boxes))
+        left = self.boxes_of(found, np.zeros(len(split)), split)
+        return Verdicts(left._replace(more=left.more._replace(more=found.shares)), 0.0, count)
+
+    def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
+        """Return the halves of boxes, and the quarters where a half would fail by its linear part alone."""
+        parts = super().divided(boxes)
+        if self._problem.dependent:
+            return parts
+        # With the positive vector of the box, the sum of all shares is that of as many row sums as there are columns.
+        shares = parts.more.more
+        shares[np.arange(len(shares)), parts.split] *= 0.5
+        fails = shares.sum(axis=1) >= self._columns
+        if not fails.any():
+            return parts
+        halves = some(parts, fails)
+        split = coordinates_to_split(halves.more.more, self.widths(halves))
+        return joined([some(parts, ~fails), super().divided(halves._replace(split=split))])

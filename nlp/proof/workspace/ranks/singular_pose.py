@@ -344,6 +344,8 @@ class SingularSearch:
         self._signed: dict[int, list[FloatArray]] = {1: [], -1: []}
         self._is_sampled = False
         self._attempts, self._last, self._due = 0, _SMALL, _FIRST
+        # Number of coordinates of the design.
+        self._count = len(problem.problem.start)
 
     @cached_property
     def _newton(self) -> SingularPose:
@@ -443,11 +445,6 @@ class SingularSearch:
         y = frozen_array(self._problem.pose_of(z), (6,))
         found = Singular(y, reason, sides, errors if errors.vectors.any() else None)
         return found if self._is_shown(found) else None
-
-    @property
-    def _count(self) -> int:
-        """Number of coordinates of the design."""
-        return len(self._problem.problem.start)
 
     def _middle(self, found: Examined, k: int) -> FloatArray:
         """Return a point (n,) in the middle of a box, with closed loops or near them."""

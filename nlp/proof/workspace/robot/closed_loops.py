@@ -38,9 +38,8 @@ class Loops:
 
     def some(self, which: Sequence[int]) -> Loops:
         """Return some of the equations."""
-        return Loops(
-            self.z, ca.vertcat(SX(0, 1), *[self.equations[k] for k in which]), self.every, self.signs, self.size
-        )
+        chosen = ca.vertcat(SX(0, 1), *[self.equations[k] for k in which])
+        return Loops(self.z, chosen, self.every, self.signs, self.size)
 
     @cached_property
     def _function(self) -> ca.Function:
