@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 from ...models import FloatArray
 from ...models.shown import Shown
@@ -22,12 +22,14 @@ from .status import Status
 
 if TYPE_CHECKING:
     from .. import Picture
-    from .certified import Certified
     from .semi_infinite import WorkspaceProof
 
 
 class Answer:
-    """An answer to a case that can show itself: a solution, alone or with its certificates."""
+    """An answer to a case that can show itself: a solution, alone or with its certificates.
+
+    The index of the package finds the functions that show it when they are needed.
+    """
 
     def table(self, width: int = 120) -> str:
         """Return the tables of the answer as text, as ``solve`` prints them.
@@ -35,9 +37,10 @@ class Answer:
         Args:
             width: number of columns.
         """
-        from .. import text_of  # noqa: PLC0415 - the index finds the function when it is needed
+        from .. import text_of  # noqa: PLC0415 - outputs come after answers
 
-        return text_of(self._found(), width)
+        found: Any = self
+        return text_of(found, width)
 
     def plot(self, file: str | Path | None = None) -> Picture:
         """Return the drawing of the robot with its tasks, which a notebook shows.
@@ -49,10 +52,9 @@ class Answer:
             InputError: the ending is another one, Matplotlib is not installed, or the file cannot be written.
             EvaluationError: the robot does not exist at the point reached.
         """
-        from .. import picture_of, plot  # noqa: PLC0415 - the index finds the functions when they are needed
+        from .. import picture_of, plot  # noqa: PLC0415 - outputs come after answers
 
-        found = self._found()
-        solution = cast("Solution", getattr(found, "solution", found))
+        solution: Any = getattr(self, "solution", self)
         if file is not None:
             plot(solution, file)
         return picture_of(solution)
@@ -66,19 +68,17 @@ class Answer:
         Raises:
             InputError: Plotly is not installed, or the file cannot be written.
         """
-        from .. import report  # noqa: PLC0415 - the index finds the function when it is needed
+        from .. import report  # noqa: PLC0415 - outputs come after answers
 
-        return report(self._found(), file=file)
+        found: Any = self
+        return report(found, file=file)
 
     def to_dict(self) -> dict[str, object]:
         """Return the result as JSON's own types, as ``--json`` writes it."""
-        from .. import json_data, result_of  # noqa: PLC0415 - the index finds the functions when they are needed
+        from .. import json_data, result_of  # noqa: PLC0415 - outputs come after answers
 
-        return {**json_data(result_of(self._found()))}
-
-    def _found(self) -> Solution | Certified:
-        """Return the answer itself, whose classes are the two kinds of answers."""
-        return cast("Solution | Certified", self)
+        found: Any = self
+        return {**json_data(result_of(found))}
 
 
 @dataclass(frozen=True, eq=False)
