@@ -1,4 +1,4 @@
-"""Rates of actuators: the equations ``J chi = D qdot`` and ``B qdot = 0`` of a limb, whatever its topology.
+"""Rates of actuators: the equations ``J chi = D qdot`` and ``B qdot = 0`` of a limb of any topology.
 
 Each row of ``J`` has a work rate in the platform's twist ``chi``, and one in a unit rate of each actuator: ``D``. Loops
 that more actuators drive than they have freedoms demand ``B qdot = 0`` of the actuators alone. The limb lets the

@@ -1,8 +1,8 @@
 """Values that a notebook shows as a table and a drawing.
 
-Robots know nothing of drawings, and a solution nothing of tables. The function that makes HTML of a value is therefore
-found by the entry point ``html`` of the group ``screwsynth.views``, as robots of other packages are by theirs, and
-loaded when a notebook first shows a value.
+Modules of robots do not import drawings, nor those of solutions tables. The function that makes HTML of a value is
+therefore found by the entry point ``html`` of the group ``screwsynth.views``, as robots of other packages are by
+theirs, and loaded when a notebook first shows a value.
 """
 
 from __future__ import annotations

@@ -3,11 +3,11 @@
 The time of a command, or of a call, is stated once, with :func:`within`; every search of its block takes from what is
 left of it, and ends by itself.
 
-A request ends the process, unless work has begun that has something to show: that work asks now and then whether it is
-requested to stop. It is the command line that listens, with :func:`listen`; a program that imports this package gets
-Python's own ``KeyboardInterrupt``. A search takes note of it instead, ends after the present step, and returns the
-state that its last complete step left; the searches that follow in the same call (:func:`one_call`) end at once.
-Elsewhere, and at a second interrupt in one step, it ends the call.
+A request ends the process, unless work with partial results has begun: such work checks regularly whether it is
+requested to stop. The command line listens, with :func:`listen`; a program that imports this package gets Python's own
+``KeyboardInterrupt``. A search takes note of it instead, ends after the present step, and returns the state that its
+last complete step left; the searches that follow in the same call (:func:`one_call`) end at once. Elsewhere, and at a
+second interrupt in one step, it ends the call.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ at any pose), ``nested`` (their members and actuators), ``placed`` (joints at an
 joint centres), ``replacing`` and ``elimination`` (unknowns that follow one after the other, of any dimensions),
 ``closedform`` (a model without unknowns that follow from the pose in closed form).
 
-The model is imported from ``robot`` itself, or as :func:`screwsynth.models.robot`: what asks for one module here, or
-for the kinds of faults, does not load them all.
+The model is imported from ``robot`` itself, or as :func:`screwsynth.models.robot`: an import of one module, or of the
+kinds of faults, does not load them all.
 """
 
 from ..expression import ExpressionError

@@ -1,10 +1,9 @@
 """A robot given joint by joint with errors of its joint centres: a machine as it is built.
 
-The robot is put together at home with each joint's centre off by a vector, and with the directions of all axes as they
-are designed. The coordinates of all joints count from there. Joints of a limb that have one centre at home, as the
-hinges of a spherical joint, have one error. The centre of a slide does not matter, and that of joints whose axes are
-parallel matters across their axes alone: the part of the error along them is left out. A parallelogram has two centres,
-at the ends of its rods, which are equal in the machine too.
+The robot is assembled at home with each joint's centre off by a vector, and with the directions of all axes of the
+design. The coordinates of all joints count from there. Joints of a limb that have one centre at home, as the hinges of
+a spherical joint, have one error. The centre of a slide has no effect, nor has an error along parallel axes of a joint:
+both are left out. A parallelogram has two centres, at the ends of its rods, which are equal in the machine too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Unknowns of a robot that follow from the pose in closed form: cranks and rails with a rod of constant length.
+"""Closed-form inverse kinematics of limbs with a crank or a slide and a rod of constant length.
 
 The loop of such a limb has one equation with one unknown:
 
@@ -10,8 +10,8 @@ that it has at home, and is 0 where both solutions meet, at the edge of the limb
 expression of dimensions and pose, and the edge a claim of its own.
 
 Coefficients are derivatives of the equation by the unknown, or by its sine and cosine, at 0. Differences of its values
-would leave terms that cancel, which bounds over boxes do not know. That it has no further terms is tested at random
-values of all symbols, at which another analytic expression would differ.
+would leave terms that cancel, and so wide bounds over boxes. Random values of all symbols test that the equation has no
+further terms: another analytic expression would differ there.
 """
 
 from __future__ import annotations

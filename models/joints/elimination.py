@@ -9,10 +9,10 @@ have one unknown less than the gap itself. An unknown follows from one equation,
 * an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of one length, ``cos t = -a.c / a.a``
   and ``sin t = -b.c / b.b``; a slide from ``a q + c = 0``: one solution.
 
-What replaces an unknown depends on dimensions and pose, and on no other unknown. Each form is read off an equation at
-a few values of the unknown, and tested at random dimensions and poses near home; of these expressions, which are
+The expression of an unknown depends on dimensions and pose, and on no other unknown. Each form is read off an equation
+at a few values of the unknown, and tested at random dimensions and poses near home; of these expressions, which are
 analytic, one that agrees there agrees everywhere. A root is written ``sqrt(max(v, 0))``, so that it has a value beyond
-the edge of reach too; a search excludes what is beyond by ``v >= 0``.
+the edge of reach too; a search excludes such points by ``v >= 0``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Faults and doubtful places of a robot's geometry: coinciding axes and joints, and axes that are almost parallel.
 
-What a limb carries depends on which of its axes are exactly parallel or meet. Typed decimals such as 0.866 break this,
-and almost parallel axes get a remark.
+The wrenches of a limb depend on axes that are exactly parallel or meet exactly. Typed decimals such as 0.866 break
+this, and almost parallel axes get a remark.
 """
 
 from __future__ import annotations

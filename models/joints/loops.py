@@ -1,4 +1,4 @@
-"""Independent loop equations: those of an overconstrained robot depend on each other, and a program needs some alone.
+"""Independent loop equations, which alone enter a program: those of an overconstrained robot depend on each other.
 
 The equations are measured at random closed configurations: random dimensions, and a pose near home from which Newton's
 method with least-norm steps closes all loops.

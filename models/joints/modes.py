@@ -1,4 +1,4 @@
-"""Signs that tell the assemblies of a limb apart: those of joints that hold together, and of home's working mode.
+"""Signs that distinguish the assemblies of a limb: of joints that hold together, and of home's working mode.
 
 The equations of a closed loop also hold for some joints that do not hold together, such as a hinge whose axes point
 against each other. Of the positions of a limb's joints at which it does hold together, those of one *working mode* are

@@ -1,8 +1,8 @@
 """A mechanism as a graph: links, and elementary joints between two of them, at one configuration in the world frame.
 
 Every description of a robot passes through this form when it is read or written: universal, cylindrical and
-parallelogram joints are made of the elementary ones, with links between them. What the other modules take for granted
-is checked here, and refused with one sentence each.
+parallelogram joints are made of the elementary ones, with links between them. The premises of the other modules are
+checked here; each fault is refused with one sentence.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Tables of a case file: known keys only, pydantic's strict types, and sentences about what pydantic refuses."""
+"""Tables of a case file: known keys only, pydantic's strict types, and sentences about values that pydantic refuses."""
 
 from __future__ import annotations
 

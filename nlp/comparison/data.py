@@ -1,4 +1,4 @@
-"""A comparison as a result, with sentences about its rules, and about what a robot lacks."""
+"""A comparison as a result, with sentences about its rules, and about limits and freedoms that a robot lacks."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """C text: tables, string literals, comments, identifiers and macros, valid for any names of a case.
 
-What CasADi generates has more than a controller needs. Beside each function CasADi writes a dozen that return names,
-sizes and sparsities, by which it loads a library. A controller calls none of them, and together they are a fifth of the
-machine code. Each number of an input is read after a test whether the input is given at all. Here every input is given,
-and the tests are a tenth of the machine code.
+CasADi's C has more than a controller needs. Beside each function CasADi writes a dozen that return names, sizes and
+sparsities, by which it loads a library. A controller calls none of them, and together they are a fifth of the machine
+code. Each number of an input is read after a test whether the input is given at all. Here every input is given, and the
+tests are a tenth of the machine code.
 """
 
 from __future__ import annotations

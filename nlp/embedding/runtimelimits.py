@@ -1,12 +1,12 @@
-"""Limits of a case that C sets at run time, in their own units; and what the case's fixed numbers make hold.
+"""Limits of a case that C sets at run time, in their own units; and conditions that hold by the case's fixed numbers.
 
 A limit is one or more bounds of constraints, each by a reading, such as the cosine of an angle or the square of a
 length. One generated function converts all limits to the bounds. The tables of this module say which constraint each
 bound belongs to.
 
-What the fixed numbers make hold is no constraint of the program. In C these numbers are arguments, and an answer is
-judged by all of it: loop equations that follow from the others at the case's numbers, lengths of fixed directions, and
-limits on fixed numbers alone.
+Conditions that hold by the fixed numbers are no constraints of the program. In C these numbers are arguments, and an
+answer is judged by all such conditions: loop equations that follow from the others at the case's numbers, lengths of
+fixed directions, and limits on fixed numbers alone.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The way in which a robot's joints are assembled at a point, compared with home along a path from there.
+"""Assembly of a robot's joints at a point, compared with home's along a path from home.
 
 The same dimensions and pose often allow several values of the internal unknowns, such as an elbow on either side, and
 the same loops several modes of operation, in which the platform moves otherwise. From home, where the robot file states

@@ -1,8 +1,8 @@
 """Freedoms, actuator rates and kinds of singularity of a robot given joint by joint, at one point.
 
 With ``C`` the wrenches that do no work in the actuated joints, the platform of a robot with free actuators has ``6 -
-rank C`` freedoms, and can make a twist where ``C`` does no work in it. The rates of a limb's actuators for a twist are
-those that leave least of the motion that the limb resists (:mod:`screwsynth.models.actuation`).
+rank C`` freedoms, and can make a twist where ``C`` does no work in it. The rates of a limb's actuators for a twist
+minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Screws of joints, and loops that nested ones close, at one point; and the velocity equations with these loops."""
+"""Screws of joints and equations of nested loops at one point, and the velocity equations with these loops."""
 
 from __future__ import annotations
 

@@ -9,11 +9,11 @@ Ranks at the point are compared with those at almost all dimensions and closed c
 * constraint: all wrenches that do no work in the actuated joints have a smaller rank;
 * actuation: all wrenches have a smaller rank, so that the platform moves with every actuator locked.
 
-A limb whose screws become dependent resists wrenches more than at almost all points near by. The wrenches near by are
-known to first order: with rates ``n`` for which ``sum n_j s_j = 0``, a wrench ``w`` of the point is also one near by
-where ``w`` does no work in the change ``sum n_j ds_j``, and ``ds_j = sum_(i<j) [s_i, s_j] dq_i`` by the motions
-``dq_i`` of the joints before. The additional wrenches are those of the point that do work in such changes. Of nested
-loops the change is not known, so that joints and wrenches are not told.
+A limb whose screws become dependent has more wrenches than at almost all nearby points. The wrenches of nearby points
+are known to first order: with rates ``n`` for which ``sum n_j s_j = 0``, a wrench ``w`` of the point is also one of
+nearby points where ``w`` does no work in the change ``sum n_j ds_j``, and ``ds_j = sum_(i<j) [s_i, s_j] dq_i`` by the
+motions ``dq_i`` of the joints before. The additional wrenches are those of the point that do work in such changes. Of
+nested loops the change is not known: joints and wrenches are not reported.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ work at home. Between the two is a serial singularity, where it does none. The s
 * ``det[passive, actuated, Z]`` beside that of home for a limb whose wrenches have no such expressions, where the
   columns ``Z`` complete the screws of all joints, turned to those of home.
 
-It is compared point by point, without a path from home, so that a limb which has turned by more than a right angle may
-have the other sign in the same working mode. A difference of the sense alone is therefore no verdict.
+The sense is compared point by point, without a path from home, so that a limb which has turned by more than a right
+angle may have the other sign in the same working mode. A difference of the sense alone is therefore no verdict.
 """
 
 from __future__ import annotations

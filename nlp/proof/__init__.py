@@ -2,7 +2,7 @@
 
 The rooms import each other in this order:
 
-* ``statement``: what is claimed, for the search and for the checker alike;
+* ``statement``: the claims, for search and checker alike;
 * ``enclosure``: ranges of expressions over boxes, in C and in NumPy;
 * ``boxes``: branch and bound;
 * ``certificate``: the global optimum of a program;

@@ -1,4 +1,4 @@
 """Searches from many points by the solver of generated C, in this process and without a compiler.
 
-They tell quickly where optima are; what they find is no answer before a solver and the evidence confirm it.
+They find optima quickly; a point is no answer before a solver and the evidence confirm it.
 """

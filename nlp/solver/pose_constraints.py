@@ -1,11 +1,10 @@
 """Claims at poses of a workspace as constraints of a program, for any robot and any machine within a tolerance.
 
-At such a pose those numbers that the robot can choose are fixed. Unknowns in closed form are put in. The other
-unknowns, and the numbers of the pose that the robot has no choice of, are further variables of the program, with the
-loop equations at this pose as constraints.
+At such a pose the independent coordinates are fixed, and unknowns in closed form are put in. The other dependent
+coordinates are further variables of the program, with the loop equations at this pose as constraints.
 
-Out of a limb's reach the closed forms are continued, so that a search may pass through it: the reach is a claim, and so
-a constraint, of its own.
+Out of a limb's reach the closed forms are continued, so that a search may pass through such points: reach is a separate
+claim, and so a separate constraint.
 """
 
 from __future__ import annotations

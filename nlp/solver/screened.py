@@ -1,9 +1,9 @@
-"""Starts that are screened: each is searched by sequential quadratic programming in C, and Ipopt has the last word.
+"""Screened starts: each is searched by sequential quadratic programming in C, and Ipopt confirms the optima.
 
 The search in C (:mod:`screwsynth.nlp.screening`) takes a fraction of Ipopt's time. Every distinct optimum that it finds
-is given to Ipopt, with its multipliers: what Ipopt confirms, or finds from there, is the answer. A start from which the
-search in C does not converge, or whose end the program's own conditions refuse, is searched by Ipopt from the
-beginning, so that no start is lost.
+is given to Ipopt, with its multipliers: the point at which Ipopt ends is the answer. A start from which the search in C
+does not converge, or whose end the program's own conditions refuse, is searched by Ipopt from the beginning, so that no
+start is lost.
 """
 
 from __future__ import annotations

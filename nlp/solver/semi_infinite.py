@@ -1,11 +1,11 @@
-"""A design that is regular and keeps its limits over a continuous workspace, by exchange of poses.
+"""Semi-infinite programming by exchange of poses: a design that is regular and keeps its limits over a workspace.
 
 A limit over a workspace is one constraint for each of its poses. A program with a few of them is solved, its design is
 judged over the whole workspace (:mod:`screwsynth.nlp.proof.workspace`), and the poses that refute a claim become
 constraints, each of the one claim that it refutes, until the proof holds.
 
 In these constraints every limit is a little tighter than in the case: a design that lies exactly on a limit at the
-worst of the poses known is beyond it at some pose nearby, and only poses without end would end the exchange.
+worst of the poses known is beyond it at some pose nearby, and the exchange would never end.
 
 Source: J. W. Blankenship, J. E. Falk, *Infinitely constrained optimization problems*, J. Optim. Theory Appl. 19 (1976).
 """

@@ -1,8 +1,8 @@
 """Trade-off curves: the optimum of a case as a function of one of its numbers, one solve for each value.
 
-Neighbours on a curve help each other. The search at each value starts from the optimum at the value before it as well
-as from the case's starting points; a second pass, backwards, tries the optimum at the value behind it. So a better
-family of optima that one solve found is followed to the others.
+The search at each value starts from the optimum at the value before it as well as from the case's starting points; a
+second pass, backwards, tries the optimum at the value behind it. So a better family of optima that one solve found is
+followed to the others.
 """
 
 from __future__ import annotations

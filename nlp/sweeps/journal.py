@@ -1,7 +1,7 @@
 """Journal of a sweep: a file to which rows are appended as they finish, and from which a killed run is resumed.
 
-A row is the answer at one point. The first line is the head, each other line a row as JSON. What a killed process
-leaves of its last line is cut off when the journal is opened again. One process at a time holds a journal.
+A row is the answer at one point. The first line is the head, each other line a row as JSON. An incomplete last line of
+a killed process is removed when the journal is opened again. One process at a time holds a journal.
 """
 
 from __future__ import annotations

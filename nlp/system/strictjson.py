@@ -1,7 +1,7 @@
 """Strict reading of JSON: plain values first, then typed values by their annotations.
 
-What is read may come from anybody: it is not nested without end, every number is finite, no key stands twice, and every
-text can be written again. A fault is a ``ValueError`` of one sentence.
+The text is not trusted: its depth is limited, every number is finite, no key stands twice, and every text can be
+written again. A fault is a ``ValueError`` of one sentence.
 """
 
 from __future__ import annotations

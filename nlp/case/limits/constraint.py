@@ -1,4 +1,4 @@
-"""Named smooth constraints, and how their bounds read in the words of a case; forms of expressions that repeat.
+"""Named smooth constraints, readings of their numbers in the words of a case, and forms of expressions that repeat.
 
 A form is one function of a few numbers, called for every leg, pair of legs, joint, task or pose. A program needs the
 expressions alone. Generated C also uses that they are calls of one function: it has the function once, and calls it in

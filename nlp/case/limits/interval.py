@@ -1,4 +1,4 @@
-"""Limits with one side or two: their tables in a case file, their checks, and those on a measure of the robot's own."""
+"""Limits with one side or two: their tables in a case file, their checks, and limits on any measure of a robot."""
 
 from __future__ import annotations
 

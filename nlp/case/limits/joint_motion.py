@@ -1,7 +1,7 @@
 """Limits on the motion of any joint of a robot given joint by joint: ranges from home, and cones.
 
-An angle is measured from home, within half a turn to either side. Where it is an unknown ``q`` of the program, it is
-limited as it is. Otherwise its sine s and cosine c, times one positive number r, follow from the displacements of the
+An angle is measured from home, within half a turn to either side. Where it is an unknown ``q`` of the program, the
+limit is on ``q``. Otherwise its sine s and cosine c, times one positive number r, follow from the displacements of the
 two bodies of the joint. The constraint is then on
 
     sin(q/2) = s / sqrt(2 r (r + c)),    r = sqrt(s^2 + c^2)

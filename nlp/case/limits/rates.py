@@ -1,8 +1,8 @@
 """Limits on rates in the task's motion: of every actuator, and the part of F that one limb carries.
 
-A straight leg's rate is the work rate of its force. The rates of a limb given joint by joint are those that leave least
-of the part of the task's twist that the limb resists. The constraint is on ``qdot^2``. A limb's part of F is the sum of
-the squared rates of its rows over F.
+A straight leg's rate is the work rate of its force. The rates of a limb given joint by joint minimise the part of the
+task's twist that the limb resists. The constraint is on ``qdot^2``. A limb's part of F is the sum of the squared rates
+of its rows over F.
 """
 
 from __future__ import annotations

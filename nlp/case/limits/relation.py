@@ -1,10 +1,10 @@
-"""A limit in words of the user's own: relations between the case's numbers, such as ``x1 - 1.5*x2 >= 0``.
+"""Relations between the case's numbers as limits, such as ``x1 - 1.5*x2 >= 0``.
 
 Numbers are in the case's units in a relation. The language is small: numbers, names, ``+ - * / ^``, brackets, the
 functions ``sqrt``, ``sin``, ``cos`` and ``abs``, and one relation ``>=``, ``<=`` or ``==``. A name may have a dot in
 it, as ``robot.p_x`` has. ``^`` binds tighter than a sign and to the right, as in mathematics. Nothing is ever handed to
-Python's own interpreter: a text becomes a tree, and a tree a CasADi expression, as in a robot's own numbers. The reader
-is one of its own, because Python's cannot say what it expects and where.
+Python's own interpreter: a text becomes a tree, and a tree a CasADi expression, as in a robot's own numbers. Python's
+parser is not used, because its messages do not name the expected text and its place.
 """
 
 from __future__ import annotations

@@ -4,9 +4,9 @@ The constraints are on eigenvalues of ``J'J``. The smallest one is estimated fro
 that a design that keeps the constraints keeps the limits. The measured numbers are computed from the singular value
 decomposition of J at a point.
 
-No closed form of an eigenvalue exists, and an eigenvalue itself has a corner where two of them meet, where optima often
-lie. The estimates of this module are smooth everywhere, made of ``+ - * /`` and square roots alone, and never on the
-unsafe side. For a positive definite matrix A,
+No closed form of an eigenvalue exists, and an eigenvalue itself has a kink where two of them coincide, where optima
+often lie. The estimates of this module are smooth everywhere, made of ``+ - * /`` and square roots alone, and never on
+the unsafe side. For a positive definite matrix A,
 
     mu(A) = (tr A^-m)^(-1/m) <= lambda_min(A),
 

@@ -1,7 +1,7 @@
 """Joints that stand for one: hinges about one axis, three hinges through one point, which are a ball, and pairs.
 
 In the tables of a robot file two crossing hinges are a universal joint, and a hinge and a slide along it are a ``C``.
-What a limb carries depends on axes that meet exactly. Joints are replaced only where they do.
+The wrenches of a limb depend on axes that meet exactly. Joints are replaced only where they do.
 """
 
 from __future__ import annotations

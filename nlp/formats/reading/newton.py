@@ -1,4 +1,4 @@
-"""Loops of a description closed by Newton's method, and by least squares from other starts where it does not."""
+"""Loops of a description closed by Newton's method, and by least squares from other starts where this fails."""
 
 from __future__ import annotations
 

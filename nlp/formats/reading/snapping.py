@@ -1,9 +1,9 @@
-"""Axes that nearly meet, coincide or are parallel, as decimals of a file leave them: found, and moved so that they do.
+"""Axes that meet, coincide or are parallel up to the decimals of a file, and correction of them.
 
 Four hinges that are nearly a parallelogram become one.
 
-What a robot can do depends on such relations exactly. Every relation within a tolerance becomes equations in the points
-and directions of all axes; Newton's method with least-norm steps finds the nearest joints that satisfy all of them.
+The freedoms of a robot need such relations exactly. Every relation within a tolerance becomes equations in the points
+and directions of all axes; Newton's method with least-norm steps finds the nearest joints that satisfy all.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Circles and symmetries in the numbers of a robot: what one dimension could state."""
+"""Circles and symmetries in the numbers of a robot: offers for dimensions."""
 
 from __future__ import annotations
 

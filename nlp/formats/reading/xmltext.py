@@ -1,4 +1,4 @@
-"""XML files as elements: what costs memory or time without end, or reaches out of the file, is refused."""
+"""XML files as elements; content that needs unbounded memory or time, or other files, is refused."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """A mechanism as MJCF, the format of MuJoCo.
 
 The bodies are placed at the exported pose, so that all coordinates are 0 there. Loops are closed by ``connect`` for a
-ball and by ``weld`` otherwise; MuJoCo keeps what these constraints find at that pose. A screw is a hinge and a slide of
-one body that a ``joint`` constraint couples.
+ball and by ``weld`` otherwise; MuJoCo takes the relative places of these constraints from that pose. A screw is a hinge
+and a slide of one body that a ``joint`` constraint couples.
 """
 
 from __future__ import annotations

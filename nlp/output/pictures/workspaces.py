@@ -147,7 +147,7 @@ def slices_notes(slices: Sequence[Slice]) -> list[str]:
     left_out = dict.fromkeys(key for each in slices for key in each.left_out)
     notes = [f"not drawn: {', '.join(left_out)}"] if left_out else []
     if len(slices[0].limits) > 1:
-        notes.append("where several limits are violated: the first on the straight way from the middle")
+        notes.append("where several limits are violated: the first on the straight line from the middle")
     return notes
 
 

@@ -1,11 +1,11 @@
 """Branch and bound over boxes: the loop of every search.
 
-A rule examines boxes: it closes them, or says what part is left, a bound over it and the coordinate to bisect. The loop
+A rule examines boxes: it closes them, or returns the part left, a bound over it and the coordinate to bisect. The loop
 takes examined boxes in an order, bisects them, has the halves examined, and keeps those that are open. Bounds are upper
 bounds of a value that is maximised; a rule without a value leaves them at 0.
 
-Everything that is claimed is one value, :class:`State`, which a step replaces by its last assignment: a search that is
-interrupted in a step claims what it did before.
+All claims of a search are one value, :class:`State`, which a step replaces by its last assignment: a search that is
+interrupted in a step keeps its claims from before the step.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Symmetries of a form, read off its expressions: mirrors, and parts that are copies of each other.
 
-A mirror changes the signs of some variables, and nothing that a certificate speaks of. The axis of a joint, for
+A mirror changes the signs of some variables, and no function or condition of the form. The axis of a joint, for
 example, may point either way. It is found where every intermediate value either keeps its sign or changes it, for all
 values of the variables. This is a linear condition, modulo 2, on the set of variables that change theirs. So the
 mirrors found are a group, and one half of the box for each of its generators holds an optimum of the whole box.

@@ -1,6 +1,6 @@
 """Record of a search as the tree of a proof: see :mod:`screwsynth.nlp.proof.checker.tree` for the nodes.
 
-A node is known by the ends of its box, which is all that a rule needs to say of a step.
+A rule names a node by the ends of its box.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Rules of claims about boxes of a form, shown by polynomials of second order: what holds, and what is left of boxes.
+"""Rules of claims about boxes of a form, by polynomials of second order: claims that hold, and contraction of boxes.
 
-A bound that is clearly wrong at the centre of what is left of a box is refused at once, without many bisections. The
-centres are evaluated in doubles, and count only where they miss the bound by far more than rounding; nothing that is
-accepted rests on this.
+A bound that is clearly wrong at the centre of a contracted box is refused at once, without many bisections. The centres
+are evaluated in doubles, and count only where they miss the bound by far more than rounding; no accepted claim rests on
+this.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Proofs as files: JSON of one format, whatever is proved.
+"""Proofs as files: JSON of one format for all claims.
 
-A file holds the case as text, what the proof says of the premises, and its claims. A claim has a name, a reason, and
-what the reason needs: a bound, a tree of boxes (compressed, in base64, with its digest), or single points. The check
+A file holds the case as text, the premises as the proof states them, and its claims. A claim has a name, a reason, and
+the data of the reason: a bound, a tree of boxes (compressed, in base64, with its digest), or single points. The check
 takes all premises from the case and from its own arguments; those in the file tell a proof for other ones at once.
 
 A proof of a program's optimum has one claim. A claim is proved by one of
@@ -16,7 +16,7 @@ and, where it is about every machine within a tolerance on joint centres, also b
 
     one machine         two directions, and two lemmas: lengths of a leg of one machine at two poses
 
-Lemmas are claims of their own that others rest on: lengths of ``one machine``, each proved by a tree for a program, and
+Lemmas are further claims on which others rest: lengths of ``one machine``, each proved by a tree for a program, and
 
     second order        a bound of the terms of second order in the errors, by which a number of all machines is bounded
 """

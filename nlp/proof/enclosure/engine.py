@@ -1,4 +1,4 @@
-"""The C kernel, which every proof needs; whatever proves nothing does without it."""
+"""The C kernel: searches for proofs need it, and nothing else does."""
 
 from __future__ import annotations
 

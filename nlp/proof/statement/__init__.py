@@ -1,4 +1,4 @@
-"""Statement of what is proved: programs in standard form, and claims about a workspace.
+"""Statement of claims: programs in standard form, and claims about a workspace.
 
 The modules import each other in this order: ``form``, ``standard_form`` and ``limb_separation`` for certificates;
 ``machine`` (a robot with its dimensions), ``claims``, ``posed_layout`` (a case as expressions of the pose) and

@@ -19,8 +19,8 @@ too, but saved no boxes of a search.
 
 In home's working mode an unknown that follows from dimensions and pose in closed form is an expression of the others
 (:mod:`screwsynth.models.joints.elimination`). The form keeps, in its place, the condition that the limb reaches the
-pose. What the equations used leave of the others is kept, such as the freedoms that a limb takes from the platform;
-what is zero everywhere is left out, which never makes the feasible set smaller. So does the range of an unknown.
+pose. The remaining equations are kept, such as those of the freedoms that a limb takes from the platform. Equations
+that are zero everywhere and the range of an unknown are left out, which never makes the feasible set smaller.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A machine at single poses with its joints in home's assembly, as ``evaluate`` shows it.
 
-A pose refutes a claim only where the machine has the fault in this assembly. Searches follow closed loops over boxes,
-by Newton's method, or take them as conditions, and may find the pose in another one.
+A pose refutes a claim only where the machine violates it in this assembly. Searches follow closed loops over boxes, by
+Newton's method, or take them as conditions, and may find the pose in another one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The proof on paper of a judgement: what its searches record, and what of that is a proof of a claim."""
+"""Proof file of a judgement: records of its searches, and the claims that these prove."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verdicts on a workspace: proved, refuted with a pose, or open with what is left."""
+"""Verdicts on a workspace: proved, refuted with a pose, or open with the reason."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ the sum of the tilts is added to the part that depends on ``s`` alone:
     phi(s, o) <= sum_k max over the boxes of limb k of (phi_k - t_k) + max_s (phi_0 + sum_k t_k).
 
 This holds for any tilts. Those used are gradient and curvature, along ``s``, of the model of the limb at a good point
-of its own variables, so that what is left of the limb hardly depends on ``s``.
+of its own variables, so that the rest of the limb hardly depends on ``s``.
 """
 
 from __future__ import annotations

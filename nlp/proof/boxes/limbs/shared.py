@@ -1,8 +1,8 @@
 """Search of a form whose limbs share variables: bisection of shared boxes, and lists of own boxes for each limb.
 
-A box of the shared variables is handed down to its halves with its limbs' lists. An own box is dropped where its bound
-and the best of all others together do not exceed the threshold. What is wider decides on the next step: the lists of
-the limbs with the largest spread are refined, or the shared box is bisected. See
+The halves of a box of the shared variables inherit its limbs' lists. An own box is dropped where its bound and the
+largest bounds of all other limbs together do not exceed the threshold. Each step refines the lists of the limbs with
+the largest spread, or bisects the shared box, whichever is wider. See
 :mod:`screwsynth.nlp.proof.boxes.limbs.decomposition` for the bounds.
 """
 

@@ -1,4 +1,4 @@
-"""Matrices whose null space has the motions of a platform that nothing resists, as expressions of the pose.
+"""Matrices of motions, as expressions of the pose: their null space has the motions that no limb resists.
 
 They are built for the check from the model and the case alone. A motion is the velocity v of the platform's origin and
 its angular velocity, here ``x = (v, length omega)``, with rates of joints. Each row is a condition that it keeps:

@@ -1,8 +1,8 @@
 """Smallest values of numbers of a robot over a workspace, from bounds of them over boxes: bisection.
 
 A :class:`Number` has lower bounds over boxes, and values at points. A value at a point is an upper bound of the
-smallest one; what is proved rests on the bounds alone. One number is searched with the boxes of the smallest bounds
-first. Several with limits share one cover by boxes: following closed loops there costs more than bounds of numbers.
+smallest one; proofs rest on the bounds alone. One number is searched with the boxes of the smallest bounds first.
+Several with limits share one cover by boxes: following closed loops there costs more than bounds of numbers.
 """
 
 from __future__ import annotations

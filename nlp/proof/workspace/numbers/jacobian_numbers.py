@@ -6,11 +6,11 @@ and with ``C A = I + E`` and ``|E| <= B``, entry by entry,
 
     (I + E)^-1 C = C - E C + ...,    where the terms of higher order are at most  B^2 (I - B)^-1 |C|.
 
-What is of first order in the coordinates is kept as it is, so that a convex number is largest at a corner of the box.
+The part of first order in the coordinates is kept exactly, so that a convex number is largest at a corner of the box.
 
 The smallest singular value of J is at least 1 over the norm of any left inverse. The norm ``(tr (P P')^n)^(1/2n)`` is
 convex in P, not below the largest singular value and close to it. The largest singular value of J itself is bounded
-likewise, from forms of its own entries. The Frobenius norm of a rest bounds what it adds.
+likewise, from forms of its own entries. The Frobenius norm of a rest bounds its effect.
 
 Errors of joint centres count as further terms of the rows. Those of six straight legs, up to t, change J by a matrix
 whose Frobenius norm bounds the change of every singular value (H. Weyl). With l the shortest length of a leg of any

@@ -1,4 +1,4 @@
-"""Limits and measures with searches of their own: singular values and condition numbers of J, clearance of legs."""
+"""Branch and bound for singular values and condition numbers of J, and for the clearance of legs."""
 
 from __future__ import annotations
 

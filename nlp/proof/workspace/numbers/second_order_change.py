@@ -1,4 +1,4 @@
-"""Bounds of what a first-order change by errors of joint centres leaves out, over a whole workspace.
+"""Bounds of the second-order change of numbers by errors of joint centres, over a whole workspace.
 
 With g a number of a machine and H its second derivatives by the errors e, on the way from the exact machine
 

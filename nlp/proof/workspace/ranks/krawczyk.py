@@ -1,4 +1,4 @@
-"""What loop equations say of the dependent coordinates over a box: a linear relation with a bounded rest.
+"""Krawczyk's operator for loop equations: the dependent coordinates over a box, as a linear relation with a rest.
 
 With forms ``g + A e + [-r, r]`` of the equations over a box, and Y close to the inverse of the columns of the dependent
 coordinates D, every closed point of the box has

@@ -1,4 +1,4 @@
-"""Matrices whose full column rank means that a robot has no motion that nothing resists.
+"""Matrices of motions: their full column rank means that the limbs of a robot resist every motion.
 
 With actuators locked, the platform's twist x is resisted unless each row ``L`` of a limb does no work in it, ``L.x =
 0``, and it is a motion of the passive joints of each member: ``x - sum_j w_j S_j = 0`` with rates ``w``. Together these
@@ -10,8 +10,8 @@ those actuators that move its member; and the relations of rates that loops dema
 of this matrix N has as many dimensions as the robot has freedoms and rates of actuators without a motion, more only
 where the constraint wrenches lose their rank, or passive screws theirs.
 
-The screws of members with nested loops follow from ``L q = 0`` with the rank that L has at almost all poses. They would
-not tell a pose at which L loses it, and the member resists less. So both matrices have, as blocks of their own, as many
+The screws of members with nested loops follow from ``L q = 0`` with the rank that L has at almost all poses. They do
+not show a pose at which L loses it, and the member resists less. So both matrices have, as blocks of their own, as many
 rows of L as its rank, transposed: full column rank means that L keeps its rank too.
 
 Twists are ``(v, length omega)`` with the velocity v of the platform's origin.

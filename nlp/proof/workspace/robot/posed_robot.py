@@ -2,7 +2,7 @@
 
 The coordinates z are those numbers of a :class:`~.pose_box.PoseBox` that vary, then the robot's unknowns. Equations
 that follow from others in this workspace are left out. Of the coordinates as many are *dependent* as there are
-equations: all unknowns, and numbers of the pose that a robot with fewer freedoms has no choice of.
+equations: all unknowns, and some numbers of the pose of a robot with fewer freedoms.
 
 Where every machine within a tolerance on joint centres is meant, the errors of each centre are three further
 coordinates, with the design's choice of equations and screws. They are never bisected: an expression's linear part in

@@ -226,7 +226,7 @@ class _Other:
 
 
 class FirstViolated:
-    """The limit that is violated first on the straight way from the middle of a slice.
+    """The limit that is violated first on the straight line from the middle of a slice.
 
     The limit's violation in a box is that of its enclosure; which of several comes first is taken from points.
 

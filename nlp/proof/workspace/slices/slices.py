@@ -1,8 +1,8 @@
 """Slices of a box of poses: where J is proved to be regular, where it is beyond a singular pose, and where limits hold.
 
 A slice has two coordinates of the box; the others stay at the middle, or follow from these two. The slice is covered by
-boxes of its own, so that what it shows is proved for the poses of the slice alone. It is wider than the workspace, to
-show what comes next. Where several limits are violated, a box has the one that is violated first on the straight way
+boxes of its own, so that its colours are proved for the poses of the slice alone. It is wider than the workspace, to
+show the poses around. Where several limits are violated, a box has the one that is violated first on the straight line
 from the middle. Loops without a closed form are followed from the middle.
 """
 
