@@ -60,7 +60,7 @@ class Model(Whole, Shown):
         scene: the drawing.
         unknowns: internal unknowns; empty for robots whose rows follow from parameters and pose.
         closure: the independent equations that determine the unknowns.
-        loops: all equations of closed loops, which hold where the robot is put together; empty for the closure alone.
+        loops: all equations of closed loops, which hold where the robot is assembled; empty for the closure alone.
         signs: of home's assembly of its joints, where these are known.
         distances: equations that follow from those of the loops, and help a search of a whole box.
         actuators: the actuated joints of a robot given joint by joint; empty for one given by its rows.

@@ -37,7 +37,7 @@ def displaced_robot(model: Model) -> DisplacedRobot:
         model: the robot, from a definition.
 
     Raises:
-        RobotError: the robot is given by links and joints, or cannot be put together near home with such errors.
+        RobotError: the robot is given by links and joints, or cannot be assembled near home with such errors.
     """
     definition = _definition(model)
     robot = home_of(read_robot(definition))

@@ -92,7 +92,7 @@ def robot(
         coupling: linear relations of joints' coordinates, each a mapping with ``factors`` by joint.
 
     Raises:
-        RobotError: a key or value is not allowed, or the robot cannot be put together near home.
+        RobotError: a key or value is not allowed, or the robot cannot be assembled near home.
     """
     tables = {
         "name": name,
@@ -279,7 +279,7 @@ def model_of_home(
         more: parameters that are among its symbols, beside its dimensions.
 
     Raises:
-        RobotError: the robot cannot be put together near home.
+        RobotError: the robot cannot be assembled near home.
     """
     words = at_home.words
     pose = PoseSymbols()

@@ -21,15 +21,15 @@ SUMMARIES = {
     "pareto": "Find the front of two or more goals of a case.",
     "compare": "Compare several robots on the task of a case.",
     "certify": "Prove a bound of the global optimum over the whole box.",
-    "verify-proof": "Check a proof anew, with nothing of what made it.",
+    "verify-proof": "Check a proof with independent code.",
     "workspace": "Prove regular poses and limits over a whole workspace.",
-    "check": "Hold cases to their expected and published values.",
+    "check": "Compare cases with their expected and published values.",
     "evaluate": "Show F, J, rank and rates at one point.",
     "codegen": "Write F and its derivatives as C for embedding.",
     "export": "Write the solved robot as MJCF, URDF, CSV or DXF.",
     "models": "List the robots, or show one in full.",
     "schema": "Print the JSON Schema of case files.",
-    "new": "Print a commented case file to begin with.",
+    "new": "Print a commented starter case.",
     "import": "Read a robot with closed loops from MJCF or URDF.",
 }
 

@@ -25,7 +25,7 @@ from .options import (
 def certify(
     case: CaseName,
     settings: SettingTexts = None,
-    gap: Annotated[float, number_option("--gap", "PART", "Part of the best F that the bound may be off by.")] = 1e-4,
+    gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of the bound.")] = 1e-4,
     time: Time = None,
     above: Annotated[
         float | None, number_option("--above", "F", "Prove that F is above this value on the whole box.")

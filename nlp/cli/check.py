@@ -18,7 +18,7 @@ def check(
     junit: Annotated[str | None, typer.Option(metavar="FILE", help="Write JUnit XML for a CI; - is stdout.")] = None,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the published numbers as a table.")] = False,
 ) -> None:
-    """Hold cases to their expected and published values."""
+    """Compare cases with their expected and published values."""
     from ..case.source import case_inputs, shipped_cases
     from ..errors import InputError
     from ..interruption import Milestone, answer_after, is_requested

@@ -16,7 +16,7 @@ def codegen(
     out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
     settings: SettingTexts = None,
     measure: Annotated[
-        bool, typer.Option("--measure/--no-measure", help="Compile it, and write flash and stack into it.")
+        bool, typer.Option("--measure/--no-measure", help="Compile the C, and write its flash and stack into it.")
     ] = True,
     force: Annotated[bool, typer.Option("--force", help="Write over files that screwsynth did not write.")] = False,
 ) -> None:

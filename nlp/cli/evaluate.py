@@ -28,7 +28,7 @@ def evaluate(
 ) -> None:
     """Show F, J, rank and rates at one point.
 
-    Nothing is optimised. What is free stands at its start, or in the middle of its range.
+    Nothing is optimised. Free numbers are at their starts, or in the middle of their ranges.
     """
     from ..case.reader import read_case
     from ..evidence import state

@@ -10,7 +10,7 @@ import typer
 def new(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="Name of a robot, or a robot file (.toml).")],
 ) -> None:
-    """Print a commented case file to begin with.
+    """Print a commented starter case.
 
     For example: screwsynth new stewart-gough > my-robot.toml. A case of a robot file belongs in the same folder.
     """

@@ -140,7 +140,7 @@ def time_option(words: str) -> Any:  # noqa: ANN401 - typer's own type is not pu
     return typer.Option("--time", parser=Number("--time"), metavar="SECONDS", callback=_begin, help=words)
 
 
-Time = Annotated[float | None, time_option("Seconds for the whole command, which then shows what it has.")]
+Time = Annotated[float | None, time_option("Seconds for the whole command, which then shows its results.")]
 AllAssemblies = Annotated[
     bool,
     typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),
@@ -154,7 +154,7 @@ ResultFile = Annotated[
 ]
 SettingTexts = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="A number instead of the case's: x4=20, p_z=40, axis=0,0,1."),
+    typer.Option("--set", metavar="NAME=VALUE", help="Replace a number of the case: x4=20, p_z=40, axis=0,0,1."),
 ]
 
 

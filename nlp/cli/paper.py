@@ -128,7 +128,7 @@ def verify_paper(proof: Proof, case: Case, leg_error: float) -> None:
         typer.echo(f"  {one_line(each.name)}: {_words(each, case)}{of}")
     _echo_unproved(proof.unproved, err=False)
     if proof.unproved:
-        typer.echo("why claims are not on paper is what the file says, and not checked")
+        typer.echo("the file's reasons for claims that are not on paper are not checked")
     typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
 
 

@@ -15,7 +15,7 @@ def report(
     out: Annotated[str, typer.Option(metavar="FILE", help="Page to write, such as report.html; - is stdout.")],
     settings: SettingTexts = None,
     certify: Annotated[
-        bool, typer.Option("--certify", help="Prove the optimum too, and show the proof's way.")
+        bool, typer.Option("--certify", help="Prove the optimum too, and show its bound over time.")
     ] = False,
     starts: Starts = None,
     seed: Seed = None,

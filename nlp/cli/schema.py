@@ -8,7 +8,7 @@ import typer
 
 
 def schema(
-    result: Annotated[bool, typer.Option("--result", help="Print that of results, which --json writes.")] = False,
+    result: Annotated[bool, typer.Option("--result", help="Print the schema of results, which --json writes.")] = False,
 ) -> None:
     """Print the JSON Schema of case files.
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 def sweep(
     case: CaseName,
     out: Annotated[
-        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a stopped run goes on.")
+        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a stopped run is resumed.")
     ],
     over: Annotated[
         list[str] | None,
@@ -46,16 +46,15 @@ def sweep(
     seed: Seed = None,
     jobs: Annotated[int | None, jobs_option("Threads, or processes of Ipopt.")] = None,
     engine: Annotated[
-        str | None, typer.Option("--engine", metavar="WORD", help="compiled or ipopt; compiled where that covers it.")
+        str | None,
+        typer.Option("--engine", metavar="WORD", help="compiled or ipopt; chosen by the case if left out."),
     ] = None,
     dask: Annotated[
         str | None,
         typer.Option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://10.0.0.1:8786."),
     ] = None,
     certified: Annotated[bool, typer.Option("--certify", help="Prove the optimum at each point too.")] = False,
-    _time: Annotated[
-        float | None, time_option("Seconds for the whole command; the same one then goes on where it was.")
-    ] = None,
+    _time: Annotated[float | None, time_option("Seconds for the whole command; the same command resumes it.")] = None,
     json_file: JsonFile = None,
     html: PageFile = None,
     plot: Annotated[

@@ -18,7 +18,7 @@ def verify_proof(
         str, typer.Argument(metavar="PROOF", help="A proof that certify --proof or workspace --proof wrote.")
     ],
     case: Annotated[
-        str | None, typer.Argument(metavar="[CASE]", help="The case that it must be for; else the one it carries.")
+        str | None, typer.Argument(metavar="[CASE]", help="The case to be proved; that in the proof if left out.")
     ] = None,
     settings: SettingTexts = None,
     of: ResultFile = None,
@@ -28,9 +28,9 @@ def verify_proof(
     all_assemblies: AllAssemblies = False,
     leg_error: LegError = 0.0,
 ) -> None:
-    """Check a proof anew, with nothing of what made it.
+    """Check a proof with independent code.
 
-    What it is about comes from the case and from the options, which are those of the command that wrote it.
+    The claims come from the case and from the options, which are those of the command that wrote the proof.
     """
     from .. import __version__
     from ..errors import InputError

@@ -39,7 +39,7 @@ def workspace(
     of_quantity: Annotated[
         list[str] | None, typer.Option("--of-quantity", metavar="NAME", help="Bound this measure of the robot too.")
     ] = None,
-    gap: Annotated[float, number_option("--gap", "PART", "Part of a value that its bound may be off by.")] = 1e-3,
+    gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a bound.")] = 1e-3,
     time: Time = None,
     leg_error: LegError = 0.0,
     scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,

@@ -112,7 +112,7 @@ def _no_answer(entry: Entry) -> str:
     if any(name.split(" at ")[0] in closure for name in names):
         few = entry.freedoms is not None and entry.freedoms < 6
         reason = f": its platform has {entry.freedoms} freedoms" if few else ""
-        return f"No answer ({status}): its joints cannot be put together at the poses of the case{reason}."
+        return f"No answer ({status}): its joints cannot be assembled at the poses of the case{reason}."
     keys = ", ".join(f"limits.{each.key}" for each in own.relaxation) or ", ".join(names[:3])
     return f"No answer ({status}): no design within the ranges keeps {keys or 'the limits'}."
 

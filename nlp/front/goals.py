@@ -209,11 +209,11 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
     if not found:
         side = int(goal.sense is Sense.MIN)
         keys = sorted({item.constraint.keys[side] for item in layout.constraints} - {""})
-        fault = "is no limit of the case that a front can move in this sense"
+        fault = "is no limit of the case that can be a goal in this sense"
         raise InputError(f"--goals {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
     reading = found[0].constraint.reading
     if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
-        raise InputError(f"--goals {goal.label}: is a limit on an estimate, which a front cannot move")
+        raise InputError(f"--goals {goal.label}: is kept by a smooth estimate, and so cannot be a goal")
     if goal.sense is Sense.MIN:
         least, most = reading.above, min(reading.from_value(item.upper) for item in found)
     else:

@@ -153,7 +153,7 @@ def _certify(
         except InputError as error:
             raise OptionError(str(error)) from None
     if several and with_proof and case.method is Method.AVERAGE:
-        raise OptionError("proof: a case whose tasks are averaged has no one program to prove something of")
+        raise OptionError("proof: averaged tasks have no single program whose optimum could be proved")
     nlps = formulate_each(case) if given is None else [outcome.own.nlp for outcome in given.outcomes]
     with_mode = not all_assemblies and has_modes(case.model)
     if given is None and nlps[0].n:

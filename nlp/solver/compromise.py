@@ -92,7 +92,7 @@ def combine(
     combined: ProgramSolution | None = None
     if not all(solution.status.is_answer for solution in own):
         x, status, value = own[0].x, next(s.status for s in own if not s.status.is_answer), None
-        notices.append("a task has no optimum by itself, so there is nothing to bring together")
+        notices.append("a task has no optimum by itself, so that the tasks cannot be combined")
     elif case.method is Method.AVERAGE:
         x, status, value = _average(nlps[0], points, weights), Status.AVERAGED, None
     else:

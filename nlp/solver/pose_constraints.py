@@ -46,7 +46,7 @@ _DETERMINANT = 1e-2
 _SQUARED, _MORE, _MOST = 1e-4, 4.0, 1e-2
 #: Steps from the middle of the workspace to a pose, along which closed loops are followed.
 _WAY = 16
-#: Half ranges by which a number of the pose that the robot has no choice of may leave its range in a search.
+#: Half ranges by which a dependent number of the pose may leave its range in a search.
 _BEYOND = 0.5
 #: Steps of Newton's method for the further variables, and largest residual of closed loops.
 _STEPS, _CLOSED = 12, 1e-9

@@ -105,7 +105,7 @@ def solve_programs(
         return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
 
     if len(nlps) > 1 and nlps[0].is_fixed:
-        raise CaseError("robot", "has nothing free, so there is nothing to bring together", source=case.source)
+        raise CaseError("robot", "has nothing free, so that several tasks cannot be combined", source=case.source)
     own = [solve_one(task.name, nlp) for nlp, task in zip(nlps, case.tasks, strict=True)]
     if len(nlps) > 1:
         pairs = [place for solution in own for place in solution.nlp.pairs]

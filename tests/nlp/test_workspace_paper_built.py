@@ -468,7 +468,7 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     design, machine = claim(given, "regular").sides
     assert design == (*machine[:6], *[0.0] * 36)
     for sides, fault in (
-        ((design, design), "not opposite signs"),
+        ((design, design), "not have opposite signs"),
         ((design, (*machine[:6], *(2.0 * part for part in machine[6:]))), "more than the tolerance"),
         ((design, (*[9.0] * 6, *machine[6:])), "not one of the workspace"),
         ((design, machine[:-3]), "no two poses"),

@@ -113,7 +113,7 @@ class _Files:
         name = element.get("file", "")
         if not name:
             raise InputError(f"{chain[-1]}: an include names no file")
-        # MuJoCo looks beside the main file; models that are put together by hand mean the file that includes.
+        # MuJoCo looks beside the main file; models that are assembled by hand mean the file that includes.
         places = [self.main.parent / name, chain[-1].parent / name]
         path = next((each for each in places if each.is_file()), places[0])
         if any(path.resolve() == each.resolve() for each in chain):

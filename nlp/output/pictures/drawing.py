@@ -179,7 +179,7 @@ def drawing_of_model(model: Model) -> Drawing:
     # A motion of zero length closes the loops.
     home = linkage.posture_after(guess, np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
     if home is None or not np.isfinite(home.points).all():
-        raise EvaluationError(f"{model.name}: the robot cannot be put together at its typical values")
+        raise EvaluationError(f"{model.name}: the robot cannot be assembled at its typical values")
     return replace(_drawing_without_task(None, model, linkage, home), headline=headline)
 
 

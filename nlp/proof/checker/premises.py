@@ -75,7 +75,7 @@ def _program(case: Case, statement: Statement) -> Nlp:
         return replace(nlp, sense=Sense.MIN) if statement.is_minimum else nlp
     weights = scaled_weights(case)
     if case.method is Method.AVERAGE:
-        raise InputError("a case whose tasks are averaged has no one program to prove something of")
+        raise InputError("averaged tasks have no single program whose optimum could be proved")
     if case.method is Method.WEIGHTED_SUM:
         return formulate_weighted(case, weights)
     # The level's size is for local solvers alone: the bounded functions do not depend on it.

@@ -63,7 +63,7 @@ def built_model(model: Model, *, extended: bool = False) -> BuiltModel:
         extended: whether closed forms have values out of reach too.
 
     Raises:
-        RobotError: its joint centres are not known, or it cannot be put together with errors.
+        RobotError: its joint centres are not known, or it cannot be assembled with errors.
     """
     displaced = _displaced(model)
     closed = closed_form(displaced.model, extended=extended)
@@ -91,7 +91,7 @@ def _displaced(model: Model) -> DisplacedRobot:
     try:
         return displaced_robot(model)
     except RobotError as error:
-        raise RobotError("", f"the robot cannot be put together with errors of its joint centres: {error}") from None
+        raise RobotError("", f"the robot cannot be assembled with errors of its joint centres: {error}") from None
 
 
 class PoseCoordinates(NamedTuple):

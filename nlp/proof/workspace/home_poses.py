@@ -34,7 +34,7 @@ from .robot.pose_box import PoseBox, pose_coordinates
 from .verdict import Outcome
 
 #: Reasons for a claim that poses of other assemblies leave open.
-_ELSEWHERE = "poses beyond the limit are known in other assemblies of the joints than home's alone"
+_ELSEWHERE = "poses beyond the limit are known only in other assemblies of the joints than home's"
 _WIDER = "the bound holds in every assembly of the joints, and the value reached is one of home's"
 #: Part of its size by which a value in home's assembly differs from that of the same assembly in a search.
 _SAME = 1e-6

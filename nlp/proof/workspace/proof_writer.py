@@ -36,7 +36,7 @@ _FOLDED = 1e-12
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
 #: Reason of claims about machines within a tolerance that are not known.
-_AS_BUILT = "the robot cannot be put together with errors of its joint centres"
+_AS_BUILT = "the robot cannot be assembled with errors of its joint centres"
 #: Reason of numbers of machines whose coordinates follow from others, or that have kinks.
 _BY_MACHINES = "it is proved by a search of boxes for all machines together, which has no proof on paper"
 #: Reason of claims of kinds that the checker does not know.

@@ -111,7 +111,7 @@ def start_of(robot: PosedRobot) -> FloatArray:
         (found,) = centre if is_closed else points.closed(centre, moving, steps=_FROM_HOME, zero=_ZERO)
         if is_home(robot, found):
             return np.asarray(found)
-    raise ProofError("no closed loops are found in the middle of the workspace, in the assembly of home")
+    raise ProofError("the loops could not be closed in the assembly of home in the middle of the workspace")
 
 
 def is_home(robot: PosedRobot, z: FloatArray) -> bool:

@@ -157,7 +157,7 @@ class RankClaim:
         """
         # The matrix is J itself, with rows that are neither normalised nor zero, over poses without loops.
         if self._shape != (6, 6) or self._freedoms or self._assembly.dependent:
-            raise ProofError("a singular pose has a proof for robots with six rows, without loops, alone")
+            raise ProofError("only robots with six rows and without loops have proofs of singular poses")
         points = [np.array(each, dtype=float) for each in sides]
         if len(points) != 2 or any(y.shape != (COORDINATES + self._errors,) for y in points):
             raise ProofError("the claim has no two poses")
@@ -168,7 +168,7 @@ class RankClaim:
                 raise ProofError("a joint centre of the machine is off by more than the tolerance")
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
-            raise ProofError("the determinant has not opposite signs at the two poses")
+            raise ProofError("the determinants at the two poses do not have opposite signs")
         for count in _PARTS:
             way = points[0] + np.linspace(0, 1, count + 1)[:, None] * (points[1] - points[0])
             way[[0, -1]] = points

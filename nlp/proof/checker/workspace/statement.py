@@ -57,7 +57,7 @@ class Machines:
         symbols: the machines as symbols of one pose.
 
     Raises:
-        RobotError: the robot cannot be put together with errors of its joint centres.
+        RobotError: the robot cannot be assembled with errors of its joint centres.
     """
 
     def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
@@ -108,7 +108,7 @@ class RobotClaims:
         reaches: claims that limbs reach every pose.
         numbers_at: assemblies that its numbers are about, in words; empty for a robot without unknowns.
         machines: every machine within the tolerance, in whose symbols the numbers and ``reaches`` are then; None where
-            the design is meant, or machines cannot be put together.
+            the design is meant, or machines cannot be assembled.
     """
 
     legs: Legs | None

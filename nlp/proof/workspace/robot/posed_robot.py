@@ -161,7 +161,7 @@ def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
     middle = np.concatenate([(0.5 * (box.lower + box.upper))[list(posed.free)], np.zeros(len(loops.size) - count)])
     start = closed_from_home(loops, middle, count)
     if start is None:
-        raise NotJudgedError("the loops are not found closed, in the assembly of home, in the middle of the workspace")
+        raise NotJudgedError("the loops could not be closed in the assembly of home in the middle of the workspace")
     needed = _needed(loops, start, count)
     loops = loops.some(needed)
     dependent = _dependent(loops, start, count)
@@ -239,7 +239,7 @@ def _check_freedoms(family: Problem, whole: PosedModel) -> None:
         every, *screws = (np.array(each) for each in function.call([ca.DM(found)]))
         if float(np.abs(every).max(initial=0.0)) > _CLOSED:
             fault = "with errors of joint centres the robot does not have the poses of the workspace exactly"
-            raise NotJudgedError(f"{fault}: state ranges for the numbers of the pose that it has no choice of")
+            raise NotJudgedError(f"{fault}: state ranges for its dependent numbers of the pose")
         if any(_rank_of(values) != member.rank for member, values in zip(members, screws, strict=True)):
             raise NotJudgedError("errors of joint centres take freedoms from the robot: its limbs change")
 
