@@ -36,7 +36,7 @@ class DimensionTable(Table):
     """A dimension that a case fixes or frees."""
 
     typical: FiniteFloat = Field(description="a sensible value; degrees for an angle")
-    kind: Literal["length", "angle", "number"] = Field(default="length", description="what it measures")
+    kind: Literal["length", "angle", "number"] = Field(default="length", description="kind of number")
     description: str = Field(default="", description="a few words")
 
 

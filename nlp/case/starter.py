@@ -76,7 +76,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         f"point = [0, 0, {z:g}]".ljust(30) + "# any point on it",
         "pitch = 2                     # translation per radian; 0: a rotation; inf: a translation along the axis",
         "",
-        "# [limits]                    # what can be built; see the documentation for all of them",
+        "# [limits]                    # of a buildable design; see the documentation for all",
         *(
             [
                 f"# leg_length = {{ min = {0.5 * z:g}, max = {1.5 * z:g} }}",

@@ -118,7 +118,7 @@ def jobs_option(words: str) -> Any:  # noqa: ANN401 - as above
 
 Starts = Annotated[int | None, starts_option("Starting points instead of the case's.")]
 Seed = Annotated[int | None, whole_option("--seed", "Seed instead of the case's.", 0)]
-Jobs = Annotated[int | None, jobs_option("Threads; what a search finds does not depend on them.")]
+Jobs = Annotated[int | None, jobs_option("Threads; results do not depend on them.")]
 
 
 def _begin(context: typer.Context, seconds: float | None) -> float | None:

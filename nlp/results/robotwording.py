@@ -14,7 +14,7 @@ from .text import Line, TextTable, Tone
 
 def models_table(models: Iterable[tuple[str, str]]) -> TextTable:
     """Return names and descriptions of robots."""
-    return TextTable(("robot", "what it is"), tuple(models))
+    return TextTable(("robot", "description"), tuple(models))
 
 
 def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) -> Iterator[Line | TextTable]:
@@ -37,7 +37,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     if model is None:
         return
     yield TextTable(
-        ("parameter", "measures", "allowed (angles in deg)", "what it is"),
+        ("parameter", "measures", "allowed (angles in deg)", "meaning"),
         tuple(
             (", ".join(item.components), item.dimension.value, _domain(item), item.description)
             for item in model.parameters
@@ -49,7 +49,7 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     yield TextTable(("row", "limb", "wrench"), tuple(rows))
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
-        yield TextTable(("quantity", "measures", "what it is"), tuple(rows))
+        yield TextTable(("quantity", "measures", "meaning"), tuple(rows))
     for remark in model.remarks:
         yield Line(remark, label="note")
 

@@ -42,7 +42,7 @@ def _headline_of(found: Solution, outcome: TaskOutcome) -> str:
     if found.combination is None:
         return _headline(outcome)
     if not found.all_solved:
-        return f"{found.status.value}: this is not what was asked for"
+        return f"{found.status.value}: this is no answer"
     method, count = found.combination.method.value, len(found.outcomes)
     return f"{outcome.task.name}: F = {outcome.F:.7g} {_unit(outcome)}, {method} of {count} tasks"
 

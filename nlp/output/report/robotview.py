@@ -64,7 +64,7 @@ def robot_section(report: Report) -> Markup:
     first = views[0]
     head: list[Markup] = []
     if not report.is_answer:
-        head.append(tag("p", "This is what was reached, and not an optimum.", class_="warning"))
+        head.append(tag("p", "This is the point reached, and not an optimum.", class_="warning"))
     if len(report.parts) > 1:
         options = [tag("option", part.name, value=k) for k, part in enumerate(report.parts) if part.views]
         head.append(

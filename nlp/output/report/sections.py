@@ -136,7 +136,7 @@ def published_section(report: Report) -> Markup:
     """Return the published numbers beside the computed ones."""
     if report.check is None:
         return Markup("")
-    caption = "What the literature prints beside what is computed here"
+    caption = "Published numbers beside the computed ones"
     return html_table(published_table(report.check), caption, id="compared")
 
 
@@ -168,7 +168,7 @@ def answer(report: Report) -> Markup:
         tasks = f"{len(report.parts)} tasks, combined by {combined.method.value}"
         lines = [f"{tasks}: {result.status.value}{value}"]
         if not report.is_answer:
-            lines.append("This is no answer: what was reached is shown below.")
+            lines.append("This is no answer: the point reached is shown below.")
     kind = "answer" if report.is_answer else "answer none"
     robot = report.result.robot
     if report.is_answer and is_unasked_singularity(robot, report.case):
@@ -277,7 +277,7 @@ def _limits(report: Report) -> Markup:
     limits, margins = report.result.limits, report.result.margins
     if not limits:
         return Markup("")
-    caption = "How near the robot comes to each limit, and what the limit costs"
+    caption = "Margin and cost of each limit"
     proof = report.result.workspace if isinstance(report.result, SolveResult) else None
     held = limits_title(report.case, proof)
     caption += f": {held}" if held else ""

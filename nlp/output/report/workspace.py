@@ -126,7 +126,7 @@ def _slices(report: WorkspaceReport) -> Markup:
         return Markup("")
     words = (
         "Two coordinates vary in each slice, three times as wide as the workspace; the others stay at its middle. "
-        "A box is coloured by what is proved for all of its poses."
+        "The colour of a box is proved for all of its poses."
     )
     if report.case.joint_centre_tolerance:
         words += " The slices are those of the design itself, without its tolerance."
