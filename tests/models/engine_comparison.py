@@ -15,8 +15,7 @@ from robot_gallery import CHI, LENGTH
 from screwsynth.models import Model, Substitution, axis_angle_from_matrix, constraint_rows, robot
 from screwsynth.models.mechanism import Mechanism, mechanism_of, wrenches_of
 from screwsynth.models.mechanism.singularities import closed_configurations
-from screwsynth.nlp import Case, Nlp, Task, evaluate, formulate
-from screwsynth.nlp.case.pose import Rotation
+from screwsynth.nlp import Case, Nlp, Rotation, Task, evaluate, formulate
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.paths import velocities_at
 

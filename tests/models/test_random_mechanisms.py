@@ -12,8 +12,7 @@ from casadi import SX
 from engine_comparison import Differences, compare
 from random_mechanisms import Array, Builder, random_mechanism, unit
 
-from screwsynth.models import GenericRanks, robot
-from screwsynth.models.joints import RobotError
+from screwsynth.models import GenericRanks, RobotError, robot
 from screwsynth.models.joints.chain import Joint
 from screwsynth.models.joints.motion import AxisKind, JointAxis
 

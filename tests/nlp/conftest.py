@@ -20,9 +20,8 @@ import pytest
 from builders import Run
 from generated import COMPILERS, STRICT
 
-from screwsynth.nlp import Case, Nlp, load_case
+from screwsynth.nlp import Case, Nlp, generate_c, load_case
 from screwsynth.nlp.cli.main import run as command_line
-from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.program.sampling import starting_points
 

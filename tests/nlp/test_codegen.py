@@ -14,9 +14,7 @@ import numpy as np
 import pytest
 from generated import COMPILERS, STRICT, assert_only_mathematics_is_needed, made, needs_compiler, run, written
 
-from screwsynth.nlp import formulate, load_case, shipped_cases
-from screwsynth.nlp.case.task import Method
-from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp import Method, formulate, generate_c, load_case, shipped_cases
 from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.embedding.subject import find_subject
 

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 from builders import Run, case_from, refusal_of
 
-from screwsynth.nlp import Case, Limits, Nlp, RateShare, formulate, load_case, solve
-from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp import Case, CaseError, Limits, Nlp, RateShare, formulate, generate_c, load_case, solve
 from screwsynth.nlp.embedding.loops import find_loops
 from screwsynth.nlp.embedding.subject import find_subject
-from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.program.sampling import starting_points
 
 Embedded = Any

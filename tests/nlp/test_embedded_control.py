@@ -14,8 +14,7 @@ import pytest
 from builders import case_from, turn_about
 from generated import BAD_INPUT, BUDGET, COMPILERS, INFEASIBLE, OK, written
 
-from screwsynth.nlp import Case, Nlp, formulate, load_case
-from screwsynth.nlp.embedding.codegen import generate_c
+from screwsynth.nlp import Case, Nlp, formulate, generate_c, load_case
 from screwsynth.nlp.program.sampling import starting_points
 
 FEASIBLE = 1e-9

@@ -13,8 +13,7 @@ from numpy_engine.first_order import Enclosures
 from numpy_engine.intervals import midpoints
 from random_graphs import random_boxes, random_function
 
-from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp import UncoveredError, formulate, load_case
 from screwsynth.nlp.proof.boxes.engine import search_tape
 from screwsynth.nlp.proof.enclosure.forms import Encloser
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape, compile_tape

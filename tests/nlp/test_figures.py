@@ -17,8 +17,7 @@ from measures import exponential
 
 from screwsynth.models import Body, Link, Model, Point, PoseSymbols, Scene, force_along, model_names
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import InputError, Solution, Task, evaluate, load_case, plot, result_of, shipped_cases, solve
-from screwsynth.nlp.case.case import Case
+from screwsynth.nlp import Case, InputError, Solution, Task, evaluate, load_case, plot, result_of, shipped_cases, solve
 from screwsynth.nlp.case.robots import build_model, model_options
 from screwsynth.nlp.output.pictures import fonts
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model

@@ -9,7 +9,7 @@ from builders import case_from
 from typer.testing import CliRunner
 
 from screwsynth.models import Model, robot_function
-from screwsynth.nlp import Case, Free, Rotation, Task, formulate, json_data, result_of, solve
+from screwsynth.nlp import Case, Free, Rotation, Status, Task, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.assembly import assembly_over_poses
@@ -17,7 +17,6 @@ from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.evidence.workingmode import turned_over_poses
 from screwsynth.nlp.results.wording import starts_lines
-from screwsynth.nlp.solver.status import Status
 
 TASK = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
 

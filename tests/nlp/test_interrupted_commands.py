@@ -15,10 +15,8 @@ import pytest
 import reachy
 
 import screwsynth.nlp
-from screwsynth.nlp import interruption
-from screwsynth.nlp.case.reader import case_from_tables
+from screwsynth.nlp import case_from_tables, interruption, pareto
 from screwsynth.nlp.cli.app import SUMMARIES
-from screwsynth.nlp.front.front import pareto
 
 Run = Callable[..., tuple[int, str, str]]
 ROOT = str(Path(screwsynth.nlp.__file__).parent)

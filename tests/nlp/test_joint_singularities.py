@@ -9,12 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from screwsynth.models import Dimension, Model, robot, robot_function
-from screwsynth.nlp import Case, Free, Task, evaluate, formulate, json_data, result_of, solve
+from screwsynth.nlp import Case, Free, PointKind, Status, Task, evaluate, formulate, json_data, result_of, solve
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.mobility import mobility_of
-from screwsynth.nlp.evidence.optimality import PointKind
 from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists, is_passive_singular
-from screwsynth.nlp.solver.status import Status
 
 TURN = [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)]
 LEG = [

@@ -11,7 +11,7 @@ from limb_cases import machine, poses, separated
 from numpy_engine.bounding import NumpyEngine
 from numpy_engine.limb_models import NumpyLimbEngine
 
-from screwsynth.nlp import Case, formulate, load_case, solve
+from screwsynth.nlp import Case, CertificateStatus, certify_program, formulate, load_case, solve
 from screwsynth.nlp.proof.boxes.engine import Engine
 from screwsynth.nlp.proof.boxes.incumbent import Incumbent
 from screwsynth.nlp.proof.boxes.limbs import shared as sharedsearch
@@ -21,8 +21,6 @@ from screwsynth.nlp.proof.boxes.limbs.shared import LeftOwn
 from screwsynth.nlp.proof.boxes.search import State
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
-from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
-from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim

@@ -15,12 +15,10 @@ import pytest
 from builders import Array, Run, case_from, saved
 from measures import leg_measures, placed_joints
 
-from screwsynth.nlp import Case, Solution, Status, formulate, json_data, result_of, solve
-from screwsynth.nlp.case.settings import Search
+from screwsynth.nlp import Case, Search, Solution, Status, formulate, json_data, result_of, solve, solve_program
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.evidence.tolerance import BuiltRobot
 from screwsynth.nlp.solver.compromise import solution_of_one_task
-from screwsynth.nlp.solver.multistart import solve_program
 
 TABLES = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))
 

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from builders import Array, case_from
 
-from screwsynth.nlp import Case, Solution, Status, certify, formulate, json_data, result_of, solve
+from screwsynth.nlp import Case, Solution, Status, certify, examine, formulate, json_data, result_of, solve
 from screwsynth.nlp.evidence.kkt import linearise
-from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.program import limits as program_limits
 from screwsynth.nlp.program.pairs import with_all_pairs, with_pairs_at
 from screwsynth.nlp.proof.statement.standard_form import standard_form

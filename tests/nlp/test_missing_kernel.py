@@ -8,12 +8,9 @@ from pathlib import Path
 import pytest
 from builders import Run, refusal_of
 
-from screwsynth.nlp import InputError, certify, formulate, load_case
+from screwsynth.nlp import InputError, certify, certify_program, formulate, judge_workspace, largest_scale, load_case
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.proof.boxes.engine import Engine
-from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
-from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.solver.certified import proof_of
 

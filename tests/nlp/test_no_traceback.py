@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 from builders import Run, output_of, refusal_of, saved
 
-from screwsynth.models import model_names, robot_function, stewart_gough
-from screwsynth.models.catalog import AmbiguousModelError
+from screwsynth.models import AmbiguousModelError, model_names, robot_function, stewart_gough
 from screwsynth.nlp import Case, CaseError, Free, LegLength, Limits, Rotation, Search, Task, build_model, load_case
 from screwsynth.nlp.case.source import find_case
 

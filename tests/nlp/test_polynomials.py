@@ -9,8 +9,7 @@ import pytest
 from random_graphs import N, random_function
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import Case, Free, Rotation, Task, formulate, load_case
-from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp import Case, Free, Rotation, Task, UncoveredError, formulate, load_case
 from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.polymodels import forms_of, polynomial_sum, reaching_part

@@ -22,9 +22,7 @@ from numpy_engine.rank_rule import NumpyRankTest
 
 from screwsynth.models import FloatArray, stewart_gough
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Task
-from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace, build_model
 from screwsynth.nlp.proof.enclosure.forms import Encloser, Forms
 from screwsynth.nlp.proof.statement.tolerance import built_model
 from screwsynth.nlp.proof.workspace.ranks import rank_rule
@@ -35,7 +33,6 @@ from screwsynth.nlp.proof.workspace.ranks.singular_pose import DeterminantSigns,
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_model import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 FOLDER = Path(__file__).parents[2] / "nlp" / "proof" / "enclosure"
 COMPILER = shutil.which("gcc") or shutil.which("cc")

@@ -16,14 +16,11 @@ from typer.testing import CliRunner
 
 from screwsynth.models import Substitution
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Task
-from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.proof.enclosure.forms import ULP, Encloser, Forms
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.machine import legs_of
-from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import SingularValues
 from screwsynth.nlp.proof.workspace.ranks import loop_boxes
@@ -34,7 +31,6 @@ from screwsynth.nlp.proof.workspace.ranks.singular_pose import BY_NEWTON
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_model import RankMatrix
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 balls = pytest.importorskip("balls")
 

@@ -9,8 +9,7 @@ from numpy_engine.bounding import NumpyEngine
 from numpy_engine.intervals import midpoints
 from numpy_engine.second_order import Forms, enclose_second, monomials
 
-from screwsynth.nlp import formulate, load_case
-from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp import UncoveredError, formulate, load_case
 from screwsynth.nlp.proof.boxes.engine import Engine, Examination, Verdict, value_tape
 from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form

@@ -12,13 +12,11 @@ import numpy as np
 import pytest
 from builders import Run, refusal_of, rows_of, starter_tables
 
-from screwsynth.nlp import InputError, case_from_tables, load_case, load_result, solve
+from screwsynth.nlp import InputError, case_from_tables, examine, formulate, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
-from screwsynth.nlp.evidence.optimality import examine
 from screwsynth.nlp.output.sweeptable import table_points, write_table
-from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job

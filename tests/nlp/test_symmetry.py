@@ -10,11 +10,9 @@ import pytest
 from casadi import SX
 from limb_cases import machine
 
-from screwsynth.nlp import formulate, load_case
+from screwsynth.nlp import CertificateStatus, certify_program, formulate, load_case
 from screwsynth.nlp.proof.boxes.symmetry import grouped, halved, mirrors
 from screwsynth.nlp.proof.certificate import branch_and_bound
-from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
-from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.statement.limb_separation import separate
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 

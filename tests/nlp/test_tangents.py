@@ -13,10 +13,8 @@ from numpy_engine.intervals import midpoints
 from numpy_engine.second_order import Forms, enclose_second, monomials
 from numpy_engine.tangent_bounds import tangent_forms
 
-from screwsynth.nlp import Search, Sense, formulate, load_case, solve_program
+from screwsynth.nlp import CertificateStatus, Search, Sense, certify_program, formulate, load_case, solve_program
 from screwsynth.nlp.proof.boxes.engine import Engine, Verdict, value_tape
-from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
-from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.squared_quotients import tangent_rows
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form

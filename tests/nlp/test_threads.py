@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from limb_cases import poses
 
-from screwsynth.nlp import Case, formulate, load_case
+from screwsynth.nlp import Case, certify_program, formulate, load_case
 from screwsynth.nlp.proof.boxes.engine import Threads, pieces
 from screwsynth.nlp.proof.certificate import branch_and_bound
-from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 
 
 def test_pieces_cover_every_box_once_and_the_last_ones_are_small() -> None:

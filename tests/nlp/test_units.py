@@ -19,17 +19,15 @@ from numpy_engine.second_order import enclose_second
 
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED, gallery_names
-from screwsynth.nlp import Case, certify, json_data, pareto, result_of, solve
+from screwsynth.nlp import Case, CertificateStatus, certify, json_data, judge_workspace, pareto, result_of, solve
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.front.goals import program_of, read_goals
 from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
-from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
-from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.results.evaluation import evaluation_of
 from screwsynth.nlp.results.rounding import ordered, residual
 from screwsynth.nlp.results.summary import case_summary, evaluation_summary

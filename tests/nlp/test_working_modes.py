@@ -12,12 +12,11 @@ from builders import Run, case_from, output_of
 
 from screwsynth.models import robot, robot_function
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import Case, Free, Nlp, Rotation, Task, certify, formulate, solve
+from screwsynth.nlp import Case, CertificateStatus, Free, Nlp, Rotation, Task, certify, formulate, solve
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.evidence.workingmode import _about
-from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.statement.standard_form import Kind, is_in_home_mode, standard_form

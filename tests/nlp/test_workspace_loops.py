@@ -7,16 +7,13 @@ import numpy as np
 import pytest
 
 from screwsynth.models import FloatArray, robot
-from screwsynth.nlp import Case, Free, Task
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace, judge_workspace
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.statement.claims import REGULAR
-from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 HOME = np.array([0.0, 1.0])
 #: A motor, both ends of a coupler, the rocker's pivot, its elbow, and the platform's hinge.

@@ -11,10 +11,7 @@ import pytest
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Task
-from screwsynth.nlp.case.reader import case_from_tables
-from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp import Case, Free, Task, TurnKind, Turns, Workspace, build_model, case_from_tables, judge_workspace
 from screwsynth.nlp.proof.checker.proof_file import (
     Premises,
     Proof,
@@ -29,7 +26,6 @@ from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, pose_root, show_on_leaves
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
-from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
