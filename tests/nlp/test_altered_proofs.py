@@ -10,7 +10,6 @@ import copy
 import hashlib
 import json
 import re
-import tomllib
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,9 +17,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from builders import case_from
 from hexapods import hexapod_text
 
-from screwsynth.nlp import InputError, case_from_tables
+from screwsynth.nlp import InputError
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.proof.checker import proof_file
 from screwsynth.nlp.proof.checker.premises import fingerprint, program_of
@@ -277,7 +277,7 @@ LOSSES = re.compile(r"F being the largest of (\S+) \((\S+) - F\('one'\)\) and (\
 
 def least_loss(weight: float, best: float, other_weight: float, other_best: float) -> float:
     """The worst of two losses, the least of it on a grid of the box; F is summed over the rows of J."""
-    case = case_from_tables(tomllib.loads(KINDS["worst loss"].case), name="grid", source="grid")
+    case = case_from(KINDS["worst loss"].case, "grid")
     nlps = formulate_each(case)
     points = np.stack(np.meshgrid(*np.linspace(nlps[0].lower, nlps[0].upper, 21).T), axis=-1).reshape(-1, nlps[0].n)
     first, second = (np.array([nlp.evaluate(x).F for x in points]) for nlp in nlps)
@@ -377,7 +377,7 @@ def test_a_proof_is_no_proof_of_another_case(cli: Run, folder: Path, proof: str)
         if case == proof:
             continue
         own = checked(cli, folder, case, written(cli, folder, case))[1]
-        other = case_from_tables(tomllib.loads(KINDS[case].case), name="other", source="other")
+        other = case_from(KINDS[case].case, "other")
         statement = Statement(**{**content["premises"], "best": tuple(content["premises"]["best"])})
         own_graph = content["claims"][0]["graph"]
         graphs = [own_graph]
@@ -396,7 +396,7 @@ def test_nothing_rests_on_the_fingerprint(cli: Run, folder: Path) -> None:
     proof = folder / "other.json"
     proof.write_text(json.dumps(content), encoding="utf-8")
     assert "other expressions" in cli("verify-proof", str(proof), str(folder / "other.toml"))[2]
-    nlp = program_of(case_from_tables(tomllib.loads(other), name="other", source="other"), Statement())
+    nlp = program_of(case_from(other, "other"), Statement())
     best = max(nlp.evaluate(x).F for x in np.random.default_rng(0).uniform(nlp.lower, nlp.upper, (50, nlp.n)))
     for bound, status in ((content["claims"][0]["bound"], 1), (0.99 * best, 1), (2 * best, 0)):
         claim = {**content["claims"][0], "graph": fingerprint(nlp), "bound": bound}

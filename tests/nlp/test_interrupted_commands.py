@@ -2,7 +2,6 @@
 
 import json
 import sys
-import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -13,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import reachy
+from builders import case_from
 
 import screwsynth.nlp
-from screwsynth.nlp import case_from_tables, interruption, pareto
+from screwsynth.nlp import interruption, pareto
 from screwsynth.nlp.cli.app import SUMMARIES
 
 Run = Callable[..., tuple[int, str, str]]
@@ -201,7 +201,7 @@ def test_the_commands_are_those_of_help() -> None:
 def test_an_interrupted_front_has_no_gap(monkeypatch: pytest.MonkeyPatch) -> None:
     requested = Event()
     monkeypatch.setattr(interruption, "_requested", requested)
-    case = case_from_tables(tomllib.loads(SMALL), name="small", source="small.toml")
+    case = case_from(SMALL, "small")
     found = pareto(case, ["max F", "min limits.leg_length.max"], points=6, progress=lambda *_: requested.set())
     assert len(found.points) == 2
     assert found.gaps == ()

@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 import pytest
+from builders import case_from
 from hexapods import smallest
 from limb_cases import machine, poses
 
@@ -24,7 +24,6 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Nlp, Task, load_case, solve, sweep
 from screwsynth.nlp.case.limits.limit import Limits
 from screwsynth.nlp.case.pose import Free
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import STOPPED, is_requested, one_call
@@ -166,7 +165,7 @@ pitch = 0.1
 [limits]
 {limits}
 """
-    case = case_from_tables(tomllib.loads(text), name=name, source=f"{name}.toml")
+    case = case_from(text, name)
     size, is_planar, angle = max(abs(each) for each in home) or 1.0, name.startswith("planar"), math.radians(turn)
     half = (width * size, width * size, 0.0 if is_planar else width * size)
     place = tuple(Free(at - by, at + by) if by else at for at, by in zip(home, half, strict=True))
@@ -355,7 +354,7 @@ leg_length = {{ min = 20, max = {longest} }}
 [workspace]
 position = [{{ min = -2, max = 2 }}, {{ min = -2, max = 2 }}, {{ min = 28, max = 32 }}]
 """
-    return case_from_tables(tomllib.loads(text), name="octahedral", source="octahedral.toml")
+    return case_from(text, "octahedral")
 
 
 def test_a_judgement_keeps_what_is_proved_before_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:

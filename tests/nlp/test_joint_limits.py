@@ -30,7 +30,6 @@ from screwsynth.nlp import (
     Search,
     Status,
     Task,
-    case_from_tables,
     certify,
     evaluate,
     formulate,
@@ -361,7 +360,7 @@ def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) ->
     two = RPS.replace('type = "R", at', 'type = "R", name = "slide", at')
     with pytest.raises(CaseError, match=r"robot\.toml: limb 1, joints: has two joints with the name 'slide'"):
         load_case(saved_with_robot(tmp_path, two, RPS_CASE))
-    legs = case_from_tables(starter_tables(stewart_gough()), name="legs", source="legs.toml")
+    legs = case_from(starter_tables(stewart_gough()), "legs")
     for limit, key in ((JointMotion("1:1", max=1.0), "joint.1:1"), (LinkClearance(1.0), "link_clearance")):
         with pytest.raises(CaseError, match=rf"limits\.{key}: is nothing that 'stewart-gough' has; it has leg_length"):
             replace(legs, limits=Limits(limit))
@@ -371,7 +370,7 @@ def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) ->
 
 
 def test_rates_of_straight_legs_are_their_work_rates() -> None:
-    case = case_from_tables(starter_tables(stewart_gough()), name="legs", source="legs.toml")
+    case = case_from(starter_tables(stewart_gough()), "legs")
     nlp = formulate(replace(case, limits=Limits(ActuatorRate(2.0))))
     rows = [row.value for row in margins_of(nlp, nlp.start, optimal=False)]
     assert sorted(rows) == pytest.approx(sorted(np.abs(evaluate(nlp, nlp.start).rates)), rel=1e-12)

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
-from builders import starter_tables
+from builders import case_from, starter_tables
 
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import CaseError, LegLength, Limits, Status, case_from_tables, margins_of, solve
+from screwsynth.nlp import CaseError, LegLength, Limits, Status, margins_of, solve
 from screwsynth.nlp.case.limits.constraint import LENGTH, BoundedConstraint, between
 from screwsynth.nlp.case.limits.interval import IntervalLimit
 from screwsynth.nlp.case.limits.limit import PosedRobot
@@ -63,7 +63,7 @@ class Height(IntervalLimit):
 
 
 def test_a_limit_outside_of_the_registry_limits_a_case_made_in_python() -> None:
-    written = case_from_tables(starter_tables(stewart_gough()), name="high", source="high.toml")
+    written = case_from(starter_tables(stewart_gough()), "high")
     case = replace(written, limits=Limits(Height(min=36.5), LegLength(max=60.0)))
     assert [limit.name for limit in case.limits] == ["leg_length", "height"]
     solution = solve(case, starts=2)
@@ -83,7 +83,7 @@ from pathlib import Path
 
 import screwsynth.nlp
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import CaseError, Status, case_from_tables, formulate, json_data, result_of, solve
+from screwsynth.nlp import CaseError, Status, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.platform_height import PlatformHeight
 from screwsynth.nlp.case.wholeschema import WholeDocument
 from screwsynth.nlp.case.starter import starter_case
@@ -92,7 +92,7 @@ starter = tomllib.loads(starter_case(stewart_gough()))
 
 
 def case_with(**limits):
-    return case_from_tables({**starter, "limits": limits}, name="high", source="high.toml")
+    return case_from({**starter, "limits": limits}, "high")
 
 
 def refusal(**limits):

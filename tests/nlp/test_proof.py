@@ -14,8 +14,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from builders import case_from
 
-from screwsynth.nlp import Case, case_from_tables, load_case
+from screwsynth.nlp import Case, load_case
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint, is_same_program, program_of
@@ -52,7 +53,7 @@ def ball_case() -> Case:
     tables["pose"]["position"] = [0, 0, 30]
     tables["pose"]["rotation"]["angle"] = {"min": -5, "max": 5}
     del tables["expect"], tables["published"]
-    return case_from_tables(tables, name="ball", source="ball")
+    return case_from(tables, "ball")
 
 
 @pytest.fixture(scope="module")
@@ -341,7 +342,7 @@ def test_a_proof_by_limbs_holds_and_its_bounds_must_add_up() -> None:
         "pose": {"position": [0, 0, 15]},
         "task": [{"name": "t", "sense": "max", "axis": [1, 2, 3], "point": [1, 0, 2], "pitch": 1}],
     }
-    case = case_from_tables(tables, name="two legs", source="two legs")
+    case = case_from(tables, "two legs")
     (proof,) = proof_of(certify(case, gap=1e-3, starts=2, with_proof=True), "").claims
     assert proof.tree[0] == Node.LIMBS
     assert proof.bound is not None
@@ -369,7 +370,7 @@ def test_leg_clearance_is_covered_and_its_proof_holds() -> None:
     tables["robot"]["parameters"].update({"x1": 26.5, "x2": 11.543, "x3": 4})
     tables["pose"]["position"] = [{"min": -6, "max": 6, "start": 0}, 0, 20]
     tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": {"min": -15, "max": 15}}
-    case = case_from_tables(tables, name="legs", source="legs")
+    case = case_from(tables, "legs")
     certified = certify(case, gap=1e-3, starts=4, with_proof=True)
     evidence = certified.solution.evidence
     assert evidence is not None

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, refusal_of, rows_of, starter_tables
+from builders import Run, case_from, refusal_of, rows_of, starter_tables
 
-from screwsynth.nlp import InputError, case_from_tables, examine, formulate, load_case, load_result, solve
+from screwsynth.nlp import InputError, examine, formulate, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
@@ -175,7 +175,7 @@ def test_rows_with_certificates_are_taken_up(tmp_path: Path) -> None:
 
 
 def test_joints_are_no_design() -> None:
-    case = case_from_tables(starter_tables("3-rps"), name="mine", source="mine")
+    case = case_from(starter_tables("3-rps"), "mine")
     found = run_in_python(case, {"task.pitch": (2,)}, starts=1)
     assert [name for name in found.design if name.startswith("q") and name[1:2].isdigit()] == []
     assert set(found.design) == {"rb", "p_x", "p_y", "p_z", "q_x", "q_y", "q_z"}

@@ -13,12 +13,13 @@ import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
+from builders import case_from
 from hexapods import HEXAPOD, bounds_of, case_of_legs, clearance, hexapod_text, smallest, subject_of, values_of
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, CaseError, Free, InputError, Limits, json_data, load_result, solve
-from screwsynth.nlp.case.reader import case_from_tables, load_case
+from screwsynth.nlp.case.reader import load_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.proof.enclosure.forms import Encloser
@@ -272,7 +273,7 @@ def test_limits_nearer_than_the_gap_are_decided(case: Case, away: float, outcome
     short, long = (of([each.reached for each in lengths if each.sense.value == of.__name__]) for of in (min, max))
     limits = f"min = {short * (1 - away)}, max = {long * (1 + away)}"
     near = tomllib.loads(TEXT.replace("min = 17, max = 44", limits))
-    judged = judge_workspace(case_from_tables(near, name="", source=""), with_objective=False).extremes
+    judged = judge_workspace(case_from(near, ""), with_objective=False).extremes
     worst = [each.outcome for each in judged if each.key[:4] == "leg_" and each.reached in (short, long)]
     assert set(worst) == {outcome}
     assert len(worst) > 1
@@ -367,7 +368,7 @@ def test_a_refuted_claim_is_seen_with_evaluate(machine: Path) -> None:
 def test_bad_workspaces_are_refused(table: dict[str, object], message: str) -> None:
     tables = tomllib.loads(TEXT) | {"workspace": table}
     with pytest.raises(CaseError) as refused:
-        case_from_tables(tables, name="bad", source="bad.toml")
+        case_from(tables, "bad")
     assert message in str(refused.value).replace(" = ", ": ") or message in str(refused.value)
 
 
@@ -375,7 +376,7 @@ def test_bad_workspaces_are_refused(table: dict[str, object], message: str) -> N
 def test_a_workspace_is_written_and_read_again(case: Case, kind: TurnKind) -> None:
     workspace = turned(kind, 25)
     written = replace(case, workspace=replace(workspace, turns=replace(workspace.turns, axis=(0.0, 0.0, 1.0))))
-    again = case_from_tables(tomllib.loads(written.to_toml()), name="again", source="")
+    again = case_from(written.to_toml(), "again")
     assert again.workspace == written.workspace
 
 
@@ -395,7 +396,7 @@ FREE = (
 
 
 def test_limits_over_a_workspace_end_with_a_proof() -> None:
-    case = case_from_tables(tomllib.loads(FREE), name="free", source="free.toml")
+    case = case_from(FREE, "free")
     solution = solve(case, starts=4, jobs=1)
     proof = solution.workspace
     assert proof is not None
@@ -439,11 +440,11 @@ def test_limits_over_a_workspace_end_with_a_proof() -> None:
 )
 def test_limits_over_a_workspace_need_one(old: str, new: str, message: str) -> None:
     with pytest.raises(CaseError) as refused:
-        solve(case_from_tables(tomllib.loads(FREE.replace(old, new)), name="free", source="free.toml"), starts=1)
+        solve(case_from(FREE.replace(old, new), "free"), starts=1)
     assert message in str(refused.value)
     without = FREE[: FREE.index("[workspace]")]
     with pytest.raises(CaseError, match=r"needs the table \[workspace\]"):
-        case_from_tables(tomllib.loads(without), name="free", source="free.toml")
+        case_from(without, "free")
 
 
 @pytest.mark.slow

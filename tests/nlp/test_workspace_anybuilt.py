@@ -15,11 +15,11 @@ import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
+from builders import case_from
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.errors import CaseError
@@ -79,7 +79,7 @@ COUNT, STEEP = 20_000, 256
 
 
 def case_of(name: str) -> Case:
-    return case_from_tables(tomllib.loads(ROBOTS[name] + HEAD + TURN), name=name, source=f"{name}.toml")
+    return case_from(ROBOTS[name] + HEAD + TURN, name)
 
 
 def machines(case: Case) -> Machines:
@@ -424,7 +424,7 @@ def test_ranks_and_numbers_of_machines_are_on_paper() -> None:
     for name, count in (("6-rus", 9), ("3-rps", 2)):
         text = ROBOTS[name] + HEAD.replace("1e-3", "1e-5").replace("0.05", "0.01").replace("1.08", "1.0999") + TURN
         text = text.replace("1.12", "1.1001").replace("5 }", "0.5 }")
-        case, record = case_from_tables(tomllib.loads(text), name=name, source=name), PaperRecord()
+        case, record = case_from(text, name), PaperRecord()
         judged = judge_workspace(case, gap=0.1, jobs=1, paper=record)
         proof = paper_of(judged, record, text)
         assert judged.is_proved
@@ -443,7 +443,7 @@ def test_a_limit_that_one_machine_violates_is_refuted_by_it() -> None:
     text = ROBOTS["3-rps"] + HEAD + TURN
     largest = 0.0694
     limits = f'[limits.joint]\n"1:2" = {{ max = {largest} }}\n'
-    case = case_from_tables(tomllib.loads(text + limits), name="3-rps", source="3-rps.toml")
+    case = case_from(text + limits, "3-rps")
     finer = judge_workspace(replace(case, joint_centre_tolerance=1e-6), with_objective=False)
     assert finer.is_proved
     judged = judge_workspace(case, quantities=["smallest_singular_value"], with_objective=False)
@@ -471,7 +471,7 @@ def test_singular_values_of_couples_have_the_characteristic_length(asked: str) -
     limit = f"{asked} = {{ {'max = 9' if asked[0] == 'c' else 'min = 0.1'}, length = 0.4 }}\n"
     exact = HEAD.replace("[tolerance]\njoint_centre = 1e-3\n", "")
     text = ROBOTS["three-upu"].replace("snu", "tsai") + limit + exact + TURN
-    case = case_from_tables(tomllib.loads(text), name="upu", source="upu.toml")
+    case = case_from(text, "upu")
     judged = judge_workspace(case, with_objective=False, gap=0.1)
     (found,) = (each for each in judged.extremes if each.name == asked)
     assert found.pose is not None
@@ -493,7 +493,7 @@ def test_a_machine_far_off_is_singular() -> None:
     )
     place = HEAD.replace("1.08", "0.78").replace("1.12", "0.82").replace("1e-3", "0.2")
     case, record = (
-        case_from_tables(tomllib.loads(text + place + TURN), name="6-ups", source="6-ups.toml"),
+        case_from(text + place + TURN, "6-ups"),
         PaperRecord(),
     )
     judged = judge_workspace(case, with_limits=False, paper=record)
@@ -531,7 +531,7 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
         .replace("1.1]", "0]")
     )
     tables = tomllib.loads(text + f"parameters = {{ {own} }}\n" + place + TURN)
-    judged = judge_workspace(case_from_tables(tables, name="spherical", source="spherical.toml"), with_objective=False)
+    judged = judge_workspace(case_from(tables, "spherical"), with_objective=False)
     assert judged.regularity.outcome is Outcome.OPEN
     assert "take freedoms" in judged.regularity.reason
     assert judged.extremes
@@ -542,18 +542,18 @@ def test_what_is_not_covered_is_open_with_the_reason() -> None:
     height = build_model("delta").home[2]
     place = HEAD.replace("{ min = 1.08, max = 1.12 }", f"{height}").replace("1.1]", f"{height}]")
     delta = tomllib.loads(f'[robot]\nmodel = "delta"\nparameters = {{ {values} }}\n' + place)
-    found = judge_workspace(case_from_tables(delta, name="delta", source="delta.toml"), with_limits=False).regularity
+    found = judge_workspace(case_from(delta, "delta"), with_limits=False).regularity
     assert found.outcome is Outcome.OPEN
     assert "does not have the poses" in found.reason
     del tables["workspace"]
     with pytest.raises(CaseError, match=r"tolerance.joint_centre: is not computed for 'spherical-3-rrr'"):
-        case_from_tables(tables, name="spherical", source="spherical.toml")
+        case_from(tables, "spherical")
 
 
 def test_clearance_and_strokes_of_three_legs_hold_for_every_machine() -> None:
     """The distance of two legs, and a stroke, against machines with random errors at random poses."""
     limits = "leg_clearance = { min = 0.01 }\nactuator = { stroke_max = 0.5 }\n"
-    case = case_from_tables(tomllib.loads(ROBOTS["three-upu"] + limits + HEAD + TURN), name="upu", source="upu.toml")
+    case = case_from(ROBOTS["three-upu"] + limits + HEAD + TURN, "upu")
     bounds = []
     for each in (case, replace(case, joint_centre_tolerance=None)):
         judged = judge_workspace(each, with_objective=False)

@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from builders import case_from
 from hexapods import bounds_of, clearance, hexapod_text, smallest, subject_of, values_of
 from typer.testing import CliRunner
 
@@ -19,7 +19,6 @@ from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Limits, load_case, load_result, solve
 from screwsynth.nlp.case.limits.joints import JointAngle
 from screwsynth.nlp.case.limits.legs import Actuator, LegLength
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
@@ -80,7 +79,7 @@ LENGTH = 11.5
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    return case_from_tables(tomllib.loads(TEXT), name="built", source="built.toml")
+    return case_from(TEXT, "built")
 
 
 def legs(case: Case) -> Legs:

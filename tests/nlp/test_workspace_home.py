@@ -1,17 +1,16 @@
 """One rule for refutations: a pose refutes a claim where ``evaluate`` shows the fault, with the joints as at home."""
 
 import math
-import tomllib
 
 import numpy as np
 import pytest
+from builders import case_from
 
 from screwsynth.models import Dimension
 from screwsynth.models.catalog import gallery_names
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case
 from screwsynth.nlp.case.pose import Rotation
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
@@ -78,7 +77,7 @@ def case_over(
         most = 100 * limit if quantity.dimension is Dimension.ANGLE else limit * size
         lines += ["[limits]", f"{quantity.name} = {{ min = {-most}, max = {most} }}"]
     lines += ["[workspace]", f"position = {position}", rotation]
-    return case_from_tables(tomllib.loads("\n".join(lines)), name="mine", source="mine")
+    return case_from("\n".join(lines), "mine")
 
 
 def about_home(name: str, part: float, degrees: float, limit: float = 0.0) -> Case:

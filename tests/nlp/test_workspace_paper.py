@@ -6,7 +6,6 @@ import json
 import math
 import subprocess
 import sys
-import tomllib
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import case_from
 from hexapods import clearance, hexapod_text, subject_of, values_of
 
 from screwsynth.models import FloatArray, hexapod, three_upu
 from screwsynth.nlp import Case, Free, Task
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.checker.fractions import tangent_ends
@@ -72,7 +71,7 @@ HEXAPOD = hexapod()
 
 
 def case_of(text: str = TEXT) -> Case:
-    return case_from_tables(tomllib.loads(text), name="machine", source="machine.toml")
+    return case_from(text, "machine")
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import json
 import math
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from builders import case_from
 from casadi import SX
 from hexapods import hexapod_text
 
@@ -18,7 +18,6 @@ import screwsynth.cases
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Limits, Task
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
@@ -94,7 +93,7 @@ ASKED = ("platform_joint_angle", "smallest_singular_value", "condition_number")
 
 
 def case_of(text: str = TEXT) -> Case:
-    return case_from_tables(tomllib.loads(text), name="machine", source="machine.toml")
+    return case_from(text, "machine")
 
 
 def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: Any) -> tuple[Judgement, Proof]:  # noqa: ANN401

@@ -1,17 +1,17 @@
 """Proofs on paper of robots that are not six straight legs: what the check accepts, and what it must not."""
 
 import math
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
+from builders import case_from
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Task, TurnKind, Turns, Workspace, build_model, case_from_tables, judge_workspace
+from screwsynth.nlp import Case, Free, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
 from screwsynth.nlp.proof.checker.proof_file import (
     Premises,
     Proof,
@@ -88,7 +88,7 @@ def one_motor(text: str) -> str:
 
 
 def reachy_case(text: str) -> Case:
-    return case_from_tables(tomllib.loads(text), name="head", source="head.toml")
+    return case_from(text, "head")
 
 
 @pytest.fixture(scope="module")

@@ -3,17 +3,16 @@
 import itertools
 import json
 import math
-import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import case_from
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Solution, load_case, pareto, solve
-from screwsynth.nlp.case.reader import case_from_tables
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
@@ -129,7 +128,7 @@ position = [0, 0, { min = 45, max = 55 }]
 
 
 def case_of(text: str, **values: str) -> Case:
-    return case_from_tables(tomllib.loads(text.format(**values)), name="mine", source="mine")
+    return case_from(text.format(**values), "mine")
 
 
 def number(case: Case, name: str) -> float:
@@ -288,7 +287,7 @@ def test_a_slice_is_drawn_where_no_loops_close_at_its_ends() -> None:
     text += "[pose]\nposition = [0, 0, 0]\n[[task]]\nsense = 'max'\naxis = [0, 0, 1]\npoint = [0, 0, 0]\npitch = 0.1\n"
     half = sum(lengths.values())
     text += f"[workspace]\nposition = [{{min = -{half}, max = {half}}}, {{min = -{half}, max = {half}}}, 0]\n"
-    (found,) = slices_of(case_from_tables(tomllib.loads(text), name="mine", source="mine"))
+    (found,) = slices_of(case_from(text, "mine"))
     assert {Region.UNKNOWN} <= set(found.regions)
 
 
@@ -301,7 +300,7 @@ def test_slices_need_two_numbers_that_the_robot_can_choose() -> None:
 def test_a_design_of_three_legs_keeps_its_strokes_over_the_workspace() -> None:
     text = THREE_UPU.replace("min = 45, max = 55", "min = 47, max = 53")
     text += f"[limits]\n{OVER}\nactuator = {{ stroke_max = 5.5 }}\n"
-    proof = proof_of(solve(case_from_tables(tomllib.loads(text), name="mine", source="mine")))
+    proof = proof_of(solve(case_from(text, "mine")))
     assert proof.is_proved
     # Without rotation the platform's joints stay above those of the base by the difference of the radii.
     stroke = np.diff(np.hypot(number(proof.judgement.case, "base_radius") - 25, [47, 53]))[0]
