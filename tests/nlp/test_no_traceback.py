@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import Run, output_of, refusal_of, saved
+from builders import Run, refusal_of, saved
 
-from screwsynth.models import AmbiguousModelError, model_names, robot_function, stewart_gough
-from screwsynth.nlp import Case, CaseError, Free, LegLength, Limits, Rotation, Search, Task, build_model, load_case
+from screwsynth.models import stewart_gough
+from screwsynth.nlp import Case, CaseError, Free, LegLength, Limits, Rotation, Search, Task, load_case
 from screwsynth.nlp.case.source import find_case
 
 TEXT = find_case("paper-4.1-helical").read_text(encoding="utf-8")
@@ -152,69 +152,6 @@ def test_what_is_a_number_in_python() -> None:
 
     for number in (np.float32(12), np.int64(12), np.array(12.0), 12):
         assert case_with(numbers={"x1": number}).parameters["x1"] == (12.0,)
-
-
-def package(folder: Path, name: str, entry_points: str, module: str) -> None:
-    info = folder / f"{name}-1.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1\n", encoding="utf-8")
-    (info / "entry_points.txt").write_text(entry_points, encoding="utf-8")
-    (folder / f"{name.replace('-', '_')}.py").write_text(module, encoding="utf-8")
-
-
-GOOD = """\
-import dataclasses
-from screwsynth.models import hexapod
-def robot():
-    return dataclasses.replace(hexapod(), name="NAME")
-"""
-
-
-def test_two_packages_with_one_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run) -> None:
-    for name in ("first-robots", "second-robots"):
-        points = f"[screwsynth.models]\nwalker = {name.replace('-', '_')}:robot\n"
-        package(tmp_path / name, name, points, GOOD.replace("NAME", "walker"))
-        monkeypatch.syspath_prepend(str(tmp_path / name))
-    assert "walker" in model_names()
-    with pytest.raises(AmbiguousModelError):
-        robot_function("walker")
-    with pytest.raises(CaseError, match="first-robots and second-robots"):
-        build_model("walker")
-    for arguments in (("models", "walker"), ("new", "walker")):
-        code, out, err = cli(*arguments)
-        assert (code, out, len(err.splitlines())) == (2, "", 1)
-        assert "first-robots and second-robots" in err
-    code, out, _ = cli("models")
-    assert code == 0
-    assert "first-robots" in " ".join(out.split())
-
-
-@pytest.mark.parametrize(
-    ("points", "module"),
-    [
-        ("[screwsynth.models]\nbroken = broken:robot\n", "raise SystemExit(3)"),
-        ("[screwsynth.models]\nbroken = broken:robot\n", "def robot(:"),
-        ("[screwsynth.models]\nbroken = broken:robot\n", "def robot(*, size: 'object()' = 1): raise SystemExit"),
-        ("[screwsynth.models]\nbroken = broken:robot\n", "def robot(): raise SystemExit"),
-        ("[screwsynth.models]\nbroken = no-such-thing:!\n", ""),
-        ("[screwsynth.models]\nbroken\n", ""),
-        ("[screwsynth.models\nbroken = broken:robot", ""),
-    ],
-)
-def test_a_broken_plug_in_beside_a_good_one(
-    points: str, module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run
-) -> None:
-    package(tmp_path / "broken", "broken", points, module)
-    package(tmp_path / "good", "good", "[screwsynth.models]\nwalker = good:robot\n", GOOD.replace("NAME", "walker"))
-    for name in ("broken", "good"):
-        monkeypatch.syspath_prepend(str(tmp_path / name))
-        monkeypatch.delitem(sys.modules, name, raising=False)
-    out = output_of(cli("models"))
-    assert "walker" in out
-    assert cli("models", "walker")[0] == 0
-    code, out, err = cli("models", "broken")
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
-    sys.modules.pop("good", None)
 
 
 def test_the_status_of_a_process_is_its_own(tmp_path: Path) -> None:

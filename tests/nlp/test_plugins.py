@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from builders import Run, edited, output_of, refusal_of, saved
 
-from screwsynth.models import model_names, robot_function
+from screwsynth.models import AmbiguousModelError, model_names, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import CaseError, InputError, build_model, formulate, load_case, solve
 
@@ -264,9 +264,13 @@ def test_a_name_that_two_packages_offer(install: Install, tmp_path: Path, cli: R
     install({"tripod": "robots:tripod"}, package="first_robots")
     install({"tripod": "robots:tripod"}, package="second_robots")
     assert model_names().count("tripod") == 1
-    code, _, err = cli("solve", case_file(tmp_path))
-    assert code in (0, 2)
-    assert len(err.splitlines()) == (1 if code else 0)
+    with pytest.raises(AmbiguousModelError):
+        robot_function("tripod")
+    with pytest.raises(CaseError, match="first_robots and second_robots"):
+        build_model("tripod")
+    for arguments in (("models", "tripod"), ("new", "tripod"), ("solve", case_file(tmp_path))):
+        refusal_of(cli(*arguments), "first_robots and second_robots")
+    assert "first_robots" in " ".join(output_of(cli("models")).split())
 
 
 def test_an_option_without_a_default(install: Install, tmp_path: Path, cli: Run) -> None:
@@ -315,38 +319,45 @@ FAULTY = {
     "has-a-hint-that-is-nothing": ("def tripod(*, legs: 'Legs' = 3):\n    pass\n", "robots:tripod", "Legs"),
     "takes-anything": ("def tripod(**options):\n    return None\n", "robots:tripod", "tripod"),
     "takes-positions": ("def tripod(legs=3, /):\n    return None\n", "robots:tripod", "by name"),
+    "exits-at-import": ("raise SystemExit(3)\n", "robots:tripod", "SystemExit"),
+    "has-a-hint-that-exits": ("def tripod(*, n: 'object()' = 1): raise SystemExit\n", "robots:tripod", "SystemExit"),
+    "exits": ("def tripod(): raise SystemExit\n", "robots:tripod", "SystemExit"),
+    "has-no-name-of-a-module": ("", "no-such-thing:!", "cannot be used"),
     "calls-itself-otherwise": (MODULE.replace('name="tripod"', 'name="quadripod"'), "robots:tripod", "quadripod"),
 }
 OPTIONS = {"legs", "twisted", "drive", "spread", "brand"}
 PLAIN = "\n".join(line for line in CASE.splitlines() if line.partition(" ")[0] not in OPTIONS)
-each_faulty = pytest.mark.parametrize("faulty", FAULTY.values(), ids=FAULTY)
 
 
-@each_faulty
-def test_a_faulty_robot_is_a_sentence(faulty: tuple[str, str, str], install: Install, tmp_path: Path, cli: Run) -> None:
-    module, target, words = faulty
+@pytest.mark.parametrize(("module", "target", "words"), FAULTY.values(), ids=FAULTY)
+def test_a_faulty_robot_is_a_sentence_and_hides_no_other(
+    module: str, target: str, words: str, install: Install, tmp_path: Path, cli: Run
+) -> None:
     install({"tripod": target}, module)
-    path = saved(tmp_path / "case.toml", PLAIN)
+    install({"sized": "robots:sized"}, package="good_robots")
+    path = str(saved(tmp_path / "case.toml", PLAIN))
     with pytest.raises(InputError) as refused:
-        load_case(str(path))
-    for said in (str(refused.value), cli("solve", str(path))[2]):
-        assert "case.toml" in said
-        assert "tripod" in said
-        assert words in said
-    for arguments in (("solve", str(path)), ("models", "tripod"), ("new", "tripod")):
+        load_case(path)
+    for said in (str(refused.value), cli("solve", path)[2]):
+        assert all(each in said for each in ("case.toml", "tripod", words))
+    for arguments in (("solve", path), ("models", "tripod"), ("new", "tripod")):
         refusal_of(cli(*arguments), "tripod", words)
-
-
-@each_faulty
-def test_a_faulty_robot_does_not_hide_the_others(faulty: tuple[str, str, str], install: Install, cli: Run) -> None:
-    module, target, _ = faulty
-    install({"tripod": target}, module)
-    assert cli("evaluate", "paper-4.1-helical")[0] == 0
+    assert cli("evaluate", "paper-4.1-helical")[0] == cli("models", "sized")[0] == 0
     code, out, err = cli("models")
     assert code == 0
     assert len(err.splitlines()) <= 1
-    for name in ("stewart-gough", "hexapod", "three-upu", "tripod"):
+    for name in ("stewart-gough", "hexapod", "three-upu", "sized", "tripod"):
         assert name in out + err
+
+
+@pytest.mark.parametrize("points", ["[screwsynth.models]\ntripod\n", "[screwsynth.models\ntripod = robots:tripod"])
+def test_entry_points_that_are_none_hide_no_other(points: str, install: Install, cli: Run) -> None:
+    site = install({})
+    (site / "workshop_robots-1.0.dist-info" / "entry_points.txt").write_text(points, encoding="utf-8")
+    install({"sized": "robots:sized"}, package="good_robots")
+    assert "sized" in output_of(cli("models"))
+    assert cli("models", "sized")[0] == 0
+    refusal_of(cli("models", "tripod"))
 
 
 def test_parameters_with_the_names_of_the_pose(install: Install, tmp_path: Path, cli: Run) -> None:
