@@ -24,6 +24,13 @@ from screwsynth.nlp.case.starter import starter_case
 
 DOCS = Path(__file__).parents[1] / "docs"
 Array = NDArray[np.float64]
+#: A robot of the gallery of each kind: cranks, slides, struts, members, parasitic motions, parallel rods and
+#: parallelograms, limbs of two kinds, and platforms that turn only, do not turn, or stay in a plane. What treats all
+#: robots given joint by joint alike is tested with these.
+EACH_KIND = (
+    "3-puu", "3-rps", "3-upu", "6-pus", "6-rus", "delta", "delta-parallelogram", "exechon", "five-bar", "planar-3-rrr",
+    "spherical-3-rrr", "tricept",
+)  # fmt: skip
 #: The command line in this process: exit status, standard output, standard error.
 Run = Callable[..., tuple[int, str, str]]
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from builders import EACH_KIND
 from numpy_engine.bounding import NumpyEngine
 
 from screwsynth.models import Dimension, Model, hexapod, robot_function
-from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, certify, formulate, solve
 from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.evidence.closing import closed_start
@@ -44,7 +44,7 @@ FEW = ("planar-3-rpr", "6-rus", "five-bar")
 
 @pytest.mark.parametrize(
     "names",
-    [FEW, pytest.param([each for each in gallery_names() if each not in FEW], marks=pytest.mark.slow)],
+    [FEW, pytest.param([each for each in EACH_KIND if each not in FEW], marks=pytest.mark.slow)],
     ids=["few", "others"],
 )
 def test_what_replaces_unknowns_closes_the_loops_in_homes_mode(names: tuple[str, ...]) -> None:

@@ -33,17 +33,27 @@ def kkt(nlp: Nlp, x: np.ndarray) -> tuple[float, float]:
     return at.violation, multipliers(at, at.active(1e-6))[1]
 
 
+#: Cases whose C differs from another's in numbers alone, with that other one.
+SAME_C = {
+    "paper-4.1-rotation": "paper-4.1-helical",
+    "paper-4.1-rotation-axis-z": "paper-4.1-helical-axis-z",
+    "paper-4.2-rotation": "paper-4.2-translation",
+    "paper-4.4-min": "paper-4.4-max",
+}
+
+
 @pytest.mark.parametrize(
     "name", [name for name in shipped_cases() if name.startswith("paper-") and name != "paper-4.2"]
 )
 def test_random_starts_end_at_the_global_optimum(name: str, embedded: EmbeddedCase) -> None:
-    c, case = embedded(name), load_case(name)
+    c, case = embedded(SAME_C.get(name, name)), load_case(name)
     nlp = formulate(case)
+    given = {"p": nlp.arguments, "lower": nlp.lower, "upper": nlp.upper, "maximise": int(nlp.sense is Sense.MAX)}
     best = solve_program(nlp, case.search).F
     size = abs(best) if abs(best) > 1e-6 * nlp.objective_scale else nlp.objective_scale
     statuses: Counter[int] = Counter()
     for k, x in enumerate(starting_points(nlp, 401, 5)[1:] if nlp.n else [nlp.start] * 3):
-        solved = c.solve(x0=x, seeds=0)
+        solved = c.solve(x0=x, seeds=0, **given)
         statuses[solved.status] += 1
         if solved.status == OK:
             assert abs(solved.F - best) <= 1e-6 * size
@@ -72,7 +82,7 @@ def test_with_limits_each_optimum_is_one_and_the_seeds_reach_the_best(embedded: 
     assert abs(c.solve().F - best) <= 1e-6 * best
 
 
-@pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.3", "paper-4.4-min"])
+@pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.3", "haptic-device"])
 def test_the_verdict_is_measured_where_the_point_is(name: str, embedded: EmbeddedCase) -> None:
     c, nlp = embedded(name), formulate(load_case(name))
     solved = c.solve()
@@ -254,7 +264,7 @@ def test_a_search_that_is_cut_off_is_no_answer(
 ) -> None:
     monkeypatch.setattr(worstcase, "_ITERATIONS", 4)
     unfinished = 0
-    for name in ("paper-4.3", "paper-4.4-max", "paper-4.1-rotation"):
+    for name in ("paper-4.3", "paper-4.4-max", "paper-4.1-helical"):
         c, nlp = embed(load_case(name), "-O0"), formulate(load_case(name))
         best = embedded(name).solve().F
         for x in starting_points(nlp, 101, 8)[1:]:

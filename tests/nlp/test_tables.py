@@ -16,11 +16,11 @@ from builders import Run, case_from, refusal_of, starter_tables
 from rich.console import Console
 
 from screwsynth.models import Model, model_names, three_upu
-from screwsynth.nlp import Case, Free, Limits, Rotation, Task, build_model, load_case, shipped_cases, solve
+from screwsynth.nlp import Case, Free, Limits, Rotation, Status, Task, build_model, load_case, shipped_cases, solve
 from screwsynth.nlp.case.limits.legs import LegLength
 from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.evidence.kkt import close_equations
-from screwsynth.nlp.evidence.state import evaluate
+from screwsynth.nlp.evidence.state import evaluate, loops_are_closed
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.output.terminal import show
@@ -355,9 +355,11 @@ def test_a_singular_answer_that_nobody_asked_for_is_no_green_bar() -> None:
 
 @pytest.mark.parametrize("robot", [*model_names(), *(three_upu(axes=axes) for axes in ("limb", "snu", "tsai"))])
 def test_every_starter_case_solves_to_rank_six(robot: str | Model) -> None:
-    state = solve(case_from(starter_tables(robot)), starts=4).state
-    assert state is not None
-    assert state.rank == 6
+    own = solve(case_from(starter_tables(robot)), starts=4).outcomes[0].own
+    assert own.status is Status.OPTIMAL
+    assert own.state is not None
+    assert own.state.rank == 6
+    assert loops_are_closed(own.nlp, own.x)
 
 
 def test_a_certificate_that_proves_only_the_obvious_says_so() -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Run, case_from, output_of
+from builders import EACH_KIND, Run, case_from, output_of
 
 from screwsynth.models import robot, robot_function
-from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, CertificateStatus, Free, Nlp, Rotation, Task, certify, formulate, solve
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
@@ -86,7 +85,7 @@ FEW = ("3-rrs", "6-pus", "planar-3-rrr", "spherical-3-rrr")
 
 @pytest.mark.parametrize(
     "names",
-    [FEW, pytest.param([each for each in gallery_names() if each not in FEW], marks=pytest.mark.slow)],
+    [FEW, pytest.param([each for each in (*EACH_KIND, "6-rss") if each not in FEW], marks=pytest.mark.slow)],
     ids=["few", "others"],
 )
 def test_signs_are_positive_from_home_on_and_negative_in_other_modes(names: tuple[str, ...]) -> None:

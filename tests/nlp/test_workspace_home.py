@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import EACH_KIND, case_from
 
 from screwsynth.models import Dimension
-from screwsynth.models.catalog import gallery_names
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case
 from screwsynth.nlp.case.pose import Rotation
@@ -143,14 +142,8 @@ def check_agreement(name: str, part: float, degrees: float, limit: float) -> int
     return count
 
 
-@pytest.mark.parametrize("name", ["3-prs", "five-bar"])
+@pytest.mark.parametrize("name", ["3-prs", *(pytest.param(each, marks=pytest.mark.slow) for each in EACH_KIND)])
 def test_limits_are_judged_alike_with_a_proof_and_without(name: str) -> None:
-    assert check_agreement(name, 0.02, 5, 0.01) == 2 * len(build_model(name).quantities[0].owners)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted({*gallery_names()} - {"3-prs", "five-bar"}))
-def test_limits_of_all_robots_are_judged_alike_with_a_proof_and_without(name: str) -> None:
     assert check_agreement(name, 0.02, 5, 0.01) >= 2 * len(build_model(name).quantities[0].owners)
 
 
