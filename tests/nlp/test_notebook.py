@@ -92,8 +92,7 @@ def test_a_notebook_shows_table_and_drawing(solution: Solution, certified: Certi
         "certified": (certified, ["p_z"]),
     }
     for name, (value, words) in values.items():
-        html = value._repr_html_()  # type: ignore[union-attr, attr-defined]
-        assert html == html_of(value), name
+        html = value._repr_html_() or ""  # type: ignore[union-attr, attr-defined]
         assert set(words) <= set(cells(html)), name
         assert image(html).tag.endswith("svg"), name
     certificate = certified.certificate
@@ -101,6 +100,7 @@ def test_a_notebook_shows_table_and_drawing(solution: Solution, certified: Certi
     html = certificate._repr_html_() or ""
     assert "no point of the box" in html
     assert image(html).tag.endswith("svg")
+    assert html_of(stewart_gough()) == stewart_gough()._repr_html_()
     assert html_of(3) is None
 
 
@@ -108,11 +108,11 @@ def test_a_notebook_shows_table_and_drawing(solution: Solution, certified: Certi
 OF_ROBOT = {(case.model.name, str(case.model.options)): case.name for case in map(load_case, reversed(shipped_cases()))}
 
 
-@pytest.mark.parametrize("name", shipped_cases())
-def test_every_case_and_its_robot_are_drawn(name: str) -> None:
+@pytest.mark.parametrize("name", OF_ROBOT.values())
+def test_cases_and_their_robots_are_drawn(name: str) -> None:
     pytest.importorskip("matplotlib")
     case = load_case(name)
-    for value in (case, case.model) if name in OF_ROBOT.values() else (case,):
+    for value in (case, case.model):
         assert image(value._repr_html_() or "").tag.endswith("svg")
 
 
