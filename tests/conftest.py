@@ -1,5 +1,6 @@
 """What all tests share: children that can be interrupted, and searches whose time is counted in looks at the clock."""
 
+import os
 import signal
 import threading
 from collections.abc import Callable
@@ -7,6 +8,10 @@ from importlib import import_module
 from types import SimpleNamespace
 
 import pytest
+
+# Before NumPy is imported: the tests' processes take all cores, and threads of linear algebra that wait for each other
+# take six times the time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Modules of searches with a limit on their time; each looks at the clock once a step.
 SEARCHES = ("boxes.search",)
