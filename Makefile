@@ -18,10 +18,10 @@ demo: $(VENV)/ready ## set everything up and solve the paper's Section 4.1
 	$(BIN)/screwsynth solve paper-4.1-helical
 
 test: $(VENV)/ready ## set everything up and run every test
-	$(BIN)/python -P -m pytest --numprocesses auto
+	$(BIN)/python -P -m pytest --numprocesses auto --dist worksteal
 
 quick: $(VENV)/ready ## run the fast tests only
-	$(BIN)/python -P -m pytest --numprocesses auto -m 'not slow'
+	$(BIN)/python -P -m pytest --numprocesses auto --dist worksteal -m 'not slow'
 
 # Type checkers cannot follow the editable install's hook, so they get the folders under the package's name.
 build/typing/screwsynth:

@@ -151,14 +151,14 @@ def test_a_sum_that_overflows_shows_nothing() -> None:
         assert test.examine(forms, 1, 0).is_regular.tolist() == [is_regular]
 
 
-#: One wrong rule each: the text of the kernel, and what stands in its place.
+#: One wrong rule each: the text of the kernel, and what stands in its place; PLANTED is whether this one is on.
 FAULTS = {
     "no fault": ("", ""),
-    "products are dropped": ("t < T; t++", "t < found->coordinates; t++"),
-    "terms of first order are dropped": ("for (int t = 0; t < T;", "for (int t = found->coordinates; t < T;"),
-    "|C| times the rest is omitted": ("fabs(by[l]) * (rest[l] + ", "fabs(by[l]) * (0 * rest[l] + "),
-    "the rest has a fifth of its width": ("rest[l] *= scale", "rest[l] *= 0.2 * scale"),
-    "the spectral radius may be above 1": ("if (most < 1 - PRODUCTS)", "if (most < 3)"),
+    "terms of first order are dropped": ("int t = 0; t < T;", "int t = PLANTED ? found->coordinates : 0; t < T;"),
+    "products are dropped": ("t < T; t++", "t < (PLANTED ? found->coordinates : T); t++"),
+    "|C| times the rest is omitted": ("fabs(by[l]) * (rest[l] + ", "fabs(by[l]) * (!(PLANTED) * rest[l] + "),
+    "the rest has a fifth of its width": ("rest[l] *= scale", "rest[l] *= (PLANTED ? 0.2 : 1) * scale"),
+    "the spectral radius may be above 1": ("if (most < 1 - PRODUCTS)", "if (most < (PLANTED ? 3 : 1 - PRODUCTS))"),
 }  # fmt: skip
 #: Wrong forms: by how much the term of a square moves the middle, and its factor. The last are those of machines alone.
 FORMS = {
@@ -169,17 +169,20 @@ FORMS = {
 
 
 class Copy:
-    """A compiled copy of the kernel, and what it keeps of its last box."""
+    """A compiled copy of the kernel with faults, one of which can be switched on, and what it keeps of its last box."""
 
-    def __init__(self, folder: Path, old: str, new: str) -> None:
+    def __init__(self, folder: Path) -> None:
         shutil.copytree(FOLDER, folder / "copy", ignore=shutil.ignore_patterns("*.so", "*.py", "__pycache__"))
         header = folder / "copy" / "kernel" / "rank.h"
         text = header.read_text(encoding="utf-8")
         judged = "found->regular[start + l] = judge_lane(m, found, l, parts, found->shares + start + l);"
-        for before, after in ((judged, f"{{ {judged} if (!l) keep_parts(m, parts); }}"), (old, new)):
-            assert not before or text.count(before) == 1, before
-            text = text.replace(before, after) if before else text
-        start = "static void rank_all("
+        planted = [
+            (old, new.replace("PLANTED", f"planted == {k}")) for k, (old, new) in enumerate(FAULTS.values()) if k
+        ]
+        for before, after in ((judged, f"{{ {judged} if (!l) keep_parts(m, parts); }}"), *planted):
+            assert text.count(before) == 1, before
+            text = text.replace(before, after)
+        text, start = text.replace("typedef struct {", "int planted;\ntypedef struct {", 1), "static void rank_all("
         kept = (
             "double kept_C[4096], kept_B[4096];\n"
             "static void keep_parts(const Matrix *m, RankParts x)\n{\n"
@@ -197,6 +200,7 @@ class Copy:
         self.module: ModuleType = importlib.util.module_from_spec(spec)
         loader.exec_module(self.module)
         library = ctypes.CDLL(str(target))
+        self.planted = ctypes.c_int.in_dll(library, "planted")
         self._kept = [(ctypes.c_double * 4096).in_dll(library, name) for name in ("kept_C", "kept_B")]
 
     def kept(self, columns: int) -> tuple[FloatArray, FloatArray]:
@@ -242,11 +246,16 @@ def attacked() -> tuple[list[Problem], Problem]:
     return problems, family_of(CASE, built_model(CASE.model), problems[0], 0.5)
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Copy:
+    if COMPILER is None:
+        pytest.skip("no C compiler")
+    return Copy(tmp_path_factory.mktemp("kernel"))
+
+
 @pytest.mark.parametrize("fault", [*FAULTS, *FORMS])
-def test_a_planted_fault_is_found(fault: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    copy = Copy(tmp_path, *FAULTS.get(fault, ("", "")))
+def test_a_planted_fault_is_found(fault: str, copy: Copy, monkeypatch: pytest.MonkeyPatch) -> None:
+    copy.planted.value = [*FAULTS].index(fault) if fault in FAULTS else 0
     monkeypatch.setattr(rank_rule, "kernel", lambda: copy.module)
     wrong, second = FORMS.get(fault), Encloser.second
     if wrong is not None:
