@@ -80,8 +80,6 @@ def edited(text: str, *edits: tuple[str, str]) -> str:
 def docs_script(name: str) -> ModuleType:
     """A script of the documentation as a module."""
     spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

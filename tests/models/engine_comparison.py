@@ -204,7 +204,6 @@ def compare(tables: dict[str, Any], driven: int = 3, regular: float = REGULAR) -
         nlp = with_twist(nlp, chi)
         state = evaluate(nlp, x)
         mobility = mobility_of(nlp, x, state)
-        assert mobility is not None
         velocities = velocities_at(nlp, x, nlp.program.kernels.robot_state(x, nlp.arguments))
         constraints = constraint_rows(model, velocities, state.position)
         assert mobility.freedoms == free.shape[1], (mobility.freedoms, free.shape[1])

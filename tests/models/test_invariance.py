@@ -157,7 +157,6 @@ def test_free_numbers_keep_the_symmetry_and_move_every_leg() -> None:
     solution = solve(case, starts=3)
     assert solution.status.is_answer
     # By symmetry the legs of each hand have one rate in a screw about the axis of symmetry.
-    assert solution.state is not None
     rates = solution.state.rates
     assert np.allclose(rates[0::2], rates[0], rtol=1e-9)
     assert np.allclose(rates[1::2], rates[1], rtol=1e-9)

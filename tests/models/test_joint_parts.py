@@ -252,7 +252,6 @@ def check_tangents(model: Model, freedoms: int) -> None:
     assert np.abs(work @ tangents[:, :6].T).max(initial=0.0) < 1e-12
     rank = rank_of_rows(constraints, x[3:6], size)
     assert np.linalg.matrix_rank(tangents[:, :6], tol=1e-7) == 6 - rank == freedoms
-    assert model.generic is not None
     assert 6 - model.generic.constraints == freedoms
     owners = [owner for quantity in model.quantities for owner in quantity.owners]
     for limb in dict.fromkeys(each.limb for each in model.actuators):

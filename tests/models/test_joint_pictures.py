@@ -147,7 +147,6 @@ def test_the_structure_is_that_of_the_engine(name: str) -> None:
     assert tuple(each.wrenches for each in structure) == ranks.W
     assert tuple(each.constraints for each in structure) == ranks.C
     generic = model_of(name).generic
-    assert generic is not None
     assert (generic.jacobian, 6 - generic.constraints) == (ranks.J, ranks.freedoms)
     assert sum(each.unknowns for each in structure) == len(model_of(name).unknowns)
     assert sum(each.kept for each in structure) == len(model_of(name).closure)

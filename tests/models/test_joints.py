@@ -158,7 +158,6 @@ def test_robots_have_the_numbers_of_an_independent_computation(name: str) -> Non
         rows = reporting_matrix(model, each.velocities, each.position) @ each.J
         assert len(rows) == sum(ranks.W)
         assert rows.T @ rows == pytest.approx(each.J.T @ each.J, abs=1e-12)
-    assert model.generic is not None
     assert (model.generic.jacobian, model.generic.constraints) == (6, ranks.constraints)
 
 
@@ -172,7 +171,6 @@ def test_published_facts_of_the_three_upu_hold() -> None:
     assert rank_of_rows(here.J, np.zeros(3), 1.0) == 4
     # Constraint singularity: the constraints have rank 1 where they have 3 elsewhere.
     assert rank_of_rows(constraint_rows(other.model, here.velocities, here.position), np.zeros(3), 1.0) == 1
-    assert other.model.generic is not None
     assert other.model.generic.constraints == 3
     assert pytest.approx(3.0, abs=1e-12) == other.at(other.home, about_z).F
     for angle in (0.0, 0.7, 2.0):

@@ -166,7 +166,6 @@ def test_the_symbolic_form_of_nested_loops_has_the_numbers_of_the_mechanism() ->
                 rows = works[6 * number : 6 * number + 6]
                 np.testing.assert_allclose(rows[:, columns], member.actuation, rtol=0, atol=1e-9)
                 np.testing.assert_array_equal(np.delete(rows, columns, axis=1), 0)
-        assert model.generic is not None
         assert (model.generic.jacobian, model.generic.constraints) == (found.ranks.jacobian, found.ranks.constraints)
         assert [each.wrenches for each in model.structure] == [each.wrenches for each in found.members]
         assert {name for each in model.structure for name in each.nested} == {each.name for each in mechanism.joints}

@@ -28,13 +28,11 @@ def test_an_elbow_on_the_other_side_is_another_assembly() -> None:
     nlp = formulate(free_pose("6-rus", 0.3))
     x = closed_start(nlp)
     here = assembly_of(nlp, x, evaluate(nlp, x))
-    assert here is not None
     assert here.is_home
     assert here.nearness == pytest.approx(1)
     assert here.sentences == ()
     state = evaluate(nlp, x)
     away = assembly_of(nlp, x, replace(state, position=state.position + 100))
-    assert away is not None
     assert not away.is_home
     (own,) = nlp.program.places.unknowns
     other = x.copy()
@@ -43,7 +41,6 @@ def test_an_elbow_on_the_other_side_is_another_assembly() -> None:
     assert np.abs(other - x).max() > 0.5
     assert loops_are_closed(nlp, other)
     found = assembly_of(nlp, other, evaluate(nlp, other))
-    assert found is not None
     assert not found.is_home
     assert found.turned == ("3",)
     assert found.nearness > NEAR_SINGULAR
@@ -63,7 +60,6 @@ def test_another_mode_of_a_three_upu_is_reached_past_a_singularity() -> None:
             found.append(assembly_of(nlp, x, evaluate(nlp, x)))
     assert found  # the platform is turned: its own mode only translates
     for each in found:
-        assert each is not None
         assert each.nearness < NEAR_SINGULAR
         assert each.brief
         assert each.sentences[0].startswith("not reached from home without passing near a singularity")
@@ -79,7 +75,6 @@ def test_poses_near_home_are_reached_from_there() -> None:
         x[list(rotation.q)[:2]] = rng.uniform(-0.1, 0.1, 2)  # type: ignore[union-attr]
         x = close_equations(nlp, x)
         found = assembly_of(nlp, x, evaluate(nlp, x))
-        assert found is not None
         assert found.is_home
         assert found.nearness > 0.5
         assert not found.brief
@@ -95,7 +90,6 @@ def test_joints_are_put_in_place_as_on_the_path_from_home() -> None:
         found = closed_in_place(nlp, x)
         if found is not None:
             assembly = assembly_of(nlp, found, evaluate(nlp, found))
-            assert assembly is not None
             assert assembly.is_home
             count += 1
     assert count > 1

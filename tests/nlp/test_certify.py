@@ -380,7 +380,6 @@ def test_a_box_that_collapses_to_a_corner_is_examined_there() -> None:
     tables = shipped_tables("paper-4.1-helical")
     tables["pose"]["rotation"] = {"axis": [0, 0, 1], "angle": -13}
     solution = solve(case_from(tables, "corner"), starts=8)
-    assert solution.evidence is not None
     assert len(solution.evidence.active) == solution.nlp.n
     proved = certify_program(solution.nlp, solution.x, claimed=solution.F, gap=1e-6)
     assert proved.status is CertificateStatus.PROVED

@@ -61,7 +61,6 @@ def answers(name: str) -> list[Posed]:
         twist = np.array(outcome.task.twist)
         for k in range(solution.case.pose_count):
             state = evaluate(solution.nlp, solution.x, k) if solution.case.pose_count > 1 else outcome.state
-            assert state is not None
             found.append(Posed(placed(solution.case, state), twist, state.F))
     return found
 

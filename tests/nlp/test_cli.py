@@ -575,8 +575,6 @@ def test_help(cli: Run) -> None:
 def test_a_reader_that_goes_away(arguments: tuple[str, ...], tmp_path: Path) -> None:
     command = [sys.executable, "-P", "-m", "screwsynth.nlp", *arguments]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
-        assert running.stdout is not None
-        assert running.stderr is not None
         running.stdout.close()
         err = running.stderr.read()
     assert "Traceback" not in err

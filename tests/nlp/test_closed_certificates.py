@@ -116,7 +116,6 @@ def test_roots_that_meet_in_the_box_stay_unknowns() -> None:
 def test_a_proof_without_unknowns_is_checked() -> None:
     case = at_home(robot_function("planar-3-rpr")())
     found = certify(case, starts=2, with_proof=True)
-    assert found.certificate is not None
     assert found.certificate.status is CertificateStatus.PROVED
     assert found.certificate.boxes < 100
     (proof,) = proof_of(found, "").claims

@@ -172,7 +172,6 @@ def test_weights_senses_and_twists_change_at_run_time(embedded: Callable[[str], 
 def test_shipped_combinations_are_solved_as_python_solves_them(name: str, embedded: Callable[[str], Embedded]) -> None:
     c, wanted = embedded(name), solve(load_case(name))
     own = wanted.combination.combined if wanted.combination is not None else wanted.outcomes[0].own
-    assert own is not None
     solved = c.solve()
     assert solved.status == 0
     assert abs(solved.F - own.F) <= 1e-6 * max(1.0, abs(own.F))

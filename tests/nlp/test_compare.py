@@ -113,7 +113,6 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
 def test_dimensions_ranges_and_certificates() -> None:
     found = compare(case(), ["6-sps", "case"], part=0.1, starts=2, certified=True)
     sps, own = sorted(found.entries, key=lambda each: each.contender.is_own)
-    assert sps.placed is not None
     assert own.solution is not None
     assert sps.solution is not None
     # Each number but the pose is free by a tenth, around the typical ones that are scaled.
@@ -128,7 +127,6 @@ def test_dimensions_ranges_and_certificates() -> None:
     values = [each.value for each in found.entries]
     assert values == sorted(values, key=lambda value: -(value or 0.0))
     for each in found.entries:
-        assert each.certificate is not None
         assert each.value is not None
         assert each.certificate.bound >= each.value * (1 - 1e-9)
 
@@ -139,7 +137,6 @@ def test_strokes_over_several_poses() -> None:
     )
     found = compare(moved, ["6-sps", "case"], part=0, starts=1)
     for entry in found.entries:
-        assert entry.solution is not None
         (stroke,) = entry.strokes.values()
         nlp, x = entry.solution.nlp, entry.solution.x
         first, last = (evaluate(nlp, x, pose) for pose in (0, 1))

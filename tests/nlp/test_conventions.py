@@ -68,7 +68,6 @@ def test_only_what_constraints_carry_depends_on_conventions(name: str) -> None:
 def test_the_derivative_by_the_length_is_that_of_f() -> None:
     nlp = at_home("planar-3-rrr")
     found = dependence_of(nlp, nlp.start)
-    assert found is not None
     values = []
     for part in (0.999, 1.001):
         changed = replace(nlp.case, characteristic_length=part * nlp.case.characteristic_length)
@@ -83,7 +82,6 @@ def test_actuation_and_constraints_of_limbs_sum_to_f(name: str) -> None:
     for each, is_feasible in ((nlp, False), (with_twist(nlp, feasible(nlp)), True)):
         state = evaluate(each, each.start)
         found = mobility_of(each, each.start, state)
-        assert found is not None
         parts = found.parts
         assert sum(sum(part) for part in parts.values()) == pytest.approx(state.F, rel=1e-9)
         carried = sum(part.constraint for part in parts.values()) / state.F

@@ -148,7 +148,6 @@ def test_no_solve_with_random_limits_answers_a_wrong_design(count: int) -> None:
             continue
         answers += 1
         state = solution.state
-        assert state is not None
         numbers = {name: float(value[0]) for name, value in state.parameters.items()}
         numbers |= dict(zip(("p_x", "p_y", "p_z"), state.position, strict=True))
         twist = np.asarray(case.tasks[0].twist, dtype=np.float64)

@@ -77,7 +77,6 @@ def test_the_platform_moves_along_the_twist_as_the_exponential_says(name: str) -
     assert robot.motion is not None
     for t in (-0.2, 1e-3, 0.3):
         moved = robot.linkage.posture_after(robot.posture, robot.motion.twist, t)
-        assert moved is not None
         E = exponential(robot.motion.twist, t)
         assert np.max(np.abs(moved.rotation - E[:3, :3] @ robot.posture.rotation)) <= 1e-12
         for index, point in enumerate(robot.model.scene.points):
@@ -92,8 +91,6 @@ def test_velocities_are_those_of_the_moving_corners() -> None:
     assert robot.motion is not None
     h = 1e-6
     ahead, behind = (robot.linkage.posture_after(robot.posture, robot.motion.twist, t) for t in (h, -h))
-    assert ahead is not None
-    assert behind is not None
     slope = (ahead.points - behind.points)[list(robot.corners)] / (2 * h)
     velocities = robot.velocities_at(robot.posture)
     assert np.max(np.abs(slope - velocities)) <= 1e-6 * np.max(np.abs(velocities))
@@ -101,7 +98,6 @@ def test_velocities_are_those_of_the_moving_corners() -> None:
 
 def test_a_helix_has_the_pitch_of_the_task() -> None:
     motion = drawing("paper-4.1-helical").motion
-    assert motion is not None
     along = motion.path @ motion.axis
     around = motion.path - np.outer(along, motion.axis)
     centre = motion.line[0] - (motion.line[0] @ motion.axis) * motion.axis

@@ -91,7 +91,6 @@ def test_each_limb_bent_the_other_way_is_another_working_mode() -> None:
         assert np.abs(far - near)[own[limb]] > 0.3
         assert turned_over_poses(nlp, far) == ((str(limb + 1),),)
         found = assembly_over_poses(nlp, far)
-        assert found is not None
         assert found.turned == (str(limb + 1),)
         assert found.brief == f"another working mode (limb {limb + 1})"
 
@@ -111,7 +110,6 @@ def test_planar_limbs_bent_the_other_way_are_found_too() -> None:
             if loops_are_closed(nlp, x) and np.abs(x - closed)[list(own)].max() > 0.5:
                 (turned,) = turned_over_poses(nlp, x)
                 judged = assembly_over_poses(nlp, x)
-                assert judged is not None
                 assert judged.turned == turned
                 found.add(turned)
     assert {("1",), ("2",), ("3",)} <= found
@@ -125,7 +123,6 @@ def test_every_distinct_optimum_says_its_working_mode() -> None:
     assert len(brief) == len(own.optima) > 1
     assert len({found.x.tobytes() for found in own.optima}) == len(own.optima)
     for found in own.optima:
-        assert found.assembly is not None
         assert found.assembly.is_home == (turned_over_poses(own.nlp, found.x) == ((),))
     assert any(words.startswith("another working mode (limb") for words in brief)
     data = result_of(solution).starts

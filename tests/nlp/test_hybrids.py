@@ -77,11 +77,9 @@ def test_solve_shows_the_rates_and_that_the_motion_is_possible() -> None:
     case = Case(five_bar(), {}, (Free(-0.1, 0.1), 1, 0), [Task(ALONG_X)])
     solution = solve(case, starts=2)
     joints = result_of(solution).robot.joints
-    assert joints is not None
     assert (joints.freedoms, joints.feasible) == (3, True)
     # At x: the arm's rate q1 by the law of cosines of both halves, from finite differences of the arm's angle.
     x = float(result_of(solution).robot.pose.position[0])
-    assert joints.actuators is not None
     step = 1e-6
     slopes = [(arm_angle(side, x + step) - arm_angle(side, x - step)) / (2 * step) for side in (-1, 1)]
     assert [each.rate for each in joints.actuators[:2]] == pytest.approx(slopes, abs=1e-8)
@@ -101,7 +99,6 @@ def test_the_constraints_keep_their_rank_over_a_workspace() -> None:
     )
     judgement = judge_workspace(case, time_limit=30)
     assert judgement.regularity.outcome is Outcome.PROVED
-    assert judgement.constraints is not None
     assert judgement.constraints.outcome is Outcome.PROVED
 
 
@@ -146,7 +143,6 @@ def test_a_rate_that_the_motion_does_not_determine_is_said_to_be_none() -> None:
     assert found.freedoms == 3
     assert {name for name, rate in found.actuator_rates.items() if math.isnan(rate)} == {"w0", "w1"}
     assert found.actuator_rates["m1"] == pytest.approx(-1.25, abs=1e-12)
-    assert model.generic is not None
     assert (model.generic.idle, model.generic.undetermined) == (1, ("w0", "w1"))
     case = Case(model, {}, (Free(-0.1, 0.1), 1, 0), [Task(ALONG_X)])
     words = "\n".join(str(each) for each in case_summary(case, result_of(solve(case, starts=1))))

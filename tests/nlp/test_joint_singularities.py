@@ -66,7 +66,6 @@ def found_at_home(model: Model, free: bool = False) -> list[Singularity]:
     pose = (Free(x - 1, x + 1), Free(y - 1, y + 1), z) if free else (x, y, z)
     nlp = formulate(Case(model, {}, pose, TURN))
     found = mobility_of(nlp, nlp.start, evaluate(nlp, nlp.start))
-    assert found is not None
     return list(found.singularities)
 
 
@@ -88,7 +87,6 @@ def test_stretched_planar_limbs_lock_the_line_of_their_links_and_meet_in_the_cen
     values = {item.name: item.typical[0] for item in model.parameters} | {"turn": 0.0, "bend": 0.0}
     nlp = formulate(Case(model, values, (Free(-1, 1), Free(-1, 1), 0.0), TURN))
     mobility = mobility_of(nlp, nlp.start, evaluate(nlp, nlp.start))
-    assert mobility is not None
     *serial, platform = mobility.singularities
     for k, each in enumerate(serial):
         assert (each.kind, each.limb) == (SingularityKind.SERIAL, str(k + 1))
@@ -110,7 +108,6 @@ def test_what_rounding_leaves_of_constraints_is_nothing_in_any_unit() -> None:
     task = Task([0, 0, 1, 0.3 * size, 0.2 * size, 0])
     nlp = formulate(Case(model, values, [size * each for each in model.home], [task]))
     mobility = mobility_of(nlp, nlp.start, evaluate(nlp, nlp.start))
-    assert mobility is not None
     assert mobility.constrained == 0
 
 

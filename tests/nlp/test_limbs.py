@@ -195,7 +195,6 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
 def test_the_common_part_with_tilts_is_bounded_and_contracted() -> None:
     """phi_0 + best + t at random points of random boxes; points that are cut off reach less, or keep no condition."""
     _, found = separated(poses(2))
-    assert found.common is not None
     x, rng, B, points = found.common.x, np.random.default_rng(4), 60, 300
     m, whole = x.numel(), (found.common.upper - found.common.lower)[:, None]
     first = Condition("sum", ca.sum1(x) - float(np.sum(found.common.lower + 0.4 * whole.ravel())), is_equation=False)

@@ -205,7 +205,6 @@ def test_a_design_with_nothing_free_is_held_to_its_limits_too() -> None:
     assert solved(case_with({"leg_length": {"max": 45}}, text)).status is Status.EVALUATED
     solution = solved(case_with({"leg_length": {"max": 30}}, text))
     assert solution.status is Status.INFEASIBLE
-    assert solution.state is not None
     longest = solution.state.quantities["leg_length"].max()
     assert [(row.key, row.needed) for row in solution.relaxation] == [
         ("leg_length.max", pytest.approx(longest, rel=1e-6))
@@ -293,7 +292,6 @@ def test_a_robot_without_legs_has_limits_on_its_own_measures_only() -> None:
     for limit in (QuantityLimit("leg_length", max=37.0), LegLength(max=37.0)):
         limited = Case(**common, tasks=[task], limits=Limits(limit))
         solution = solved(limited)
-        assert solution.state is not None
         assert solution.state.quantities["leg_length"].max() == pytest.approx(37, rel=1e-9)
 
 

@@ -32,11 +32,9 @@ def test_every_start_finds_the_one_optimum(solved: dict[str, Solution], name: st
     assert solution.status is Status.OPTIMAL
     assert pytest.approx(F, abs=5e-5) == solution.F
     assert [optimum.count for optimum in solution.optima] == [STARTS]
-    assert solution.evidence is not None
     assert solution.evidence.kind is PointKind.STRICT_MAXIMUM
     assert solution.evidence.stationarity < 1e-12
     assert solution.evidence.feasibility == 0
-    assert solution.state is not None
     np.testing.assert_array_equal(solution.state.position, [-10, -10, 50])
     assert solution.state.rank == 6
 
@@ -51,7 +49,6 @@ def test_every_start_finds_the_one_optimum(solved: dict[str, Solution], name: st
 )
 def test_angle_about_the_held_axis(solved: dict[str, Solution], name: str, degrees: float, tolerance: float) -> None:
     state = solved[name].state
-    assert state is not None
     assert math.degrees(state.angle) == pytest.approx(degrees, abs=tolerance)
 
 
@@ -62,13 +59,11 @@ def test_platform_joint_angle_of_section_4_3(
     solved: dict[str, Solution], name: str, degrees: float, tolerance: float
 ) -> None:
     state = solved[name].state
-    assert state is not None
     assert math.degrees(state.parameters["x4"][0]) == pytest.approx(degrees, abs=tolerance)
 
 
 def test_rotation_vector_of_the_free_helical_optimum(solved: dict[str, Solution]) -> None:
     state = solved["paper-4.1-helical"].state
-    assert state is not None
     np.testing.assert_allclose(state.angle * state.axis, [0.2684, -0.2101, -0.2278], atol=5e-5)
 
 
@@ -87,7 +82,6 @@ def test_translation_of_section_4_2_has_f_6_on_equal_plates(solved: dict[str, So
 def test_rotation_of_section_4_2_has_f_0_on_equal_angles(solved: dict[str, Solution]) -> None:
     solution = solved["paper-4.2-rotation"]
     state = solution.state
-    assert state is not None
     assert pytest.approx(0, abs=1e-20) == solution.F
     assert state.parameters["x3"][0] == pytest.approx(state.parameters["x4"][0], abs=1e-9)
     assert state.rank == 3
@@ -106,7 +100,6 @@ def test_rotation_of_section_4_2_has_f_0_on_equal_angles(solved: dict[str, Solut
 )
 def test_flat_directions_of_section_4_2_are_named(solved: dict[str, Solution], name: str, flat: list[set[str]]) -> None:
     evidence = solved[name].evidence
-    assert evidence is not None
     assert evidence.kind is PointKind.NOT_ISOLATED
     assert sorted(map(sorted, evidence.flat)) == sorted(map(sorted, flat))
 

@@ -247,7 +247,6 @@ def test_each_point_is_the_optimum_of_the_case_with_that_value(small: str, cli: 
         solution = solve(load_case(str(path)))
         assert point["F"] == pytest.approx(solution.F, rel=1e-9)
         assert point["tasks"] == [point["F"]]
-        assert solution.state is not None
         assert point["pose"]["position"] == pytest.approx(solution.state.position, abs=1e-4)
     F = [point["F"] for point in found["points"]]
     assert sorted(F) == F, "a wider limit loses nothing"

@@ -186,7 +186,6 @@ def test_several_tasks_over_several_poses_are_brought_together() -> None:
     text = HEAD + ALONG.replace("count = 3", 'count = 3\ntask = "drive"') + combined + LIFT + TASK
     compromise = solve(case_from(text.replace("SENSE", "max"), "two"))
     assert compromise.all_solved
-    assert compromise.combination is not None
     assert compromise.combination.value == pytest.approx(sum(outcome.F for outcome in compromise.outcomes), rel=1e-9)
     states = [evaluate(compromise.outcomes[0].own.nlp, compromise.x, k).F for k in range(3)]
     assert pytest.approx(np.mean(states), rel=1e-9) == compromise.outcomes[0].F
@@ -221,7 +220,6 @@ def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None
 
 def test_an_optimum_over_poses_has_its_evidence() -> None:
     solution = solve(case_of(ALONG, "worst"))
-    assert solution.evidence is not None
     assert solution.evidence.kind is PointKind.STRICT_MAXIMUM
     names = {side.name for side in solution.evidence.active}
     assert {"F pose 1", "F pose 3"} & names

@@ -373,7 +373,6 @@ def test_leg_clearance_is_covered_and_its_proof_holds() -> None:
     case = case_from(tables, "legs")
     certified = certify(case, gap=1e-3, starts=4, with_proof=True)
     evidence = certified.solution.evidence
-    assert evidence is not None
     assert any(side.name.startswith("leg_clearance") for side in evidence.active)
     (proof,) = proof_of(certified, "").claims
     nlp = program_of(case, Statement())

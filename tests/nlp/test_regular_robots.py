@@ -271,7 +271,6 @@ def test_a_determinant_that_touches_zero_is_refuted_with_the_pose() -> None:
     assert found.y is not None
     pose = found.box.pose(found.y)
     legs = legs_of(case)
-    assert legs is not None
     arm = legs.platform @ pose.rotation.T
     span = pose.position + arm - legs.base
     values = np.linalg.svd(np.hstack([span, np.cross(arm, span) / 11.5]), compute_uv=False)

@@ -178,7 +178,6 @@ def test_size_and_no_network(page_file: Callable[..., Path], page: Callable[...,
     assert all(value is not None and value.startswith(("#", "data:")) for value in fetched)
     policies = [a["content"] for tag, a in found.elements if tag == "meta" and "http-equiv" in a]
     assert len(policies) == 1
-    assert policies[0] is not None
     assert policies[0].startswith("default-src 'none';")
     assert "http" not in policies[0]
     own = found.text.replace(found.script("plotly"), "")

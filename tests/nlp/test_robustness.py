@@ -63,10 +63,6 @@ def moved_hexapod(away: float) -> Case:
 @pytest.mark.parametrize("away", [1e3, 1e5])
 def test_the_answer_does_not_depend_on_where_the_world_origin_is(away: float) -> None:
     near, far = solve(moved_hexapod(0), starts=12), solve(moved_hexapod(away), starts=12)
-    assert near.state is not None
-    assert far.state is not None
-    assert near.evidence is not None
-    assert far.evidence is not None
     assert (far.status, far.evidence.kind, far.state.rank) == (near.status, near.evidence.kind, near.state.rank)
     assert far.status is Status.OPTIMAL
     # Products of moments and velocities lose about (away / size)^2 rounding errors.
@@ -98,9 +94,7 @@ def turned_case(degrees: float) -> Case:
 
 def test_the_angle_bears_the_whole_multiplier_when_the_axis_is_a_coordinate_axis() -> None:
     solution = solve(turned_case(10), starts=8)
-    assert solution.state is not None
     assert abs(solution.state.axis[2]) == pytest.approx(1, abs=1e-6)
-    assert solution.evidence is not None
     assert [side.name for side in solution.evidence.active] == ["angle"]
     slope = (solve(turned_case(10.01), starts=4).F - solve(turned_case(9.99), starts=4).F) / math.radians(0.02)
     assert solution.evidence.active[0].multiplier == pytest.approx(slope, rel=1e-4)
@@ -113,7 +107,6 @@ def test_multipliers_of_the_worst_case_share_out_one() -> None:
     case = load_case("paper-4.1-helical")
     other = Task.screw("max", axis=[0, 1, 0], point=[5, 0, 30], pitch=2, name="p_x")
     found = solve(replace(case, tasks=[case.tasks[0], other], method=Method.WORST_CASE), starts=8)
-    assert found.evidence is not None
     shares = {s.name: s.multiplier for s in found.evidence.active if s.name.startswith("task ")}
     assert sum(shares.values()) == pytest.approx(1, abs=1e-9)
     # A task may be called like a variable without taking its place.

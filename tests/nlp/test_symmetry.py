@@ -99,7 +99,6 @@ def test_a_mirror_changes_no_value_and_its_half_reaches_every_point() -> None:
 def test_copies_have_the_same_maximum_and_others_are_no_copies() -> None:
     form = standard_form(formulate(load_case("paper-4.4-max")))
     found = separate(form)
-    assert found is not None
     forms = [each.form for each in found.limbs]
     assert grouped(forms) == [[0, 1, 2]]
     x = np.random.default_rng(0).uniform(-1, 1, 6)
@@ -109,7 +108,6 @@ def test_copies_have_the_same_maximum_and_others_are_no_copies() -> None:
     loose = replace(forms[0], conditions=forms[0].conditions[1:])
     assert grouped([forms[0], narrow, forms[1], other, loose]) == [[0, 2], [1], [3], [4]]
     legs = separate(standard_form(formulate(machine(2.0))))
-    assert legs is not None
     assert all(len(each) == 1 for each in grouped([each.form for each in legs.limbs]))
 
 
@@ -121,7 +119,6 @@ def test_symmetries_leave_the_bound_of_the_paper(monkeypatch: pytest.MonkeyPatch
     # The optimum is in another half too, which a point of the box shows that is no point of the half.
     form = standard_form(nlp)
     assert len(mirrors(form)) == 9
-    assert found.x is not None
     flipped = found.x.copy()
     for each in mirrors(form):
         flipped[list(each)] *= -1

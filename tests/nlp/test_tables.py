@@ -204,7 +204,6 @@ def test_rates_angles_and_lengths_by_pose_and_leg_with_the_worst_pose_marked() -
     case = eight()
     result = evaluated(case)
     several = result.robot.several
-    assert several is not None
     tables = {i.name: i for i in evaluation_summary(case, result) if isinstance(i, TextTable)}
     forces = [np.array(pose.jacobian) for pose in several.poses]
     twist = np.asarray(case.tasks[0].twist)
@@ -270,7 +269,6 @@ def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
     assert cli("evaluate", name, "--csv", str(target), "--table", "rates")[0] == 0
     rows = list(csv.DictReader(io.StringIO(target.read_text(encoding="utf-8"))))
     several = evaluated(eight()).robot.several
-    assert several is not None
     assert [[float(row[f"{limb}, mm/rad"]) for limb in LIMB_NAMES] for row in rows] == [
         list(pose.rates) for pose in several.poses
     ]
@@ -343,7 +341,6 @@ def test_a_singular_answer_that_nobody_asked_for_is_no_green_bar() -> None:
     solution = solve(case, starts=2)
     result = result_of(solution)
     assert isinstance(result, SolveResult)
-    assert result.robot is not None
     assert result.robot.singular
     unasked = replace(case, expect=replace(case.expect, singular=False))
     asked = replace(case, expect=replace(case.expect, singular=True))
@@ -357,7 +354,6 @@ def test_a_singular_answer_that_nobody_asked_for_is_no_green_bar() -> None:
 def test_every_starter_case_solves_to_rank_six(robot: str | Model) -> None:
     own = solve(case_from(starter_tables(robot)), starts=4).outcomes[0].own
     assert own.status is Status.OPTIMAL
-    assert own.state is not None
     assert own.state.rank == 6
     assert loops_are_closed(own.nlp, own.x)
 

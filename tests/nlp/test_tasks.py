@@ -181,7 +181,6 @@ def check_outcomes(found: Solution, setting: Setting, own: Array) -> Array:
     """Every task's F, rates, weight and loss at the combined point; returns the F by hand."""
     F = setting.F(found.x[None])[:, 0]
     for j, outcome in enumerate(found.outcomes):
-        assert outcome.state is not None
         assert pytest.approx(F[j], rel=1e-11) == outcome.state.F
         assert float(outcome.state.rates @ outcome.state.rates) == pytest.approx(F[j], rel=1e-11)
         assert outcome.task.weight == pytest.approx(setting.scaled()[j], rel=1e-15)
@@ -250,11 +249,9 @@ def test_averages_of_lengths_and_of_an_angle_about_a_held_axis_are_those_of_equa
     np.testing.assert_allclose(found.x, by_hand, atol=1e-12)
     assert np.max(np.abs(alone[0].x - alone[1].x)) > 0.1  # or the average would be any of them
     state = found.outcomes[0].state
-    assert state is not None
     np.testing.assert_allclose([*state.position[:2], state.angle], by_hand, atol=1e-12)
     for outcome, task, solution in zip(found.outcomes, tasks, alone, strict=True):
         F = float(objective_by_hand(by_hand[None], free, np.asarray(task.twist))[0])
-        assert outcome.state is not None
         assert pytest.approx(F, rel=1e-11) == outcome.state.F
         loss = solution.F - F if task.sense.value == "max" else F - solution.F
         assert outcome.loss == pytest.approx(loss, abs=1e-12 * outcome.own.nlp.objective_scale)
@@ -290,7 +287,6 @@ def test_free_orientations_average_on_so3(weights: tuple[float, ...], largest: f
     rotations = []
     for task in tasks:
         alone = solve(replace(case, tasks=[task]), starts=6, jobs=1).state
-        assert alone is not None
         rotations.append(alone.rotation)
     assert all(outcome.unique for outcome in found.outcomes)
     # The rotation nearest to the weighted mean of the matrices, by its singular values.
@@ -298,7 +294,6 @@ def test_free_orientations_average_on_so3(weights: tuple[float, ...], largest: f
     U, _, Vt = np.linalg.svd(mean)
     nearest = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
     state = found.outcomes[0].state
-    assert state is not None
     np.testing.assert_allclose(state.rotation, nearest, atol=1e-12)
     # It is not what averaging quaternion vectors or rotation vectors would give.
     assert np.max(np.abs(rotations[0] - rotations[1])) > 0.05
@@ -311,7 +306,6 @@ def test_an_average_that_turns_too_little_is_reported() -> None:
     tasks = random_tasks(24, ("max", "min"), (1.0, 1.0))
     found = solve(free_axis(tasks, Free(0.3, 0.5)), starts=6, jobs=1)
     state = found.outcomes[0].state
-    assert state is not None
     assert state.angle < 0.3 - 1e-3
     assert found.status is Status.INFEASIBLE
     assert combination(found).violated == ("angle",)
@@ -385,8 +379,6 @@ def test_the_peg_in_hole_robot_serves_both_of_its_tasks_in_full(method: Method) 
     assert x1 == pytest.approx(x2, abs=1e-4)
     assert x3 == pytest.approx(x4, abs=1e-6)
     push, turn = found.outcomes
-    assert push.state is not None
-    assert turn.state is not None
     assert pytest.approx(6, rel=1e-11) == push.state.F
     assert turn.state.F < 1e-10
     assert not push.unique
@@ -486,7 +478,6 @@ def test_the_answer_to_several_tasks_has_no_single_objective(method: Method) -> 
             with pytest.raises(EvaluationError, match="no single program"):
                 getattr(found, name)
     else:
-        assert found.decided_by is not None
         assert found.evidence is found.decided_by.evidence
         assert found.starts == found.decided_by.starts
 

@@ -130,13 +130,11 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
     case = delta()
     solution = solve(case)
     own = certify(solution, with_proof=True)
-    assert own.certificate is not None
     assert own.certificate.status is CertificateStatus.PROVED
     assert not own.certificate.was_beaten
     assert own.certificate.bound == pytest.approx(solution.F, rel=1.1e-4)
     assert "in home's working mode has F larger than" in own.certificate.statement
     every = certify(solution, all_assemblies=True)
-    assert every.certificate is not None
     assert every.certificate.status is CertificateStatus.PROVED
     assert every.certificate.incumbent > 1.1 * solution.F
     assert "better than the one given, in another working mode than home's" in every.certificate.statement
@@ -144,7 +142,6 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
     (outcome,) = solution.outcomes
     elsewhere = replace(outcome.own, x=every.certificate.x)
     again = certify(replace(solution, outcomes=(replace(outcome, own=elsewhere),)))
-    assert again.certificate is not None
     assert not again.certificate.nlp.in_home_mode
     assert not again.statement.in_home_mode
     # The proof is about home's mode alone, and fails for all modes.
@@ -182,7 +179,6 @@ def test_robots_at_home_are_proved_in_a_few_boxes(name: str, proved: int) -> Non
         parameters[key] = Free(0.95 * float(parameters[key]), 1.05 * float(parameters[key]))  # type: ignore[arg-type]
     task = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]), "max")  # type: ignore[arg-type]
     found = certify(Case(model, parameters, model.home, [task]), starts=2, time_limit=20).certificate
-    assert found is not None
     assert found.status is CertificateStatus.PROVED
     assert found.boxes <= proved
 

@@ -399,7 +399,6 @@ def test_limits_over_a_workspace_end_with_a_proof() -> None:
     case = case_from(FREE, "free")
     solution = solve(case, starts=4, jobs=1)
     proof = solution.workspace
-    assert proof is not None
     assert proof.is_proved
     assert not proof.first.is_proved
     assert solution.status.is_answer
@@ -450,7 +449,6 @@ def test_limits_over_a_workspace_need_one(old: str, new: str, message: str) -> N
 @pytest.mark.slow
 def test_the_shipped_design_violates_nothing_at_a_million_poses() -> None:
     proof = solve(load_case("hexapod-workspace")).workspace
-    assert proof is not None
     assert proof.is_proved
     robot, box = legs(proof.judgement.case), pose_box(proof.judgement.workspace)
     rng = np.random.default_rng(10)
@@ -628,7 +626,6 @@ def test_an_interrupt_keeps_what_is_proved(case: Case, monkeypatch: pytest.Monke
         done[0] = max(done[0], number)
 
     judged = judge_workspace(case, gap=0.05, progress=progress)
-    assert judged.regularity is not None
     assert judged.regularity.outcome is Outcome.PROVED
     assert judged.extremes[0].outcome is Outcome.PROVED
     assert [each.reason for each in judged.extremes].count("interrupted") > 3

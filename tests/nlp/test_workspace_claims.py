@@ -70,7 +70,6 @@ def test_the_objective_over_a_small_box_about_home_is_bounded(name: str) -> None
         turn = rng.uniform(-math.radians(5), math.radians(5)) if is_planar and k % 2 else 0.0
         assert low.bound <= squares_at(case, place, Rotation((0, 0, 1), turn)) <= high.bound
     for each in (low, high):
-        assert each.pose is not None
         axis = [float(part) for part in each.pose.axis]
         at = squares_at(case, [float(part) for part in each.pose.position], Rotation(axis, float(each.pose.angle)))
         assert at == pytest.approx(each.reached, rel=1e-9)
@@ -159,7 +158,6 @@ def counted(result: WorkspaceResult) -> tuple[int, int]:
     }
     others = sum(int(each.words.partition(",")[0]) for each in lines if each.label == "other refuted claims")
     counts = re.search(r"(\d+) refuted", verdict_words(result))
-    assert counts is not None
     return int(counts[1]), len(shown) + others
 
 

@@ -95,7 +95,6 @@ def locked(rocker: FloatArray, pose: FloatArray) -> FloatArray:
 
 
 def poses_of(case: Case, count: int, seed: int) -> FloatArray:
-    assert case.workspace is not None
     ends = [each for each in (*case.workspace.position, *case.workspace.turns.angles) if isinstance(each, Free)]
     low, high = (np.array([float(getattr(each, name)) for each in ends]) for name in ("lower", "upper"))
     return np.asarray(np.random.default_rng(seed).uniform(low, high, (count, 3)))

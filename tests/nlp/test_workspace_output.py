@@ -64,7 +64,6 @@ def violations(
 ) -> dict[str, FloatArray]:
     """How far each limit is violated at poses, (K, 3) and (K, 3, 3): positive where it is; by the definitions alone."""
     legs = legs_of(case)
-    assert legs is not None
     ends = position[:, None] + np.einsum("kij,lj->kli", rotation, legs.platform)
     span = ends - legs.base
     length = np.linalg.norm(span, axis=2)
@@ -264,7 +263,6 @@ def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceRes
         assert claim.words in page.words
     assert len(text) < 1_000_000
     worst = worst_claim(result, Sense.MAX)
-    assert worst is not None
     assert worst.words in page.words
     assert 'id="limb 1+"' in (folder / "worst.svg").read_text(encoding="utf-8")
 
