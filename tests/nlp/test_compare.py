@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, output_of, saved
+from builders import Run, output_of, refusal_of, saved
 from jsonschema import Draft202012Validator
 
 from screwsynth.models import Displacement
@@ -182,9 +182,7 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
         (("6-ups", "delta", "--json", "-", "--csv", "-"), "standard output can take one of"),
         (("delta", "3-puu", "--range", "0", "--starts", "1"), "task tilt: no robot of the comparison has the freedom"),
     ):
-        code, out, err = cli("compare", path, *arguments)
-        assert (code, out, len(err.splitlines())) == (2, "", 1), err
-        assert words in err
+        refusal_of(cli("compare", path, *arguments), words)
     with pytest.raises(InputError, match="is given twice"):
         compare(case(), ["case", build_model("6-ups"), "case"])
 

@@ -232,8 +232,7 @@ def test_commands_and_generated_code_have_every_pose(cli: Run, tmp_path: Path) -
     assert "worst over 3 poses" in output_of(cli("solve", str(path)))
     result = json.loads(output_of(cli("evaluate", str(path), "--json", "-")))
     assert result["F"] == pytest.approx(min(pose["F"] for pose in result["poses"]))
-    code, _, err = cli("codegen", str(path), "--no-measure", "--out", str(tmp_path / "c"))
-    assert code == 0, err
+    output_of(cli("codegen", str(path), "--no-measure", "--out", str(tmp_path / "c")))
     manifest = json.loads((tmp_path / "c" / "manifest.json").read_text(encoding="utf-8"))
     assert "level" in [number["name"] for number in manifest["variables"]]
 

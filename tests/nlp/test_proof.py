@@ -14,7 +14,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, output_of, refusal_of
 
 from screwsynth.nlp import Case, load_case
 from screwsynth.nlp.case.source import find_case
@@ -197,9 +197,7 @@ def test_the_command_line_rejects_what_is_damaged_or_altered(cli: Run, tmp_path:
     tree = zlib.decompress(base64.b64decode(claim["tree"]))
     claim["tree"] = base64.b64encode(zlib.compress(tree[:-1])).decode()
     target.write_text(json.dumps(content))
-    code, _, err = cli("verify-proof", str(target))
-    assert code == 2
-    assert "damaged" in err
+    refusal_of(cli("verify-proof", str(target)), "damaged")
     claim["digest"] = hashlib.sha256(tree[:-1]).hexdigest()
     target.write_text(json.dumps(content))
     code, _, err = cli("verify-proof", str(target))
@@ -218,9 +216,7 @@ def test_what_is_no_proof_is_refused_in_a_sentence(cli: Run, tmp_path: Path, tex
 
 
 def test_a_proof_that_is_not_there_is_refused(cli: Run, tmp_path: Path) -> None:
-    code, _, err = cli("verify-proof", str(tmp_path / "none.json"))
-    assert code == 2
-    assert "cannot be read" in err
+    refusal_of(cli("verify-proof", str(tmp_path / "none.json")), "cannot be read")
 
 
 @pytest.mark.parametrize(
@@ -242,8 +238,7 @@ def test_wrong_input_to_certify_is_one_sentence(cli: Run, arguments: tuple[str, 
 
 
 def test_the_certificate_in_the_result(cli: Run) -> None:
-    code, out, _ = cli("solve", NAME, "--starts", "4", "--certify", "--json", "-")
-    assert code == 0
+    out = output_of(cli("solve", NAME, "--starts", "4", "--certify", "--json", "-"))
     result = json.loads(out)
     certificate = result["certificate"]
     assert certificate["status"] == "proved"
@@ -253,24 +248,20 @@ def test_the_certificate_in_the_result(cli: Run) -> None:
     assert certificate["relative_gap"] <= 1e-4
     assert certificate["open"] == 0
     assert all(len(row) == 3 for row in certificate["history"])
-    code, out, _ = cli("solve", NAME, "--starts", "4", "--json", "-")
+    out = output_of(cli("solve", NAME, "--starts", "4", "--json", "-"))
     assert json.loads(out)["certificate"] is None
 
 
 def test_several_tasks_are_certified_one_by_one(cli: Run) -> None:
-    code, out, _ = cli("certify", "paper-4.2", "--json", "-")
-    assert code == 0
+    out = output_of(cli("certify", "paper-4.2", "--json", "-"))
     result = json.loads(out)
     assert [task["certificate"]["status"] for task in result["tasks"]] == ["proved", "proved"]
     assert result["certificate"] is None
-    code, _, err = cli("certify", "paper-4.2", "--proof", "p.json")
-    assert code == 2
-    assert "averaged" in err
+    refusal_of(cli("certify", "paper-4.2", "--proof", "p.json"), "averaged")
 
 
 def test_above_on_the_command_line(cli: Run) -> None:
-    code, out, _ = cli("certify", NAME, "--above", "1")
-    assert code == 0
+    out = output_of(cli("certify", NAME, "--above", "1"))
     assert "F is above 1 on the whole box" in out
     code, out, _ = cli("certify", NAME, "--above", "300")
     assert code == 1
@@ -285,8 +276,7 @@ def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, meth
     text += f'[combine]\nmethod = "{method}"\n'
     case, target = tmp_path / "two.toml", tmp_path / "proof.json"
     case.write_text(text, encoding="utf-8")
-    code, out, err = cli("certify", str(case), "--gap", "1e-3", "--proof", str(target), "--json", "-")
-    assert code == 0, err
+    out = output_of(cli("certify", str(case), "--gap", "1e-3", "--proof", str(target), "--json", "-"))
     result = json.loads(out)
     assert result["certificate"]["status"] == "proved"
     assert len(result["tasks"]) == 2
@@ -304,12 +294,10 @@ def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, meth
     }[method, sense]
     assert words in re.sub(r"\d+\.\d{9,}", lambda found: f"{float(found[0]):.6f}", out)
     assert 0 <= outwards * (stated - bound) <= 1e-9 * bound
-    code, out, _ = cli("solve", str(case), "--certify", "--starts", "4", "--json", "-")
-    assert code == 0
+    out = output_of(cli("solve", str(case), "--certify", "--starts", "4", "--json", "-"))
     combined = json.loads(out)["combined"]
     assert outwards * (combined["certificate"]["bound"] - combined["value"]) >= 0
-    code, out, _ = cli("solve", str(case), "--certify", "--starts", "4")
-    assert code == 0
+    out = output_of(cli("solve", str(case), "--certify", "--starts", "4"))
     assert out.count("proved:") == 3
 
 

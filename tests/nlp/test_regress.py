@@ -5,7 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree  # what is parsed here was written here
 
 import pytest
-from builders import Run, edited, saved
+from builders import Run, edited, output_of, saved
 
 from screwsynth.nlp import load_case, shipped_cases
 from screwsynth.nlp.output.checks import checks_as_junit, checks_as_markdown
@@ -131,8 +131,7 @@ def changed(tmp_path: Path, name: str, *changes: tuple[str, str]) -> str:
 
 
 def test_a_users_own_file_is_checked(tmp_path: Path, cli: Run) -> None:
-    code, out, _ = cli("check", changed(tmp_path, "paper-4.3-axis-x"))
-    assert code == 0
+    out = output_of(cli("check", changed(tmp_path, "paper-4.3-axis-x")))
     assert "all hold" in out
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, case_from, refusal_of, starter_tables
+from builders import Run, case_from, output_of, refusal_of, starter_tables
 from rich.console import Console
 
 from screwsynth.models import Model, model_names, three_upu
@@ -272,8 +272,7 @@ def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
     assert [[float(row[f"{limb}, mm/rad"]) for limb in LIMB_NAMES] for row in rows] == [
         list(pose.rates) for pose in several.poses
     ]
-    code, out, _ = cli("evaluate", name, "--csv", "-")
-    assert code == 0
+    out = output_of(cli("evaluate", name, "--csv", "-"))
     assert re.findall(r"^[a-z-]+$", out, re.MULTILINE) == [
         "design", "poses", "rates", "leg-lengths", "base-joint-angles", "platform-joint-angles", "limits", "jacobian",
         "motions", "margins",

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, output_of
 from casadi import SX
 from hexapods import hexapod_text
 
@@ -484,8 +484,7 @@ def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Pa
     file.write_text(head + tail[tail.index("[workspace]") :], encoding="utf-8")
     code, out, err = cli("workspace", str(file), "--gap", "0.3", "--proof", str(target))
     assert (code, err) == (0, ""), out
-    code, out, err = cli("verify-proof", str(target), str(file))
-    assert code == 0, err
+    out = output_of(cli("verify-proof", str(target), str(file)))
     assert "for every machine whose joint centres are off by at most 0.02 in" in out
     content = json.loads(target.read_text(encoding="utf-8"))
     content["case"] = content["case"].replace("joint_centre = 0.02", "joint_centre = 0.002")
@@ -524,11 +523,8 @@ def test_shipped_workspaces_of_machines_as_they_are_built_are_accepted(
     case.write_text(text.replace("[[task]]", "[tolerance]\njoint_centre = 0.002\n\n[[task]]"), encoding="utf-8")
     of: tuple[str, ...] = ()
     if name == "hexapod-workspace":
-        code, _, err = cli("solve", str(case), "--starts", "4", "--json", str(result))
-        assert (code, err) == (0, "")
+        output_of(cli("solve", str(case), "--starts", "4", "--json", str(result)))
         of = ("--of", str(result))
-    code, _, err = cli("workspace", str(case), *of, "--gap", gap, "--time", "200", "--proof", str(target))
-    assert (code, err) == (0, "")
-    code, out, err = cli("verify-proof", str(target))
-    assert code == 0, err
+    output_of(cli("workspace", str(case), *of, "--gap", gap, "--time", "200", "--proof", str(target)))
+    out = output_of(cli("verify-proof", str(target)))
     assert "not on paper" not in out
