@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from builders import Run
-from generated import COMPILERS, STRICT
+from generated import COMPILERS, OPTIMISED, STRICT
 
 from screwsynth.nlp import Case, Nlp, generate_c, load_case
 from screwsynth.nlp.cli.main import run as command_line
@@ -117,7 +117,7 @@ def built(files: Mapping[str, str], root: Path, level: str) -> Path:
 class Embedded:
     """The C of a case, compiled and loaded."""
 
-    def __init__(self, case: Case, root: Path, level: str = "-O2") -> None:
+    def __init__(self, case: Case, root: Path, level: str = "-O1") -> None:
         files = generate_c(case, "")
         self.prefix = identifier(case.name)
         self.header = files[f"{self.prefix}.h"]
@@ -292,10 +292,10 @@ def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Embedded]:
     base = tmp_path_factory.getbasetemp()
     root = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"
     root.mkdir(exist_ok=True)
-    return lambda case, level="-O2": Embedded(case, root, level)
+    return lambda case, level="-O1": Embedded(case, root, level)
 
 
 @pytest.fixture(scope="session")
 def embedded(embed: Callable[..., Embedded]) -> Callable[[str], Embedded]:
     """The C of a shipped case, made once."""
-    return cache(lambda name: embed(load_case(name)))
+    return cache(lambda name: embed(load_case(name), "-O2" if name in OPTIMISED else "-O1"))

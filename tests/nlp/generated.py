@@ -13,6 +13,8 @@ from screwsynth.nlp.case.source import find_case
 
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler is installed")
+#: Shipped cases with few constraints, with many, and with a level of several values: compiled as the Makefile does it.
+OPTIMISED = ("paper-4.1-helical", "hexapod-machining", "camera-mount")
 #: Statuses of the solver in C, in its order.
 OK, NOT_CONVERGED, INFEASIBLE, BAD_INPUT, BUDGET, OTHER_ASSEMBLY, RANGE_END = range(7)
 #: Flags by which generated C compiles without a warning, as C and as C++.

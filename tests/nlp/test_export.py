@@ -10,12 +10,12 @@ import ezdxf
 import mujoco
 import numpy as np
 import pytest
-from builders import Array, case_from, rows_of, starter, turn_about
+from builders import EACH_KIND, Array, case_from, rows_of, starter, turn_about
 from link_robots import CASE, COUPLING, ROBOT
 from mujoco_trees import Tree
 
 from screwsynth.models import WrenchKind, robot, robot_function
-from screwsynth.models.catalog import gallery_names
+from screwsynth.models.catalog import SHIPPED
 from screwsynth.models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink, links_of, wrenches_of
 from screwsynth.nlp import (
     Case,
@@ -43,7 +43,7 @@ from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
 from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.formats.writing.urdf import urdf_of
 
-ROBOTS = (*gallery_names(), "stewart-gough", "hexapod", "three-upu")
+ROBOTS = (*EACH_KIND, *SHIPPED)
 #: One of each kind of limb and of closing, for tests that build the robot again.
 SOME = ("3-rps", "delta-parallelogram", "three-upu")
 OTHERS = ("delta", "exechon", "spherical-3-rrr", "6-rss", "hexapod")

@@ -85,9 +85,8 @@ def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> RankVerdict:
 
 def determinants(robot: Legs, box: PoseBox, points: FloatArray) -> FloatArray:
     """Determinants of the legs' vectors and moments at points (K, 6), from rotation matrices."""
-    turn = np.array([box.pose(each).rotation for each in points])
-    arm = np.einsum("kij,lj->kli", turn, robot.platform)
-    span = points[:, None, :3] + arm - robot.base
+    span = spans(robot, box, points)
+    arm = span - points[:, None, :3] + robot.base
     return np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2))
 
 
@@ -285,9 +284,7 @@ def test_roll_pitch_and_yaw_have_the_same_poses_in_both_searches(case: Case) -> 
     judged = judge_workspace(case, workspace=workspace, with_objective=False)
     box, robot = pose_box(workspace), legs(case)
     points = box.random(5000, np.random.default_rng(4))
-    lengths = np.array(
-        [np.linalg.norm(p.position + robot.platform @ p.rotation.T - robot.base, axis=1) for p in map(box.pose, points)]
-    )
+    lengths = np.linalg.norm(spans(robot, box, points), axis=2)
     long = [each for each in judged.extremes if each.key == "leg_length.max"]
     for each, most in zip(long, lengths.max(axis=0), strict=True):
         assert most <= each.bound <= 1.02 * most
@@ -458,8 +455,7 @@ def test_the_shipped_design_violates_nothing_at_a_million_poses() -> None:
         span = spans(robot, box, points)
         lengths = np.linalg.norm(span, axis=2)
         least, most = np.minimum(least, lengths.min(axis=0)), np.maximum(most, lengths.max(axis=0))
-        arm = span - points[:, None, :3] + robot.base
-        assert (np.linalg.det(np.concatenate([span, np.cross(arm, span)], axis=2)) < 0).all()
+        assert (determinants(robot, box, points) < 0).all()
         home = np.add(robot.platform, (0, 0, 20)) - robot.base
         cosine = (span * home).sum(axis=2) / lengths / np.linalg.norm(home, axis=1)
         assert cosine.min() >= math.cos(math.radians(25))

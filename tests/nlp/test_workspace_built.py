@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Limits, load_case, load_result, solve
+from screwsynth.nlp import Case, Free, Limits, RateShare, load_case, load_result, solve
 from screwsynth.nlp.case.limits.joints import JointAngle
 from screwsynth.nlp.case.limits.legs import Actuator, LegLength
 from screwsynth.nlp.case.task import Sense
@@ -354,7 +354,9 @@ def test_closed_forms_of_the_worst_machine(case: Case) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [TOLERANCE, 0.2])
 def test_every_claim_holds_for_a_hundred_thousand_machines(case: Case, tolerance: float) -> None:
-    built = replace(case, joint_centre_tolerance=tolerance)
+    # Shares of rates take longest, and are judged for the smaller tolerance.
+    kept = [each for each in case.limits if tolerance == TOLERANCE or not isinstance(each, RateShare)]
+    built = replace(case, joint_centre_tolerance=tolerance, limits=Limits(*kept))
     judged = judge_workspace(built, gap=1e-3 if tolerance == TOLERANCE else 5e-2, quantities=["base_joint_angle"])
     # Errors of the pose of the larger tolerance are too large for a bound of their terms of second order.
     left = [each for each in judged.extremes if each.outcome is not Outcome.PROVED]

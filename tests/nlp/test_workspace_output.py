@@ -113,7 +113,7 @@ def test_limits_over_boxes_are_those_at_their_poses(limited: Path, kind: TurnKin
     relation = no_relation(BOXES, Coordinates(list(range(len(free))), [], []))
     states = cells.of_limits(cells.examine(boxes, relation, np.repeat(cells.unknown, BOXES, axis=0)))
     points = rng.uniform(np.repeat(lower, POSES, axis=0), np.repeat(upper, POSES, axis=0))
-    found = violations(case, points[:, :3], np.array([box.pose(point).rotation for point in points]))
+    found = violations(case, points[:, :3], box.rotations(points))
     for limit, row in zip(cells.limits, states, strict=True):
         values = found[limit.key].reshape(BOXES, POSES)
         # The distance of two legs is taken between points 1.7 in apart: it is too large by less than 0.3 in.

@@ -401,8 +401,7 @@ def test_changes_of_rows_hold_those_of_machines() -> None:
         claims = [regular(some.exact, root, each) for each in (0.0, t)]
         without, bound = (each._matrices(each._closed(lower, upper)).E for each in claims)
         y = lower + rng.uniform(size=lower.shape) * (upper - lower)
-        poses = [box.pose(each) for each in y]
-        R, p = np.array([each.rotation for each in poses]), np.array([each.position for each in poses])
+        R, p = box.rotations(y), y[:, :3]
         squares = 1 + y[:, 3:] ** 2
         scale = {TurnKind.AXIS: squares[:, 0], TurnKind.ROLL_PITCH_YAW: squares.prod(axis=1)}
         s = scale.get(kind, squares.sum(axis=1) - 2)[:, None, None]
