@@ -313,7 +313,7 @@ def test_an_interrupted_search_claims_no_more_than_a_complete_one(search: Search
 @each_search
 @pytest.mark.parametrize("watched", [LOOPS, WATCHED], ids=["loops", "all"])
 def test_searches_are_interrupted_at_many_instructions(search: Search, watched: tuple[str, ...]) -> None:
-    assert interrupted(search, KeyboardInterrupt, watched, 30, 2) >= (2 if watched == LOOPS else 0)
+    assert interrupted(search, KeyboardInterrupt, watched, 16, 2) >= (2 if watched == LOOPS else 0)
     assert interrupted(search, MemoryError, watched, 3, 3) == 0
 
 

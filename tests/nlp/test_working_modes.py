@@ -1,7 +1,6 @@
 """Working modes: the signs that tell them apart, and certificates that keep to home's or cover them all."""
 
 import json
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 from builders import EACH_KIND, Run, case_from, output_of
 
-from screwsynth.models import robot, robot_function
+from screwsynth.models import robot_function
 from screwsynth.nlp import Case, CertificateStatus, Free, Nlp, Rotation, Task, certify, formulate, solve
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
@@ -181,36 +180,3 @@ def test_robots_at_home_are_proved_in_a_few_boxes(name: str, proved: int) -> Non
     found = certify(Case(model, parameters, model.home, [task]), starts=2, time_limit=20).certificate
     assert found.status is CertificateStatus.PROVED
     assert found.boxes <= proved
-
-
-def scaled(name: str, factor: float) -> Case:
-    """A robot of the gallery in another unit of length, with a dimension and the pose free."""
-    tables = tomllib.loads((Path(__file__).parents[2] / f"models/robots/{name}.toml").read_text(encoding="utf-8"))
-    for item in tables["dimensions"].values():
-        item["typical"] *= factor if item.get("kind", "length") == "length" else 1
-    model = robot(**tables)
-    size = float(np.linalg.norm(model.home))
-    parameters: dict[str, float | Free] = {item.name: item.typical[0] for item in model.parameters}
-    parameters["rb"] = Free(0.8 * model.parameters[0].typical[0], 1.2 * model.parameters[0].typical[0])
-    position = [Free(value - 0.1 * size, value + 0.1 * size) for value in model.home]
-    twist = np.array([0.3, -0.5, 0.7, 0.4 * factor, 0.6 * factor, -0.2 * factor])
-    return Case(
-        model,
-        parameters,
-        position,
-        [Task(twist, "max")],
-        Rotation(None, Free(-0.2, 0.2)),
-        characteristic_length=0.7 * factor,
-    )  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("name", ["3-rps", "6-pus", "tricept"])
-def test_loops_do_not_depend_on_the_unit_of_length(name: str) -> None:
-    metres, millimetres = (formulate(scaled(name, factor)) for factor in (1.0, 1000.0))
-    here, there = (nlp.evaluate(nlp.start + 0.1 * nlp.scale) for nlp in (metres, millimetres))
-    np.testing.assert_allclose(there.g, here.g, rtol=1e-9, atol=1e-12)
-    assert np.abs(here.g).max() > 1e-3
-    found = [solve(scaled(name, factor), starts=2, seed=1) for factor in (1.0, 1000.0)]
-    assert pytest.approx(1e6 * found[0].F, rel=1e-9) == found[1].F
-    iterations = [[start.iterations for start in each.outcomes[0].own.starts] for each in found]
-    assert iterations[0] == iterations[1]
