@@ -83,7 +83,7 @@ from pathlib import Path
 
 import screwsynth.nlp
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import CaseError, Status, formulate, json_data, result_of, solve
+from screwsynth.nlp import CaseError, Status, case_from_tables, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.platform_height import PlatformHeight
 from screwsynth.nlp.case.wholeschema import WholeDocument
 from screwsynth.nlp.case.starter import starter_case
@@ -92,7 +92,7 @@ starter = tomllib.loads(starter_case(stewart_gough()))
 
 
 def case_with(**limits):
-    return case_from({**starter, "limits": limits}, "high")
+    return case_from_tables({**starter, "limits": limits}, name="high", source="high.toml")
 
 
 def refusal(**limits):
