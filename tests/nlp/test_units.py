@@ -313,7 +313,7 @@ def test_a_bound_of_F_on_a_front_is_of_the_same_size_in_every_unit() -> None:  #
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hexapod", "orthoglide", "five-bar"])
+@pytest.mark.parametrize("name", ["hexapod", "3-puu", "five-bar"])
 def test_a_front_is_the_same_in_every_unit(name: str) -> None:
     fronts = []
     for unit, f in ((unit, UNITS[unit]) for unit in units_of(name)):
