@@ -18,12 +18,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from screwsynth.models import Model, robot_function
-from screwsynth.nlp import Case, case_from_tables
+from screwsynth.nlp import Case, case_from_tables, shipped_cases
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.starter import starter_case
 
 DOCS = Path(__file__).parents[1] / "docs"
 Array = NDArray[np.float64]
+#: Shipped cases that another one is like, with the same robot and another task, sense or axis; and the others.
+LIKE_ANOTHER = {
+    "drilling-spindle", "paper-4.1-helical-axis-z", "paper-4.1-rotation", "paper-4.1-rotation-axis-z",
+    "paper-4.3-axis-x", "paper-4.4-min",
+}  # fmt: skip
+EACH_CASE = [name for name in shipped_cases() if name not in LIKE_ANOTHER]
 #: A robot of the gallery of each kind: cranks, slides, struts, members, parasitic motions, parallel rods and
 #: parallelograms, limbs of two kinds, and platforms that turn only, do not turn, or stay in a plane. What treats all
 #: robots given joint by joint alike is tested with these.

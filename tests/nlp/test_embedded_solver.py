@@ -84,8 +84,9 @@ def test_with_limits_each_optimum_is_one_and_the_seeds_reach_the_best(embedded: 
 
 @pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.3", "free-wrist"])
 def test_the_verdict_is_measured_where_the_point_is(name: str, embedded: EmbeddedCase) -> None:
-    c, nlp = embedded(name), formulate(load_case(name))
-    solved = c.solve()
+    c, case = embedded(name), load_case(name)
+    nlp, solved = formulate(case), c.solve()
+    assert abs(solved.F - solve_program(nlp, case.search).F) <= 1e-6 * solved.F
     state = nlp.program.kernels.robot_state(solved.x, nlp.arguments)
     F, g = nlp.evaluate(solved.x)
     assert solved.status == OK

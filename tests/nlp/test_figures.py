@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, case_from, output_of, refusal_of, saved
+from builders import EACH_CASE, Run, case_from, output_of, refusal_of, saved
 from casadi import SX
 from matplotlib.figure import Figure
 from measures import exponential
 
 from screwsynth.models import Body, Link, Model, Point, PoseSymbols, Scene, force_along, model_names
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import Case, InputError, Solution, Task, evaluate, load_case, plot, result_of, shipped_cases, solve
+from screwsynth.nlp import Case, InputError, Solution, Task, evaluate, load_case, plot, result_of, solve
 from screwsynth.nlp.case.robots import build_model, model_options
 from screwsynth.nlp.output.pictures import fonts
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
@@ -31,7 +31,7 @@ DRAWN_BY_HAND = [name for name in model_names() if name not in gallery_names()]
 
 
 #: Shipped cases with an axis to draw; hexapod-workspace has the robot of hexapod-machining, and takes long to solve.
-PICTURED = [name for name in shipped_cases() if name not in {"paper-4.2", "hexapod-workspace"}]
+PICTURED = [name for name in EACH_CASE if name not in {"paper-4.2", "hexapod-workspace"}]
 
 
 @cache

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import EACH_KIND, case_from
 
 import screwsynth.models
 from screwsynth.models import Dimension, robot, robot_function
@@ -42,7 +42,7 @@ def with_tuples(value: object) -> object:
     return tuple(with_tuples(each) for each in value) if isinstance(value, list) else value
 
 
-@pytest.mark.parametrize("name", gallery_names())
+@pytest.mark.parametrize("name", EACH_KIND)
 def test_a_robot_in_python_is_written_and_read_again(name: str) -> None:
     tables = tables_of(name)
     model = robot(**{key: with_tuples(value) for key, value in tables.items()})
