@@ -41,7 +41,6 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     ("m.xml", HEAD, (*BODY, "--loops", "x.yaml"), "--loops x.yaml: is for URDF files"),
     # Loops.
     ("m.xml", reachy.mjcf(lift=0.001), BODY, "the loop loop_1 is open by 0.001 and 0 deg, more than 1e-06 of the robot's size 0.117; --close closes it by Newton's method"),
-    ("m.xml", reachy.mjcf(lift=0.5).replace('<freejoint/>', '<joint type="slide" axis="1 0 0"/>'), (*BODY, "--close"), "Newton's method, which came no closer"),
     # Hostile and broken files.
     ("m.xml", BOMB, BODY, "it declares a document type or entities, which are not read"),
     ("m.urdf", OUTSIDE, BODY, "it declares a document type or entities, which are not read"),
