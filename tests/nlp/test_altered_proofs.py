@@ -468,7 +468,8 @@ def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Pat
     assert cli("evaluate", str(fixed), "--json", result)[0] in (0, 1)
     code, _, err = cli("workspace", str(free), "--gap", "0.1", "--of", result, "--proof", proof)
     assert (code, err) == (0, f"--of {result}: has the dimensions of the case 'fixed'\n")
-    assert "is free" in cli("verify-proof", proof, str(free))[2]
+    for command in (("verify-proof", proof, str(free)), ("workspace", str(free))):
+        assert "robot.parameters.x2: is free" in cli(*command)[2]
     for options in (("--of", result), ("--set", "x2=11.543")):
         code, out, err = cli("verify-proof", proof, str(free), *options)
         assert code == 0, err

@@ -72,16 +72,6 @@ def test_what_a_case_says_cannot_break_the_c(tmp_path: Path) -> None:
     assert "0 failed" in made(where, f"CFLAGS={STRICT} -O2 -Wno-trigraphs", "test")
 
 
-@pytest.mark.parametrize("option", [("--language", "c"), ("--precision", "double")])
-def test_options_with_one_value_are_gone(tmp_path: Path, cli: Run, option: tuple[str, str]) -> None:
-    code, _, err = cli("codegen", "paper-4.1-helical", "--out", str(tmp_path / "made"), *option)
-    assert code == 2
-    assert option[0] in err
-    assert not (tmp_path / "made").exists()
-    _, out, _ = cli("codegen", "--help")
-    assert option[0] not in out
-
-
 @needs_compiler
 def test_a_compiled_solve_is_the_same_and_compiles_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: Run

@@ -315,35 +315,6 @@ def test_the_command_proves_and_refutes(machine: Path, tmp_path: Path) -> None:
     assert "refuted" in shorter.output
 
 
-def test_dimensions_come_from_a_result(machine: Path, tmp_path: Path) -> None:
-    result = tmp_path / "result.json"
-    free = tmp_path / "free.toml"
-    free.write_text(TEXT.replace("x2 = 11.543", "x2 = { min = 8, max = 15 }"), encoding="utf-8")
-    runner = CliRunner()
-    refused = runner.invoke(app, ["workspace", str(free)])
-    assert "robot.parameters.x2: is free" in str(refused.exception)
-    solved = runner.invoke(app, ["evaluate", str(machine), "--json", str(result)])
-    assert solved.exit_code in (0, 1)
-    run = runner.invoke(app, ["workspace", str(free), "--gap", "0.01", "--of", str(result)])
-    assert run.exit_code == 0, run.output
-
-
-def test_a_refuted_claim_is_seen_with_evaluate(machine: Path) -> None:
-    wide = ["--set", "limits.leg_length.max=40"]
-    run = CliRunner().invoke(app, ["workspace", str(machine), *wide, "--gap", "0.01", "--json", "-"])
-    extremes = json.loads(run.stdout)["extremes"]
-    worst = next(each for each in extremes if each["key"] == "leg_length.max" and each["outcome"] == "refuted")
-    pose = worst["pose"]
-    settings = [f"{name}={value!r}" for name, value in zip(("p_x", "p_y", "p_z"), pose["position"], strict=True)]
-    settings += [f"axis={','.join(map(repr, pose['axis']))}", f"angle={pose['angle']!r}"]
-    shown = CliRunner().invoke(
-        app, ["evaluate", str(machine), *wide, *(part for each in settings for part in ("--set", each)), "--json", "-"]
-    )
-    lengths = json.loads(shown.stdout)["quantities"]["leg_length"]
-    limb = worst["name"].removeprefix("leg_length limb ")
-    assert lengths[limb] == pytest.approx(worst["reached"], rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("table", "message"),
     [
