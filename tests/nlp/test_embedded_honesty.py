@@ -114,7 +114,7 @@ def test_the_worst_case_of_other_tasks_is_theirs(name: str, compiled: Compiled, 
     lower, upper = (each[robot.free] for each in ranges(own))
     rng, best = np.random.default_rng(1), np.zeros(60)
     for radius in (1.0, 0.1, 1e-2, 1e-3, 1e-4):
-        for _ in range(300):
+        for _ in range(120):
             x = found.x.copy()
             x[:, robot.free] = np.clip(
                 x[:, robot.free] + radius * rng.uniform(-1, 1, (60, len(lower))) * (upper - lower), lower, upper
