@@ -52,9 +52,9 @@ def displaced_legs(model: Model) -> DisplacedRobot:
         model: the robot, with its rows as built.
     """
     centres = [
-        Centre(f"{leg.name} {plate}", error)
+        Centre(name, error)
         for leg in model.legs
-        for plate, error in (("base", leg.base_error), ("platform", leg.platform_error))
+        for name, error in zip(leg.centres, (leg.base_error, leg.platform_error), strict=True)
     ]
     legs = [leg.built for leg in model.legs]
     of_legs = {each.name: each for each in legged_platform(legs, model.pose).quantities}

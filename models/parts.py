@@ -167,6 +167,8 @@ class Leg:
         platform: (3, 1) centre of its platform joint in the platform frame, length.
         base_error, platform_error: (3, 1) symbols of the error of each joint centre in the machine as it is built, in
             the frame of that centre, length.
+        centres: names of both centres in a :class:`~.displaced.DisplacedRobot`: labels of joints of a limb given joint
+            by joint; empty for the name of the leg and its plate.
     """
 
     name: str
@@ -174,6 +176,13 @@ class Leg:
     platform: SX
     base_error: SX = field(default_factory=lambda: SX.sym("base_error", 3))
     platform_error: SX = field(default_factory=lambda: SX.sym("platform_error", 3))
+    centres: tuple[str, str] = ("", "")
+
+    def __post_init__(self) -> None:
+        named = tuple(
+            own or f"{self.name} {plate}" for own, plate in zip(self.centres, ("base", "platform"), strict=True)
+        )
+        object.__setattr__(self, "centres", named)
 
     @property
     def built(self) -> Leg:

@@ -8,7 +8,7 @@ both are left out. A parallelogram has two centres, at the ends of its rods, whi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -18,6 +18,7 @@ from casadi import SX
 from ..catalog import gallery_names, gallery_tables
 from ..displaced import Centre, DisplacedRobot, error_parameter
 from ..model import Model
+from ..parts import Leg
 from .chain import Joint, Limb, home_of
 from .forms import RobotError
 from .generic import PathFrame, sampled_dimensions
@@ -62,7 +63,25 @@ def displaced_robot(model: Model) -> DisplacedRobot:
     # Of equations that depend on each other those of the design are kept, also where others would be as good.
     every = {each.name: each for each in found.loops}
     closure = tuple(replace(every[f"{each.name} in full"], name=each.name) for each in model.closure)
-    return DisplacedRobot(replace(found, closure=closure), tuple(displaced.centres))
+    legs = _displaced_legs(model, robot.symbols, displaced.centres)
+    return DisplacedRobot(replace(found, closure=closure, legs=legs), tuple(displaced.centres))
+
+
+def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> tuple[Leg, ...]:
+    """Return the straight legs of a robot between centres with their errors.
+
+    Args:
+        model: the robot.
+        dimensions: (d, 1) symbols in the place of its dimensions.
+        centres: those with an error; of a hinge the whole error, also the part that its motion does not depend on.
+    """
+    own = ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters])
+    errors, found = {each.name: each.error for each in centres}, []
+    for leg in model.legs:
+        ends = ca.Function("ends", [own], [leg.base, leg.platform]).call([dimensions])
+        base, platform = (end + errors[centre] for end, centre in zip(ends, leg.centres, strict=True))
+        found.append(replace(leg, base=base, platform=platform))
+    return tuple(found)
 
 
 def _definition(model: Model) -> Mapping[str, object]:

@@ -48,6 +48,7 @@ from .opened import OpenedPath, Variables, closures, distance_equations, open_pa
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .states import PathJoints, limb_links, with_shared_places
+from .straight import straight_leg
 from .words import read_robot
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -313,6 +314,7 @@ def model_of_home(
         pose=pose,
         home=(x, y, z),
         wrenches=tuple(builder.wrenches),
+        legs=tuple(leg for leg in (straight_leg(limb, frame) for limb in at_home.limbs) if leg is not None),
         members=tuple(members),
         quantities=quantities(builder.actuators, builder.positions),
         scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, builder.networks),

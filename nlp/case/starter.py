@@ -77,21 +77,32 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         "pitch = 2                     # translation per radian; 0: a rotation; inf: a translation along the axis",
         "",
         "# [limits]                    # of a buildable design; see the documentation for all",
-        *(
-            [
-                f"# leg_length = {{ min = {0.5 * z:g}, max = {1.5 * z:g} }}",
-                "# base_joint_angle = 45       # half angle of each joint's cone about the base's normal",
-                f"# leg_clearance = {{ min = {0.02 * z:g} }}",
-            ]
-            if model.legs
-            else ["# rate_share = { max = 0.5 }"]
-        ),
+        *_limit_lines(model),
         "",
         "[solve]",
         f"starts = {search.starts}".ljust(30) + "# starting points; more find the best of several optima more surely",
         f"seed = {search.seed}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _limit_lines(model: Model) -> list[str]:
+    """Return lines of limits, as comments."""
+    if not model.legs:
+        return ["# rate_share = { max = 0.5 }"]
+    z = model.home[2]
+    cone = ["# base_joint_angle = 45       # half angle of each joint's cone about the base's normal"]
+    if model.joints:
+        typical = ca.DM([value for item in model.parameters for value in item.typical])
+        spans = [leg.base - leg.platform - ca.DM(model.home) for leg in model.legs]
+        symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
+        function = ca.Function("lengths", [symbols], [ca.vertcat(*map(ca.norm_2, spans))])
+        z, cone = float(f"{float(ca.mmax(function(typical))):.3g}"), []
+    return [
+        f"# leg_length = {{ min = {0.5 * z:g}, max = {1.5 * z:g} }}",
+        *cone,
+        f"# leg_clearance = {{ min = {0.02 * z:g} }}",
+    ]
 
 
 def _size(model: Model) -> float:

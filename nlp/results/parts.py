@@ -107,7 +107,8 @@ class PoseStateData(JsonObject):
         singular_values: of the Jacobian with moments about the platform's origin, divided by their longest arm, largest
             first.
         quantities: leg lengths, joint angles and the like, by limb.
-        limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
+        limited_quantities: what the case's limits speak of beside the quantities, by limb: angles from the mounting
+            axes that they state, and lengths of legs of a robot given joint by joint; absent without any.
     """
 
     F: float
@@ -153,7 +154,8 @@ class RobotData(JsonObject):
         free_motions: basis of the motions that no row resists.
         task_is_free: whether F is zero, so that nothing resists the task's motion.
         quantities: leg lengths, joint angles and the like, by limb.
-        limited_quantities: angles from the mounting axes that the case's limits state, by limb; absent without any.
+        limited_quantities: what the case's limits speak of beside the quantities, by limb: angles from the mounting
+            axes that they state, and lengths of legs of a robot given joint by joint; absent without any.
         characteristic_length: that relates couples to forces; absent for robots without constraint couples.
         length_dependence: relative derivative of F by it, ``(l / F) dF/dl``, over all poses; absent for such robots,
             where F is 0, and with several tasks.

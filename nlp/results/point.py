@@ -97,7 +97,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
 
 
 def _limited_quantities(nlp: Nlp, x: FloatArray) -> list[Mapping[str, ByOwner]]:
-    """Return the angles that the limits of a case speak of at a point (n,), for each pose; empty without any."""
+    """Return what limits of a case speak of beside quantities at a point (n,), for each pose; empty without any."""
     case, program = nlp.case, nlp.program
     rows = [
         {limit.key: found for limit in case.limits if (found := limit.measures(robot)) is not None}

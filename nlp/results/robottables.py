@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...models import Dimension, Model, Quantity, WrenchKind, component_names
+from ...models import Dimension, Model, WrenchKind, component_names
 from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
 from ..case.task import Sense
@@ -230,13 +230,17 @@ def _measures(case: Case, robot: RobotData) -> list[_Measure]:
     """Return the measures of a robot."""
     references = {limit.name: limit.reference for limit in case.limits}
 
-    def measure(item: Quantity) -> _Measure:
-        reference = references.get(item.name, "")
-        parts = (f"from {reference}" if reference else "", case.units.label(item.dimension))
+    def measure(name: str, dimension: Dimension) -> _Measure:
+        reference = references.get(name, "")
+        parts = (f"from {reference}" if reference else "", case.units.label(dimension))
         unit = ", ".join(part for part in parts if part)
-        return _Measure(item.name, item.dimension, item.name.replace("_", " "), reference, unit)
+        return _Measure(name, dimension, name.replace("_", " "), reference, unit)
 
-    return [measure(item) for item in case.model.quantities if item.name in robot.quantities]
+    found = {item.name: item.dimension for item in case.model.quantities if item.name in robot.quantities}
+    # Lengths of legs of a robot given joint by joint are no quantity of it.
+    limited = robot.limited_quantities or {}
+    found |= {each.name: each.numbers["max"].dimension for each in case.limits if each.name in limited.keys() - found}
+    return [measure(*item) for item in found.items()]
 
 
 def robot_table(case: Case, robot: RobotData) -> TextTable:

@@ -45,6 +45,9 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
     )
     if model.structure:
         yield from _structure_words(model)
+        if model.legs:
+            words = f"{', '.join(leg.name for leg in model.legs)}: straight, so that limits of legs can be set"
+            yield Line(words, label="legs")
     rows = [(str(index + 1), row.member, row.kind.value) for index, row in enumerate(model.rows)]
     yield TextTable(("row", "limb", "wrench"), tuple(rows))
     if model.quantities:

@@ -167,7 +167,10 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
         names.append("limbs")
     else:
         names += ["poses", *(["rates"] if at_point or len(case.tasks) == 1 else [])]
-        names += [plural_name(item.name) for item in case.model.quantities]
+        measured = [item.name for item in case.model.quantities]
+        # Lengths of legs that are no quantity of the robot are shown where they are limited.
+        measured += [each.name for each in case.limits if each.name == "leg_length"]
+        names += [plural_name(name) for name in dict.fromkeys(measured)]
     if case.model.generic is not None and (at_point or len(case.tasks) == 1):
         names.append("actuation")
     if case.limits:

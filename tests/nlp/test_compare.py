@@ -103,7 +103,9 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
     # A Delta translates alone: all of F is constraint, in words and not as an error.
     assert (robots["delta"]["freedoms"], robots["delta"]["tasks"][0]["can_move"]) == (3, False)
     assert any("which has 3 freedoms, cannot make the motion of tilt" in each for each in robots["delta"]["sentences"])
-    assert [each["key"] for each in robots["6-sps"]["limits_left_out"]] == ["limits.leg_length"]
+    # The legs of the 6-SPS have lengths, the rods of the Delta have none that could change.
+    left_out = {name: [item["key"] for item in each["limits_left_out"]] for name, each in robots.items()}
+    assert (left_out["6-sps"], left_out["delta"]) == ([], ["limits.leg_length"])
     rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
     assert [float(row["value"]) for row in rows] == [each["value"] for each in result["robots"]]
     assert "no freedom" in out
@@ -162,7 +164,7 @@ def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
     assert np.array(ends) + offset == pytest.approx([20, -20, 140])
     # Limits hold over the workspace of every robot.
     assert own.workspace.has_limits
-    assert [each.key for each in found.left_out] == ["limits.leg_length"]
+    assert ([each.name for each in own.limits], found.left_out) == (["leg_length"], ())
 
 
 def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
@@ -188,23 +190,28 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
 
 
 def test_robots_that_keep_more_limits_come_first_and_what_others_lack_is_said(cli: Run) -> None:
-    names = ["6-ups", "delta", "case"]
+    names = ["6-pus", "delta", "case", "6-ups"]
     result = json.loads(output_of(cli("compare", "hexapod-machining", *names, "--starts", "2", "--json", "-")))
     kept = {each["name"]: (each["part"], each["limits_kept"], each["value"]) for each in result["robots"]}
-    # The six legs given joint by joint resist the motion more, without all limits but one.
-    assert kept["6-ups"][2] > kept["case"][2]
+    # The six rods on rails resist the motion more, without all limits but one.
+    assert kept["6-pus"][2] > kept["case"][2]
     assert [(each["name"], each["part"]) for each in result["robots"]] == [
         ("case", "ranked"),
-        ("6-ups", "ranked"),
+        ("6-pus", "ranked"),
         ("delta", "no freedom"),
+        ("6-ups", "no answer"),
     ]
-    assert [kept[name][1] for name in names] == [1, 1, 7]
+    # Legs given joint by joint have the limits of legs too, but cones that are stated by joint.
+    assert [kept[name][1] for name in names] == [1, 1, 7, 5]
     sentences = {each["name"]: " ".join(each["sentences"]) for each in result["robots"]}
-    for name, measure in (("6-ups", "actuator_length"), ("delta", "actuator_angle")):
+    for name, measure in (("6-pus", "actuator_length"), ("delta", "actuator_angle")):
         assert "legs between joint centres, and this robot is given joint by joint" in sentences[name]
         assert f"its own measures are {measure}" in sentences[name]
         assert "cannot hold" not in sentences[name]
-    units = {each["name"]: {rate["unit"] for rate in each["tasks"][0]["rates"]} for each in result["robots"]}
-    assert units == {"case": {"in/rad"}, "6-ups": {"in/rad"}, "delta": {"rad/rad"}}
+    assert "no design within the ranges keeps limits.joint_spacing.min, limits.footprint.platform" in sentences["6-ups"]
+    assert "Solved without limits.base_joint_angle, limits.platform_joint_angle" in sentences["6-ups"]
+    answered = [each for each in result["robots"] if each["name"] != "6-ups"]
+    units = {each["name"]: {rate["unit"] for rate in each["tasks"][0]["rates"]} for each in answered}
+    assert units == {"case": {"in/rad"}, "6-pus": {"in/rad"}, "delta": {"rad/rad"}}
     # The case's robot keeps its ranges with --range 0 too.
     assert any("--range 0 for one size of all but the case's robot" in each for each in result["sentences"])

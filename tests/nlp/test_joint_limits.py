@@ -340,7 +340,7 @@ REFUSALS = {
     "ball = { axis = [0, 0, 1] }": "limits.joint.ball",
     "ball = { cone = 9, axis = [0, 0, 0] }": "limits.joint.ball.axis = [0.0, 0.0, 0.0]: must be three finite numbers",
     "ball = { cone = 9, axis = [0, 0] }": "limits.joint.ball.axis: must",
-    "[limits]\nleg_length = { max = 3 }": "limits.leg_length: is nothing that '3-RPS' has",
+    "[limits]\nbase_joint_angle = 30": "limits.base_joint_angle: is nothing that '3-RPS' has",
     "[limits]\nlink_clearance = { min = 0 }": "limits.link_clearance.min = 0.0: must be above 0 m",
     "[limits]\nactuator_rate = { max = -1 }": "limits.actuator_rate.max = -1.0: must be above 0",
     "[limits]\njoint = 3": "limits.joint = 3: must be a table",

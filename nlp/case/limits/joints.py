@@ -212,6 +212,11 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         if isinstance(home, MountingPose) and not all(map(math.isfinite, (*home.position, home.angle))):
             raise CaseError(key, "must be a pose of finite numbers")
 
+    @classmethod
+    def is_for(cls, model: Model) -> bool:
+        """Return whether a robot has legs, and is not given joint by joint: then its joints have cones of their own."""
+        return super().is_for(model) and not model.joints
+
     @property
     def reference(self) -> str:
         """Word for the mounting axes."""

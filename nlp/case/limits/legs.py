@@ -17,11 +17,11 @@ import casadi as ca
 from casadi import SX
 from pydantic import Field, FiniteFloat
 
-from ....models import Model
+from ....models import Dimension, Model, RobotInstance
 from ..table import Table
 from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, Call, Form, PairFamily, between
 from .interval import IntervalLimit, QuantityLimit, quantity_named
-from .limit import Design, Limit, NumberRange, PosedRobot, Ranges
+from .limit import Design, Limit, Measures, NumberRange, PosedRobot, Ranges
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,13 @@ class LegLength(IntervalLimit):
     def exists_for(self, model: Model) -> bool:
         """Return whether a robot has legs, or a measure of this name without them."""
         return super().exists_for(model) or quantity_named(self.key, model) is not None
+
+    def measures(self, robot: RobotInstance) -> Measures | None:
+        """Return the lengths of a robot given joint by joint; the model's own quantity states those of other legs."""
+        if not (robot.legs and robot.joints):
+            return None
+        lengths = ca.vertcat(*[ca.norm_2(leg.span) for leg in robot.legs])
+        return Measures(tuple(leg.name for leg in robot.legs), lengths, Dimension.LENGTH)
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the squared length of each leg between its squared limits."""

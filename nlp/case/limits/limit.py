@@ -399,7 +399,7 @@ def _measures(model: Model) -> list[str]:
     """Return the keys of ``[limits]`` that mean something for a robot."""
     from .registry import LIMIT_TYPES  # noqa: PLC0415 - a case without limits starts without their tables
 
-    of_legs = [kind.key for kind in LIMIT_TYPES if kind.needs_legs] if model.legs else []
+    of_legs = [kind.key for kind in LIMIT_TYPES if kind.needs_legs and kind.is_for(model)]
     own = [quantity.name for quantity in model.quantities]
     always = [kind.key for kind in LIMIT_TYPES if not kind.needs_legs and kind.fields() and kind.is_for(model)]
     return list(dict.fromkeys([*of_legs, *own, *always]))

@@ -75,7 +75,7 @@ def _rates(pose: PosedRobot, limb: str) -> tuple[tuple[str, ...], SX]:
     """Return the names of the actuators of a limb, and their rates (n, tasks)."""
     model, robot = pose.model, pose.robot
     rows = [i for i, row in enumerate(model.frame_rows) if row.limb == limb]
-    if model.legs:
+    if model.legs and not model.actuators:
         rows = [i for i in rows if model.frame_rows[i].kind is WrenchKind.FORCE]
         return (limb,), robot.rates[rows[:1], :]
     own = [a for a, each in enumerate(model.actuators) if each.limb == limb]

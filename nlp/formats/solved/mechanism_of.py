@@ -7,7 +7,6 @@ counted from the exported pose. Other limits (cones, strokes, clearances, rates)
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -15,7 +14,8 @@ import numpy as np
 
 from ....models import FloatArray
 from ....models.limbjoints import LimbJoint
-from ....models.mechanism import MechanismJoint
+from ....models.mechanism import Mechanism, MechanismJoint
+from ....models.mechanism.topology import reached
 from ...case.case import Case
 from ...evidence.state import RobotState, evaluate
 from ...program.nlp import Nlp
@@ -56,22 +56,22 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
     """
     state = evaluate(nlp, x, pose - 1)
     model, known = nlp.program.model, nlp.program.robots[pose - 1].joints
-    lengths: dict[str, float] = {}
+    legs = _legs(nlp, x, pose - 1, state)
     if tables_of(model):
         coordinates = _coordinates(nlp, x, pose - 1)
         given = GivenRobot(model, state, known, coordinates)
         found = given_mechanism(given)
     else:
         check_legs(model)
-        legs = _legs(nlp, x, pose - 1, state)
-        lengths = {leg.name: float(np.linalg.norm(leg.platform - leg.base)) for leg in legs}
         found = leg_mechanism(model.name, legs, state.rotation, state.position)
     labelled = {joint.label: joint for joint in known}
-    joints = tuple(
-        replace(joint, range=_joint_range(nlp.case, joint, words, labelled.get(words.label), lengths, found.size))
-        for joint, words in zip(found.mechanism.joints, found.joints, strict=True)
-    )
-    mechanism = replace(found.mechanism, joints=joints)
+    spans, joints = {leg.name: leg.platform - leg.base for leg in legs}, []
+    for joint, words in zip(found.mechanism.joints, found.joints, strict=True):
+        given = labelled.get(words.label)
+        span = spans.get(words.actuator if given is None else given.limb)
+        length = None if span is None or not joint.actuated else _signed_length(found.mechanism, joint, span)
+        joints.append(replace(joint, range=_joint_range(nlp.case, joint, words, given, length, found.size)))
+    mechanism = replace(found.mechanism, joints=tuple(joints))
     return Exported(mechanism, found.joints, found.size, found.notes, nlp.case, pose)
 
 
@@ -90,9 +90,9 @@ def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], fl
 def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLeg]:
     """Return the legs at a pose, with the axes of upper universal joints from the drawing."""
     model, legs = nlp.program.model, nlp.program.robots[pose].legs
-    numbers = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.horzcat(*[each.base for each in legs])])
-    spans = ca.Function("spans", [nlp.program.x, nlp.program.p], [ca.horzcat(*[each.span for each in legs])])
-    base, span = (each(x, nlp.arguments).full() for each in (numbers, spans))
+    ends = [ca.horzcat(ca.SX(3, 0), *[getattr(leg, each) for leg in legs]) for each in ("base", "span")]
+    function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in ends])
+    base, span = (each.full() for each in function(x, nlp.arguments))
     own = [each.symbol for each in model.parameters]
     vectors = [each.vector for each in model.scene.directions]
     directions = ca.Function(
@@ -108,12 +108,20 @@ def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLe
     ]
 
 
+def _signed_length(mechanism: Mechanism, slide: MechanismJoint, span: FloatArray) -> float:
+    """Return the length of a leg from its base joint by a vector (3,); negative where its slide shortens it."""
+    ends = ((each.inner, each.outer) for each in mechanism.joints if each is not slide)
+    on_base = reached(mechanism.base, [each for each in ends if mechanism.platform not in each])
+    is_longer = bool(slide.axis @ span > 0) == (slide.inner in on_base)
+    return float(np.linalg.norm(span)) * (1 if is_longer else -1)
+
+
 def _joint_range(
     case: Case,
     joint: MechanismJoint,
     words: ExportedJoint,
     given: LimbJoint | None,
-    lengths: Mapping[str, float],
+    length: float | None,
     size: float,
 ) -> tuple[float, float] | None:
     """Return the smallest and the largest coordinate of a joint from the exported pose; None without a limit.
@@ -123,7 +131,7 @@ def _joint_range(
         joint: the joint.
         words: the same in the words of the case.
         given: the joint of the robot file that it is part of; None for a leg.
-        lengths: of the legs at that pose, by limb.
+        length: of the leg that it drives at that pose, negative where it shortens it; None for another joint.
         size: length of the order of the robot's own.
     """
     if not case.limits or joint.kind in ("S", "weld") or words.follows:
@@ -138,15 +146,17 @@ def _joint_range(
     lower, upper, lever, value = -math.inf, math.inf, words.lever or 1.0, words.coordinate or 0.0
     for limit in case.limits:
         at = None
-        if isinstance(limit, LegLength) and joint.actuated and words.actuator in lengths:
-            at = lengths[words.actuator]
+        if isinstance(limit, LegLength) and is_slide:
+            at = length
         elif isinstance(limit, QuantityLimit) and joint.actuated and given is not None:
             at = value if limit.measure == measure else None
         elif isinstance(limit, JointMotion) and given is not None and given.is_called(limit.joint):
             at = value if limit.part == words.part else None
         if at is not None and isinstance(limit, LegLength | QuantityLimit | JointMotion):
-            lower = max(lower, -math.inf if limit.min is None else limit.min / lever - at)
-            upper = min(upper, math.inf if limit.max is None else limit.max / lever - at)
+            ends = -math.inf if limit.min is None else limit.min, math.inf if limit.max is None else limit.max
+            if isinstance(limit, LegLength) and at < 0:
+                ends = -ends[1], -ends[0]
+            lower, upper = max(lower, ends[0] / lever - at), min(upper, ends[1] / lever - at)
     if math.isinf(lower) and math.isinf(upper):
         return None
     # Formats have ranges with two sides; a limit of an angle counts within half a turn from home.

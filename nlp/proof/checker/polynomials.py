@@ -80,12 +80,7 @@ def places(d: int) -> Places:
     first, second = np.triu_indices(d, 1)
     count = 1 + 2 * d + len(first)
     return Places(
-        slice(1, 1 + d),
-        slice(1 + d, 1 + 2 * d),
-        slice(1 + 2 * d, count),
-        first,
-        second,
-        2 * (count + 32) * UNIT,
+        slice(1, 1 + d), slice(1 + d, 1 + 2 * d), slice(1 + 2 * d, count), first, second, 2 * (count + 32) * UNIT
     )
 
 

@@ -151,7 +151,7 @@ def claims_of(layout: Layout, quantities: Sequence[str] = (), *, with_objective:
     Raises:
         InputError: the robot has no measure of a name.
     """
-    found = [*_of_limits(layout), *_of_legs(layout)]
+    found = [*_of_limits(layout), *_of_legs(layout, quantities)]
     # A measure with its limit is claimed once.
     named = {(each.name, each.sense) for each in found}
     found += [each for each in _of_quantities(layout, quantities) if (each.name, each.sense) not in named]
@@ -171,10 +171,12 @@ def _of_limits(layout: Layout) -> Iterator[Claim]:
                 yield Claim(constraint.name, sense, constraint.expression, constraint.reading, key, limit)
 
 
-def _of_legs(layout: Layout) -> Iterator[Claim]:
+def _of_legs(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
     """Yield the smallest and the largest length of each leg, with their limits: the lengths that its actuator needs."""
     limit = next((each for each in layout.case.limits if isinstance(each, LegLength)), None)
-    for i, leg in enumerate(layout.robots[0].legs):
+    # A robot given joint by joint has measures of its own beside them.
+    is_asked = LegLength.key in names or any(isinstance(each, LegLength | Actuator) for each in layout.case.limits)
+    for i, leg in enumerate(layout.robots[0].legs if is_asked or not layout.case.model.structure else ()):
         for sense in (Sense.MIN, Sense.MAX):
             allowed = None if limit is None else getattr(limit, sense.value)
             key, square = ("", None) if allowed is None else (f"leg_length.{sense.value}", allowed**2)
@@ -186,6 +188,8 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
     """Yield the smallest and the largest value of measures of the robot, at each of their owners."""
     known = {quantity.name: k for k, quantity in enumerate(layout.case.model.quantities)}
     for name in dict.fromkeys(names):
+        if name == LegLength.key and layout.robots[0].legs:
+            continue  # among the claims already
         if name not in known:
             raise InputError(f"--of-quantity {name}: no measure of this robot; {nearest(name, known)}")
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]

@@ -79,8 +79,8 @@ def check_leg_error(case: Case, leg_error: float) -> None:
 
 
 def has_straight_legs(model: Model) -> bool:
-    """Return whether a robot is six straight legs and nothing else."""
-    return len(model.legs) == LEGS and len(model.wrenches) == LEGS and not (model.members or model.unknowns)
+    """Return whether a robot that is given by its rows is six straight legs and nothing else."""
+    return len(model.legs) == LEGS == len(model.wrenches) and not (model.members or model.unknowns or model.structure)
 
 
 def legs_of(case: Case) -> Legs | None:

@@ -251,12 +251,13 @@ def length_of_one_machine(machines: MachineLayout, leg: int, sense: Sense, about
     part with the fixed vectors c_p and c_b cancels; little is left of it where the leg's direction changes little.
 
     Args:
-        machines: with two errors for each leg.
+        machines: among whose errors are two for each leg.
         leg: index of the leg.
         sense: whether the smallest or the largest value is meant.
         about: c_b and c_p.
     """
-    e, f = machines.errors[6 * leg : 6 * leg + 3], machines.errors[6 * leg + 3 : 6 * leg + 6]
+    places = (3 * machines.built.names.index(each) for each in machines.built.model.legs[leg].centres)
+    e, f = (machines.errors[k : k + 3] for k in places)
     same = ca.dot(f, SX(about.platform.tolist())) - ca.dot(e, SX(about.base.tolist()))
     length = ca.norm_2(machines.layout.robots[0].legs[leg].span)
     return Claim(one_machine_name(about.claim), sense, length - same, LENGTH, legs=(leg,))

@@ -218,11 +218,15 @@ class _Writer:
         if directions is None:
             self._need_lengths([found.name.partition(" limb ")[2]], ("min", "max"))
             return ProofClaim(found.name, found.sense.value, "lengths", found.bound)
+        if any((one_machine_name(found.name), sense) not in self._record.programs for sense in ("min", "max")):
+            raise ProofError(_BY_MACHINES)
         sides = tuple(directions.base.tolist()), tuple(directions.platform.tolist())
         return ProofClaim(found.name, found.sense.value, "one machine", found.bound, sides=sides)
 
     def _boxes(self, each: Claim, found: Extreme) -> ProofClaim:
         """Return a claim with a tree of a search of its own."""
+        if each.name not in self._record.boxes:
+            raise ProofError(_ONE_ASSEMBLY)
         if each.kind is ClaimKind.ERROR or (self._case.joint_centre_tolerance and each.kind is not ClaimKind.CLEARANCE):
             self._need_lengths([leg.name for leg in self._case.model.legs], ("min",))
         if each.kind is ClaimKind.ERROR:

@@ -151,10 +151,10 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
     every = [*(Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in ranks), *robot.reaches, *claims]
+    every += [*length_claims(case), *searched_claims(case, quantities)]
     if robot.legs is None:
-        return every
-    errors = ERRORS if leg_error_of(case, leg_error) > 0 else ()
-    return [*every, *length_claims(case), *searched_claims(case, quantities), *errors]
+        return [each for each in every if each.kind is not ClaimKind.SPECTRUM]
+    return [*every, *(ERRORS if leg_error_of(case, leg_error) > 0 else ())]
 
 
 def _has_constraints(model: Model) -> bool:

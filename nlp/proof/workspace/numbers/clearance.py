@@ -48,7 +48,7 @@ class Clearance(Number):
         ends = [end for base, arm in pairs for end in (scale * base, scale * y[:3] + turned @ arm)]
         scaled = ca.densify(ca.vertcat(*ends))
         super().__init__(problem, ca.vertcat(scaled, scale))
-        self._ends = ca.Function("ends", [problem.z], [scaled / scale])
+        self._ends = ca.Function("ends", [problem.z[: len(problem.free)]], [scaled / scale])
         self._legs, self._places, self._nearer = legs, places, 2 * legs.tolerance
 
     def values(self, z: FloatArray) -> FloatArray:
@@ -58,7 +58,7 @@ class Clearance(Number):
 
     def between(self, z: FloatArray) -> FloatArray:
         """Return the vectors (P, 3) from the nearest point of the second leg to that of the first."""
-        return _between(values_at(self._ends, z)[0][:, :, 0])
+        return _between(values_at(self._ends, z[:, : len(self.problem.free)])[0][:, :, 0])
 
     def worst(self, y: FloatArray) -> FloatArray | None:
         """Return the errors (m, 3) with which the legs are nearest at a pose (6,); None for the design."""
@@ -105,9 +105,7 @@ class Clearance(Number):
         return np.where(np.isfinite(found), found, np.inf)
 
 
-def _ends_over(
-    forms: Forms,
-) -> tuple[FloatArray, FloatArray, FloatArray, tuple[FloatArray, FloatArray], FloatArray]:
+def _ends_over(forms: Forms) -> tuple[FloatArray, FloatArray, FloatArray, tuple[FloatArray, FloatArray], FloatArray]:
     """Return the ends of two legs over B boxes.
 
     Args:
@@ -130,9 +128,9 @@ def _ends_over(
 
 
 def _shares(falls: FloatArray, count: int) -> FloatArray:
-    """Return the share (B, f) of each coordinate in terms (B, t): its own, and half of each product with it."""
-    shares = falls[:, :count].copy()
-    for k, (i, j) in enumerate(itertools.combinations_with_replacement(range(count), 2), start=count):
+    """Return the share (B, f) of each coordinate in terms (B, t): its own, and half of each product with it, if any."""
+    shares, pairs = falls[:, :count].copy(), itertools.combinations_with_replacement(range(count), 2)
+    for k, (i, j) in zip(range(count, falls.shape[1]), pairs, strict=False):
         shares[:, [i, j]] += 0.5 * falls[:, [k]] * (2 if i == j else 1)
     return shares
 

@@ -88,11 +88,7 @@ class Extreme:
 
 
 def extreme_of(
-    claim: Claim,
-    found: Minimum,
-    pose: PoseNumbers | None = None,
-    *,
-    errors: JointErrors | None = None,
+    claim: Claim, found: Minimum, pose: PoseNumbers | None = None, *, errors: JointErrors | None = None
 ) -> Extreme:
     """Return the extreme of a number from the smallest value of its expression, or of minus it for the largest one.
 

@@ -51,9 +51,14 @@ class Subject:
     reason: str = ""
     shortest: float = 0.0
 
-    def errors(self, vectors: FloatArray | None) -> JointErrors | None:
-        """Return errors (m, 3) of joint centres with their names; None for the design."""
-        return None if vectors is None or self.machines is None else JointErrors(self.machines.names, vectors)
+    def errors(self, vectors: FloatArray | None, *, of_legs: bool = False) -> JointErrors | None:
+        """Return errors (m, 3) of joint centres, or of those of legs alone, with their names; None for the design."""
+        if vectors is None or self.machines is None:
+            return None
+        names, found = self.machines.names, np.zeros((len(self.machines.names), 3))
+        of = [names.index(each) for leg in self.case.model.legs for each in leg.centres] if of_legs else slice(None)
+        found[of] = vectors
+        return JointErrors(names, found)
 
     @cached_property
     def legs(self) -> Legs:
@@ -74,6 +79,8 @@ class Subject:
     def number(self, claim: Claim) -> SingularValues | Clearance:
         """Return what has bounds of the number of a claim about a clearance or a spectrum, or of minus it."""
         if claim.kind is ClaimKind.CLEARANCE:
+            if self.legs.tolerance and self.problem.has_following:
+                raise NotJudgedError("numbers of the pose that follow from others differ from machine to machine")
             return Clearance(self.problem, self.legs, claim.legs)
         return self.spectrum(claim.length, is_condition=claim.sense is Sense.MAX)
 
@@ -118,7 +125,8 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
     if not math.isfinite(found.value):
         return extreme_of(claim, found)
     y = problem.pose_of(found.at)
-    return extreme_of(claim, found, problem.box.pose(y), errors=subject.errors(number.worst(y)))
+    errors = subject.errors(number.worst(y), of_legs=claim.kind is ClaimKind.CLEARANCE)
+    return extreme_of(claim, found, problem.box.pose(y), errors=errors)
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:

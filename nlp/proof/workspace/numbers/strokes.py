@@ -104,13 +104,16 @@ class _Combined:
         poses = [each.pose for each in ends if each.pose is not None]
         if not self._legs.tolerance or len(poses) < len(ends):
             return float(self._factors @ [each.reached for each in ends]), None
+        if self._subject.machines is None or self._subject.machines.has_following:
+            # Both poses are of different machines.
+            return math.nan, None
         # The errors are along the change of the number, to first order.
         at, turned = self.directions(poses)
         errors = np.zeros((2 * len(self._legs.base), 3))
         slopes = self._sign * np.stack([-self._factors @ at, self._factors @ turned])
         e, f = errors[2 * self._leg : 2 * self._leg + 2] = steepest(slopes, self._legs.tolerance)
         moved = self._spans(poses) + [pose.rotation @ f - e for pose in poses]
-        return float(self._factors @ np.linalg.norm(moved, axis=1)), self._subject.errors(errors)
+        return float(self._factors @ np.linalg.norm(moved, axis=1)), self._subject.errors(errors, of_legs=True)
 
     def _spans(self, poses: Sequence[PoseNumbers]) -> FloatArray:
         """Return the vectors (K, 3) along the leg at poses, in the world frame."""

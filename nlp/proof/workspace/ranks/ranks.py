@@ -43,11 +43,7 @@ class Ranks(NamedTuple):
 
 
 def prove_ranks(
-    problem: Problem,
-    homes: Homes,
-    *,
-    progress: RankProgress | None = None,
-    paper: PaperRecord | None = None,
+    problem: Problem, homes: Homes, *, progress: RankProgress | None = None, paper: PaperRecord | None = None
 ) -> Ranks:
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
 

@@ -83,6 +83,11 @@ class Problem:
         return self.design or self
 
     @property
+    def has_following(self) -> bool:
+        """Whether numbers of the pose follow from others, so that each machine has its own."""
+        return any(k < len(self.free) for k in self.dependent)
+
+    @property
     def length(self) -> float:
         """A length of the order of the robot's."""
         return self.chosen.length

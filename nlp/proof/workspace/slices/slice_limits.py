@@ -25,7 +25,6 @@ from ....case.task import Sense
 from ....errors import UncoveredError
 from ...enclosure.forms import Encloser
 from ...statement.claims import Claim, searched_claims
-from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
 from ..numbers.extremes import slack_of
@@ -104,7 +103,11 @@ class SliceLimits:
         self._others: list[_Other] = []
         for claim in searched_claims(case):
             number = subject.number(claim)
-            if problem.dependent or not _is_covered(number):
+            try:
+                examiner = None if problem.dependent else number.examiner
+            except UncoveredError:
+                examiner = None
+            if examiner is None:
                 uncovered[claim.key] = None
                 continue
             is_enclosed = isinstance(number, Clearance)
@@ -168,10 +171,7 @@ class SliceLimits:
         found = np.zeros((len(self.limits), len(z)), dtype=np.bool_)
         with np.errstate(all="ignore"):
             numbers = values_at(self._function, z)[0][:, :, 0].T
-            claims = [
-                *(numbers < self._leasts[:, None])[self._reaches :],
-                *(each.violated(z) for each in self._others),
-            ]
+            claims = [*(numbers < self._leasts[:, None])[self._reaches :], *(each.violated(z) for each in self._others)]
         for place, claim in zip(self._places, claims, strict=True):
             found[place] |= claim
         return found
@@ -186,15 +186,6 @@ def _least(claim: Claim) -> float:
 def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[np.int8]:
     """Return states from whether claims are proved to be kept, or violated."""
     return np.where(kept, LimitState.KEPT, np.where(violated, LimitState.VIOLATED, LimitState.OPEN)).astype(np.int8)
-
-
-def _is_covered(number: Number) -> bool:
-    """Return whether a number has no operation without a rule."""
-    try:
-        _ = number.examiner
-    except UncoveredError:
-        return False
-    return True
 
 
 class _Other:
