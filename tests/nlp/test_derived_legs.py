@@ -6,7 +6,7 @@ import copy
 import itertools
 import json
 import math
-from collections.abc import Mapping
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,21 +14,21 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, output_of, refusal_of, saved, starter_tables, turn_about
+from builders import Array, Run, case_from, output_of, refusal_of, saved, turn_about
 from generated import made, needs_compiler, written
 from measures import circle_joints, segment_distance
 
 from screwsynth.models import Model, Substitution, robot, stewart_gough
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import Case, Nlp, Status, formulate, judge_workspace, margins_of, result_of, solve, text_of
+from screwsynth.nlp import Case, Nlp, Status, formulate, judge_workspace, margins_of, result_of, solve
 from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.formats.solved.mechanism_of import mechanism_of
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.workspace.judge import Judgement
 from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
-
 
 Tables = dict[str, Any]
 
@@ -164,7 +164,7 @@ def test_a_3_upu_by_its_joints_has_the_lengths_of_one_by_its_rows() -> None:
 
 
 def hexapod_at(Q: Array, base: Array, arms: Array, home: Array) -> Tables:
-    """Six legs between points, all turned or mirrored by Q at home, where the platform's axes are those of the world."""
+    """Six legs between points, turned or mirrored by Q at home, where the platform has the axes of the world."""
     limbs = []
     for b, a in zip(base @ Q.T, (home + arms) @ Q.T, strict=True):
         joints = leg(b.tolist(), a.tolist(), (a - b).tolist())
@@ -234,6 +234,7 @@ def with_joints(joints: list[Tables]) -> Model:
 
 
 UP, SPIN = leg("B", "A", "A - B"), {"type": "R", "at": "A", "axis": "A - B"}
+CARDAN = {"type": "U", "at": "A", "axes": [[1, 0, 0], [0, 1, 0]]}
 HINGES = [{"type": "R", "at": "B", "axis": axis} for axis in ([1, 0, 0], [0, 1, 0])]
 #: Joints of a limb that is a leg, whatever they are called and wherever a hinge is written on its axis.
 LEGS = {
@@ -242,17 +243,17 @@ LEGS = {
     "a hinge written elsewhere on its axis": [HINGES[0] | {"at": "B + 7*x"}, *UP[1:]],
     "a slide that is written off the line": [UP[0], UP[1] | {"at": [0, 0, 3]}, UP[2]],
     "against the line": [UP[0], UP[1] | {"axis": "B - A"}, UP[2]],
-    "a leg that spins": [*UP[:2], SPIN, {"type": "U", "at": "A", "axes": [[1, 0, 0], [0, 1, 0]]}],
+    "a leg that spins": [*UP[:2], SPIN, CARDAN],
     "the slide beside the platform": [UP[0], UP[1] | {"at": "A"}, UP[2]],
 }
 #: Joints of a limb that is none.
 OTHERS = {
     "a slide that leans": [UP[0], UP[1] | {"axis": "A - B + x"}, UP[2]],
-    "a passive slide": [*UP[:2], {"type": "P", "at": "A", "axis": [0, 0, 1]}, {"type": "U", "at": "A", "axes": [[1, 0, 0], [0, 1, 0]]}],
+    "a passive slide": [*UP[:2], {"type": "P", "at": "A", "axis": [0, 0, 1]}, CARDAN],
     "a slide on the base": [UP[1], UP[0], UP[2]],
     "a hinge off the line": [HINGES[0] | {"at": "B + 3*y"}, *UP[1:]],
-    "a driven hinge and a rod": [HINGES[0] | {"actuated": True}, {"type": "U", "at": [20, -20, 5], "axes": [[1, 0, 0], [0, 1, 0]]}, UP[2]],
-}  # fmt: skip
+    "a driven hinge and a rod": [HINGES[0] | {"actuated": True}, CARDAN | {"at": [20, -20, 5]}, UP[2]],
+}
 
 
 @pytest.mark.parametrize("kind", LEGS)
@@ -263,7 +264,9 @@ def test_a_driven_slide_between_two_centres_is_a_leg(kind: str) -> None:
     for own, other in zip(model.legs, by_rows.legs, strict=True):
         for end in ("base", "platform"):
             found, expected = (
-                ca.evalf(ca.substitute(getattr(each, end), ca.vertcat(*[p.symbol for p in m.parameters]), ca.DM(numbers)))
+                ca.evalf(
+                    ca.substitute(getattr(each, end), ca.vertcat(*[p.symbol for p in m.parameters]), ca.DM(numbers))
+                )
                 for each, m, numbers in ((own, model, [*values, 20]), (other, by_rows, values))
             )
             assert found.full() == pytest.approx(expected.full(), abs=1e-9)
@@ -272,3 +275,328 @@ def test_a_driven_slide_between_two_centres_is_a_leg(kind: str) -> None:
 @pytest.mark.parametrize("kind", OTHERS)
 def test_another_limb_is_no_leg(kind: str) -> None:
     assert [leg.name for leg in with_joints(OTHERS[kind]).legs] == ["1-", "1+", "2-", "2+", "3-"]
+
+
+# Workspaces
+
+
+def poses_of(rng: np.random.Generator, count: int) -> list[tuple[Array, Array]]:
+    """Poses of the workspace: position and rotation."""
+    x, z, angle = rng.uniform(-1, 1, count), rng.uniform(19, 21, count), np.radians(rng.uniform(-4, 4, count))
+    return [(np.array([x[k], 0, z[k]]), turn_about([0, 1, 1], angle[k])) for k in range(count)]
+
+
+def legs_of(errors: Array, pose: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Ends (6, 3) of the legs of a machine with errors (12, 3) of its joint centres, in the world."""
+    base, platform = circle_joints(FIXED | {name: math.radians(FIXED[name]) for name in ("x3", "x4")})
+    p, R = pose
+    return base + errors[::2], p + (platform + errors[1::2]) @ R.T
+
+
+def ends_of(judged: Judgement) -> dict[tuple[str, str], float]:
+    """Proven bounds by name and sense."""
+    return {(each.name, each.sense.value): each.bound for each in judged.extremes}
+
+
+@pytest.fixture(scope="module", params=[None, 0.02], ids=["exact", "as built"])
+def workspaces(request: pytest.FixtureRequest) -> tuple[float, list[tuple[Case, Judgement, PaperRecord]]]:
+    """Both descriptions judged over a workspace, every machine within a tolerance too, with records for a proof."""
+    more = {"tolerance": {"joint_centre": request.param}} if request.param else {}
+    found = []
+    for case in both(FIXED, HELD, workspace=WORKSPACE, **more):
+        record = PaperRecord()
+        found.append((case, judge_workspace(case, with_objective=False, paper=record), record))
+    return request.param or 0.0, found
+
+
+Workspaces = tuple[float, list[tuple[Case, Judgement, PaperRecord]]]
+
+
+def test_bounds_over_a_workspace_contain_every_machine_and_agree(workspaces: Workspaces) -> None:
+    tolerance, ((_, by_rows, _), (_, judged, _)) = workspaces
+    bounds, others = ends_of(judged), ends_of(by_rows)
+    assert bounds.keys() == others.keys()
+    assert judged.is_proved
+    for key, bound in bounds.items():
+        assert bound == pytest.approx(others[key], rel=2e-3), key
+    rng, names = np.random.default_rng(0), ["1-", "1+", "2-", "2+", "3-", "3+"]
+    worst = dict.fromkeys(bounds, math.inf)
+
+    def reached(name: str, sense: str, value: float) -> None:
+        room = bounds[name, sense] - value if sense == "max" else value - bounds[name, sense]
+        assert room >= -1e-9, (name, sense)
+        worst[name, sense] = min(worst[name, sense], room)
+
+    for _ in range(20):
+        errors = rng.normal(size=(12, 3))
+        errors *= tolerance / np.linalg.norm(errors, axis=1, keepdims=True)
+        every = [legs_of(errors, pose) for pose in poses_of(rng, 60)]
+        lengths = np.array([np.linalg.norm(ends - base, axis=1) for base, ends in every])
+        for k, name in enumerate(names):
+            short, long = lengths[:, k].min(), lengths[:, k].max()
+            reached(f"leg_length limb {name}", "min", short)
+            reached(f"leg_length limb {name}", "max", long)
+            reached(f"actuator.stroke_max limb {name}", "max", long - short)
+            reached(f"actuator.dead_length limb {name}", "min", 2 * short - long)
+        for i, j in itertools.combinations(range(6), 2):
+            base, ends = every[0]
+            apart = segment_distance(base[i], ends[i], base[j], ends[j])
+            reached(f"leg_clearance limbs {names[i]} and {names[j]}", "min", apart)
+    # Lengths have bounds that are nearly reached: less than the tolerance and a part of the range away.
+    assert all(room < 0.5 + 3 * tolerance for (name, _), room in worst.items() if name.startswith("leg_length"))
+
+
+def proof_of(judged: Judgement, record: PaperRecord) -> Proof:
+    """The proof as its file has it."""
+    return read_proof(paper_of(judged, record, "").as_text(), "again")
+
+
+def test_the_proof_on_paper_is_accepted_and_an_altered_one_is_not(workspaces: Workspaces) -> None:
+    _, (_, (case, judged, record)) = workspaces
+    proof = proof_of(judged, record)
+    checked = {(each.name, each.sense): each for each in check_workspace_proof(proof, case).claims}
+    named = {each.name for each in proof.claims}
+    assert {"leg_length limb 1-", "actuator.stroke_max limb 3+", "leg_clearance limbs 1- and 1+"} <= named
+    for each in judged.extremes:
+        if each.limit is not None:
+            found = checked[each.name, each.sense.value]
+            assert found.bound is not None
+            assert found.limit == pytest.approx(each.limit)
+            # The check has bounds of its own, which keep the limit too.
+            assert (
+                (found.bound <= each.limit) if each.sense.value == "max" else (found.bound >= each.limit * (1 - 1e-9))
+            )
+    for name, factor in (("leg_length limb 1-", 1.1), ("leg_clearance limbs 1- and 1+", 2.0)):
+        claims = tuple(
+            replace(each, bound=(each.bound or 0.0) * factor) if (each.name, each.sense) == (name, "min") else each
+            for each in proof.claims
+        )
+        with pytest.raises(ProofError):
+            check_workspace_proof(replace(proof, claims=claims), case)
+    # Another robot, whose base is smaller.
+    other = case_from(tables(octahedral(), FIXED | {"x1": 24.0}, HELD, workspace=WORKSPACE))
+    with pytest.raises(ProofError):
+        check_workspace_proof(proof, other)
+
+
+TRIPOD = {
+    "robot": {"model": "3-rps", "parameters": {"rb": 1, "rp": 0.6, "h": 1.1}},
+    "pose": {"position": [0, 0, 1.1]},
+    "task": [{"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}],
+    "limits": {
+        "leg_length": {"min": 0.9, "max": 1.5},
+        "actuator": {"stroke_max": 0.4},
+        "leg_clearance": {"min": 0.5},
+    },
+    "workspace": {
+        "position": [{"min": -0.05, "max": 0.05}, {"min": -0.05, "max": 0.05}, {"min": 1.05, "max": 1.15}],
+        "rotation": {"angle": {"min": -4, "max": 4}},
+    },
+}
+
+
+def tripod_pose(z: float, turn: Array, errors: Array) -> tuple[Array, Array]:
+    """Ends (3, 3) of the legs of a 3-RPS with errors (6, 3): each leg lies in the plane across its hinge.
+
+    The numbers of the pose that the robot has no choice of are found by Newton's method.
+    """
+    angles = np.radians([0, 120, 240])
+    around = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    hinges = np.stack([-np.sin(angles), np.cos(angles), 0 * angles], axis=1)
+    base, platform = around + errors[::2], 0.6 * around + errors[1::2]
+
+    def ends(u: Array) -> Array:
+        vector = np.array([*turn, u[2]])
+        size = float(np.linalg.norm(vector))
+        R = turn_about(vector, size) if size else np.eye(3)
+        return np.asarray(np.array([u[0], u[1], z]) + platform @ R.T)
+
+    u = np.zeros(3)
+    for _ in range(20):
+        off = ((ends(u) - base) * hinges).sum(axis=1)
+        slopes = np.array(
+            [((ends(u + step) - ends(u - step)) * hinges).sum(axis=1) / 2e-6 for step in 1e-6 * np.eye(3)]
+        )
+        u = u - np.linalg.solve(slopes.T, off)
+    assert np.abs(((ends(u) - base) * hinges).sum(axis=1)).max() < 1e-12
+    assert np.abs(u[:2]).max() < 0.05
+    return base, ends(u)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.001])
+def test_a_robot_with_fewer_freedoms_and_loops(tolerance: float) -> None:
+    more = {"tolerance": {"joint_centre": tolerance}} if tolerance else {}
+    judged = judge_workspace(case_from({**TRIPOD, **more}), with_objective=False)
+    bounds, outcomes = ends_of(judged), {each.name: each.outcome for each in judged.extremes}
+    rng, every = np.random.default_rng(1), []
+    errors = rng.normal(size=(6, 3))
+    errors *= tolerance / np.linalg.norm(errors, axis=1, keepdims=True)
+    for _ in range(200):
+        turn = rng.normal(size=2)
+        turn *= np.radians(3.9) * rng.uniform() / np.linalg.norm(turn)
+        every.append(tripod_pose(rng.uniform(1.05, 1.15), turn, errors))
+    lengths = np.array([np.linalg.norm(ends - base, axis=1) for base, ends in every])
+    for k in range(3):
+        short, long = lengths[:, k].min(), lengths[:, k].max()
+        assert bounds[f"leg_length limb {k + 1}", "min"] <= short < long <= bounds[f"leg_length limb {k + 1}", "max"]
+        assert long - short <= bounds[f"actuator.stroke_max limb {k + 1}", "max"]
+        assert outcomes[f"actuator.stroke_max limb {k + 1}"] is Outcome.PROVED
+    base, ends = every[0]
+    for i, j in itertools.combinations(range(3), 2):
+        name = f"leg_clearance limbs {i + 1} and {j + 1}"
+        if tolerance:
+            # Poses of other machines are not those of the design: the claim stays open, with the reason.
+            (extreme,) = (each for each in judged.extremes if each.name == name)
+            assert extreme.outcome is Outcome.OPEN
+            assert extreme.reason == "numbers of the pose that follow from others differ from machine to machine"
+        else:
+            assert outcomes[name] is Outcome.PROVED
+            assert bounds[name, "min"] <= segment_distance(base[i], ends[i], base[j], ends[j])
+
+
+# Commands, files and C
+
+CASE = """
+[robot]
+model = "6-ups"
+parameters = { rb = { min = 20, max = 30 }, rp = { min = 8, max = 13 }, base_half = 50, platform_half = 8, h = 20 }
+[pose]
+position = [0, 0, { min = 18, max = 22 }]
+[[task]]
+sense = "max"
+axis = [1, 2, 6]
+point = [3, 1, 12]
+pitch = 0.1
+[limits]
+leg_length = { min = 24, max = 27 }
+actuator = { dead_length = 10 }
+leg_clearance = { min = 2 }
+footprint = { base = 28, platform = 12 }
+joint_spacing = { min = 2 }
+[solve]
+starts = 4
+"""
+#: Limits of legs, one of each kind.
+OF_LEGS = {
+    "leg_length": "{ max = 30 }",
+    "actuator": "{ stroke_max = 3 }",
+    "leg_clearance": "{ min = 1 }",
+    "footprint": "{ base = 9 }",
+    "joint_spacing": "{ min = 1 }",
+    "radius_ratio": "{ max = 1 }",
+}
+
+
+def test_the_command_line_shows_the_lengths_that_are_limited(cli: Run, tmp_path: Path) -> None:
+    path = saved(tmp_path / "legs.toml", CASE)
+    out = output_of(cli("solve", str(path)))
+    assert "leg length" in out
+    assert "leg_length.max" in out
+    result = json.loads(output_of(cli("solve", str(path), "--json", "-")))
+    lengths = result["limited_quantities"]["leg_length"]
+    numbers = {each["name"]: each["value"] for each in result["margins"] if each["name"].startswith("leg_length")}
+    assert {f"leg_length limb {name}": value for name, value in lengths.items()} == pytest.approx(numbers)
+    assert max(lengths.values()) <= 27 * (1 + 1e-9)
+    # Lengths from home and between centres differ by the length at home.
+    ways = result["quantities"]["actuator_length"]
+    assert len({round(lengths[name] - ways[name], 6) for name in lengths}) == 1
+    saved(path, CASE.replace("leg_length = { min = 24, max = 27 }\n", ""))
+    without = json.loads(output_of(cli("solve", str(path), "--json", "-")))
+    assert "limited_quantities" not in without
+    assert set(without["quantities"]) == {"actuator_length"}
+    assert without["F"] > result["F"]
+
+
+def test_the_workspace_command_proves_limits_of_legs_on_paper(cli: Run, tmp_path: Path) -> None:
+    text = CASE.replace("rb = { min = 20, max = 30 }, rp = { min = 8, max = 13 }", "rb = 28, rp = 12")
+    text = text.replace("{ min = 18, max = 22 }]", "20]").replace("max = 27", "max = 34")
+    box = "[workspace]\nposition = [0, { min = -0.5, max = 0.5 }, { min = 19, max = 20 }]\n"
+    path, proof = saved(tmp_path / "legs.toml", text + box), tmp_path / "legs.proof"
+    out = output_of(cli("workspace", str(path), "--proof", str(proof), "--of-quantity", "leg_length"))
+    assert "actuator.dead_length" in out
+    assert output_of(cli("verify-proof", str(proof), str(path)))
+    saved(path, (text + box).replace("leg_clearance = { min = 2 }", "leg_clearance = { min = 2.5 }"))
+    assert cli("verify-proof", str(proof), str(path))[0] != 0
+
+
+def test_robots_without_legs_refuse_their_limits_by_name(cli: Run, tmp_path: Path) -> None:
+    for robot_name, (key, limit) in itertools.product(("delta", "6-rss"), OF_LEGS.items()):
+        text = output_of(cli("new", robot_name)).replace("# [limits]", f"[limits]\n{key} = {limit}\n#")
+        path = saved(tmp_path / "case.toml", text)
+        refusal_of(cli("solve", str(path)), f"limits.{key}: is nothing that '{robot_name}' has; it has actuator_angle")
+    # Cones of the joints of a file's legs are stated by joint.
+    path = saved(tmp_path / "case.toml", CASE.replace("[solve]", "base_joint_angle = 30\n[solve]"))
+    refusal_of(cli("solve", str(path)), "limits.base_joint_angle: is nothing that '6-ups' has; it has leg_length")
+
+
+@pytest.mark.parametrize("name", ["6-ups", "3-rps", "planar-3-rpr", "tricept"])
+def test_a_starter_states_limits_that_its_robot_keeps_at_home(name: str) -> None:
+    text = starter_case(build_model(name))
+    assert "base_joint_angle" not in text
+    for line in ("[limits]", "leg_length", "leg_clearance"):
+        assert f"# {line}" in text
+        text = text.replace(f"# {line}", line)
+    nlp = formulate(case_from(text))
+    own = margins_of(nlp, nlp.start, optimal=False)
+    assert {each.key for each in own} == {"leg_length.min", "leg_length.max", "leg_clearance.min"}
+    # Pairs of legs of the 6-UPS have one joint in common.
+    assert {each.key for each in own if each.violated} == ({"leg_clearance.min"} if name == "6-ups" else set())
+
+
+def test_slides_of_exported_legs_have_ranges_from_their_lengths() -> None:
+    limits = {"leg_length": {"min": 24, "max": 30}}
+    ranges = []
+    for definition in (None, octahedral(), octahedral("B - A")):
+        turned = {"position": [0.5, 0, 20], "rotation": {"axis": [0, 1, 1], "angle": 5}}
+        nlp = formulate(case_from(tables(definition, FIXED, limits, pose=turned)))
+        slides = [joint for joint in mechanism_of(nlp, np.zeros(0)).mechanism.joints if joint.kind == "P"]
+        ranges.append([joint.range for joint in slides])
+    (by_rows, outward, inward) = ([each for each in own if each is not None] for own in ranges)
+    assert len(by_rows) == len(outward) == len(inward) == 6
+    assert np.array(outward) == pytest.approx(np.array(by_rows))
+    # A slide whose axis is against the leg makes it shorter.
+    assert -np.array(inward)[:, ::-1] == pytest.approx(np.array(by_rows))
+    numbers = FIXED | {name: math.radians(FIXED[name]) for name in ("x3", "x4")}
+    base, platform = circle_joints(numbers)
+    lengths = np.linalg.norm([0.5, 0, 20] + platform @ turn_about([0, 1, 1], math.radians(5)).T - base, axis=1)
+    assert np.array(by_rows) == pytest.approx(np.stack([24 - lengths, 30 - lengths], axis=1))
+
+
+@pytest.mark.parametrize("name", ["mjcf", "urdf"])
+def test_an_imported_hexapod_has_limits_of_legs(name: str, cli: Run, tmp_path: Path) -> None:
+    text = CASE.replace("{ min = 20, max = 30 }", "26.5").replace("{ min = 8, max = 13 }", "11.5")
+    text = text.replace("{ min = 18, max = 22 }]", "20]").partition("[limits]")[0]
+    path = saved(tmp_path / "given.toml", text)
+    output_of(cli("export", str(path), "--format", name, "--out", str(tmp_path / "out")))
+    file = tmp_path / "out" / ("robot.xml" if name == "mjcf" else "robot.urdf")
+    # As other programs write it, with six digits.
+    plain = re.sub(r"-?\d+\.\d{6,}(e-?\d+)?", lambda found: f"{float(found[0]):.6g}", file.read_text())
+    file.write_text(plain)
+    code, _, err = cli(
+        "import", str(file), "--platform", "platform", "--close", "--snap", "0.001", "--out", str(tmp_path / "own.toml")
+    )
+    assert (code, err) == (0, "")
+    limits = "[limits]\nleg_length = { max = 40 }\nleg_clearance = { min = 0.1 }\nactuator = { dead_length = 1 }\n"
+    task = "[[task]]\nsense = 'max'\naxis = [0, 0, 1]\npitch = inf\n[pose]\nposition = [0, 0, 20]\n"
+    case = saved(tmp_path / "case.toml", f"[robot]\nfile = 'own.toml'\n{task}{limits}")
+    found = json.loads(output_of(cli("solve", str(case), "--json", "-")))["limited_quantities"]["leg_length"]
+    given = json.loads(output_of(cli("solve", str(saved(path, text + limits)), "--json", "-")))
+    expected = given["limited_quantities"]["leg_length"]
+    assert sorted(found.values()) == pytest.approx(sorted(expected.values()), rel=1e-5)
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_generated_c_has_the_limits_and_the_legs(tmp_path: Path) -> None:
+    folder = written(case_from(CASE), tmp_path / "c")
+    manifest = json.loads((folder / "manifest.json").read_text())
+    keys = {each["key"] for each in manifest["limits"]}
+    assert {
+        "leg_length.max",
+        "actuator.dead_length",
+        "leg_clearance.min",
+        "footprint.base",
+        "joint_spacing.min",
+    } <= keys
+    assert any("_LEGS 6 " in header.read_text() for header in folder.glob("*.h"))
+    assert " 0 failed" in made(folder, "test")

@@ -74,7 +74,7 @@ class AtPoses:
         robot, inner = layout.robots[0], set(nlp.program.places.inner)
         self._given = [k for k in range(nlp.n) if k not in inner]
         links = [(each.name, frozenset([each.name]), each.base, each.span) for each in robot.legs]
-        links = links or [(each.name, each.ends, each.start, each.span) for each in robot.links]
+        links += [(each.name, each.ends, each.start, each.span) for each in robot.links]
         self._names = [(name, ends) for name, ends, _, _ in links]
         ends = [ca.vertcat(start, start + span) for _, _, start, span in links]
         self._ends = ca.Function("ends", [nlp.program.x, nlp.program.p], [ca.densify(ca.horzcat(*ends))])
@@ -138,7 +138,8 @@ def descended(
 def test_no_pose_is_beyond_a_proven_number(name: str, part: float, degrees: float) -> None:
     has_legs, length = name == "three-upu", LENGTHS.get(name, 0.4)
     # Links of 6-rus have 60 distances.
-    apart: list[Limit] = [LegClearance(1.0), Actuator(stroke_max=30.0)] if has_legs else [LinkClearance(1e-3)]
+    apart: list[Limit] = [LegClearance(1.0) if has_legs else LinkClearance(1e-3)]
+    apart += [Actuator(stroke_max=30.0)] if name in ("three-upu", "6-ups") else []
     case = robot_case(
         name, SmallestSingularValue(1e-3, length), ConditionNumber(1e4, length), *(apart if name != "6-rus" else [])
     )

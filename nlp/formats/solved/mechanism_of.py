@@ -97,10 +97,10 @@ def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLe
     vectors = [each.vector for each in model.scene.directions]
     directions = ca.Function(
         "directions",
-        [ca.vertcat(*own), model.pose.rotation, model.pose.position],
+        [ca.vertcat(ca.SX(0, 1), *own), model.pose.rotation, model.pose.position],
         [ca.horzcat(ca.SX(3, 0), *vectors)],
     )
-    parameters = np.concatenate([state.parameters[each.name] for each in model.parameters])
+    parameters = np.concatenate([np.zeros(0), *[state.parameters[each.name] for each in model.parameters]])
     axes = directions(parameters, state.rotation, state.position).full()
     return [
         PosedLeg(leg.name, base[:, k], base[:, k] + span[:, k], tuple(axes[:, i] for i in axes_of(model, leg.name)))
