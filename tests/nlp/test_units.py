@@ -200,7 +200,10 @@ def test_a_workspace_is_the_same_in_every_unit(name: str) -> None:
     def judged(case: Case) -> tuple[object, Iterable[Line | TextTable]]:
         tables, f = fixed_over_box(model, case.units.length, 0.01, 1.0), UNITS[case.units.length]
         if model.legs:
-            tables["limits"] = {"leg_length": {"min": 10 * f, "max": 90 * f}, "leg_clearance": {"min": 0.1 * f}}
+            tables["limits"] = {"leg_length": {"min": 10 * f, "max": 90 * f}}
+        if model.legs and name not in ("4-upu", "6-ups"):
+            # Legs of these cross, or have a joint in common: of their distance rounding is left.
+            tables["limits"] |= {"leg_clearance": {"min": 0.1 * f}}
         held = case_from(tables, name)
         found = workspace_of(judge_workspace(held))
         assert found.regular.outcome.name == "PROVED"

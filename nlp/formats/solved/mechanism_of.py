@@ -67,10 +67,10 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
     labelled = {joint.label: joint for joint in known}
     spans, joints = {leg.name: leg.platform - leg.base for leg in legs}, []
     for joint, words in zip(found.mechanism.joints, found.joints, strict=True):
-        given = labelled.get(words.label)
-        span = spans.get(words.actuator if given is None else given.limb)
+        own = labelled.get(words.label)
+        span = spans.get(words.actuator if own is None else own.limb)
         length = None if span is None or not joint.actuated else _signed_length(found.mechanism, joint, span)
-        joints.append(replace(joint, range=_joint_range(nlp.case, joint, words, given, length, found.size)))
+        joints.append(replace(joint, range=_joint_range(nlp.case, joint, words, own, length, found.size)))
     mechanism = replace(found.mechanism, joints=tuple(joints))
     return Exported(mechanism, found.joints, found.size, found.notes, nlp.case, pose)
 
