@@ -45,6 +45,44 @@ def straight_leg(limb: Limb, frame: PathFrame) -> Leg | None:
     if slide.type != "P" or not slide.actuated or not all(sides):
         return None
     along = slide.axes[0].axis
+    turning = [[joint for joint in side if not _spins(frame, joint, along)] for side in sides]
+    if not all(turning):
+        return None
+    # Joints are mostly written at their centres.
+    ends: tuple[SX, SX] | None = turning[0][0].point, turning[1][0].point
+    if not _are_centres(frame, ends, sides, along):
+        ends = _met(frame, sides, along)
+        if ends is None or not _are_centres(frame, ends, sides, along):
+            return None
+    base, platform = ends
+    # Errors of joints that have one centre have the name of the first of them.
+    places = frame.sampled(ca.vertcat(*[joint.point / frame.size for joint in joints])).reshape(-1, len(joints), 3)
+    apart = [np.abs(places - places[:, [joints.index(own[0])]]).max(axis=(0, 2)) for own in turning]
+    first, last = (limb.label(0, int(np.argmax(each < INCIDENT))) for each in apart)
+    return Leg(limb.name, base, platform - frame.robot.home, centres=(first, last))
+
+
+def _spins(frame: PathFrame, joint: Joint, along: SX) -> bool:
+    """Return whether all rotations of a joint are about lines along a slide."""
+    return len(joint.axes) == 1 and frame.are_parallel(joint.axes[0].axis, along)
+
+
+def _are_centres(frame: PathFrame, ends: tuple[SX, SX], sides: Sequence[Sequence[Joint]], along: SX) -> bool:
+    """Return whether all axes before and behind a slide pass through two points (3, 1), whose line is along it."""
+    off = [
+        ca.norm_2(ca.cross(end - axis.point, axis.axis)) / frame.size
+        for end, side in zip(ends, sides, strict=True)
+        for joint in side
+        for axis in joint.axes
+    ]
+    span = ends[1] - ends[0]
+    sine = ca.sumsqr(ca.cross(span, along)) / ca.sumsqr(span)
+    found = frame.sampled(ca.vertcat(ca.norm_2(span) / frame.size, sine, *off))
+    return bool(np.all(found[:, 0] > INCIDENT) and np.all(found[:, 1] <= _STRAIGHT) and np.all(found[:, 2:] < INCIDENT))
+
+
+def _met(frame: PathFrame, sides: Sequence[Sequence[Joint]], along: SX) -> tuple[SX, SX] | None:
+    """Return the points (3, 1) where axes before and behind a slide meet, or a hinge meets the line of the leg."""
     base, platform = (_centre(frame, side) for side in sides)
     if base is None and platform is None:
         base = sides[0][0].point
@@ -52,18 +90,7 @@ def straight_leg(limb: Limb, frame: PathFrame) -> Leg | None:
         platform = _on_hinge(frame, sides[1], base, along)
     elif base is None and platform is not None:
         base = _on_hinge(frame, sides[0], platform, along)
-    if base is None or platform is None or not _is_straight(frame, platform - base, along):
-        return None
-    labels = []
-    for side, centre in zip(sides, (base, platform), strict=True):
-        turning = [joint for joint in side if any(not frame.are_parallel(each.axis, along) for each in joint.axes)]
-        off = [ca.cross(centre - axis.point, axis.axis) / frame.size for joint in side for axis in joint.axes]
-        if not turning or not frame.is_zero(ca.vertcat(*off)):
-            return None
-        # Errors of joints that have one centre have the name of the first of them.
-        first = next(j for j, each in enumerate(joints) if frame.coincide(each.point, turning[0].point))
-        labels.append(limb.label(0, first))
-    return Leg(limb.name, base, platform - frame.robot.home, centres=(labels[0], labels[1]))
+    return None if base is None or platform is None else (base, platform)
 
 
 def _centre(frame: PathFrame, side: Sequence[Joint]) -> SX | None:
@@ -81,10 +108,3 @@ def _on_hinge(frame: PathFrame, side: Sequence[Joint], centre: SX, along: SX) ->
     if frame.are_parallel(axis.axis, along):
         return None
     return meeting_point(frame, [(axis.point, axis.axis), (centre, along)])
-
-
-def _is_straight(frame: PathFrame, span: SX, along: SX) -> bool:
-    """Return whether a vector (3, 1) between centres has a length, and is parallel to a slide for all dimensions."""
-    length = frame.sampled(ca.norm_2(span) / frame.size)
-    sine = frame.sampled(ca.sumsqr(ca.cross(span, along)) / ca.sumsqr(span))
-    return bool(np.all(length > INCIDENT) and np.all(sine <= _STRAIGHT))
