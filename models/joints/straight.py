@@ -49,11 +49,10 @@ def straight_leg(limb: Limb, frame: PathFrame) -> Leg | None:
     if not all(turning):
         return None
     # Joints are mostly written at their centres.
-    ends: tuple[SX, SX] | None = turning[0][0].point, turning[1][0].point
-    if not _are_centres(frame, ends, sides, along):
-        ends = _met(frame, sides, along)
-        if ends is None or not _are_centres(frame, ends, sides, along):
-            return None
+    written = turning[0][0].point, turning[1][0].point
+    ends = written if _are_centres(frame, written, sides, along) else _met(frame, sides, along)
+    if ends is None or not _are_centres(frame, ends, sides, along):
+        return None
     base, platform = ends
     # Errors of joints that have one centre have the name of the first of them.
     places = frame.sampled(ca.vertcat(*[joint.point / frame.size for joint in joints])).reshape(-1, len(joints), 3)

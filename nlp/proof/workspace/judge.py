@@ -124,8 +124,7 @@ def judge_workspace(
 
     Raises:
         CaseError: the case has no workspace, or a free dimension.
-        InputError: the robot has no measure of a name, the error of legs is negative, or for a robot that is not six
-            straight legs, or the C kernel was not built.
+        InputError: the robot has no such measure, the error of legs is negative or not for it, or there is no C kernel.
     """
     own = workspace_of_case(case)
     kernel()  # before any work where it is missing

@@ -215,6 +215,8 @@ class _Writer:
     def _of_lengths(self, found: Extreme) -> ProofClaim:
         """Return a claim about a telescoping leg, from its lengths or from those of one machine."""
         directions = self._record.directions.get(one_machine_name(found.name))
+        if directions is None and self._case.model.unknowns:
+            raise ProofError(_ONE_ASSEMBLY)
         if directions is None:
             self._need_lengths([found.name.partition(" limb ")[2]], ("min", "max"))
             return ProofClaim(found.name, found.sense.value, "lengths", found.bound)

@@ -102,19 +102,17 @@ class SliceLimits:
         subject = Subject(case, closed.model, problem)
         self._others: list[_Other] = []
         for claim in searched_claims(case):
-            number = subject.number(claim)
+            key, number = claim.key, subject.number(claim)
             try:
                 examiner = None if problem.dependent else number.examiner
             except UncoveredError:
                 examiner = None
             if examiner is None:
-                uncovered[claim.key] = None
+                uncovered[key] = None
                 continue
             is_enclosed = isinstance(number, Clearance)
-            limits[claim.key] = SliceLimit(
-                claim.key, claim.limit or 0.0, claim.reading.dimension, is_enclosed=is_enclosed
-            )
-            self._others.append(_Other(claim.key, number, _least(claim)))
+            limits[key] = SliceLimit(key, claim.limit or 0.0, claim.reading.dimension, is_enclosed=is_enclosed)
+            self._others.append(_Other(key, number, _least(claim)))
         keys = [*(each.key for each in known), *(each.key for each in self._others)]
         self._places, self._reaches = [list(limits).index(key) for key in keys], len(reaches)
         self.uncovered, self.limits = tuple(uncovered), tuple(limits.values())
