@@ -344,8 +344,7 @@ class SingularSearch:
         self._signed: dict[int, list[FloatArray]] = {1: [], -1: []}
         self._is_sampled = False
         self._attempts, self._last, self._due = 0, _SMALL, _FIRST
-        # Number of coordinates of the design.
-        self._count = len(problem.problem.start)
+        self._count = len(problem.problem.start)  # coordinates of the design
 
     @cached_property
     def _newton(self) -> SingularPose:
