@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from collections.abc import Sequence
 
 import casadi as ca
+import numpy as np
 
 from ...models import Dimension, Model, Parameter
 from ..units import Units
@@ -90,18 +92,23 @@ def _limit_lines(model: Model) -> list[str]:
     """Return lines of limits, as comments."""
     if not model.legs:
         return ["# rate_share = { max = 0.5 }"]
-    z = model.home[2]
+    z, apart = model.home[2], math.inf
     cone = ["# base_joint_angle = 45       # half angle of each joint's cone about the base's normal"]
     if model.joints:
         typical = ca.DM([value for item in model.parameters for value in item.typical])
-        spans = [leg.base - leg.platform - ca.DM(model.home) for leg in model.legs]
         symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
-        function = ca.Function("lengths", [symbols], [ca.vertcat(*map(ca.norm_2, spans))])
-        z, cone = float(f"{float(ca.mmax(function(typical))):.3g}"), []
+        ends = [ca.horzcat(*[getattr(leg, plate) for leg in model.legs]).T for plate in ("base", "platform")]
+        base, platform = (each.full() for each in ca.Function("ends", [symbols], ends).call([typical]))
+        lengths = np.linalg.norm(platform + model.home - base, axis=1)
+        z, cone = float(f"{lengths.max():.3g}"), []
+        # Legs that share a joint have no clearance.
+        pairs = itertools.combinations(range(len(base)), 2)
+        apart = min((math.dist(plate[i], plate[j]) for i, j in pairs for plate in (base, platform)), default=0.0)
+    clearance = 0.02 * z
     return [
         f"# leg_length = {{ min = {0.5 * z:g}, max = {1.5 * z:g} }}",
         *cone,
-        f"# leg_clearance = {{ min = {0.02 * z:g} }}",
+        *([f"# leg_clearance = {{ min = {clearance:g} }}"] if apart > clearance else []),
     ]
 
 
