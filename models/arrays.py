@@ -47,6 +47,23 @@ def frozen_vector(values: Sequence[float] | FloatArray) -> FloatArray:
     return frozen_array(values, (len(values),))
 
 
+def buffer_on(function: ca.Function, inputs: Sequence[FloatArray], outputs: Sequence[FloatArray]) -> tuple[Any, Any]:
+    """Return CasADi's buffer of a dense function, and its evaluation, which function, buffer and arrays must outlive.
+
+    Args:
+        function: the function.
+        inputs: memory of each input, column after column.
+        outputs: that of each result.
+    """
+    buffer: Any
+    buffer, evaluate = function.buffer()
+    for place, arrays in ((buffer.set_arg, inputs), (buffer.set_res, outputs)):
+        for index, array in enumerate(arrays):
+            if array.size:
+                place(index, array.data)
+    return buffer, evaluate
+
+
 def values_at(function: ca.Function, *points: FloatArray) -> list[FloatArray]:
     """Return the results (P, rows, columns) of a CasADi function, dense, at P points.
 
@@ -60,14 +77,10 @@ def values_at(function: ca.Function, *points: FloatArray) -> list[FloatArray]:
     arguments = [np.ascontiguousarray(each, dtype=np.float64) for each in points]
     found = [np.zeros((count, *function.size_out(k)[::-1])) for k in range(function.n_out())]
     if count:
-        buffer: Any
         mapped = function.map(count)
-        buffer, evaluate = mapped.buffer()
-        for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, found)):
-            for k, each in enumerate(arrays):
-                if each.size:
-                    place(k, each.data)
+        buffer, evaluate = buffer_on(mapped, arguments, found)
         evaluate()
+        del buffer
     return [each.transpose(0, 2, 1) for each in found]
 
 

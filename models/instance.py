@@ -54,7 +54,7 @@ class Substitution:
     def identity(cls, model: Model) -> Substitution:
         """Return the model's own symbols, so that nothing is replaced."""
         return cls(
-            ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters]),
+            model.symbols,
             ca.vertcat(SX(0, 1), *[item.symbol for item in model.unknowns]),
             model.pose.rotation,
             model.pose.position,

@@ -13,8 +13,10 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
+from .arrays import FloatArray
 from .drawing import Scene
 from .limbjoints import LimbJoint, LimbLink
 from .member import Member
@@ -115,6 +117,16 @@ class Model(Whole, Shown):
         options = "".join(f", {key}={value!r}" for key, value in self.options.items() if not isinstance(value, Mapping))
         counts = f"{len(self.parameters)} parameters, {len(self.limbs)} limbs, {len(self.rows)} rows"
         return f"<Model {self.name!r}{options}: {counts}>"
+
+    @property
+    def symbols(self) -> SX:
+        """Symbols (d, 1) of all components of the parameters."""
+        return ca.vertcat(SX(0, 1), *[item.symbol for item in self.parameters])
+
+    @property
+    def typical(self) -> FloatArray:
+        """Typical values (d,) of all components of the parameters."""
+        return np.array([value for item in self.parameters for value in item.typical], dtype=np.float64)
 
     @property
     def limbs(self) -> tuple[str, ...]:

@@ -59,12 +59,12 @@ def displaced_robot(model: Model) -> DisplacedRobot:
     off = np.random.default_rng(_SEED).uniform(-_OFF, _OFF, (len(exact), count))
     off *= np.array([[float(sizes(each))] for each in exact])
     parameters = [error_parameter(each) for each in displaced.centres]
-    found = model_of_home(with_errors, np.hstack([exact, off]), definition, parameters)
+    legs = _displaced_legs(model, robot.symbols, displaced.centres)
+    found = model_of_home(with_errors, np.hstack([exact, off]), definition, parameters, legs)
     # Of equations that depend on each other those of the design are kept, also where others would be as good.
     every = {each.name: each for each in found.loops}
     closure = tuple(replace(every[f"{each.name} in full"], name=each.name) for each in model.closure)
-    legs = _displaced_legs(model, robot.symbols, displaced.centres)
-    return DisplacedRobot(replace(found, closure=closure, legs=legs), tuple(displaced.centres))
+    return DisplacedRobot(replace(found, closure=closure), tuple(displaced.centres))
 
 
 def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> tuple[Leg, ...]:
@@ -75,10 +75,9 @@ def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> 
         dimensions: (d, 1) symbols in the place of its dimensions.
         centres: those with an error; of a hinge the whole error, also the part that its motion does not depend on.
     """
-    own = ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters])
     errors, found = {each.name: each.error for each in centres}, []
     for leg in model.legs:
-        ends = ca.Function("ends", [own], [leg.base, leg.platform]).call([dimensions])
+        ends = ca.Function("ends", [model.symbols], [leg.base, leg.platform]).call([dimensions])
         base, platform = (end + errors[centre] for end, centre in zip(ends, leg.centres, strict=True))
         found.append(replace(leg, base=base, platform=platform))
     return tuple(found)

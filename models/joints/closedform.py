@@ -163,9 +163,8 @@ def _at_zero(expression: SX, unknowns: SX, by: Sequence[SX | tuple[SX, SX]]) -> 
 
 def _slope_at_home(model: Model, expression: SX) -> float:
     """Return the value of an expression at home, with typical dimensions."""
-    typical = [value for item in model.parameters for value in item.typical]
     function = ca.Function("home", Substitution.identity(model).all, [ca.densify(expression)])
-    return float(function(np.array(typical), 0, np.eye(3), np.array(model.home)))
+    return float(function(model.typical, 0, np.eye(3), np.array(model.home)))
 
 
 def _is_same(model: Model, one: SX, other: SX) -> bool:
@@ -173,7 +172,7 @@ def _is_same(model: Model, one: SX, other: SX) -> bool:
     symbols = Substitution.identity(model).all
     function = ca.Function("two", symbols, [ca.densify(one), ca.densify(other)])
     rng = np.random.default_rng(_SEED)
-    typical = np.array([value for item in model.parameters for value in item.typical])
+    typical = model.typical
     for _ in range(_TESTS):
         values = typical * rng.uniform(0.8, 1.2, typical.shape)
         turn = rng.normal(size=(3, 3))

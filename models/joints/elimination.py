@@ -298,7 +298,7 @@ def _is_positive(work: _Elimination, value: SX) -> bool:
 def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]:
     """Return home and points near it: values of parameters, unknowns, rotation and position."""
     rng = np.random.default_rng(_SEED)
-    typical = np.array([value for item in model.parameters for value in item.typical])
+    typical = model.typical
     home = np.array(model.home)
     size = float(np.linalg.norm(home)) or 1.0
     points = [[typical, np.zeros(len(model.unknowns)), np.eye(3) if rotation is None else rotation, home]]

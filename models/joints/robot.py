@@ -17,6 +17,7 @@ from ..parts import (
     AssemblySign,
     Closure,
     Dimension,
+    Leg,
     Parameter,
     PoseSymbols,
     Unknown,
@@ -48,7 +49,7 @@ from .opened import OpenedPath, Variables, closures, distance_equations, open_pa
 from .pictures import DrawnPath, scene_of
 from .resistance import Ranks, path_ranks, resistance
 from .states import PathJoints, limb_links, with_shared_places
-from .straight import straight_leg
+from .straight import straight_legs
 from .words import read_robot
 
 #: Range of an unknown from home: half a turn for an angle; for a slide, four times the robot's size.
@@ -269,7 +270,11 @@ def joint_labels(limb: Limb, index: int, joints: Sequence[Joint], known: Mapping
 
 
 def model_of_home(
-    at_home: HomeRobot, samples: FloatArray, definition: Mapping[str, object], more: Sequence[Parameter] = ()
+    at_home: HomeRobot,
+    samples: FloatArray,
+    definition: Mapping[str, object],
+    more: Sequence[Parameter] = (),
+    legs: Sequence[Leg] | None = None,
 ) -> Model:
     """Return the model of a robot at home.
 
@@ -278,6 +283,7 @@ def model_of_home(
         samples: (s, d) values of its dimensions at which ranks are measured.
         definition: the tables that state it.
         more: parameters that are among its symbols, beside its dimensions.
+        legs: its straight legs, where they are known.
 
     Raises:
         RobotError: the robot cannot be assembled near home.
@@ -314,7 +320,7 @@ def model_of_home(
         pose=pose,
         home=(x, y, z),
         wrenches=tuple(builder.wrenches),
-        legs=tuple(leg for leg in (straight_leg(limb, frame) for limb in at_home.limbs) if leg is not None),
+        legs=straight_legs(frame) if legs is None else tuple(legs),
         members=tuple(members),
         quantities=quantities(builder.actuators, builder.positions),
         scene=scene_of(builder.paths, pose, at_home.home, frame, builder.carrying, builder.networks),

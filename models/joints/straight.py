@@ -29,13 +29,18 @@ from .generic import INCIDENT, PathFrame, meeting_point
 _STRAIGHT = 1e-8
 
 
-def straight_leg(limb: Limb, frame: PathFrame) -> Leg | None:
-    """Return the straight leg that a limb is; None where it is another limb.
+def straight_legs(frame: PathFrame) -> tuple[Leg, ...]:
+    """Return the straight legs among the limbs of a robot.
 
     Args:
-        limb: the limb.
         frame: values that all paths of the robot share.
     """
+    every = (_straight_leg(limb, frame) for limb in frame.robot.limbs)
+    return tuple(leg for leg in every if leg is not None)
+
+
+def _straight_leg(limb: Limb, frame: PathFrame) -> Leg | None:
+    """Return the straight leg that a limb is; None where it is another limb."""
     joints = limb.paths[0]
     slides = [j for j, joint in enumerate(joints) for axis in joint.axes if not axis.is_hinge]
     if len(limb.branches) > 1 or len(slides) != 1:

@@ -95,10 +95,10 @@ def _limit_lines(model: Model) -> list[str]:
     z, apart = model.home[2], math.inf
     cone = ["# base_joint_angle = 45       # half angle of each joint's cone about the base's normal"]
     if model.joints:
-        typical = ca.DM([value for item in model.parameters for value in item.typical])
-        symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
         ends = [ca.horzcat(*[getattr(leg, plate) for leg in model.legs]).T for plate in ("base", "platform")]
-        base, platform = (each.full() for each in ca.Function("ends", [symbols], ends).call([typical]))
+        base, platform = (
+            each.full() for each in ca.Function("ends", [model.symbols], ends).call([ca.DM(model.typical)])
+        )
         lengths = np.linalg.norm(platform + model.home - base, axis=1)
         z, cone = float(f"{lengths.max():.3g}"), []
         # Legs that share a joint have no clearance.
@@ -117,8 +117,7 @@ def _size(model: Model) -> float:
 
     It is 0 for a robot without a drawing, or with one that depends on more than the dimensions.
     """
-    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
-    typical = ca.DM([value for item in model.parameters for value in item.typical])
+    symbols, typical = model.symbols, ca.DM(model.typical)
     sizes = []
     for point in model.scene.points:
         size = ca.norm_2(point.position)

@@ -107,7 +107,7 @@ def size_of_home(model: Model) -> float:
     Raises:
         InputError: the robot has no points, or they coincide.
     """
-    parameters = np.array([value for item in model.parameters for value in item.typical])
+    parameters = model.typical
     # Joints of a robot that is given joint by joint count from home.
     unknowns = np.zeros(len(model.unknowns))
     size = _size(model, parameters, unknowns, np.eye(3), np.array(model.home))

@@ -87,7 +87,7 @@ class BuiltRobot:
         """
         model, length = self._nlp.program.model, self._nlp.case.characteristic_length
         F = objective(model.built, SX(twist.tolist()), SX(length))
-        symbols = [ca.vertcat(SX(0, 1), *[item.symbol for item in model.parameters])]
+        symbols = [model.symbols]
         symbols += [model.pose.rotation, model.pose.position, e]
         whole = ca.Function("built", symbols, [F])
         at = whole.call([*(ca.DM(value) for value in values), e])[0]

@@ -15,13 +15,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from threading import Lock
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, Model, RobotInstance, Substitution
+from ...models.arrays import buffer_on
 from ...models.whole import Whole
 from ..case.limits.constraint import Call, Constraint
 from .places import Places, Scalar
@@ -54,14 +55,7 @@ class Kernel(Generic[T]):
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
         # The buffer must outlive the evaluation handle that belongs to it, and the function must outlive both.
         self._function = function
-        self._buffer: Any
-        self._buffer, self._evaluate = function.buffer()
-        for index, array in enumerate(self._inputs):
-            if array.size:
-                self._buffer.set_arg(index, array.data)
-        for index, array in enumerate(self._outputs):
-            if array.size:
-                self._buffer.set_res(index, array.data)
+        self._buffer, self._evaluate = buffer_on(function, self._inputs, self._outputs)
         self._lock = Lock()
 
     def __call__(self, *arguments: FloatArray | float) -> T:

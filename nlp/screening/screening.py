@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...models import FloatArray
+from ...models.arrays import FloatArray, buffer_on
 from ..interruption import is_requested
 from ..program.nlp import Nlp
 
@@ -67,15 +67,8 @@ def buffer_of(function: ca.Function, *inputs: FloatArray) -> Buffer:
         function: the function, made of ``SX``.
         inputs: memory of each input, which the function reads when it is evaluated.
     """
-    buffer: Any
-    buffer, _ = function.buffer()
     outputs = tuple(np.zeros(function.numel_out(i)) for i in range(function.n_out()))
-    for index, array in enumerate(inputs):
-        if array.size:
-            buffer.set_arg(index, array.data)
-    for index, array in enumerate(outputs):
-        if array.size:
-            buffer.set_res(index, array.data)
+    buffer, _ = buffer_on(function, inputs, outputs)
     return Buffer(buffer._self(), outputs, (function, buffer, inputs))
 
 

@@ -39,8 +39,7 @@ class Answer:
         """
         from .. import text_of  # noqa: PLC0415 - outputs come after answers
 
-        found: Any = self
-        return text_of(found, width)
+        return text_of(self._found, width)
 
     def plot(self, file: str | Path | None = None) -> Picture:
         """Return the drawing of the robot with its tasks, which a notebook shows.
@@ -54,7 +53,7 @@ class Answer:
         """
         from .. import picture_of, plot  # noqa: PLC0415 - outputs come after answers
 
-        solution: Any = getattr(self, "solution", self)
+        solution = getattr(self._found, "solution", self._found)
         if file is not None:
             plot(solution, file)
         return picture_of(solution)
@@ -70,15 +69,17 @@ class Answer:
         """
         from .. import report  # noqa: PLC0415 - outputs come after answers
 
-        found: Any = self
-        return report(found, file=file)
+        return report(self._found, file=file)
 
     def to_dict(self) -> dict[str, object]:
         """Return the result as JSON's own types, as ``--json`` writes it."""
         from .. import json_data, result_of  # noqa: PLC0415 - outputs come after answers
 
-        found: Any = self
-        return {**json_data(result_of(found))}
+        return {**json_data(result_of(self._found))}
+
+    @property
+    def _found(self) -> Any:  # noqa: ANN401 - naming both kinds of answers here would import what imports this
+        return self
 
 
 @dataclass(frozen=True, eq=False)

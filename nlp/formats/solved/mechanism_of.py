@@ -93,11 +93,10 @@ def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLe
     ends = [ca.horzcat(ca.SX(3, 0), *[getattr(leg, each) for leg in legs]) for each in ("base", "span")]
     function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in ends])
     base, span = (each.full() for each in function(x, nlp.arguments))
-    own = [each.symbol for each in model.parameters]
     vectors = [each.vector for each in model.scene.directions]
     directions = ca.Function(
         "directions",
-        [ca.vertcat(ca.SX(0, 1), *own), model.pose.rotation, model.pose.position],
+        [model.symbols, model.pose.rotation, model.pose.position],
         [ca.horzcat(ca.SX(3, 0), *vectors)],
     )
     parameters = np.concatenate([np.zeros(0), *[state.parameters[each.name] for each in model.parameters]])

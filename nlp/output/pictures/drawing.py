@@ -171,7 +171,7 @@ def drawing_of_model(model: Model) -> Drawing:
     Raises:
         EvaluationError: the robot's expressions have no finite value there.
     """
-    parameters = np.array([value for item in model.parameters for value in item.typical])
+    parameters = model.typical
     middles = np.array([(item.lower + item.upper) / 2 for item in model.unknowns])
     linkage = Linkage(model, parameters)
     headline = ", ".join(f"{key} = {value}" for key, value in model.options.items() if not isinstance(value, Mapping))

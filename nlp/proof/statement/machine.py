@@ -91,7 +91,7 @@ def legs_of(case: Case) -> Legs | None:
 def joint_centres(case: Case) -> Legs:
     """Return the straight legs, if any, of a robot with fixed dimensions, with the case's tolerance."""
     model = case.model
-    symbols = ca.vertcat(ca.SX(0, 1), *[item.symbol for item in model.parameters])
+    symbols = model.symbols
     parts = [value for name in case.parameters for value in case.components(name)]
     values = ca.vertcat(ca.DM(0, 1), *[ca.DM(value) for value in parts if not isinstance(value, Free)])
     ends = [

@@ -314,7 +314,7 @@ def _at_size(nlp: Nlp, place: int) -> float:
     model, unknown = nlp.program.model, nlp.program.model.unknowns[place]
     if unknown.dimension is Dimension.ANGLE:
         return 1.0
-    typical = tuple(value for item in model.parameters for value in item.typical)
+    typical = tuple(model.typical.tolist())
     case, home = (float(sizes_at(model, [unknown], each, SX.ones(1))) for each in (reference_of(nlp.case), typical))
     return (case / home) ** 2
 

@@ -213,8 +213,7 @@ class SmallestValues(LoopRule):
         width = self.widths(left.boxes)
         # Bounds over long and narrow boxes are wide, those of loops above all.
         split = coordinates_to_split(left.shares * np.sqrt(width / width.max(axis=1, keepdims=True)), width)
-        parts = self.boxes_of(left, (-left.smallest).max(axis=1), split)
-        parts = parts._replace(more=parts.more._replace(more=left.smallest))
+        parts = self.boxes_of(left, (-left.smallest).max(axis=1), split, left.smallest)
         return Verdicts(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
 
     def _try(self, found: Examined) -> None:

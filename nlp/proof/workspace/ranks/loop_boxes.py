@@ -436,11 +436,13 @@ class LoopRule(Rule[Followed]):
                 low[:, free[j]], high[:, free[j]] = lower[:, j], upper[:, j]
         return low, high
 
-    def boxes_of(self, found: Examined, bound: FloatArray, split: NDArray[np.intp]) -> Boxes[Followed]:
-        """Return examined boxes, with bounds (B,) and places (B,) among the independent coordinates to bisect."""
+    def boxes_of(
+        self, found: Examined, bound: FloatArray, split: NDArray[np.intp], more: FloatArray
+    ) -> Boxes[Followed]:
+        """Return examined boxes with bounds (B,), places (B,) of the coordinates to bisect, and columns of the rule."""
         lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
-        return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation))
+        return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation, more))
 
     def widths(self, boxes: LoopBoxes | Boxes[Followed]) -> FloatArray:
         """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""

@@ -165,8 +165,7 @@ class _RankRule(LoopRule):
             self.singular = self._look(found, self._examined)
         found = some(found, np.flatnonzero(~found.is_regular))
         split = coordinates_to_split(found.shares, self.widths(found.boxes))
-        left = self.boxes_of(found, np.zeros(len(split)), split)
-        return Verdicts(left._replace(more=left.more._replace(more=found.shares)), 0.0, count)
+        return Verdicts(self.boxes_of(found, np.zeros(len(split)), split, found.shares), 0.0, count)
 
     def divided(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
         """Return the halves of boxes, and the quarters where a half would fail by its linear part alone."""
