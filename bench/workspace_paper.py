@@ -16,7 +16,8 @@ from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.proof_file import ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
-from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
+from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 
 _PART, _DEGREES = 0.02, 5.0
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..proof.checker.proof_file import Proof, Unproved
     from ..proof.checker.workspace.check import CheckedClaim
     from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.proof_writer import PaperRecord
+    from ..proof.workspace.paper_record import PaperRecord
 
 
 class Machine(NamedTuple):
@@ -60,7 +60,7 @@ def paper_record(target: str | None, json_file: str | None) -> PaperRecord | Non
         InputError: both are standard output.
     """
     from ..errors import InputError
-    from ..proof.workspace.proof_writer import PaperRecord
+    from ..proof.workspace.paper_record import PaperRecord
 
     if target is None:
         return None

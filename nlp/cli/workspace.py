@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from ..case.case import Case
     from ..proof.workspace.judge import Judgement
-    from ..proof.workspace.proof_writer import PaperRecord
+    from ..proof.workspace.paper_record import PaperRecord
     from ..proof.workspace.slices.slices import Slice
     from ..results.workspace import WorkspacePose, WorkspaceResult
 

@@ -27,7 +27,8 @@ from screwsynth.nlp.formats.solved.mechanism_of import mechanism_of
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.workspace.judge import Judgement
-from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
+from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Tables = dict[str, Any]

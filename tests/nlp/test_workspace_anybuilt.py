@@ -36,7 +36,8 @@ from screwsynth.nlp.proof.workspace.numbers import machines as tolerance
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, smallest_values
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines
-from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
+from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks import rank_rule as rank
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examiner, LoopBoxes
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose

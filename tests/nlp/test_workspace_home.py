@@ -25,7 +25,8 @@ from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
+from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank, prove_ranks
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularSearch
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box

@@ -42,7 +42,8 @@ from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Number
 from screwsynth.nlp.proof.workspace.numbers.jacobian_numbers import WorstError
 from screwsynth.nlp.proof.workspace.numbers.pose_error import PoseErrors, with_rest
-from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
+from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem

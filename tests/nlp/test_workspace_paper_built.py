@@ -32,7 +32,8 @@ from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
-from screwsynth.nlp.proof.workspace.proof_writer import PaperRecord, paper_of
+from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
+from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.verdict import Outcome

@@ -16,15 +16,13 @@ the sum of squares is small; any other one gives a bound that holds too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
 from ..statement.limb_separation import factored_terms, terms_of
-
-if TYPE_CHECKING:
-    from ..statement.standard_form import StandardForm
+from ..statement.standard_form import StandardForm
 
 
 class Quotient(NamedTuple):

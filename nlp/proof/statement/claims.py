@@ -7,12 +7,12 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
+from ...case.case import Case
 from ...case.limits.clearance import LegClearance
 from ...case.limits.constraint import LENGTH, NUMBER, SQUARED_LENGTH, Reading
 from ...case.limits.legs import Actuator, LegLength
@@ -20,9 +20,6 @@ from ...case.limits.singular_values import ConditionNumber, SmallestSingularValu
 from ...case.task import Sense
 from ...errors import InputError, nearest
 from ...program.layout import Layout
-
-if TYPE_CHECKING:
-    from ...case.case import Case
 
 #: Names of the claims that J, and that the constraint wrenches alone, have full rank.
 REGULAR, CONSTRAINTS = "regular", "constraints regular"

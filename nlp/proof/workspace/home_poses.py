@@ -28,10 +28,10 @@ from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import JointErrors
 from ..statement.posed_layout import extreme_program
 from ..statement.tolerance import coordinate_layout
-from .numbers.extremes import Extreme, slack_of
+from .numbers.extremes import Extreme
 from .numbers.machines import Machines
 from .robot.pose_box import PoseBox, pose_coordinates
-from .verdict import Outcome
+from .verdict import Outcome, slack_of
 
 #: Reasons for a claim that poses of other assemblies leave open.
 _ELSEWHERE = "poses beyond the limit are known only in other assemblies of the joints than home's"

@@ -30,7 +30,7 @@ from .robot.posed_robot import NotJudgedError, Problem, build_problem
 from .verdict import Outcome, RankVerdict
 
 if TYPE_CHECKING:
-    from .proof_writer import PaperRecord
+    from .paper_record import PaperRecord
 
 #: Seconds for all searches together where none are asked for: those of singular values have no other end in six
 #: dimensions. Of what is left, each takes half at most.

@@ -9,6 +9,9 @@ from ....models import FloatArray
 from ..statement.machine import JointErrors
 from .robot.pose_box import PoseBox, PoseNumbers
 
+#: Part of a limit by which a value may be beyond it and still count as on it: rounding.
+_ON_LIMIT = 1e-9
+
 
 class Outcome(enum.Enum):
     """Verdict on a claim about every pose; each value is the word in results."""
@@ -59,3 +62,11 @@ class RankVerdict:
     def fails(self) -> bool:
         """Whether the claim is not proved."""
         return self.outcome is not Outcome.PROVED
+
+
+def slack_of(limit: float) -> float:
+    """Return how far a value may be beyond a limit and still count as on it: a part of the limit, for rounding.
+
+    It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
+    """
+    return _ON_LIMIT * abs(limit)

@@ -19,6 +19,7 @@ from casadi import SX
 from .....models import FloatArray
 from ....interruption import one_search
 from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Verdicts, joined, some
+from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Forms
 from ..ranks.loop_boxes import (
     APART,
@@ -35,8 +36,6 @@ from ..robot.posed_robot import Problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from ...boxes.tree import TreeRecord
 
 #: Number of boxes examined at once, and number of those with the smallest bounds at which values are computed.
 _BLOCK, _TRIED = 256, 8

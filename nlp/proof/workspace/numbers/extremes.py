@@ -25,11 +25,11 @@ from ...statement.claims import Claim
 from ...statement.machine import JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
-from ..verdict import Outcome
+from ..verdict import Outcome, slack_of
 from .bound_search import Goal, Minimum
 
 if TYPE_CHECKING:
-    from ..proof_writer import PaperRecord
+    from ..paper_record import PaperRecord
 
 #: Returns the errors of the machine that is worst at a pose, to first order, and the value of its expression.
 WorstMachine = Callable[[PoseNumbers], tuple[JointErrors, float]]
@@ -39,8 +39,6 @@ GAP = 1e-3
 _FINEST = 1e-10
 #: Part of the room between a value and its limit that a finer gap is: the value known grows a little in a search.
 _SHARE = 0.9
-#: Part of a limit by which a value may be beyond it and still count as on it: rounding.
-ON_LIMIT = 1e-9
 #: Part of an expression's scale that gaps of smaller values are parts of, as in the search of certificates.
 _NEAR_ZERO = 1e-6
 #: Reason for a limit that stays open between a bound and a value although the search ended.
@@ -223,14 +221,6 @@ def _finer_gap(nlp: Nlp, claim: Claim, found: Certificate) -> float | None:
         return None
     finer = _SHARE * room / max(abs(found.incumbent), _NEAR_ZERO * nlp.objective_size)
     return finer if finer >= _FINEST else None
-
-
-def slack_of(limit: float) -> float:
-    """Return how far a value may be beyond a limit and still count as on it: a part of the limit, for rounding.
-
-    It is a part of the limit and not of the value: a value far from its limit decides it without any slack.
-    """
-    return ON_LIMIT * abs(limit)
 
 
 def _pose(nlp: Nlp, x: FloatArray) -> PoseNumbers:

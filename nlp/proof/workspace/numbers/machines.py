@@ -48,7 +48,7 @@ from .extremes import GAP, Extreme, extreme_of, goal_of, prove_extreme
 from .second_order_change import second_order_change
 
 if TYPE_CHECKING:
-    from ..proof_writer import PaperRecord
+    from ..paper_record import PaperRecord
 
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12

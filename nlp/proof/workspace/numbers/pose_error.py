@@ -34,7 +34,7 @@ from .jacobian_numbers import WorstError
 from .searched import Subject
 
 if TYPE_CHECKING:
-    from ..proof_writer import PaperRecord
+    from ..paper_record import PaperRecord
 
 #: Part of its size by which a computed bound is moved outwards: rounding.
 _ROUNDING = 1e-10

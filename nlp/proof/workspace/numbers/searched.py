@@ -23,7 +23,7 @@ from .extremes import Extreme, extreme_of, goal_of
 from .jacobian_numbers import SingularValues, change_of_rows
 
 if TYPE_CHECKING:
-    from ..proof_writer import PaperRecord
+    from ..paper_record import PaperRecord
 
 #: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
 _NEAR_ZERO = 0.1

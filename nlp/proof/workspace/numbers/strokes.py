@@ -15,9 +15,9 @@ from ...statement.machine import JointErrors
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
 from ..robot.posed_robot import steepest
-from ..verdict import Outcome
+from ..verdict import Outcome, slack_of
 from .bound_search import Minimum
-from .extremes import Extreme, extreme_of, slack_of
+from .extremes import Extreme, extreme_of
 from .searched import Subject
 
 #: Smallest gap of a length, as a part of it, and part of the room that lengths may leave: that of rounding.

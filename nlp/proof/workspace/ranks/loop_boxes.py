@@ -20,6 +20,7 @@ from .....models import FloatArray
 from .....models.arrays import first_largest
 from ...boxes.engine import MOST_VARIABLES
 from ...boxes.search import Boxes, Order, Rule, Search, bisected, joined, some
+from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Encloser, Forms
 from ..robot.closed_loops import inverses
 from ..robot.posed_model import RankMatrix
@@ -29,8 +30,6 @@ from .rank_rule import EntryChange, RankTest, Tested, is_polynomial, not_regular
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from ...boxes.tree import TreeRecord
 
 #: Factors by which widths of dependent coordinates are made wider: the first guess, from slopes at the middle of a box,
 #: and later ones, from the relation that was found with the guess before.

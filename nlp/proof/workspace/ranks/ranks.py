@@ -25,7 +25,7 @@ from .singular_pose import Singular, SingularSearch
 
 if TYPE_CHECKING:
     from ...boxes.tree import TreeRecord
-    from ..proof_writer import PaperRecord
+    from ..paper_record import PaperRecord
 
 #: Number of boxes examined at once.
 _BLOCK = 1024

@@ -27,7 +27,6 @@ from ...enclosure.forms import Encloser
 from ...statement.claims import Claim, searched_claims
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
-from ..numbers.extremes import slack_of
 from ..numbers.jacobian_numbers import SingularValues
 from ..numbers.machines import Machines
 from ..numbers.searched import Subject
@@ -35,6 +34,7 @@ from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import PoseBox
 from ..robot.posed_robot import build_problem
+from ..verdict import slack_of
 
 #: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
 KEPT, UNDECIDED = -1, -2

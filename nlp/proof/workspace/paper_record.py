@@ -1,0 +1,64 @@
+"""Records of the searches of a judgement, from which its proof is written."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ...program.nlp import Nlp
+from ..boxes.tree import TreeRecord
+from ..certificate.certificate import Certificate, CertificateStatus
+from ..checker.premises import fingerprint
+from ..checker.proof_file import ProofClaim
+from ..checker.tree import Node
+from ..statement.claims import Claim
+from ..statement.tolerance import Directions
+from .verdict import slack_of
+
+#: Name and sense of a claim.
+Key = tuple[str, str]
+#: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
+_FOLDED = 1e-12
+
+
+@dataclass(eq=False)
+class PaperRecord:
+    """Records of all searches about one machine.
+
+    Attributes:
+        programs: bounds of numbers by the rules of ``certify``, with their trees.
+        boxes: trees of other searches, by name.
+        firsts: bounds of the errors of the pose to first order, for legs that are one unit off, by name.
+        rests: bounds of terms of second order by which numbers of machines are bounded.
+        directions: fixed directions of a leg, by the name of lengths of one machine.
+    """
+
+    programs: dict[Key, ProofClaim] = field(default_factory=dict)
+    boxes: dict[str, TreeRecord] = field(default_factory=dict)
+    firsts: dict[str, float] = field(default_factory=dict)
+    rests: dict[Key, float] = field(default_factory=dict)
+    directions: dict[str, Directions] = field(default_factory=dict)
+
+    def own(self, name: str) -> TreeRecord:
+        """Return the record of a search of its own."""
+        return self.boxes.setdefault(name, TreeRecord())
+
+    def constant(self, claim: Claim, nlp: Nlp, value: float) -> None:
+        """Record a number that does not depend on the pose."""
+        bound = -nlp.sign * value
+        self._keep(claim, nlp, bound + _FOLDED * abs(bound), bytes([Node.BOUNDED]))
+
+    def program(self, claim: Claim, found: Certificate, tree: TreeRecord) -> None:
+        """Record a search of a number, if it has a bound, open boxes being leaves, that keeps the number's limit."""
+        is_bounded = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE)
+        sign = claim.sense.sign
+        most = math.inf if claim.limit is None else sign * claim.limit + slack_of(claim.limit)
+        if is_bounded and math.isfinite(found.bound) and sign * found.bound <= most:
+            self._keep(claim, found.nlp, -found.nlp.sign * found.bound, tree.tree(with_open=True))
+
+    def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
+        """Keep the best bound of a program; of two programs of one name the first, as the check has it."""
+        found = ProofClaim(claim.name, claim.sense.value, "program", bound, fingerprint(nlp), tree)
+        before = self.programs.setdefault((found.name, found.sense), found)
+        if before.graph == found.graph and bound <= (before.bound or 0.0):
+            self.programs[found.name, found.sense] = found
