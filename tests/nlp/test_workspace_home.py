@@ -210,14 +210,14 @@ def test_ranks_are_refuted_by_what_is_shown_alone(monkeypatch: pytest.MonkeyPatc
     assert case.workspace is not None
     homes = Homes(case, pose_box(case.workspace), (), None)
     problem = build_problem(case, closed_form(case.model).model, pose_box(case.workspace))
-    found = prove_ranks(problem, homes)
+    found = prove_ranks(problem, homes.is_singular)
     judged = Judgement(case, case.workspace, found.regular, (), found.constraints)
     assert check_shown(case, judged) == 1
     assert found.regular.y is not None
     assert [homes.is_singular(found.regular.y, None, constraints=each) for each in (False, True)] == [True, False]
     monkeypatch.setattr(Homes, "is_singular", lambda *_, **__: False)
     with within(0.2):
-        assert prove_ranks(problem, homes).regular.outcome is Outcome.OPEN
+        assert prove_ranks(problem, homes.is_singular).regular.outcome is Outcome.OPEN
 
 
 @pytest.mark.parametrize(

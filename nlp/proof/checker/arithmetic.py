@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
+from ....models import FloatArray
 from ...errors import UncoveredError
 from .polynomials import Polynomial, atan, constant, cos, exp, log, ramp, sin, sqrt, square, step, variable
-
-if TYPE_CHECKING:
-    from ....models import FloatArray
 
 #: Largest whole power that is written as products.
 _LARGEST_POWER = 64

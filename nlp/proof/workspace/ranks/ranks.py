@@ -14,7 +14,6 @@ from ....interruption import one_search
 from ...boxes.search import TOO_SMALL, Boxes, Effort, Order, Verdicts, joined, some
 from ...enclosure.engine import ENGINE
 from ...statement.claims import CONSTRAINTS, REGULAR
-from ..home_poses import Homes
 from ..robot.pose_box import PoseBox
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
@@ -33,6 +32,8 @@ _BLOCK = 1024
 RankProgress = Callable[[float, int, int], None]
 #: Search for a singular pose from the boxes that were examined last, and the number of all.
 Look = Callable[[Examined, int], Singular | None]
+#: Whether J, or the constraint wrenches, lose their rank at a pose (6,) of the machine with errors of joint centres.
+IsSingular = Callable[..., bool]
 
 
 class Ranks(NamedTuple):
@@ -43,13 +44,13 @@ class Ranks(NamedTuple):
 
 
 def prove_ranks(
-    problem: Problem, homes: Homes, *, progress: RankProgress | None = None, paper: PaperRecord | None = None
+    problem: Problem, is_singular: IsSingular, *, progress: RankProgress | None = None, paper: PaperRecord | None = None
 ) -> Ranks:
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
 
     Args:
         problem: the design, or all machines that are meant.
-        homes: the same at single poses.
+        is_singular: shows single poses, in home's assembly; others refute nothing.
         progress: called during them.
         paper: records the searches for a proof.
     """
@@ -60,7 +61,7 @@ def prove_ranks(
                 continue
 
             def is_shown(at: Singular, *, constraints: bool = name == CONSTRAINTS) -> bool:
-                return homes.is_singular(at.y, at.errors, constraints=constraints)
+                return is_singular(at.y, at.errors, constraints=constraints)
 
             recorder, search = None if paper is None else paper.own(name), SingularSearch(problem, matrix, is_shown)
             verdict = prove_rank(problem, matrix, progress=progress, recorder=recorder, look=search.look)
