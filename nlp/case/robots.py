@@ -13,7 +13,7 @@ from pydantic import ConfigDict, PydanticSchemaGenerationError, TypeAdapter, Val
 from ...models import AmbiguousModelError, Model, RobotFunction, UnknownModelError, model_names, robot_function
 from ..errors import CaseError, listing, nearest
 from .schema import RobotTable
-from .starter import toml_value
+from .toml import option_text
 
 
 def build_model(name: str, options: Mapping[str, Any] | None = None) -> Model:
@@ -128,8 +128,8 @@ def model_options(name: str) -> list[ModelOption]:
     for key, option in declared.items():
         hint = hints.get(key, Any)
         choices = typing.get_args(hint) if typing.get_origin(hint) is typing.Literal else ()
-        allowed = listing(map(toml_value, choices)) if choices else getattr(hint, "__name__", str(hint))
-        default = None if option.default is option.empty else toml_value(option.default)
+        allowed = listing(map(option_text, choices)) if choices else getattr(hint, "__name__", str(hint))
+        default = None if option.default is option.empty else option_text(option.default)
         rows.append(ModelOption(key, allowed, default, choices))
     return rows
 

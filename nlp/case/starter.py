@@ -13,7 +13,7 @@ import numpy as np
 from ...models import Dimension, Model, Parameter
 from ..units import Units
 from .settings import Search
-from .toml import plain_value, toml_text
+from .toml import option_text, plain_value, toml_text
 
 _UNITS = Units("cm", "deg")
 
@@ -39,7 +39,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     reach = _SPREAD * (math.hypot(*model.home) or max(lengths, default=0.0) or _size(model)) or 1.0
     position = ", ".join(_free_number(value, reach) for value in model.home)
-    options = [f"{key} = {toml_value(value)}" for key, value in model.options.items() if key != "definition"]
+    options = [f"{key} = {option_text(value)}" for key, value in model.options.items() if key != "definition"]
     definition = model.options.get("definition")
     units = _units_of(model)
     robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
@@ -146,8 +146,3 @@ def _free_number(middle: float, width: float, domain: Sequence[float] = (-math.i
     """Return a range about a number as TOML; the number alone where its domain leaves no range."""
     lower, upper = max(middle - width, domain[0]), min(middle + width, domain[1])
     return f"{{ min = {lower:g}, max = {upper:g} }}" if lower < upper else f"{middle:g}"
-
-
-def toml_value(value: object) -> str:
-    """Return the value of a robot's option as TOML writes it."""
-    return repr(value) if isinstance(value, float) else json.dumps(value, default=str)

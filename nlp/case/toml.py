@@ -65,6 +65,11 @@ def toml_text(value: TomlValue, number_text: Callable[[float], str] = _short_num
     raise TypeError(f"TOML has no form for {value!r} here")
 
 
+def option_text(value: object) -> str:
+    """Return the value of a robot's option as TOML writes it."""
+    return repr(value) if isinstance(value, float) else json.dumps(value, default=str)
+
+
 def toml_key(key: str) -> str:
     """Return a key, in quotes where it needs them."""
     return key if _BARE_KEY.fullmatch(key) else toml_text(key)
