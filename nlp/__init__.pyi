@@ -13,7 +13,7 @@ from .case.limits.joints import MountingPose as MountingPose
 from .case.limits.joints import PlatformJointAngle as PlatformJointAngle
 from .case.limits.legs import Actuator as Actuator
 from .case.limits.legs import LegLength as LegLength
-from .case.limits.limit import Limits as Limits
+from .case.limits.limits import Limits as Limits
 from .case.limits.plates import Footprint as Footprint
 from .case.limits.plates import JointSpacing as JointSpacing
 from .case.limits.plates import RadiusRatio as RadiusRatio
@@ -41,6 +41,7 @@ from .case.task import Task as Task
 from .case.workspace import TurnKind as TurnKind
 from .case.workspace import Turns as Turns
 from .case.workspace import Workspace as Workspace
+from .case.writer import case_text as case_text
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import compare as compare
 from .comparison.data import comparison_result as comparison_result

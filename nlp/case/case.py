@@ -19,7 +19,8 @@ from ...models.whole import Whole
 from ..errors import CaseError, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_value, check_vector
-from .limits.limit import LimitedCase, Limits
+from .limits.limit import LimitedCase
+from .limits.limits import Limits
 from .names import parameter_name, pose_prefixes
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
@@ -109,7 +110,7 @@ class Case(Whole, Shown):
         Raises:
             CaseError: no case file can state the case, such as one of a robot that is not found by its name.
         """
-        from .writer import case_text  # noqa: PLC0415 - a case that is not written starts without the tables of files
+        from .. import case_text  # noqa: PLC0415 - files come after cases
 
         return case_text(self)
 

@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 
@@ -24,9 +24,7 @@ from ..units import Units
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from .schema import Range
     from .toml import TomlValue
-    from .wholeschema import SpanTable
 
 #: Largest distance of a matrix from an orthogonal one, in a component of ``R' R``, and of a quaternion's size from 1:
 #: more than numbers with seven decimals leave, and far less than a slip of the pen.
@@ -60,7 +58,14 @@ class Free:
 Value: TypeAlias = float | Free
 
 
-def internal_value(written: float | Range | SpanTable, units: Units, dimension: Dimension) -> Value:
+class StatedRange(Protocol):
+    """A range of a number as a table of a case file states it, in the file's units; it may have a ``start``."""
+
+    min: float
+    max: float
+
+
+def internal_value(written: float | StatedRange, units: Units, dimension: Dimension) -> Value:
     """Return a fixed or free number of a case file, radians for an angle."""
     if isinstance(written, float | int):
         return units.to_internal(written, dimension)

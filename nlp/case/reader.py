@@ -7,13 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pydantic import ValidationError
+
 from ...models import Dimension
 from ..errors import CaseError
 from ..units import Units
 from .case import Case
 from .csvrows import TableOrigins, insert_rows
 from .displacements import read_displacements
-from .limits.limit import Limits
+from .limits.limits import Limits
 from .overrides import Settings, override_number
 from .pose import (
     OverPoses,
@@ -26,20 +28,12 @@ from .pose import (
     rotation_from_rpy,
 )
 from .robots import insert_robot_file, model_of_table
-from .schema import (
-    Document,
-    ExpectTable,
-    PublishedTable,
-    Range,
-    RotationTable,
-    TaskTable,
-    parse_document,
-)
+from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, read_text, tables_of
+from .table import case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
-from .workspace import workspace_of
 
 
 class CaseFile(NamedTuple):
@@ -103,14 +97,38 @@ def case_from_tables(
     try:
         origins = insert_rows(tables, folder or Path())
         robot_file = insert_robot_file(tables, folder or Path())
-        written = parse_document(tables)
+        written = _parse(tables)
         if settings:
             for key, value in settings.items():
                 override_number(tables, key, value)
-            written = parse_document(tables)
+            written = _parse(tables)
         return _case_of(written, name, source, robot_file)
     except CaseError as error:
         raise (error if error.source else origins.error_in(error, source)) from None
+
+
+def _parse(tables: dict[str, Any]) -> Document:
+    """Return a document as tables of the schema.
+
+    Args:
+        tables: the document, as ``tomllib`` returns it.
+
+    Raises:
+        CaseError: the first fault, with its dotted key.
+    """
+    try:
+        return _kind_of(tables).model_validate(tables)
+    except ValidationError as error:
+        raise case_error(error.errors(include_url=False)[0]) from None
+
+
+def _kind_of(tables: dict[str, Any]) -> type[Document]:
+    """Return the schema of a document, with the tables of limits and of the workspace where it states one of them."""
+    if tables.keys().isdisjoint(("limits", "workspace")):
+        return Document
+    from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
+
+    return WholeDocument
 
 
 def _case_of(written: Document, name: str, source: str, robot_file: str | None = None) -> Case:
@@ -157,11 +175,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         over_poses=over_poses,
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
-        workspace=workspace_of(
-            written.workspace,
-            units,
-            has_limits=written.limits is not None and written.limits.over == "workspace",
-        ),
+        workspace=written.read_workspace(units),
         tasks=tasks,
         units=units,
         characteristic_length=written.robot.characteristic_length,

@@ -10,33 +10,17 @@ without them; :mod:`.wholeschema` has the document with them.
 
 from __future__ import annotations
 
-from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    ConfigDict,
-    Discriminator,
-    Field,
-    FiniteFloat,
-    StringConstraints,
-    Tag,
-    ValidationError,
-    model_validator,
-)
+from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, StringConstraints, Tag, model_validator
 
 from ..errors import listing
 from ..units import Units
 from .case import Case
 from .settings import Expectation, Published, Search
-from .table import Table, Vector, case_error, fault_of
+from .table import Table, Vector, fault_of
 from .task import Task
-
-if TYPE_CHECKING:
-    from .limits.registry import LimitsTable
-    from .wholeschema import WorkspaceTable
-else:
-    # A document that states neither has nothing at these keys.
-    LimitsTable = WorkspaceTable = NoneType
+from .workspace import Workspace
 
 #: Forms of a fixed rotation, each of which stands alone.
 _FIXED = ("rpy", "matrix", "quaternion")
@@ -320,9 +304,10 @@ class Document(Table):
     poses: FileName | None = Field(default=None, description="CSV file beside this one with a pose in each row")
     tasks: FileName | None = Field(default=None, description="CSV file beside this one with a task in each row")
     combine: CombineTable | None = Field(default=None, description="several tasks or poses only")
-    limits: LimitsTable | None = None
+    # Of this document these two are None: one that states them is a whole document.
+    limits: Table | None = None
     tolerance: ToleranceTable | None = Field(default=None, description="manufacturing tolerances")
-    workspace: WorkspaceTable | None = None
+    workspace: Table | None = None
     solve: SolveTable = SolveTable.model_construct()
     expect: ExpectTable = ExpectTable.model_construct()
     published: list[PublishedTable] = Field(default_factory=list)
@@ -335,26 +320,13 @@ class Document(Table):
                 raise fault_of(key, "is missing")
         return self
 
+    def read_workspace(self, units: Units) -> Workspace | None:  # noqa: ARG002 - it has none
+        """Return the workspace that the document states; None where it states none.
 
-def parse_document(tables: dict[str, Any]) -> Document:
-    """Return a document as tables of the schema.
+        Args:
+            units: the document's units.
 
-    Args:
-        tables: the document, as ``tomllib`` returns it.
-
-    Raises:
-        CaseError: the first fault, with its dotted key.
-    """
-    try:
-        return _kind_of(tables).model_validate(tables)
-    except ValidationError as error:
-        raise case_error(error.errors(include_url=False)[0]) from None
-
-
-def _kind_of(tables: dict[str, Any]) -> type[Document]:
-    """Return the schema of a document, with the tables of limits and of the workspace where it states one of them."""
-    if tables.keys().isdisjoint(("limits", "workspace")):
-        return Document
-    from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
-
-    return WholeDocument
+        Raises:
+            CaseError: the axis of its rotations is zero, or limits hold over a workspace that is not stated.
+        """
+        return None

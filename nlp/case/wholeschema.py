@@ -6,10 +6,15 @@ from typing import Annotated
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
 
+from ...models import Dimension, unit_vector
+from ..errors import CaseError
+from ..units import Units
+from .checks import check_direction
 from .limits.registry import LimitsTable
+from .pose import internal_value
 from .schema import Document
 from .table import Table, Vector, fault_of
-from .workspace import TURNS
+from .workspace import TURNS, TurnKind, Turns, Workspace
 
 
 class SpanTable(Table):
@@ -71,3 +76,31 @@ class WholeDocument(Document):
 
     limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
     workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
+
+    def read_workspace(self, units: Units) -> Workspace | None:
+        """Return the workspace that the document states, over which its limits may hold."""
+        has_limits = self.limits is not None and self.limits.over == "workspace"
+        if self.workspace is None:
+            if has_limits:
+                raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
+            return None
+        position = [internal_value(value, units, Dimension.LENGTH) for value in self.workspace.position]
+        return Workspace(position, _turns(self.workspace.rotation, units), has_limits)
+
+
+def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:
+    """Return the rotations that a case file states.
+
+    Raises:
+        CaseError: the axis is zero.
+    """
+    if rotation is None:
+        return Turns()
+    if rotation.angle is None:
+        angles = [internal_value(getattr(rotation, name) or 0.0, units, Dimension.ANGLE) for name in TURNS]
+        return Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles))
+    angle = internal_value(rotation.angle, units, Dimension.ANGLE)
+    if rotation.axis is None:
+        return Turns(TurnKind.ANY_AXIS, (angle,))
+    x, y, z = unit_vector(check_direction(rotation.axis, "workspace.rotation.axis")).tolist()
+    return Turns(TurnKind.AXIS, (angle,), (x, y, z))

@@ -8,15 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from ...models import Dimension, unit_vector
+from ...models import Dimension
 from ..errors import CaseError
 from ..units import Units
-from .checks import check_direction, check_value
-from .pose import Free, Value, internal_value, written_value
+from .checks import check_value
+from .pose import Free, Value, written_value
 
 if TYPE_CHECKING:
     from .toml import TomlValue
-    from .wholeschema import WorkspaceRotationTable, WorkspaceTable
 
 #: Largest size of a rotation's angle: the coordinates in which boxes of rotations are covered, tangents of half the
 #: angle, grow without bound towards half a turn.
@@ -122,43 +121,6 @@ class Workspace:
             "position": [_written(value, units, Dimension.LENGTH) for value in self.position],
             "rotation": None if turns == Turns() else rotation,
         }
-
-
-def workspace_of(written: WorkspaceTable | None, units: Units, *, has_limits: bool = False) -> Workspace | None:
-    """Return the workspace that a case file states; None where it states none.
-
-    Args:
-        written: its table.
-        units: the file's units.
-        has_limits: whether the limits of the case hold over the workspace.
-
-    Raises:
-        CaseError: the axis is zero, or limits hold over a workspace that is not stated.
-    """
-    if written is None:
-        if has_limits:
-            raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
-        return None
-    position = [internal_value(value, units, Dimension.LENGTH) for value in written.position]
-    return Workspace(position, _turns(written.rotation, units), has_limits)
-
-
-def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:
-    """Return the rotations that a case file states.
-
-    Raises:
-        CaseError: the axis is zero.
-    """
-    if rotation is None:
-        return Turns()
-    if rotation.angle is None:
-        angles = [internal_value(getattr(rotation, name) or 0.0, units, Dimension.ANGLE) for name in TURNS]
-        return Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles))
-    angle = internal_value(rotation.angle, units, Dimension.ANGLE)
-    if rotation.axis is None:
-        return Turns(TurnKind.ANY_AXIS, (angle,))
-    x, y, z = unit_vector(check_direction(rotation.axis, "workspace.rotation.axis")).tolist()
-    return Turns(TurnKind.AXIS, (angle,), (x, y, z))
 
 
 def _written(value: Value, units: Units, dimension: Dimension) -> TomlValue:

@@ -19,7 +19,8 @@ from casadi import SX
 
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, Substitution, frozen_array, model_names
 from ..case.case import Case
-from ..case.limits.limit import Limit, Limits
+from ..case.limits.limit import Limit
+from ..case.limits.limits import Limits
 from ..case.pose import Free, Pose, Value
 from ..case.robotfile import model_of_definition, read_definition
 from ..case.robots import build_model

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from ...models import Dimension, FloatArray, Model, component_names
 from ..case.case import Case
-from ..case.limits.limit import Limits
+from ..case.limits.limits import Limits
 from ..case.pose import HERE, Free, Value
 from ..errors import CaseError, EvaluationError, InputError
 from ..evidence.state import evaluate

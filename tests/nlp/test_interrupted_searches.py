@@ -22,7 +22,7 @@ import screwsynth.nlp
 from screwsynth.models import FloatArray, hexapod
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Nlp, Task, load_case, solve, sweep
-from screwsynth.nlp.case.limits.limit import Limits
+from screwsynth.nlp.case.limits.limits import Limits
 from screwsynth.nlp.case.pose import Free
 from screwsynth.nlp.case.robots import build_model
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace

@@ -16,7 +16,7 @@ from ....models import Dimension, Model, Substitution
 from ....models.joints.closedform import ClosedForm, Reach
 from ...case.case import Case
 from ...case.limits.constraint import Reading
-from ...case.limits.limit import Limits
+from ...case.limits.limits import Limits
 from ...case.pose import HERE, Pose, Rotation, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Workspace

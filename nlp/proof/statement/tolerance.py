@@ -22,7 +22,8 @@ from ....models.joints.closedform import Reach, closed_form
 from ...case.case import Case
 from ...case.limits.constraint import LENGTH, BoundedConstraint, Constraint, Reading
 from ...case.limits.joints import BaseJointAngle, JointAngle, MountingPose, unit_axes
-from ...case.limits.limit import Limit, Limits
+from ...case.limits.limit import Limit
+from ...case.limits.limits import Limits
 from ...case.pose import HERE, Free, Pose, Rotation, Value
 from ...case.task import Sense
 from ...program.layout import Layout, StatedPoseSymbols, lay_out
