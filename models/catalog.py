@@ -67,6 +67,15 @@ def gallery_tables(name: str) -> dict[str, Any]:
     return tomllib.loads((_GALLERY / f"{name}.toml").read_text(encoding="utf-8"))
 
 
+def definition_of(model: Model) -> dict[str, object]:
+    """Return the tables of the file of a robot given joint by joint, under its own name; none where none are known."""
+    found = model.options.get("definition")
+    if isinstance(found, Mapping):
+        return dict(found)
+    in_gallery = model.structure and model.name in gallery_names()
+    return gallery_tables(model.name) | {"name": model.name} if in_gallery else {}
+
+
 @cache
 def gallery_robot(name: str) -> Model:
     """Return a shipped robot that is given joint by joint.

@@ -15,7 +15,6 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..catalog import gallery_names, gallery_tables
 from ..displaced import Centre, DisplacedRobot, error_parameter
 from ..model import Model
 from ..parts import Leg
@@ -31,16 +30,19 @@ _OFF = 0.01
 _SEED = 0
 
 
-def displaced_robot(model: Model) -> DisplacedRobot:
+def displaced_robot(model: Model, definition: Mapping[str, object]) -> DisplacedRobot:
     """Return a robot given joint by joint with errors of its joint centres.
 
     Args:
-        model: the robot, from a definition.
+        model: the robot.
+        definition: the tables of its file; none where they are not known.
 
     Raises:
-        RobotError: the robot is given by links and joints, or cannot be assembled near home with such errors.
+        RobotError: the robot is not known by such tables, is given by links and joints, or cannot be assembled near
+            home with such errors.
     """
-    definition = _definition(model)
+    if not definition:
+        raise RobotError("joint", "is known as a row alone")
     robot = home_of(read_robot(definition))
     if robot.graph is not None:
         raise RobotError("joint", "is one of links and joints, whose centres are not known as those of limbs")
@@ -81,20 +83,6 @@ def _displaced_legs(model: Model, dimensions: SX, centres: Sequence[Centre]) -> 
         base, platform = (end + errors[centre] for end, centre in zip(ends, leg.centres, strict=True))
         found.append(replace(leg, base=base, platform=platform))
     return tuple(found)
-
-
-def _definition(model: Model) -> Mapping[str, object]:
-    """Return the tables that state a robot.
-
-    Raises:
-        RobotError: they are not known.
-    """
-    found = model.options.get("definition")
-    if isinstance(found, Mapping):
-        return dict(found)
-    if not (model.structure and model.name in gallery_names()):
-        raise RobotError("joint", "is known as a row alone")
-    return gallery_tables(model.name) | {"name": model.name}
 
 
 class _Displaced:

@@ -16,6 +16,7 @@ import numpy as np
 from casadi import SX
 
 from ....models import Dimension, FloatArray, Model, matrix_from_axis_angle
+from ....models.catalog import definition_of
 from ....models.displaced import DisplacedRobot, displaced_legs
 from ....models.joints import RobotError
 from ....models.joints.closedform import Reach, closed_form
@@ -90,7 +91,7 @@ def _displaced(model: Model) -> DisplacedRobot:
     from ....models.joints.centres import displaced_robot  # noqa: PLC0415
 
     try:
-        return displaced_robot(model)
+        return displaced_robot(model, definition_of(model))
     except RobotError as error:
         raise RobotError("", f"the robot cannot be assembled with errors of its joint centres: {error}") from None
 
