@@ -18,6 +18,11 @@ class Dimension(enum.Enum):
     LENGTH = "length"
     ANGLE = "angle"
     NUMBER = "number"
+    FORCE = "force"
+    TORQUE = "torque"
+    SPEED = "length per second"
+    TURN_SPEED = "angle per second"
+    POWER = "power"
 
 
 def component_names(name: str, size: int) -> tuple[str, ...]:

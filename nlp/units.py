@@ -1,4 +1,4 @@
-"""Units of a case: a label for lengths, and degrees or radians for people. Computations are in radians."""
+"""Units of a case: labels for lengths and forces, and degrees or radians for people. Computations are in radians."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ class Units:
     Attributes:
         length: label of the length unit for every output; lengths are never converted.
         angle: ``"deg"`` or ``"rad"``, the unit of angles in files, tables and messages.
+        force: label of the unit of force; a torque is a force times a length, and speeds are per second.
     """
 
     length: str = "m"
     angle: Literal["deg", "rad"] = "deg"
+    force: str = "N"
 
     def to_internal(self, value: float, dimension: Dimension) -> float:
         """Return a number in the case's unit as computations use it, in radians for an angle."""
@@ -59,14 +61,23 @@ class Units:
 
     def label(self, dimension: Dimension) -> str:
         """Return the label of the unit; an empty one for a plain number."""
-        return {Dimension.LENGTH: self.length, Dimension.ANGLE: self.angle, Dimension.NUMBER: ""}[dimension]
+        return {
+            Dimension.LENGTH: self.length,
+            Dimension.ANGLE: self.angle,
+            Dimension.NUMBER: "",
+            Dimension.FORCE: self.force,
+            Dimension.TORQUE: f"{self.force} {self.length}",
+            Dimension.SPEED: f"{self.length}/s",
+            Dimension.TURN_SPEED: f"{self.angle}/s",
+            Dimension.POWER: f"{self.force} {self.length}/s",
+        }[dimension]
 
     def text(self, value: float, dimension: Dimension) -> str:
         """Return a number from a computation with its unit, for messages."""
         return f"{self.shown(value, dimension):.10g} {self.label(dimension)}".strip()
 
     def _is_degrees(self, dimension: Dimension) -> bool:
-        return dimension is Dimension.ANGLE and self.angle == "deg"
+        return dimension in (Dimension.ANGLE, Dimension.TURN_SPEED) and self.angle == "deg"
 
 
 def rate_unit(twist: Iterable[float], units: Units, dimension: Dimension = Dimension.LENGTH) -> str:

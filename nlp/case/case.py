@@ -15,12 +15,14 @@ import numpy as np
 
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ...models.shown import Shown
+from ...models.statics import statics_hindrance
 from ...models.whole import Whole
 from ..errors import CaseError, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_value, check_vector
 from .limits.limit import LimitedCase
 from .limits.limits import Limits
+from .loads import NO_LOADING, Loading
 from .names import parameter_name, pose_prefixes
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
@@ -48,6 +50,7 @@ class Case(Whole, Shown):
         over_poses: combination of F over several poses.
         joint_centre_tolerance: largest error of a joint centre in the machine as it is built, length; None for none.
         workspace: poses for which a machine with these dimensions is judged; None for none.
+        loading: loads on the platform, and its fastest motions.
         search: settings of the search.
         method: method that combines several tasks; the average is equation 15.
         title: one line for people.
@@ -74,6 +77,7 @@ class Case(Whole, Shown):
     over_poses: OverPoses = OverPoses.SUM
     joint_centre_tolerance: float | None = None
     workspace: Workspace | None = None
+    loading: Loading = NO_LOADING
     search: Search = field(default_factory=Search)
     method: Method = Method.AVERAGE
     title: str = ""
@@ -89,6 +93,7 @@ class Case(Whole, Shown):
         store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
         store(self, "further", _check_further_poses(self))
         store(self, "tasks", _check_tasks(self))
+        _check_loading(self)
         self.limits.check(self.as_limited)
         _check_tolerance(self)
         if self.workspace is not None:
@@ -171,7 +176,21 @@ class Case(Whole, Shown):
     @property
     def as_limited(self) -> LimitedCase:
         """The part of the case that its limits read."""
-        return LimitedCase(self.model, self.units, self.scalars)
+        return LimitedCase(self.model, self.units, self.scalars, self.loading)
+
+
+def _check_loading(case: Case) -> None:
+    """Refuse loads and motions that mean nothing, and those of a robot whose forces they do not determine.
+
+    Raises:
+        CaseError: in the words of a case file.
+    """
+    case.loading.check(case.units)
+    stated = [key for key, given in (("load", case.loading.loads), ("motion", case.loading.motion)) if given]
+    if stated:
+        hindrance = statics_hindrance(case.model)
+        if hindrance:
+            raise CaseError(stated[0], f"is not for {case.model.name!r}: {hindrance}")
 
 
 def _counted(count: int, word: str) -> str:

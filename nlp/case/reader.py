@@ -123,8 +123,8 @@ def _parse(tables: dict[str, Any]) -> Document:
 
 
 def _kind_of(tables: dict[str, Any]) -> type[Document]:
-    """Return the schema of a document, with the tables of limits and of the workspace where it states one of them."""
-    if tables.keys().isdisjoint(("limits", "workspace")):
+    """Return the schema of a document: with the tables of limits, workspace and loads where it states one of them."""
+    if tables.keys().isdisjoint(("limits", "workspace", "load", "motion", "gravity")):
         return Document
     from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
 
@@ -143,7 +143,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
     Raises:
         CaseError: the document holds a fault.
     """
-    units = Units(written.units.length, written.units.angle)
+    units = Units(written.units.length, written.units.angle, written.units.force)
     model = model_of_table(written.robot, robot_file)
     if not model.has_couples and "characteristic_length" in written.robot.model_fields_set:
         raise CaseError("robot.characteristic_length", f"means nothing for {model.name!r}, which has no couple rows")
@@ -176,6 +176,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
         workspace=written.read_workspace(units),
+        loading=written.read_loading(units),
         tasks=tasks,
         units=units,
         characteristic_length=written.robot.characteristic_length,

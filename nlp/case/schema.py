@@ -4,8 +4,8 @@ The classes mirror the file, in the user's units and words. They check keys, typ
 robot need be known. Everything else is checked once, by :class:`screwsynth.nlp.case.case.Case`. A key that may be left
 out has the default of the value that it becomes.
 
-The tables of limits and of the workspace take as long to make as all others together. A file without them is read
-without them; :mod:`.wholeschema` has the document with them.
+The tables of limits, of the workspace and of loads take as long to make as all others together. A file without them is
+read without them; :mod:`.wholeschema` has the document with them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, StringConstr
 from ..errors import listing
 from ..units import Units
 from .case import Case
+from .loads import NO_LOADING, Loading
 from .settings import Expectation, Published, Search
 from .table import Table, Vector, fault_of
 from .task import Task
@@ -27,6 +28,7 @@ _FIXED = ("rpy", "matrix", "quaternion")
 
 
 FileName = Annotated[str, StringConstraints(min_length=1)]
+Label = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)]
 
 
 class Range(Table):
@@ -63,10 +65,9 @@ VectorOrValue = Annotated[
 class UnitsTable(Table):
     """Units of every number in the file."""
 
-    length: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=20)] = Field(
-        default=Units.length, description="label of the length unit"
-    )
+    length: Label = Field(default=Units.length, description="label of the length unit")
     angle: Literal["deg", "rad"] = Field(default=Units.angle, description="unit of angles")
+    force: Label = Field(default=Units.force, description="label of the unit of force; a torque is force times length")
 
 
 class RobotTable(Table):
@@ -282,7 +283,7 @@ class PublishedTable(Table):
 
 
 class Document(Table):
-    """A case file that states no limits and no workspace."""
+    """A case file that states no limits, no workspace and no loads."""
 
     model_config = ConfigDict(
         title="screwsynth case file",
@@ -330,3 +331,11 @@ class Document(Table):
             CaseError: the axis of its rotations is zero, or limits hold over a workspace that is not stated.
         """
         return None
+
+    def read_loading(self, units: Units) -> Loading:  # noqa: ARG002 - it has none
+        """Return the loads, the motions and the gravity that the document states.
+
+        Args:
+            units: the document's units.
+        """
+        return NO_LOADING

@@ -86,6 +86,7 @@ _FORMS = {
     "twist": "must be a list of 6 numbers",
     "position": "must be a list of 3, each a number or { min, max }",
     "task": "must be a list of tables: write [[task]], with two brackets",
+    "load": "must be a list of tables: write [[load]], with two brackets",
     "limb": "must be a list of tables: write [[limb]], with two brackets",
     "published": "must be a list of tables: write [[published]], with two brackets",
 }

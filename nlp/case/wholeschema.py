@@ -11,6 +11,8 @@ from ..errors import CaseError
 from ..units import Units
 from .checks import check_direction
 from .limits.registry import LimitsTable
+from .loads import Loading
+from .loadtables import GravityTable, LoadTable, MotionTable, loading_of
 from .pose import internal_value
 from .schema import Document
 from .table import Table, Vector, fault_of
@@ -76,6 +78,9 @@ class WholeDocument(Document):
 
     limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
     workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
+    load: list[LoadTable] = Field(default_factory=list, description="loads on the platform")
+    motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
+    gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
 
     def read_workspace(self, units: Units) -> Workspace | None:
         """Return the workspace that the document states, over which its limits may hold."""
@@ -86,6 +91,10 @@ class WholeDocument(Document):
             return None
         position = [internal_value(value, units, Dimension.LENGTH) for value in self.workspace.position]
         return Workspace(position, _turns(self.workspace.rotation, units), has_limits)
+
+    def read_loading(self, units: Units) -> Loading:
+        """Return the loads, the motions and the gravity that the document states."""
+        return loading_of(self.load, self.motion, self.gravity, units)
 
 
 def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:

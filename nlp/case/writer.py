@@ -16,8 +16,10 @@ import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Substitution, axis_from_screw, unit_vector
 from ..errors import CaseError
+from ..units import Units
 from .case import Case
 from .displacements import written_displacements
+from .loads import Loading
 from .pose import Free, Pose, written_value
 from .reader import case_from_tables
 from .settings import Expectation, Search
@@ -59,7 +61,7 @@ def _lines(case: Case) -> Iterator[str]:
     """Yield the lines of a case file."""
     units, model = case.units, case.model
     yield from toml_lines({"title": case.title or None})
-    yield from toml_table("[units]", {"length": units.length, "angle": units.angle})
+    yield from toml_table("[units]", _units(units))
     length = case.characteristic_length if model.has_couples else None
     options: dict[str, TomlValue | None] = {key: plain_value(value) for key, value in model.options.items()}
     name = None if "definition" in options else model.name
@@ -76,6 +78,7 @@ def _lines(case: Case) -> Iterator[str]:
     for task in case.tasks:
         yield from toml_table("[[task]]", _task(task))
     yield from toml_table("[combine]", _combination(case))
+    yield from _loading(case.loading, units)
     yield from toml_table("[limits]", _limits(case))
     yield from toml_table("[tolerance]", {"joint_centre": case.joint_centre_tolerance})
     if case.workspace is not None:
@@ -86,6 +89,35 @@ def _lines(case: Case) -> Iterator[str]:
     for row in case.published:
         value = row.value[0] if len(row.value) == 1 else row.value
         yield from toml_table("[[published]]", {**vars(row), "value": value, "because": row.because or None})
+
+
+def _units(units: Units) -> dict[str, TomlValue | None]:
+    """Return the table of the units; a file without forces has none for them."""
+    force = None if units.force == Units.force else units.force
+    return {"length": units.length, "angle": units.angle, "force": force}
+
+
+def _loading(loading: Loading, units: Units) -> Iterator[str]:
+    """Yield the lines of loads, motion and gravity."""
+    for load in loading.loads:
+        sizes = {"force": load.any_force or None, "moment": load.any_moment or None}
+        table: dict[str, TomlValue | None] = {
+            "name": load.name,
+            "mass": load.mass or None,
+            "force": load.force if any(load.force) else None,
+            "moment": load.moment if any(load.moment) else None,
+            "centre" if load.mass else "point": load.point if any(load.point) else None,
+            "frame": "platform" if load.in_platform else None,
+            "sign": "both" if load.both_signs else None,
+            "any": sizes if any(sizes.values()) else None,
+            "always": load.always or None,
+        }
+        yield from toml_table("[[load]]", table)
+    if loading.motion is not None:
+        angular = units.written(loading.motion.angular, Dimension.TURN_SPEED)
+        yield from toml_table("[motion]", {"linear": loading.motion.linear, "angular": angular})
+    if loading.gravity is not None:
+        yield from toml_table("[gravity]", {"acceleration": loading.gravity})
 
 
 def _expectation(expect: Expectation) -> Iterator[str]:
@@ -177,11 +209,16 @@ def _merge(found: dict[str, TomlValue | None], other: Mapping[str, TomlValue | N
     """
     for key, value in other.items():
         have = found.setdefault(key, value)
-        if isinstance(have, dict) and isinstance(value, Mapping) and "joint" in (key, place.rpartition(".")[2]):
+        if isinstance(have, dict) and isinstance(value, Mapping) and _is_merged(key, place):
             _merge(have, value, f"{place}.{key}")
         elif have != value:
             fault = "cannot be written to a case file, which has one value of it, while the limits have two"
             raise CaseError(f"{place}.{key}", fault)
+
+
+def _is_merged(key: str, place: str) -> bool:
+    """Return whether several limits may have one key, by joint or by actuator."""
+    return "joint" in (key, place.rpartition(".")[2]) or key.startswith("actuator_")
 
 
 def _are_same(one: Model, other: Model) -> bool:

@@ -133,7 +133,7 @@ def _constraints(
         yield from pair
     for k, robot in enumerate(robots):
         tasks = tuple(task.name for task in case.tasks[: robot.rates.shape[1]])
-        pose = PosedRobot(model, robot, tasks, f" pose {k + 1}" if len(robots) > 1 else "")
+        pose = PosedRobot(model, robot, tasks, f" pose {k + 1}" if len(robots) > 1 else "", case.loading)
         for limit in limits:
             for item in limit.at_pose(pose):
                 yield replace(item, constraint=replace(item.constraint, pose=k))

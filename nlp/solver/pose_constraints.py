@@ -336,7 +336,7 @@ class PoseConstraints:
         legs = tuple(replace(one, span=other.span) for one, other in zip(design, robot.legs, strict=True))
         for limit in self._case.limits:
             posed = replace(robot, legs=legs) if isinstance(limit, JointAngle) else robot
-            yield from limit.at_pose(PosedRobot(closed.model, posed, names, where))
+            yield from limit.at_pose(PosedRobot(closed.model, posed, names, where, self._case.loading))
             if robot.legs:
                 yield from (item for plate in plates for item in limit.on_plate(plate))
             if limit.needs_legs:

@@ -14,6 +14,7 @@ import abc
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeAlias, TypeVar
 
 from casadi import SX
@@ -22,9 +23,11 @@ from ....models import Dimension, Model, RobotInstance
 from ...errors import CaseError
 from ...units import Units
 from ..checks import check_real
+from ..loads import NO_LOADING, Loading
 from .constraint import BoundedConstraint, PairFamily
 
 if TYPE_CHECKING:
+    from ..forces import PosedForces
     from ..table import Table
     from ..toml import TomlValue
 
@@ -94,11 +97,13 @@ class LimitedCase(NamedTuple):
         model: the robot.
         units: units for people.
         scalars: names of the case's own numbers, and the dimension of each.
+        loading: loads on the platform, and its motions.
     """
 
     model: Model
     units: Units
     scalars: Mapping[str, Dimension]
+    loading: Loading = NO_LOADING
 
     def check_number(self, key: str, value: float | None, allowed: NumberRange) -> None:
         """Refuse a number of a limit that is out of its range.
@@ -153,7 +158,8 @@ class Design(NamedTuple):
     numbers: Mapping[str, SX]
 
 
-class PosedRobot(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class PosedRobot:
     """The robot at one pose, as expressions of the program's variables and arguments.
 
     Attributes:
@@ -161,12 +167,21 @@ class PosedRobot(NamedTuple):
         robot: the robot at the pose.
         tasks: names of the tasks that the columns of its rates belong to.
         where: end of the names of constraints at this pose; empty for a single pose.
+        loading: loads on the platform, and its motions.
     """
 
     model: Model
     robot: RobotInstance
     tasks: tuple[str, ...]
     where: str = ""
+    loading: Loading = NO_LOADING
+
+    @cached_property
+    def forces(self) -> PosedForces:
+        """Forces and speeds of the actuators."""
+        from ..forces import forces_at  # noqa: PLC0415 - a case without loads starts without them
+
+        return forces_at(self.model, self.robot, self.loading)
 
 
 class Measures(NamedTuple):

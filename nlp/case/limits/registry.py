@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, create_model
 
 from ..table import Table
 from .clearance import LegClearance, LinkClearance
+from .forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from .interval import IntervalTable, QuantityLimit
 from .joint_motion import JointCone, JointMotion
 from .joints import BaseJointAngle, PlatformJointAngle
@@ -36,6 +37,9 @@ LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
     ConditionNumber,
     SmallestSingularValue,
     ActuatorRate,
+    ActuatorForce,
+    ActuatorSpeed,
+    ActuatorPower,
     JointMotion,
     JointCone,
     RateShare,

@@ -1,0 +1,123 @@
+"""Forces and speeds of actuators at a pose, as expressions: for every load case, and for the fastest motions.
+
+A load case has one force of an actuator, and a largest change of it by loads of any direction: ``a |v| + b |omega|``
+for a force of size a at a point, whose velocity is v in the platform's motion by a unit rate of this actuator alone,
+and a moment of size b. The largest rate of an actuator is ``linear |g_v| + angular |g_omega|`` for the two parts of its
+row of rates. It is exact where the platform has its rotations and translations independently, as with six freedoms or
+with translations alone; else a motion with both at their largest may be none that it can make.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+from ...models import Model, RobotInstance
+from ...models.parts import Dimension
+from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of, statics_of
+from .loads import LoadCase, Loading, Motion
+
+#: Keeps sizes of vectors smooth where they are 0: they are too large by at most this, in the unit of the vector.
+_SMOOTH = 1e-12
+
+
+class CaseForces(NamedTuple):
+    """Forces of the actuators under one load case.
+
+    Attributes:
+        case: the loads.
+        wrench: (6, 1) their fixed part: force, then moment about the platform's origin, in the world frame.
+        centre: (a, 1) forces that hold it, positive in the sense of the actuator's rate; torques of turning actuators.
+        spread: (a, 1) largest change of each by loads of any direction.
+    """
+
+    case: LoadCase
+    wrench: SX
+    centre: SX
+    spread: SX
+
+    @property
+    def largest(self) -> SX:
+        """Largest force (a, 1) of each actuator."""
+        return self.centre + self.spread
+
+    @property
+    def smallest(self) -> SX:
+        """Smallest force (a, 1) of each actuator, negative where it pulls."""
+        return self.centre - self.spread
+
+
+class PosedForces(NamedTuple):
+    """Forces and speeds of the actuators at a pose.
+
+    Attributes:
+        joints: the actuators.
+        statics: motions of the platform by each of them.
+        cases: their forces under each load case.
+        speeds: (a, 1) their largest speeds; empty without a motion.
+    """
+
+    joints: tuple[DrivenJoint, ...]
+    statics: Statics
+    cases: tuple[CaseForces, ...]
+    speeds: SX
+
+
+def forces_at(model: Model, robot: RobotInstance, loading: Loading) -> PosedForces:
+    """Return the forces and speeds of a robot's actuators at a pose.
+
+    Args:
+        model: the robot, of which :func:`~screwsynth.models.statics.statics_hindrance` says nothing.
+        robot: the robot at the pose.
+        loading: loads on its platform, and its motions.
+    """
+    statics = statics_of(model, robot)
+    cases = tuple(_case_forces(case, statics, robot.rotation) for case in loading.cases)
+    speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion)
+    return PosedForces(driven_joints(model), statics, cases, speeds)
+
+
+def _case_forces(case: LoadCase, statics: Statics, rotation: SX) -> CaseForces:
+    """Return the forces under one load case."""
+    motions = ca.horzsplit(statics.motions)
+    wrench = case.wrench(rotation)
+    centre = ca.vertcat(*[-(ca.dot(wrench[:3], each[3:]) + ca.dot(wrench[3:], each[:3])) for each in motions])
+    spread = SX.zeros(len(motions))
+    for load, _ in case.parts:
+        if load.any_force or load.any_moment:
+            arm = rotation @ SX([float(value) for value in load.point])
+            spread += ca.vertcat(
+                *[
+                    load.any_force * _size(each[3:] + ca.cross(each[:3], arm)) + load.any_moment * _size(each[:3])
+                    for each in motions
+                ]
+            )
+    return CaseForces(case, wrench, centre, spread)
+
+
+def _speeds(model: Model, statics: Statics, motion: Motion) -> SX:
+    """Return the largest speeds (a, 1) of the actuators."""
+    if freedoms_of(model) == 6 and not model.actuators:
+        rates = statics.rows  # of straight legs
+    else:
+        rates = statics.rates(SX(motion.linear / motion.angular if motion.linear and motion.angular else 1.0))
+    return ca.vertcat(
+        *[motion.linear * _size(row[3:].T) + motion.angular * _size(row[:3].T) for row in ca.vertsplit(rates)]
+    )
+
+
+def _size(vector: SX) -> SX:
+    """Return the size of a vector (3, 1), smooth where it is 0."""
+    return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + _SMOOTH**2)
+
+
+def dimension_of_force(joint: DrivenJoint) -> Dimension:
+    """Return the dimension of an actuator's force: a torque where it turns."""
+    return Dimension.TORQUE if joint.dimension is Dimension.ANGLE else Dimension.FORCE
+
+
+def dimension_of_speed(joint: DrivenJoint) -> Dimension:
+    """Return the dimension of an actuator's speed."""
+    return Dimension.TURN_SPEED if joint.dimension is Dimension.ANGLE else Dimension.SPEED

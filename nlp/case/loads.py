@@ -1,0 +1,209 @@
+"""Loads on the platform, and its fastest motions: what forces, speeds and powers of actuators follow from.
+
+A load is what the world does to the platform: a force and a moment at a point, a weight, and on top any force and any
+moment up to a size in any direction. Loads are alternatives, each with all that are always there. Angles are radians.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi as ca
+from casadi import SX
+
+from ..errors import CaseError
+from ..units import Units
+from .checks import check_real, check_size, check_vector
+
+#: Acceleration of gravity in metres and newtons, length per second squared.
+GRAVITY = (0.0, 0.0, -9.81)
+#: The units in which it is known.
+_KNOWN = ("m", "N")
+_NONE = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A load on the platform.
+
+    Attributes:
+        name: a few words.
+        force: (3,) force.
+        moment: (3,) moment about the point.
+        point: (3,) where it acts, in the platform's frame, length; the centre of a mass.
+        in_platform: whether force and moment are in the platform's directions, instead of the world's.
+        both_signs: whether the opposite load counts too.
+        any_force: size of a further force in any direction at the point.
+        any_moment: size of a further moment about any axis.
+        mass: mass whose weight the load is, force over acceleration.
+        always: whether it is added to each other load, and stands alone where there is none.
+    """
+
+    name: str = "load"
+    force: Sequence[float] = _NONE
+    moment: Sequence[float] = _NONE
+    point: Sequence[float] = _NONE
+    in_platform: bool = False
+    both_signs: bool = False
+    any_force: float = 0.0
+    any_moment: float = 0.0
+    mass: float = 0.0
+    always: bool = False
+
+    def __post_init__(self) -> None:
+        for part in ("force", "moment", "point"):
+            object.__setattr__(self, part, tuple(getattr(self, part)))
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it has a force, a moment or a weight of one direction."""
+        return bool(self.mass or any(self.force) or any(self.moment))
+
+    def check(self, key: str) -> None:
+        """Refuse numbers that mean nothing.
+
+        Args:
+            key: its dotted key, for messages.
+
+        Raises:
+            CaseError: a number is not finite or negative, or the load is nothing.
+        """
+        for part in ("force", "moment", "point"):
+            for index, value in enumerate(check_vector(getattr(self, part), f"{key}.{part}").tolist()):
+                check_size(value, f"{key}.{part}[{index}]")
+        sizes = (("any.force", self.any_force), ("any.moment", self.any_moment), ("mass", self.mass))
+        for name, size in sizes:
+            if not (math.isfinite(check_real(size, f"{key}.{name}")) and size >= 0):
+                raise CaseError(f"{key}.{name}", "must be at least 0 and finite", size)
+            check_size(size, f"{key}.{name}")
+        if not (self.is_fixed or self.any_force or self.any_moment):
+            raise CaseError(key, "is no load: give force, moment, any or mass")
+        if self.both_signs and not self.is_fixed:
+            raise CaseError(f"{key}.sign", "means nothing without force or moment", "both")
+        if self.mass and (any(self.force) or any(self.moment) or self.in_platform):
+            raise CaseError(f"{key}.mass", "cannot stand beside force, moment or frame; write another [[load]]")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The platform's fastest motions, in any direction and about any axis, both at once.
+
+    Attributes:
+        linear: largest speed of the platform's origin, length per second.
+        angular: largest angular speed, radians per second.
+    """
+
+    linear: float = 0.0
+    angular: float = 0.0
+
+    def check(self) -> None:
+        """Refuse a speed that is negative or not finite, and no motion at all.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        for name, speed in (("linear", self.linear), ("angular", self.angular)):
+            if not (math.isfinite(check_real(speed, f"motion.{name}")) and speed >= 0):
+                raise CaseError(f"motion.{name}", "must be at least 0 and finite", speed)
+            check_size(speed, f"motion.{name}")
+        if not (self.linear or self.angular):
+            raise CaseError("motion", "must have linear, angular, or both, above 0")
+
+
+class SignedLoad(NamedTuple):
+    """A load with a factor of its fixed part: 1, or -1 for the opposite load."""
+
+    load: Load
+    sign: float
+
+
+class LoadCase(NamedTuple):
+    """Loads that act together.
+
+    Attributes:
+        name: of the load, and of those whose opposite is meant.
+        parts: the loads.
+        gravity: (3,) acceleration, length per second squared.
+    """
+
+    name: str
+    parts: tuple[SignedLoad, ...]
+    gravity: Sequence[float]
+
+    def wrench(self, rotation: SX) -> SX:
+        """Return the force and the moment about the platform's origin, (6, 1), in the world frame.
+
+        Args:
+            rotation: (3, 3) platform to world coordinates.
+        """
+        force, moment = SX.zeros(3), SX.zeros(3)
+        for load, sign in self.parts:
+            turn = rotation if load.in_platform else SX.eye(3)
+            own = sign * (turn @ _vector(load.force) + load.mass * _vector(self.gravity))
+            force += own
+            moment += sign * (turn @ _vector(load.moment)) + ca.cross(rotation @ _vector(load.point), own)
+        return ca.vertcat(force, moment)
+
+
+def _vector(values: Sequence[float]) -> SX:
+    return SX([float(value) for value in values])
+
+
+class Loading(NamedTuple):
+    """What acts on the platform of a case, and how fast it moves.
+
+    Attributes:
+        loads: the loads.
+        motion: its fastest motions; None where none are stated.
+        gravity: (3,) acceleration of gravity, length per second squared; None for that in the case's units.
+    """
+
+    loads: tuple[Load, ...] = ()
+    motion: Motion | None = None
+    gravity: Sequence[float] | None = None
+
+    def check(self, units: Units) -> None:
+        """Refuse loads, motions and a gravity that mean nothing.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        names = [each.name for each in self.loads]
+        for index, load in enumerate(self.loads):
+            if load.name in names[:index]:
+                raise CaseError(f"load[{index}].name", "is used by an earlier load", load.name)
+            load.check(f"load[{index}]")
+        if self.motion is not None:
+            self.motion.check()
+        is_heavy = any(load.mass for load in self.loads)
+        if self.gravity is None:
+            if is_heavy and (units.length, units.force) != _KNOWN:
+                fault = f"is missing: a mass needs it in {units.length} per second squared"
+                raise CaseError("gravity.acceleration", fault)
+        elif not any(check_vector(self.gravity, "gravity.acceleration")):
+            raise CaseError("gravity.acceleration", "must not be zero", list(self.gravity))
+
+    @property
+    def cases(self) -> tuple[LoadCase, ...]:
+        """The loads that act together: each load with those that are always there; those alone without another."""
+        always = [load for load in self.loads if load.always]
+        each = [[load] for load in self.loads if not load.always] or ([[]] if always else [])
+        return tuple(found for own in each for found in self._signed(own, always))
+
+    def _signed(self, own: Sequence[Load], always: Sequence[Load]) -> Iterator[LoadCase]:
+        """Yield the load cases of one load, or of none, with those that are always there."""
+        loads = [*own, *always]
+        whole = " and ".join(load.name for load in own or always)
+        for signs in itertools.product(*((1.0, -1.0) if load.both_signs else (1.0,) for load in loads)):
+            parts = tuple(map(SignedLoad, loads, signs))
+            turned = [load.name for load, sign in parts if sign < 0]
+            ends = [" reversed"] if turned == [whole] else [f", {each} reversed" for each in turned]
+            yield LoadCase("".join([whole, *ends]), parts, self.gravity or GRAVITY)
+
+
+#: No loads, and no motions.
+NO_LOADING = Loading()
