@@ -20,7 +20,6 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from .instance import RobotInstance
 from .model import Model
 from .parts import Dimension
 from .wrench import WrenchKind
@@ -72,11 +71,13 @@ class Statics(NamedTuple):
         motions: (6, a) motion of the platform by a unit rate of each actuator alone: angular velocity, then velocity of
             the platform's origin, in the world frame.
         rows: (m, 6) the rows of J for such motions.
+        driven: (m, a) work rates of the rows for a unit rate of each actuator.
         factors: of ``J'J`` for them.
     """
 
     motions: SX
     rows: SX
+    driven: SX
     factors: tuple[SX, SX]
 
     def rates(self, length: SX) -> SX:
@@ -100,21 +101,23 @@ class Statics(NamedTuple):
         return -self.rows @ _solved(self.factors, ca.vertcat(load[3:], load[:3]))
 
 
-def statics_of(model: Model, robot: RobotInstance) -> Statics:
+def statics_of(model: Model, jacobian: SX, driven: SX, position: SX) -> Statics:
     """Return the motions of a robot's platform by its actuators at a pose.
 
     Args:
         model: the robot, of which :func:`statics_hindrance` says nothing.
-        robot: the robot at the pose.
+        jacobian: (m, 6) that of a :class:`~.instance.RobotInstance` at the pose: expressions or numbers.
+        driven: (m, a) that of the instance, or numbers.
+        position: (3, 1) origin of the platform frame in the world frame, length.
     """
-    force, moment = robot.jacobian[:, :3], robot.jacobian[:, 3:]
-    about_origin = moment - ca.horzcat(*[ca.cross(robot.position, each.T) for each in ca.vertsplit(force)]).T
+    force, moment = jacobian[:, :3], jacobian[:, 3:]
+    about_origin = moment - ca.horzcat(*[ca.cross(position, each.T) for each in ca.vertsplit(force)]).T
     rows = ca.horzcat(about_origin, force)
-    driven = robot.driven if model.actuators else _of_legs(model)
+    driven = driven if model.actuators else _of_legs(model)
     factors = _factors(rows.T @ rows)
     motions = _solved(factors, rows.T @ driven)
     motions += _solved(factors, rows.T @ (driven - rows @ motions))
-    return Statics(motions, rows, factors)
+    return Statics(motions, rows, driven, factors)
 
 
 def _of_legs(model: Model) -> SX:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
-from ...models import Model, RobotInstance
+from ...models import Model
 from ...models.parts import Dimension
-from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of, statics_of
+from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of
 from .loads import LoadCase, Loading, Motion
 
 #: Keeps sizes of vectors smooth where they are 0: they are too large by at most this, in the unit of the vector.
@@ -65,16 +65,16 @@ class PosedForces(NamedTuple):
     speeds: SX
 
 
-def forces_at(model: Model, robot: RobotInstance, loading: Loading) -> PosedForces:
+def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading) -> PosedForces:
     """Return the forces and speeds of a robot's actuators at a pose.
 
     Args:
-        model: the robot, of which :func:`~screwsynth.models.statics.statics_hindrance` says nothing.
-        robot: the robot at the pose.
+        model: the robot.
+        statics: motions of its platform at the pose.
+        rotation: (3, 3) platform to world coordinates.
         loading: loads on its platform, and its motions.
     """
-    statics = statics_of(model, robot)
-    cases = tuple(_case_forces(case, statics, robot.rotation) for case in loading.cases)
+    cases = tuple(_case_forces(case, statics, rotation) for case in loading.cases)
     speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion)
     return PosedForces(driven_joints(model), statics, cases, speeds)
 

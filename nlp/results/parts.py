@@ -11,6 +11,7 @@ from ..case.task import Sense
 from ..system.strictjson import Size
 from .jointdata import JointsData, MotionData
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, Vector6
+from .loaddata import LoadingData
 
 #: Version of the format.
 SCHEMA = 1
@@ -160,6 +161,7 @@ class RobotData(JsonObject):
         length_dependence: relative derivative of F by it, ``(l / F) dF/dl``, over all poses; absent for such robots,
             where F is 0, and with several tasks.
         joints: freedoms, actuator rates and singularities of a robot given joint by joint; absent for others.
+        loading: forces and speeds of its actuators; absent without loads and motions.
         several: the robot at every pose; absent where there is one.
     """
 
@@ -180,6 +182,7 @@ class RobotData(JsonObject):
     characteristic_length: Absent[float]
     length_dependence: Absent[float]
     joints: Absent[JointsData]
+    loading: Inline[LoadingData | None]
     several: Inline[PosesData | None]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from ...models import Dimension, FloatArray, Quantity
 from .. import __version__
 from ..case.case import Case
+from ..case.loads import NO_LOADING
 from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
@@ -20,6 +21,7 @@ from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from .jointdata import joints_data, motion_data
 from .jsondata import Vector, matrix, vector
+from .loaddata import loading_data
 from .parts import (
     SCHEMA,
     ByOwner,
@@ -92,6 +94,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
         length_dependence=None if dependence is None else dependence.length,
         joints=joints_data(nlp, x, state, dependence, with_task=task is not None),
+        loading=loading_data(nlp, x, state) if case.loading != NO_LOADING else None,
         several=several,
     )
 

@@ -14,6 +14,7 @@ from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
 from ..case.task import Sense
 from ..units import Units, rate_unit, slope_unit
+from .loaddata import loading_tables
 from .rounding import (
     STATED,
     TURNED,
@@ -249,10 +250,11 @@ def robot_table(case: Case, robot: RobotData) -> TextTable:
 
 
 def robot_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
-    """Yield every limb; or, with several poses, the robot at every pose, then rates and measures by pose and limb."""
+    """Yield every limb, or with several poses the robot at each of them; then what holds the loads."""
     yield robot_table(case, robot)
     if robot.several is not None:
         yield from _tables_by_limb(case, robot, robot.several)
+    yield from loading_tables(case, robot)
 
 
 def _pose_table(case: Case, robot: RobotData, several: PosesData) -> TextTable:

@@ -171,6 +171,10 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
         # Lengths of legs that are no quantity of the robot are shown where they are limited.
         measured += [each.name for each in case.limits if each.name == "leg_length"]
         names += [plural_name(name) for name in dict.fromkeys(measured)]
+    if case.loading.loads:
+        names.append("forces")
+    if case.loading.motion is not None:
+        names.append("speeds")
     if case.model.generic is not None and (at_point or len(case.tasks) == 1):
         names.append("actuation")
     if case.limits:
