@@ -1,7 +1,6 @@
 """Loads, and forces, speeds and powers of actuators, as data and as a table of text."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from ...models import Dimension, FloatArray
 from ...models.statics import driven_joints
@@ -13,9 +12,6 @@ from ..program.nlp import Nlp
 from .jsondata import Absent, JsonObject, Vector6, finite_or_none, vector
 from .rounding import number
 from .text import TextTable
-
-if TYPE_CHECKING:
-    from .parts import RobotData
 
 
 class ActuatorForceData(JsonObject):
@@ -147,9 +143,8 @@ def _load(case: Case, load: LoadState, speeds: FloatArray, pose: int | None) -> 
     )
 
 
-def loading_tables(case: Case, robot: "RobotData") -> Iterator[TextTable]:
+def loading_tables(case: Case, data: LoadingData | None) -> Iterator[TextTable]:
     """Yield the forces and powers of the actuators, the wrenches of constraints, and the speeds of the actuators."""
-    data = robot.loading
     if data is None:
         return
     if data.loads is not None:

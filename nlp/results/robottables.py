@@ -254,7 +254,7 @@ def robot_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
     yield robot_table(case, robot)
     if robot.several is not None:
         yield from _tables_by_limb(case, robot, robot.several)
-    yield from loading_tables(case, robot)
+    yield from loading_tables(case, robot.loading)
 
 
 def _pose_table(case: Case, robot: RobotData, several: PosesData) -> TextTable:
