@@ -1,8 +1,6 @@
-"""Loads, and forces, speeds and powers of actuators, as data and as a table of text."""
+"""Forces, powers and speeds of actuators, and the wrenches of constraints that hold loads, as data."""
 
-from collections.abc import Iterator, Sequence
-
-from ...models import Dimension, FloatArray
+from ...models import FloatArray
 from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_force, dimension_of_speed
@@ -10,8 +8,6 @@ from ..evidence.loads import LoadState, loads_at
 from ..evidence.state import RobotState, evaluate
 from ..program.nlp import Nlp
 from .jsondata import Absent, JsonObject, Vector6, finite_or_none, vector
-from .rounding import number
-from .text import TextTable
 
 
 class ActuatorForceData(JsonObject):
@@ -141,65 +137,3 @@ def _load(case: Case, load: LoadState, speeds: FloatArray, pose: int | None) -> 
     return LoadData(
         name=load.name, pose=pose, wrench=vector(load.wrench), actuators=tuple(actuators), constraints=held or None
     )
-
-
-def loading_tables(case: Case, data: LoadingData | None) -> Iterator[TextTable]:
-    """Yield the forces and powers of the actuators, the wrenches of constraints, and the speeds of the actuators."""
-    if data is None:
-        return
-    if data.loads is not None:
-        yield _force_table(case, data.loads)
-        yield from _constraint_table(case, data.loads)
-    if data.speeds is not None:
-        size = max((each.value or 0.0 for each in data.speeds), default=0.0)
-        rows = [(*_pose(each), each.actuator, _text(each.value, size), each.unit) for each in data.speeds]
-        yield TextTable((*_pose_header(data.speeds), "actuator", "speed", "unit"), tuple(rows), "speeds")
-
-
-def _force_table(case: Case, loads: Sequence[LoadData]) -> TextTable:
-    """Return the force of every actuator under every load."""
-    every = [row for load in loads for row in load.actuators]
-    size = max((abs(row.value or 0.0) for row in every), default=0.0)
-    has_range = any(row.smallest != row.largest for row in every)
-    has_power = any(row.power is not None for row in every)
-    rows = []
-    for load in loads:
-        for row in load.actuators:
-            forces = (row.smallest, row.largest) if has_range else (row.value,)
-            cells = [*(_text(force, size, signed=True) for force in forces), row.unit]
-            cells += [_text(row.power)] if has_power else []
-            rows.append((*_pose(load), load.name, row.actuator, *cells))
-    columns = ["smallest force", "largest force"] if has_range else ["force"]
-    power = [f"power\n{case.units.label(Dimension.POWER)}"] if has_power else []
-    headers = (*_pose_header(loads), "load", "actuator", *columns, "unit", *power)
-    return TextTable(headers, tuple(rows), "forces")
-
-
-def _constraint_table(case: Case, loads: Sequence[LoadData]) -> Iterator[TextTable]:
-    """Yield the wrenches by which the constraints of limbs hold the loads, where statics determines one of them."""
-    rows = []
-    for load in loads:
-        held = [(each.limb, each.wrench) for each in load.constraints or () if each.wrench is not None]
-        force = max((abs(part) for _, wrench in held for part in wrench[:3]), default=0.0)
-        moment = max((abs(part) for _, wrench in held for part in wrench[3:]), default=0.0)
-        for limb, wrench in held:
-            cells = [number(part, force, digits=6, signed=True) for part in wrench[:3]]
-            cells += [number(part, moment, digits=6, signed=True) for part in wrench[3:]]
-            rows.append((*_pose(load), load.name, limb, *cells))
-    if rows:
-        parts = [f"f_{axis}\n{case.units.label(Dimension.FORCE)}" for axis in "xyz"]
-        parts += [f"m_{axis}\n{case.units.label(Dimension.TORQUE)}" for axis in "xyz"]
-        headers = (*_pose_header(loads), "load", "limb", *parts)
-        yield TextTable(headers, tuple(rows), "constraints", "wrenches of the limbs' constraints on the platform")
-
-
-def _text(value: float | None, size: float = 0.0, *, signed: bool = False) -> str:
-    return "none" if value is None else number(value, size, digits=6, signed=signed)
-
-
-def _pose(row: LoadData | ActuatorSpeedData) -> tuple[str, ...]:
-    return () if row.pose is None else (str(row.pose),)
-
-
-def _pose_header(rows: Sequence[LoadData | ActuatorSpeedData]) -> tuple[str, ...]:
-    return ("pose",) if any(row.pose is not None for row in rows) else ()

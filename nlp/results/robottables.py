@@ -14,7 +14,7 @@ from ..case.case import Case
 from ..case.pose import Free, Value, sizes_of_turn
 from ..case.task import Sense
 from ..units import Units, rate_unit, slope_unit
-from .loaddata import loading_tables
+from .loadtables import loading_tables
 from .rounding import (
     STATED,
     TURNED,
