@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ...models.shown import Shown
-from ...models.statics import statics_hindrance
+from ...models.statics import driven_joints, statics_hindrance
 from ...models.whole import Whole
-from ..errors import CaseError, nearest
+from ..errors import CaseError, listing, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_value, check_vector
 from .limits.limit import LimitedCase
@@ -26,7 +26,7 @@ from .loads import NO_LOADING, Loading
 from .names import parameter_name, pose_prefixes
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
-from .task import Method, Sense, Task
+from .task import MEASURES, Method, Sense, Task
 from .workspace import Workspace
 
 
@@ -193,6 +193,34 @@ def _check_loading(case: Case) -> None:
             raise CaseError(stated[0], f"is not for {case.model.name!r}: {hindrance}")
 
 
+def _check_measure(case: Case, task: Task) -> None:
+    """Refuse a number of the actuators that is minimised, where it means nothing.
+
+    Raises:
+        CaseError: in the words of a case file.
+    """
+    if not task.measure:
+        return
+    key = "objective.minimise"
+    if task.measure not in MEASURES:
+        raise CaseError(key, f"must be one of {listing(MEASURES)}", task.measure)
+    if len(case.tasks) > 1:
+        raise CaseError("task", "must be one at most beside [objective], as its F is not optimised")
+    if task.sense is not Sense.MIN:
+        raise CaseError("task[0].sense", "contradicts [objective], which minimises; write min, or leave the task out")
+    needs_loads, needs_motion = MEASURES[task.measure]
+    if needs_loads and not case.loading.loads:
+        raise CaseError(key, "needs a [[load]]", task.measure)
+    if needs_motion and case.loading.motion is None:
+        raise CaseError(key, "needs [motion]", task.measure)
+    hindrance = statics_hindrance(case.model)
+    if hindrance:
+        raise CaseError(key, f"is not for {case.model.name!r}: {hindrance}", task.measure)
+    joints = driven_joints(case.model)
+    if task.measure != "actuator_power" and len({joint.dimension for joint in joints}) > 1:
+        raise CaseError(key, "means nothing where some actuators turn and others slide", task.measure)
+
+
 def _counted(count: int, word: str) -> str:
     """Return a number of things in words."""
     return f"{count} {word}{'' if count == 1 else 's'}"
@@ -335,7 +363,9 @@ def _check_tasks(case: Case) -> tuple[Task, ...]:
         if not (math.isfinite(weight) and weight > 0):
             raise CaseError(f"{key}.weight", "must be positive", task.weight)
         point = None if task.point is None else frozen_array(check_vector(task.point, f"{key}.point"), (3,))
-        tasks.append(Task(frozen_array(twist, (6,)), Sense(task.sense), task.name, weight, point))
+        _check_measure(case, task)
+        stated = replace(task, twist=frozen_array(twist, (6,)), sense=Sense(task.sense), weight=weight, point=point)
+        tasks.append(stated)
     names = [task.name for task in tasks]
     for index, name in enumerate(names):
         if name in names[:index]:

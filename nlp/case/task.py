@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
+#: Numbers of the actuators that can be minimised, and whether they need loads and motions.
+MEASURES = {"actuator_force": (True, False), "actuator_speed": (False, True), "actuator_power": (True, True)}
+
+
 class Sense(enum.Enum):
     """Sense of the optimisation of F."""
 
@@ -37,6 +41,8 @@ class Task:
         name: a few words.
         weight: positive weight among several tasks.
         point: (3,) point of the axis as it was stated, length; None for a translation, and for a task given as a twist.
+        measure: number of the actuators that is minimised instead of F, such as ``actuator_force``; empty for F.
+        is_stated: whether the motion is a case's own; else it stands for none, and says nothing.
     """
 
     twist: ArrayLike
@@ -44,6 +50,18 @@ class Task:
     name: str = "task"
     weight: float = 1.0
     point: ArrayLike | None = None
+    measure: str = ""
+    is_stated: bool = True
+
+    @classmethod
+    def minimise(cls, measure: str) -> Task:
+        """Return the objective that a number of the actuators is as small as possible.
+
+        Args:
+            measure: ``"actuator_force"``, ``"actuator_speed"`` or ``"actuator_power"``: the largest size over loads,
+                actuators and poses.
+        """
+        return cls((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, measure, measure=measure, is_stated=False)
 
     @classmethod
     def screw(

@@ -81,9 +81,9 @@ def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
     states = [kernel(x, whole.arguments) for kernel in whole.program.kernels.robot_states for x in points]
     sizes = [float(state.magnitude[0, 0]) for state in states if np.isfinite(state.magnitude).all()]
     ceiling = max([*sizes, whole.objective_size])
-    epigraph = _EpigraphBuilder(layout, Free(-ceiling, _LEVEL_BOUND * ceiling, ceiling / 2), ceiling)
+    epigraph = EpigraphBuilder(layout, Free(-ceiling, _LEVEL_BOUND * ceiling, ceiling / 2), ceiling)
     for k, robot in enumerate(layout.robots):
-        form = Form(_above_level if sense is Sense.MAX else _below_level, (False,))
+        form = Form(above_level if sense is Sense.MAX else below_level, (False,))
         epigraph.add(f"F pose {k + 1}", form, robot.F[0], SX(1))
     return epigraph.program(sense)
 
@@ -104,7 +104,7 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
     F = ca.horzcat(*[robot.F for robot in layout.robots])
     is_mean = case.over_poses is OverPoses.MEAN
     senses = {task.sense for task in case.tasks}
-    epigraph = _EpigraphBuilder(layout, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling), ceiling)
+    epigraph = EpigraphBuilder(layout, Free(-0.1 * ceiling, 1.1 * ceiling, 0.5 * ceiling), ceiling)
     own_places, weight_places = [], []
     for j, task in enumerate(case.tasks):
         weight, (weight_place,) = layout.table.add(f"weight{j}", Dimension.NUMBER, weights[j])
@@ -115,7 +115,7 @@ def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float],
             form = Form(_loss_of_maximum if task.sense is Sense.MAX else _loss_of_minimum, (is_mean,))
             epigraph.add(f"task {task.name}", form, F[j, :].T, weight, own)
         else:
-            form = Form(_above_level if task.sense is Sense.MAX else _below_level, (is_mean,))
+            form = Form(above_level if task.sense is Sense.MAX else below_level, (is_mean,))
             epigraph.add(f"task {task.name}", form, F[j, :].T, weight)
     return epigraph.program(Sense.MAX if senses == {Sense.MAX} else Sense.MIN, tuple(own_places), tuple(weight_places))
 
@@ -141,18 +141,17 @@ def level_of_tasks(case: Case, values: Sequence[float], weights: Sequence[float]
 
 
 def with_exact_level(nlp: Nlp, x: FloatArray) -> FloatArray:
-    """Return a point with the level of a worst pose set to the worst F there; another program's point unchanged.
+    """Return a point with the level of a worst case of one task set to its best there; another point unchanged.
 
     Args:
         nlp: the program.
         x: (n,) the point.
     """
     epigraph = nlp.program.places.epigraph
-    if epigraph is None or len(nlp.program.robots) == 1:
+    if epigraph is None or len(nlp.program.places.twists) > 1:
         return x
-    values = [float(kernel(x, nlp.arguments).F[0, 0]) for kernel in nlp.program.kernels.robot_states]
     moved = np.array(x)
-    moved[epigraph.level] = worst_value(values, nlp.sense)
+    moved[epigraph.level] = exact_levels(nlp, moved[:, None])[0]
     return moved
 
 
@@ -162,7 +161,7 @@ def with_wider_level(nlp: Nlp, x: FloatArray) -> Nlp | None:
     The bounds are estimates, and no limits of the case: a level on its bound is no answer.
     """
     epigraph = nlp.program.places.epigraph
-    if epigraph is None or nlp.size is not None:
+    if epigraph is None:
         return None
     k = epigraph.level
     level, way = float(with_exact_level(nlp, x)[k]), _AT_BOUND * (nlp.upper[k] - nlp.lower[k])
@@ -175,25 +174,32 @@ def with_wider_level(nlp: Nlp, x: FloatArray) -> Nlp | None:
 
 
 def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return the best level of a worst pose, (k,), at each of several points.
+    """Return the best level of a worst case, (k,), at each of several points.
 
     Args:
-        nlp: a program over poses.
+        nlp: a program with a level.
         points: (n, k) one point a column.
     """
-    values = ca.vertcat(*[robot.F[0] for robot in nlp.program.robots])
-    extreme = ca.mmin(values) if nlp.sense is Sense.MAX else ca.mmax(values)
-    levels: FloatArray = ca.Function("levels", [nlp.program.x, nlp.program.p], [extreme])(points, nlp.arguments).full()
-    return levels.ravel()
+    epigraph = nlp.program.places.epigraph
+    own = [each.expression for each in nlp.program.constraints if epigraph and each in epigraph.constraints]
+    slacks = ca.Function("slacks", [nlp.program.x, nlp.program.p], [ca.vertcat(*own)])
+    # The slacks are affine in the level.
+    ends = []
+    for level in (0.0, 1.0):
+        at = np.array(points)
+        at[epigraph.level if epigraph else -1] = level
+        ends.append(slacks(at, nlp.arguments).full())
+    levels = ends[0] / (ends[0] - ends[1])
+    return np.asarray(levels.min(axis=0) if nlp.sense is Sense.MAX else levels.max(axis=0))
 
 
-def _above_level(numbers: SX, is_mean: bool) -> SX:
+def above_level(numbers: SX, is_mean: bool) -> SX:
     """Return ``(F - weight level) / ceiling`` from ceiling, level, weight and F at each pose."""
     ceiling, level, weight = ca.vertsplit(numbers[:3])
     return (_total(numbers[3:], is_mean) - weight * level) / ceiling
 
 
-def _below_level(numbers: SX, is_mean: bool) -> SX:
+def below_level(numbers: SX, is_mean: bool) -> SX:
     """Return ``(level - weight F) / ceiling`` from ceiling, level, weight and F at each pose."""
     ceiling, level, weight = ca.vertsplit(numbers[:3])
     return (level - weight * _total(numbers[3:], is_mean)) / ceiling
@@ -226,7 +232,7 @@ def _constant(slope: float, value: float) -> float:  # noqa: ARG001 - a slope is
     return slope
 
 
-class _EpigraphBuilder:
+class EpigraphBuilder:
     """An epigraph under construction: the epigraph variable, last of the program's variables, and its constraints.
 
     Args:

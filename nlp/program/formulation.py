@@ -22,6 +22,7 @@ from ..case.case import Case
 from ..case.limits.constraint import Call, Form
 from ..case.pose import OverPoses
 from ..case.task import Sense
+from .actuators import formulate_actuators
 from .epigraph import formulate_worst_pose, weighted_total
 from .layout import Layout, assemble, lay_out
 from .nlp import Nlp
@@ -41,6 +42,8 @@ def formulate(case: Case, task: int = 0) -> Nlp:
     """
     layout = lay_out(case, [case.tasks[task]])
     sense = case.tasks[task].sense
+    if case.tasks[task].measure:
+        return formulate_actuators(layout, case.tasks[task].measure)
     if len(layout.robots) > 1 and case.over_poses is OverPoses.WORST:
         return formulate_worst_pose(layout, sense)
     return assemble(layout, _weighted_call(layout, [SX(1)]), sense)

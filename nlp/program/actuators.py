@@ -1,0 +1,86 @@
+"""Largest force, speed or power of the actuators as the objective, over loads, actuators and poses.
+
+It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models.statics import statics_of
+from ..case.forces import PosedForces, forces_at
+from ..case.limits.constraint import Form
+from ..case.pose import Free
+from ..case.task import Sense
+from .epigraph import EpigraphBuilder, below_level
+from .layout import Layout, assemble
+from .nlp import Nlp
+from .sampling import starting_points
+
+#: Number of points at which the size of the objective is evaluated.
+_SIZE_POINTS = 32
+#: Upper bound of the level, as a multiple of the median of that size.
+_LEVEL_BOUND = 8.0
+
+
+class Measured(NamedTuple):
+    """A number of an actuator, (1, 1), and its name."""
+
+    name: str
+    value: SX
+
+
+def formulate_actuators(layout: Layout, measure: str) -> Nlp:
+    """Return the program that makes the largest number of the actuators as small as possible.
+
+    Args:
+        layout: a case with one task.
+        measure: ``actuator_force``, ``actuator_speed`` or ``actuator_power``.
+
+    Raises:
+        CaseError: a limb has zero length at every point of the box.
+    """
+    values = list(_values(layout, measure))
+    size = _size(assemble(layout, layout.robots[0].F[0], Sense.MIN), [each.value for each in values])
+    epigraph = EpigraphBuilder(layout, Free(0.0, _LEVEL_BOUND * size, size), size)
+    for each in values:
+        epigraph.add(each.name, Form(below_level, (False,)), each.value, SX(1))
+    return replace(epigraph.program(Sense.MIN), size=size)
+
+
+def _values(layout: Layout, measure: str) -> Iterator[Measured]:
+    """Yield the numbers of all actuators, under each load case and at each pose, in both senses."""
+    case, robots = layout.case, layout.robots
+    for k, robot in enumerate(robots):
+        where = f" pose {k + 1}" if len(robots) > 1 else ""
+        statics = statics_of(case.model, robot.jacobian, robot.driven, robot.position)
+        for each in measured(forces_at(case.model, statics, robot.rotation, case.loading), measure):
+            yield Measured(f"{each.name}{where}", each.value)
+
+
+def measured(forces: PosedForces, measure: str) -> Iterator[Measured]:
+    """Yield the numbers of all actuators at a pose, under each load case, in both senses."""
+    for k, joint in enumerate(forces.joints):
+        name = f"{measure} actuator {joint.name}"
+        if measure == "actuator_speed":
+            yield Measured(name, forces.speeds[k])
+            continue
+        factor = forces.speeds[k] if measure == "actuator_power" else SX(1)
+        for each in forces.cases:
+            yield Measured(f"{name} load {each.case.name}", factor * each.largest[k])
+            yield Measured(f"{name} backwards load {each.case.name}", -factor * each.smallest[k])
+
+
+def _size(nlp: Nlp, values: list[SX]) -> float:
+    """Return the size of the objective: the median of the largest of the values at a few points; 1 where unknown."""
+    program = nlp.program
+    function = ca.Function("largest", [program.x, program.p], [ca.mmax(ca.vertcat(*values))])
+    found = np.array([float(function(x, nlp.arguments)) for x in starting_points(nlp, _SIZE_POINTS, 0)])
+    known = found[np.isfinite(found) & (found > 0)]
+    return float(np.median(known)) if len(known) else 1.0
