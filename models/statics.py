@@ -15,11 +15,13 @@ found from the normal equations, with one step of refinement, in which no row is
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
+from .instance import RobotInstance
 from .model import Model
 from .parts import Dimension
 from .wrench import WrenchKind
@@ -118,6 +120,79 @@ def statics_of(model: Model, jacobian: SX, driven: SX, position: SX) -> Statics:
     motions = _solved(factors, rows.T @ driven)
     motions += _solved(factors, rows.T @ (driven - rows @ motions))
     return Statics(motions, rows, driven, factors)
+
+
+def posed_statics(model: Model, robot: RobotInstance) -> Statics:
+    """Return the motions of a robot's platform by its actuators at a pose, by minors where it has six rows of legs.
+
+    Args:
+        model: the robot, of which :func:`statics_hindrance` says nothing.
+        robot: the robot at the pose.
+    """
+    found = statics_of(model, robot.jacobian, robot.driven, robot.position)
+    by_minors = _motions_by_minors(robot)
+    return found if by_minors is None else found._replace(motions=by_minors)
+
+
+def _motions_by_minors(robot: RobotInstance) -> SX | None:
+    """Return the motions (6, a) of a robot with six rows, of straight legs and couples, as quotients of minors.
+
+    They are those of :func:`statics_of` without the pivots of a factored matrix: polynomials of spans and joint centres
+    over the determinant of the rows, with which a search of a whole box has bounds. None for other robots.
+
+    Args:
+        robot: the robot at a pose.
+    """
+    legs = {leg.name: leg for leg in robot.legs}
+    if len(robot.rows) != 6 or robot.jacobian.shape[0] != 6 or not legs:
+        return None
+    turning, sliding, lengths = [], [], []
+    for row in robot.rows:
+        if row.kind is WrenchKind.FORCE:
+            leg = legs[row.limb]
+            turning.append(ca.cross(robot.rotation @ leg.platform, leg.span))
+            sliding.append(leg.span)
+            lengths.append(ca.norm_2(leg.span))
+        else:
+            turning.append(row.moment)
+            sliding.append(SX.zeros(3))
+    driven = [k for k, row in enumerate(robot.rows) if row.kind is WrenchKind.FORCE]
+    if len(driven) == 3:  # the couples alone keep the platform from turning
+        f = [sliding[k] for k in driven]
+        crossed = [ca.cross(f[(k + 1) % 3], f[(k + 2) % 3]) for k in range(3)]
+        volume = ca.dot(f[0], crossed[0])
+        return ca.vertcat(
+            SX.zeros(3, 3), ca.horzcat(*[length * each / volume for length, each in zip(lengths, crossed, strict=True)])
+        )
+    matrix = ca.horzcat(ca.horzcat(*turning).T, ca.horzcat(*sliding).T)
+    cofactors = _cofactors(matrix)
+    whole = sum((matrix[0, c] * cofactors[0, c] for c in range(6)), SX(0))
+    return ca.horzcat(*[length * cofactors[k, :].T / whole for k, length in zip(driven, lengths, strict=True)])
+
+
+def _cofactors(matrix: SX) -> SX:
+    """Return the cofactors (6, 6) of a matrix (6, 6), from minors of its first and of its last three columns."""
+    rows, found = range(6), SX(6, 6)
+    blocks = (matrix[:, :3], matrix[:, 3:])
+    thirds = [{s: ca.det(block[list(s), :]) for s in itertools.combinations(rows, 3)} for block in blocks]
+    for half, c in itertools.product(range(2), range(3)):
+        columns = [j for j in range(3) if j != c]
+        pairs = {
+            s: blocks[half][s[0], columns[0]] * blocks[half][s[1], columns[1]]
+            - blocks[half][s[0], columns[1]] * blocks[half][s[1], columns[0]]
+            for s in itertools.combinations(rows, 2)
+        }
+        for k in rows:
+            others = [i for i in rows if i != k]
+            value = SX(0)
+            for s in itertools.combinations(range(5), 2):
+                two = tuple(others[i] for i in s)
+                three = tuple(i for i in others if i not in two)
+                # Laplace's expansion: the two rows belong to the block without its column, before or behind the other.
+                sign = (-1) ** (sum(s) + (1 if half == 0 else 7))
+                value += sign * pairs[two] * thirds[1 - half][three]
+            found[k, 3 * half + c] = (-1) ** (k + 3 * half + c) * value
+    return found
 
 
 def _of_legs(model: Model) -> SX:

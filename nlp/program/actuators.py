@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models.statics import statics_of
+from ...models.statics import posed_statics
 from ..case.forces import PosedForces, forces_at
 from ..case.limits.constraint import Form
 from ..case.pose import Free
@@ -59,7 +59,7 @@ def _values(layout: Layout, measure: str) -> Iterator[Measured]:
     case, robots = layout.case, layout.robots
     for k, robot in enumerate(robots):
         where = f" pose {k + 1}" if len(robots) > 1 else ""
-        statics = statics_of(case.model, robot.jacobian, robot.driven, robot.position)
+        statics = posed_statics(case.model, robot)
         for each in measured(forces_at(case.model, statics, robot.rotation, case.loading), measure):
             yield Measured(f"{each.name}{where}", each.value)
 

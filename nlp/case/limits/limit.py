@@ -179,12 +179,11 @@ class PosedRobot:
     @cached_property
     def forces(self) -> PosedForces:
         """Forces and speeds of the actuators."""
-        from ....models.statics import statics_of  # noqa: PLC0415 - a case without loads starts without them
+        from ....models.statics import posed_statics  # noqa: PLC0415 - a case without loads starts without them
         from ..forces import forces_at  # noqa: PLC0415 - likewise
 
-        robot = self.robot
-        statics = statics_of(self.model, robot.jacobian, robot.driven, robot.position)
-        return forces_at(self.model, statics, robot.rotation, self.loading)
+        statics = posed_statics(self.model, self.robot)
+        return forces_at(self.model, statics, self.robot.rotation, self.loading)
 
 
 class Measures(NamedTuple):
