@@ -70,17 +70,24 @@ class Statics(NamedTuple):
     """Motions of a robot's platform by its actuators at one pose, and what follows from them by virtual work.
 
     Attributes:
-        motions: (6, a) motion of the platform by a unit rate of each actuator alone: angular velocity, then velocity of
-            the platform's origin, in the world frame.
+        numerators: (6, a) motion of the platform by a unit rate of each actuator alone, times the divisor: angular
+            velocity, then velocity of the platform's origin, in the world frame.
+        divisor: (1, 1) number that is 0 where the rows are dependent; 1 for motions that are no quotients.
         rows: (m, 6) the rows of J for such motions.
         driven: (m, a) work rates of the rows for a unit rate of each actuator.
         factors: of ``J'J`` for them.
     """
 
-    motions: SX
+    numerators: SX
+    divisor: SX
     rows: SX
     driven: SX
     factors: tuple[SX, SX]
+
+    @property
+    def motions(self) -> SX:
+        """Motion (6, a) of the platform by a unit rate of each actuator alone."""
+        return self.numerators / self.divisor
 
     def rates(self, length: SX) -> SX:
         """Return the rates (a, 6) of all actuators in a motion that the platform can make.
@@ -92,8 +99,9 @@ class Statics(NamedTuple):
             length: (1, 1) the length.
         """
         weights = ca.vertcat(SX.ones(3) * length**2, SX.ones(3))
-        weighted = self.motions * ca.repmat(weights, 1, self.motions.shape[1])
-        return _solved(_factors(self.motions.T @ weighted), weighted.T)
+        motions = self.motions
+        weighted = motions * ca.repmat(weights, 1, motions.shape[1])
+        return _solved(_factors(motions.T @ weighted), weighted.T)
 
     def row_forces(self, load: SX) -> SX:
         """Return forces (m, 1) of the rows that hold a load (6, 1), force and moment about the platform's origin.
@@ -119,7 +127,7 @@ def statics_of(model: Model, jacobian: SX, driven: SX, position: SX) -> Statics:
     factors = _factors(rows.T @ rows)
     motions = _solved(factors, rows.T @ driven)
     motions += _solved(factors, rows.T @ (driven - rows @ motions))
-    return Statics(motions, rows, driven, factors)
+    return Statics(motions, SX(1), rows, driven, factors)
 
 
 def posed_statics(model: Model, robot: RobotInstance) -> Statics:
@@ -130,12 +138,12 @@ def posed_statics(model: Model, robot: RobotInstance) -> Statics:
         robot: the robot at the pose.
     """
     found = statics_of(model, robot.jacobian, robot.driven, robot.position)
-    by_minors = _motions_by_minors(robot)
-    return found if by_minors is None else found._replace(motions=by_minors)
+    quotient = _quotient_of_minors(robot)
+    return found if quotient is None else found._replace(numerators=quotient[0], divisor=quotient[1])
 
 
-def _motions_by_minors(robot: RobotInstance) -> SX | None:
-    """Return the motions (6, a) of a robot with six rows, of straight legs and couples, as quotients of minors.
+def _quotient_of_minors(robot: RobotInstance) -> tuple[SX, SX] | None:
+    """Return the motions of a robot with six rows, of straight legs and couples, as numerators (6, a) and a divisor.
 
     They are those of :func:`statics_of` without the pivots of a factored matrix: polynomials of spans and joint centres
     over the determinant of the rows, with which a search of a whole box has bounds. None for other robots.
@@ -161,13 +169,12 @@ def _motions_by_minors(robot: RobotInstance) -> SX | None:
         f = [sliding[k] for k in driven]
         crossed = [ca.cross(f[(k + 1) % 3], f[(k + 2) % 3]) for k in range(3)]
         volume = ca.dot(f[0], crossed[0])
-        return ca.vertcat(
-            SX.zeros(3, 3), ca.horzcat(*[length * each / volume for length, each in zip(lengths, crossed, strict=True)])
-        )
+        found = ca.horzcat(*[length * each for length, each in zip(lengths, crossed, strict=True)])
+        return ca.vertcat(SX.zeros(3, 3), found), volume
     matrix = ca.horzcat(ca.horzcat(*turning).T, ca.horzcat(*sliding).T)
     cofactors = _cofactors(matrix)
     whole = sum((matrix[0, c] * cofactors[0, c] for c in range(6)), SX(0))
-    return ca.horzcat(*[length * cofactors[k, :].T / whole for k, length in zip(driven, lengths, strict=True)])
+    return ca.horzcat(*[length * cofactors[k, :].T for k, length in zip(driven, lengths, strict=True)]), whole
 
 
 def _cofactors(matrix: SX) -> SX:

@@ -24,29 +24,39 @@ _SMOOTH = 1e-12
 
 
 class CaseForces(NamedTuple):
-    """Forces of the actuators under one load case.
+    """Forces of the actuators under one load case, as quotients.
 
     Attributes:
         case: the loads.
         wrench: (6, 1) their fixed part: force, then moment about the platform's origin, in the world frame.
-        centre: (a, 1) forces that hold it, positive in the sense of the actuator's rate; torques of turning actuators.
-        spread: (a, 1) largest change of each by loads of any direction.
+        centre: (a, 1) forces that hold it, times the divisor: positive in the sense of the actuator's rate, torques of
+            turning actuators.
+        spread: (a, 1) largest change of each by loads of any direction, times the size of the divisor.
+        divisor: (1, 1) that of the motions.
     """
 
     case: LoadCase
     wrench: SX
     centre: SX
     spread: SX
+    divisor: SX
 
     @property
     def largest(self) -> SX:
         """Largest force (a, 1) of each actuator."""
-        return self.centre + self.spread
+        return self.centre / self.divisor + self.spread / ca.fabs(self.divisor)
 
     @property
     def smallest(self) -> SX:
         """Smallest force (a, 1) of each actuator, negative where it pulls."""
-        return self.centre - self.spread
+        return self.centre / self.divisor - self.spread / ca.fabs(self.divisor)
+
+    @property
+    def squares(self) -> tuple[SX, ...]:
+        """Squares (a, 1) of the largest and of the smallest force of each actuator, in any order; one if equal."""
+        if self.spread.is_zero():
+            return (self.centre**2 / self.divisor**2,)
+        return tuple((self.centre + sign * self.spread) ** 2 / self.divisor**2 for sign in (1, -1))
 
 
 class PosedForces(NamedTuple):
@@ -81,7 +91,7 @@ def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading) ->
 
 def _case_forces(case: LoadCase, statics: Statics, rotation: SX) -> CaseForces:
     """Return the forces under one load case."""
-    motions = ca.horzsplit(statics.motions)
+    motions = ca.horzsplit(statics.numerators)
     wrench = case.wrench(rotation)
     centre = ca.vertcat(*[-(ca.dot(wrench[:3], each[3:]) + ca.dot(wrench[3:], each[:3])) for each in motions])
     spread = SX.zeros(len(motions))
@@ -94,7 +104,7 @@ def _case_forces(case: LoadCase, statics: Statics, rotation: SX) -> CaseForces:
                     for each in motions
                 ]
             )
-    return CaseForces(case, wrench, centre, spread)
+    return CaseForces(case, wrench, centre, spread, statics.divisor)
 
 
 def _speeds(model: Model, statics: Statics, motion: Motion) -> SX:

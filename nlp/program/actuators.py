@@ -1,6 +1,7 @@
 """Largest force, speed or power of the actuators as the objective, over loads, actuators and poses.
 
-It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`.
+It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`. The values are squares: they
+are smooth where a force changes its sense, and squared quotients are what a search of a whole box bounds best.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Measured(NamedTuple):
 
 
 def formulate_actuators(layout: Layout, measure: str) -> Nlp:
-    """Return the program that makes the largest number of the actuators as small as possible.
+    """Return the program that makes the square of the largest number of the actuators as small as possible.
 
     Args:
         layout: a case with one task.
@@ -55,26 +56,26 @@ def formulate_actuators(layout: Layout, measure: str) -> Nlp:
 
 
 def _values(layout: Layout, measure: str) -> Iterator[Measured]:
-    """Yield the numbers of all actuators, under each load case and at each pose, in both senses."""
+    """Yield the squares of the numbers of all actuators, under each load case and at each pose."""
     case, robots = layout.case, layout.robots
     for k, robot in enumerate(robots):
         where = f" pose {k + 1}" if len(robots) > 1 else ""
         statics = posed_statics(case.model, robot)
-        for each in measured(forces_at(case.model, statics, robot.rotation, case.loading), measure):
+        for each in squares_of(forces_at(case.model, statics, robot.rotation, case.loading), measure):
             yield Measured(f"{each.name}{where}", each.value)
 
 
-def measured(forces: PosedForces, measure: str) -> Iterator[Measured]:
-    """Yield the numbers of all actuators at a pose, under each load case, in both senses."""
+def squares_of(forces: PosedForces, measure: str) -> Iterator[Measured]:
+    """Yield the squares of the numbers of all actuators at a pose, under each load case."""
     for k, joint in enumerate(forces.joints):
         name = f"{measure} actuator {joint.name}"
         if measure == "actuator_speed":
-            yield Measured(name, forces.speeds[k])
+            yield Measured(name, forces.speeds[k] ** 2)
             continue
-        factor = forces.speeds[k] if measure == "actuator_power" else SX(1)
+        factor = forces.speeds[k] ** 2 if measure == "actuator_power" else SX(1)
         for each in forces.cases:
-            yield Measured(f"{name} load {each.case.name}", factor * each.largest[k])
-            yield Measured(f"{name} backwards load {each.case.name}", -factor * each.smallest[k])
+            for sense, square in zip(("", " other sense"), each.squares, strict=False):
+                yield Measured(f"{name} load {each.case.name}{sense}", factor * square[k])
 
 
 def _size(nlp: Nlp, values: list[SX]) -> float:
