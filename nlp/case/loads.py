@@ -202,7 +202,8 @@ class Loading(NamedTuple):
             parts = tuple(map(SignedLoad, loads, signs))
             turned = [load.name for load, sign in parts if sign < 0]
             ends = [" reversed"] if turned == [whole] else [f", {each} reversed" for each in turned]
-            yield LoadCase("".join([whole, *ends]), parts, self.gravity or GRAVITY)
+            gravity = GRAVITY if self.gravity is None else self.gravity
+            yield LoadCase("".join([whole, *ends]), parts, gravity)
 
 
 #: No loads, and no motions.
