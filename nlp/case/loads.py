@@ -19,10 +19,12 @@ from ..errors import CaseError
 from ..units import Units
 from .checks import check_real, check_size, check_vector
 
-#: Acceleration of gravity in metres and newtons, length per second squared.
+#: Acceleration of gravity: weight of a unit of mass, in newtons and kilograms.
 GRAVITY = (0.0, 0.0, -9.81)
-#: The units in which it is known.
+#: The units in which it need not be stated.
 _KNOWN = ("m", "N")
+#: Largest number of loads with both signs that are always there: each doubles the loads that act together.
+_MOST_SIGNS = 6
 _NONE = (0.0, 0.0, 0.0)
 
 
@@ -39,7 +41,7 @@ class Load:
         both_signs: whether the opposite load counts too.
         any_force: size of a further force in any direction at the point.
         any_moment: size of a further moment about any axis.
-        mass: mass whose weight the load is, force over acceleration.
+        mass: mass whose weight the load is: force over the acceleration of gravity.
         always: whether it is added to each other load, and stands alone where there is none.
     """
 
@@ -84,8 +86,10 @@ class Load:
             raise CaseError(key, "is no load: give force, moment, any or mass")
         if self.both_signs and not self.is_fixed:
             raise CaseError(f"{key}.sign", "means nothing without force or moment", "both")
-        if self.mass and (any(self.force) or any(self.moment) or self.in_platform):
-            raise CaseError(f"{key}.mass", "cannot stand beside force, moment or frame; write another [[load]]")
+        beside = (*self.force, *self.moment, self.any_force, self.any_moment, self.in_platform, self.both_signs)
+        if self.mass and any(beside):
+            fault = "cannot stand beside force, moment, frame, sign or any; write another [[load]]"
+            raise CaseError(f"{key}.mass", fault, self.mass)
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,7 @@ class LoadCase(NamedTuple):
     Attributes:
         name: of the load, and of those whose opposite is meant.
         parts: the loads.
-        gravity: (3,) acceleration, length per second squared.
+        gravity: (3,) acceleration, force over mass.
     """
 
     name: str
@@ -159,7 +163,7 @@ class Loading(NamedTuple):
     Attributes:
         loads: the loads.
         motion: its fastest motions; None where none are stated.
-        gravity: (3,) acceleration of gravity, length per second squared; None for that in the case's units.
+        gravity: (3,) acceleration of gravity, force over mass; None for that in metres, newtons and kilograms.
     """
 
     loads: tuple[Load, ...] = ()
@@ -174,18 +178,38 @@ class Loading(NamedTuple):
         """
         names = [each.name for each in self.loads]
         for index, load in enumerate(self.loads):
+            if not load.name:
+                raise CaseError(f"load[{index}].name", "must not be empty", load.name)
             if load.name in names[:index]:
                 raise CaseError(f"load[{index}].name", "is used by an earlier load", load.name)
             load.check(f"load[{index}]")
+        self._check_cases()
         if self.motion is not None:
             self.motion.check()
-        is_heavy = any(load.mass for load in self.loads)
-        if self.gravity is None:
-            if is_heavy and (units.length, units.force) != _KNOWN:
-                fault = f"is missing: a mass needs it in {units.length} per second squared"
-                raise CaseError("gravity.acceleration", fault)
-        elif not any(check_vector(self.gravity, "gravity.acceleration")):
-            raise CaseError("gravity.acceleration", "must not be zero", list(self.gravity))
+        self._check_gravity(units)
+
+    def _check_cases(self) -> None:
+        """Refuse more loads that act together than can be told apart, by their number or by their names."""
+        signs = sum(load.both_signs for load in self.loads if load.always)
+        if signs > _MOST_SIGNS:
+            fault = f"has {signs} loads with always and both signs, which act together in 2^{signs} ways; at most"
+            raise CaseError("load", f"{fault} {_MOST_SIGNS}")
+        names = [each.name for each in self.cases]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise CaseError("load", f"has loads that act together under one name, {twice!r}, twice; rename a load")
+
+    def _check_gravity(self, units: Units) -> None:
+        """Refuse a gravity of zero, and a mass without one where the units do not say it."""
+        if self.gravity is not None:
+            for index, value in enumerate(check_vector(self.gravity, "gravity.acceleration").tolist()):
+                check_size(value, f"gravity.acceleration[{index}]")
+            if not any(self.gravity):
+                raise CaseError("gravity.acceleration", "must not be zero")
+        elif (units.length, units.force) != _KNOWN and any(load.mass for load in self.loads):
+            fault = f"is missing: a mass times it is a weight in {units.force}"
+            known = ", [0, 0, -9.81] for a mass in kg" if units.force == _KNOWN[1] else ""
+            raise CaseError("gravity.acceleration", fault + known)
 
     @property
     def cases(self) -> tuple[LoadCase, ...]:

@@ -58,7 +58,7 @@ class GravityTable(Table):
     """Gravity, for loads that are masses."""
 
     acceleration: Vector = Field(
-        default=list(GRAVITY), description="length per second squared; [0, 0, -9.81] in m and N if left out"
+        description=f"weight of a unit of mass; without this table {[*GRAVITY]}, in m, N and kg"
     )
 
 

@@ -78,8 +78,7 @@ _KINDS = {
 }
 #: Sentences for keys whose type alone would say too little.
 _FORMS = {
-    "axis": "must be a list of 3 numbers",
-    "point": "must be a list of 3 numbers",
+    **dict.fromkeys(("axis", "point", "force", "moment", "centre", "acceleration"), "must be a list of 3 numbers"),
     "rpy": "must be a list of 3 numbers: roll, pitch, yaw",
     "matrix": "must be a list of 3 rows of 3 numbers",
     "quaternion": "must be a list of 4 numbers: w, x, y, z",

@@ -12,14 +12,14 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Annotated, Any, ClassVar, Self
 
 from casadi import SX
-from pydantic import Discriminator, Tag
+from pydantic import BeforeValidator, Discriminator, Tag
 
 from ....models import Dimension, Model
 from ....models.statics import DrivenJoint, driven_joints, statics_hindrance
 from ...errors import CaseError, nearest
 from ...units import Units
 from ..forces import PosedForces, dimension_of_force, dimension_of_speed
-from ..table import Table
+from ..table import Table, fault_of
 from ..toml import TomlValue
 from .constraint import BoundedConstraint, Reading, between
 from .interval import AtMost, IntervalTable
@@ -28,16 +28,22 @@ from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, Written
 
 def _kind(value: object) -> str:
     """Return the branch of a union for a table of numbers, or for one such table for each of several actuators."""
-    is_each = isinstance(value, dict) and value and all(isinstance(part, dict | Table) for part in value.values())
+    is_each = isinstance(value, dict) and any(isinstance(part, dict | Table) for part in value.values())
     return "<list>" if is_each else "<range>"
 
 
+def _unmixed(value: object) -> object:
+    """Return the value at a limit's key, or refuse numbers for all actuators beside tables of single ones."""
+    if isinstance(value, dict) and len({isinstance(part, dict | Table) for part in value.values()}) > 1:
+        raise fault_of("", "has numbers for all actuators beside a table for one; write one table for each actuator")
+    return value
+
+
+_Each = Discriminator(_kind), BeforeValidator(_unmixed)
 _Intervals = Annotated[
-    Annotated[IntervalTable, Tag("<range>")] | Annotated[dict[str, IntervalTable], Tag("<list>")], Discriminator(_kind)
+    Annotated[IntervalTable, Tag("<range>")] | Annotated[dict[str, IntervalTable], Tag("<list>")], *_Each
 ]
-_Largest = Annotated[
-    Annotated[AtMost, Tag("<range>")] | Annotated[dict[str, AtMost], Tag("<list>")], Discriminator(_kind)
-]
+_Largest = Annotated[Annotated[AtMost, Tag("<range>")] | Annotated[dict[str, AtMost], Tag("<list>")], *_Each]
 
 
 class ActuatorLimit(Limit[Table], abc.ABC):
@@ -116,7 +122,7 @@ class ActuatorLimit(Limit[Table], abc.ABC):
         if self.actuator and self.actuator not in every:
             fault = f"is no actuator of {case.model.name!r}; {nearest(self.actuator, every)}"
             raise CaseError(f"limits.{self.name}", fault)
-        if len({joint.dimension for _, joint in self.limited(case.model)}) > 1:
+        if len({self.dimension(joint) for _, joint in self.limited(case.model)}) > 1:
             fault = "means actuators that turn and actuators that slide; give one table for each, by its name"
             raise CaseError(f"limits.{self.name}", f"{fault}: {', '.join(every)}")
         super().check(case)
