@@ -117,7 +117,7 @@ def _loading(loading: Loading, units: Units) -> Iterator[str]:
         angular = units.written(loading.motion.angular, Dimension.TURN_SPEED)
         yield from toml_table("[motion]", {"linear": loading.motion.linear, "angular": angular})
     if loading.gravity is not None:
-        yield from toml_table("[gravity]", {"acceleration": loading.gravity})
+        yield from toml_table("[gravity]", {"acceleration": tuple(loading.gravity)})
 
 
 def _expectation(expect: Expectation) -> Iterator[str]:
