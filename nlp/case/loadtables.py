@@ -62,6 +62,14 @@ class GravityTable(Table):
     )
 
 
+class ObjectiveTable(Table):
+    """A number of the actuators that is optimised instead of F."""
+
+    minimise: Literal["actuator_force", "actuator_speed", "actuator_power"] = Field(
+        description="its largest size over loads, actuators and poses is made as small as possible"
+    )
+
+
 def loading_of(
     loads: list[LoadTable], motion: MotionTable | None, gravity: GravityTable | None, units: Units
 ) -> Loading:

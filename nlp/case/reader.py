@@ -124,7 +124,7 @@ def _parse(tables: dict[str, Any]) -> Document:
 
 def _kind_of(tables: dict[str, Any]) -> type[Document]:
     """Return the schema of a document: with the tables of limits, workspace and loads where it states one of them."""
-    if tables.keys().isdisjoint(("limits", "workspace", "load", "motion", "gravity")):
+    if tables.keys().isdisjoint(("limits", "workspace", "load", "motion", "gravity", "objective")):
         return Document
     from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
 
@@ -177,7 +177,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
         workspace=written.read_workspace(units),
         loading=written.read_loading(units),
-        tasks=tasks,
+        tasks=written.read_tasks(tasks),
         units=units,
         characteristic_length=written.robot.characteristic_length,
         search=Search(search.starts, search.seed, search.max_iterations, screen=search.screen),

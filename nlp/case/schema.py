@@ -10,6 +10,7 @@ read without them; :mod:`.wholeschema` has the document with them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, StringConstraints, Tag, model_validator
@@ -317,7 +318,7 @@ class Document(Table):
     def _refuse_without_pose_or_task(self) -> Document:
         """Return the document, or refuse one that states no pose or no task."""
         for key in ("pose", "task"):
-            if key not in self.model_fields_set:
+            if key not in self.model_fields_set and not (key == "task" and "objective" in self.model_fields_set):
                 raise fault_of(key, "is missing")
         return self
 
@@ -331,6 +332,14 @@ class Document(Table):
             CaseError: the axis of its rotations is zero, or limits hold over a workspace that is not stated.
         """
         return None
+
+    def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
+        """Return the tasks, or what is optimised instead of their F.
+
+        Args:
+            tasks: those that the document states.
+        """
+        return list(tasks)
 
     def read_loading(self, units: Units) -> Loading:  # noqa: ARG002 - it has none
         """Return the loads, the motions and the gravity that the document states.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Annotated
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
@@ -12,10 +14,11 @@ from ..units import Units
 from .checks import check_direction
 from .limits.registry import LimitsTable
 from .loads import Loading
-from .loadtables import GravityTable, LoadTable, MotionTable, loading_of
+from .loadtables import GravityTable, LoadTable, MotionTable, ObjectiveTable, loading_of
 from .pose import internal_value
 from .schema import Document
 from .table import Table, Vector, fault_of
+from .task import Task
 from .workspace import TURNS, TurnKind, Turns, Workspace
 
 
@@ -81,6 +84,7 @@ class WholeDocument(Document):
     load: list[LoadTable] = Field(default_factory=list, description="loads on the platform")
     motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
     gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
+    objective: ObjectiveTable | None = Field(default=None, description="what is optimised instead of F")
 
     def read_workspace(self, units: Units) -> Workspace | None:
         """Return the workspace that the document states, over which its limits may hold."""
@@ -91,6 +95,14 @@ class WholeDocument(Document):
             return None
         position = [internal_value(value, units, Dimension.LENGTH) for value in self.workspace.position]
         return Workspace(position, _turns(self.workspace.rotation, units), has_limits)
+
+    def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
+        """Return the tasks, that of a number of the actuators in the place of F of a motion."""
+        if self.objective is None:
+            return list(tasks)
+        if not tasks:
+            return [Task.minimise(self.objective.minimise)]
+        return [replace(task, measure=self.objective.minimise) for task in tasks]
 
     def read_loading(self, units: Units) -> Loading:
         """Return the loads, the motions and the gravity that the document states."""

@@ -76,7 +76,9 @@ def _lines(case: Case) -> Iterator[str]:
     yield from toml_table("[robot.parameters]", parameters)
     yield from toml_tables("[[pose]]" if case.further else "[pose]", (_pose(case, pose) for pose in case.poses))
     for task in case.tasks:
-        yield from toml_table("[[task]]", _task(task))
+        if task.is_stated:
+            yield from toml_table("[[task]]", _task(task))
+        yield from toml_table("[objective]", {"minimise": task.measure or None})
     yield from toml_table("[combine]", _combination(case))
     yield from _loading(case.loading, units)
     yield from toml_table("[limits]", _limits(case))

@@ -66,14 +66,15 @@ def _verify(statement: Statement, claim: ProofClaim, case: Case, above: float | 
     """
     from ..errors import one_line
     from ..proof.checker.check import check_proof
-    from ..proof.checker.premises import claim_words, hold_statement, program_of
+    from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
     from ..proof.checker.proof_file import ProofError
 
     try:
         hold_statement(case, statement, above=above, all_assemblies=all_assemblies)
         checked = check_proof(claim, program_of(case, statement))
-        if above is not None and not -checked.bound > above:
-            raise ProofError(f"the proof shows {-checked.bound:.10g}, which is not above {above:.10g}")
+        shown = root_below(-checked.bound) if case.tasks[0].measure else -checked.bound
+        if above is not None and not shown > above:
+            raise ProofError(f"the proof shows {shown:.10g}, which is not above {above:.10g}")
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None

@@ -1,7 +1,7 @@
 """Largest force, speed or power of the actuators as the objective, over loads, actuators and poses.
 
-It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`. The values are squares: they
-are smooth where a force changes its sense, and squared quotients are what a search of a whole box bounds best.
+It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`. Its square bounds their
+squares, which are smooth where a force changes its sense, and are what a search of a whole box bounds best.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..case.forces import PosedForces, forces_at
 from ..case.limits.constraint import Form
 from ..case.pose import Free
 from ..case.task import Sense
-from .epigraph import EpigraphBuilder, below_level
+from .epigraph import EpigraphBuilder, below_squared_level
 from .layout import Layout, assemble
 from .nlp import Nlp
 from .sampling import starting_points
@@ -38,7 +38,7 @@ class Measured(NamedTuple):
 
 
 def formulate_actuators(layout: Layout, measure: str) -> Nlp:
-    """Return the program that makes the square of the largest number of the actuators as small as possible.
+    """Return the program that makes the largest number of the actuators as small as possible.
 
     Args:
         layout: a case with one task.
@@ -49,9 +49,9 @@ def formulate_actuators(layout: Layout, measure: str) -> Nlp:
     """
     values = list(_values(layout, measure))
     size = _size(assemble(layout, layout.robots[0].F[0], Sense.MIN), [each.value for each in values])
-    epigraph = EpigraphBuilder(layout, Free(0.0, _LEVEL_BOUND * size, size), size)
+    epigraph = EpigraphBuilder(layout, Free(0.0, _LEVEL_BOUND * size, size), size, power=2)
     for each in values:
-        epigraph.add(each.name, Form(below_level, (False,)), each.value, SX(1))
+        epigraph.add(each.name, Form(below_squared_level), each.value)
     return replace(epigraph.program(Sense.MIN), size=size)
 
 
@@ -79,9 +79,9 @@ def squares_of(forces: PosedForces, measure: str) -> Iterator[Measured]:
 
 
 def _size(nlp: Nlp, values: list[SX]) -> float:
-    """Return the size of the objective: the median of the largest of the values at a few points; 1 where unknown."""
+    """Return the size of the objective, from squares: the median at a few points; 1 where none is known."""
     program = nlp.program
-    function = ca.Function("largest", [program.x, program.p], [ca.mmax(ca.vertcat(*values))])
+    function = ca.Function("largest", [program.x, program.p], [ca.sqrt(ca.mmax(ca.vertcat(*values)))])
     found = np.array([float(function(x, nlp.arguments)) for x in starting_points(nlp, _SIZE_POINTS, 0)])
     known = found[np.isfinite(found) & (found > 0)]
     return float(np.median(known)) if len(known) else 1.0

@@ -183,13 +183,14 @@ def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
     epigraph = nlp.program.places.epigraph
     own = [each.expression for each in nlp.program.constraints if epigraph and each in epigraph.constraints]
     slacks = ca.Function("slacks", [nlp.program.x, nlp.program.p], [ca.vertcat(*own)])
-    # The slacks are affine in the level.
+    # The slacks are affine in the level, or in its square.
     ends = []
     for level in (0.0, 1.0):
         at = np.array(points)
         at[epigraph.level if epigraph else -1] = level
         ends.append(slacks(at, nlp.arguments).full())
     levels = ends[0] / (ends[0] - ends[1])
+    levels = np.sqrt(levels) if epigraph and epigraph.power == 2 else levels
     return np.asarray(levels.min(axis=0) if nlp.sense is Sense.MAX else levels.max(axis=0))
 
 
@@ -203,6 +204,12 @@ def below_level(numbers: SX, is_mean: bool) -> SX:
     """Return ``(level - weight F) / ceiling`` from ceiling, level, weight and F at each pose."""
     ceiling, level, weight = ca.vertsplit(numbers[:3])
     return (level - weight * _total(numbers[3:], is_mean)) / ceiling
+
+
+def below_squared_level(numbers: SX) -> SX:
+    """Return ``(level^2 - square) / ceiling^2`` from ceiling, level and a square."""
+    ceiling, level, square = ca.vertsplit(numbers)
+    return (level**2 - square) / ceiling**2
 
 
 def _loss_of_maximum(numbers: SX, is_mean: bool) -> SX:
@@ -239,10 +246,11 @@ class EpigraphBuilder:
         layout: the case as symbols, to which the epigraph variable is added.
         bounds: bounds and start of the epigraph variable.
         ceiling: positive size by which the constraints are divided.
+        power: 2 where the level is the root of the worst of squares.
     """
 
-    def __init__(self, layout: Layout, bounds: Free, ceiling: float) -> None:
-        self._layout = layout
+    def __init__(self, layout: Layout, bounds: Free, ceiling: float, power: int = 1) -> None:
+        self._layout, self._power = layout, power
         self.level, (self._level_place,) = layout.table.add("level", Dimension.NUMBER, bounds)
         self._size, (self._size_place,) = layout.table.add("ceiling", Dimension.NUMBER, ceiling)
         self._reading = Reading(
@@ -278,5 +286,6 @@ class EpigraphBuilder:
             self._size_place.index,
             tuple(item.constraint for item in self._constraints),
             best,
+            self._power,
         )
         return assemble(self._layout, self.level, sense, self._constraints, epigraph, weights)

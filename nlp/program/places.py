@@ -76,12 +76,14 @@ class Epigraph:
         ceiling: index in ``p`` of the size by which the constraints are divided.
         constraints: one for each objective.
         best: indices in ``p`` of each task's own optimum; empty for a worst pose.
+        power: 2 where the level is the root of the worst of squares.
     """
 
     level: int
     ceiling: int
     constraints: tuple[Constraint, ...]
     best: tuple[int, ...] = ()
+    power: int = 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses, has_modes, program_of
 from ..proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
 from ..proof.enclosure.engine import kernel
+from ..proof.statement.form import power_of
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
@@ -218,7 +219,8 @@ def proof_of(certified: Certified, text: str) -> Proof:
     if certificate is None or certified.tree is None:
         raise OptionError("proof: nothing was proved, so nothing is written")
     nlp = certificate.nlp
-    bound = None if certificate.status is CertificateStatus.INFEASIBLE else -nlp.sign * certificate.bound
+    is_empty = certificate.status is CertificateStatus.INFEASIBLE
+    bound = None if is_empty else -nlp.sign * certificate.bound ** power_of(nlp)
     graph = fingerprint(program_of(nlp.case, certified.statement))
     claim = ProofClaim(OPTIMUM, "", "program", bound, graph, certified.tree)
     return Proof(text, nlp.case.name, certified.statement, (claim,))

@@ -63,7 +63,7 @@ class Incumbent:
     @property
     def was_beaten(self) -> bool:
         """Whether the search has found a better point than the one given."""
-        return self.value > self._given + _BETTER * self._form.nlp.objective_size
+        return self.value > self._given + _BETTER * self._form.size
 
     def program_point(self) -> FloatArray | None:
         """Return the point (n,) in the program's variables; None without one."""
@@ -91,8 +91,10 @@ class Incumbent:
         violation = self._violation(point, value)
         if not violation <= FEASIBLE:
             raise IncumbentError(f"the incumbent lies outside of the limits by {violation:.3g} half ranges")
-        if claimed is not None and form.sign * claimed > value + _SAME_VALUE * nlp.objective_size:
-            raise IncumbentError(f"the incumbent is said to have F = {claimed:.10g}, but has {form.sign * value:.10g}")
+        if claimed is not None and form.value_of(claimed) > value + _SAME_VALUE * form.size:
+            raise IncumbentError(
+                f"the incumbent is said to have F = {claimed:.10g}, but has {form.objective_of(value):.10g}"
+            )
         self._best, self._given = _Point(point, value), value
 
     def consider(self, point: FloatArray) -> None:
@@ -121,7 +123,7 @@ class Incumbent:
         if self._form.nlp.program.places.epigraph is None:
             return variables
         nlp = self._form.nlp
-        return np.append(variables, np.clip(self._form.sign * value, nlp.lower[-1], nlp.upper[-1]))
+        return np.append(variables, np.clip(self._form.objective_of(value), nlp.lower[-1], nlp.upper[-1]))
 
     def _violation(self, point: FloatArray, value: float, known: Linearisation | None = None) -> float:
         """Return the largest violation of the program's limits, in half ranges; infinite where loops are open.
@@ -139,7 +141,7 @@ class Incumbent:
         """Keep a point if it is feasible and better; the program linearised there may be known."""
         value = self._form.value_at(point)
         # Rounding chooses none of several points with the same value.
-        better = value > self.value + _TIE * self._form.nlp.objective_size
+        better = value > self.value + _TIE * self._form.size
         if better and self._violation(point, value, known) <= FEASIBLE:
             self._best = _Point(np.array(point), value)
 

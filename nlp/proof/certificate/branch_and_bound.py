@@ -176,7 +176,8 @@ class _Search:
         """Largest bound of a box that may be closed."""
         if self._above is not None:
             # Strictly below, and by more than the bound moves outwards in the end.
-            return math.nextafter(-self._above - 2 * _FOLDED * abs(self._above), -math.inf)
+            value = self._form.value_of(self._above)
+            return math.nextafter(value - 2 * _FOLDED * abs(value), -math.inf)
         if self.incumbent.x is None:
             return -math.inf
         # The bound moves outwards in the end, and the gap must hold with that.
@@ -186,13 +187,15 @@ class _Search:
         """Return whether F is not above the value at a known point; an F that is rounding error counts as 0."""
         if self._above is None or self.incumbent.x is None:
             return False
-        return self.incumbent.value >= -self._above - ZERO_F * self._form.nlp.objective_size
+        return self.incumbent.value >= self._form.value_of(self._above) - ZERO_F * self._form.size
 
     def _allowed_gap(self) -> tuple[float, bool]:
         """Return the largest difference of bound and incumbent, and whether it is a part of the incumbent."""
-        floor, value = _NEAR_ZERO * self._form.nlp.objective_size, abs(self.incumbent.value)
+        floor, value = _NEAR_ZERO * self._form.size, abs(self.incumbent.value)
         is_relative = floor < value < math.inf
-        return self._gap * (value if is_relative else floor), is_relative
+        # A square has a gap of (2 - gap) times that of its root.
+        gap = self._gap if self._form.power == 1 else self._gap * (2 - self._gap)
+        return gap * (value if is_relative else floor), is_relative
 
     @property
     def _bound(self) -> float:
@@ -203,7 +206,7 @@ class _Search:
     def _is_met(self) -> bool:
         """Return whether the bound is as good as asked for, once no box is open."""
         if self._above is not None:
-            return self._bound < -self._above
+            return self._bound < self._form.value_of(self._above)
         return self._method.bound <= self._threshold + _GAP_ROUNDING * self._allowed_gap()[0]
 
     def _ending(self) -> str | None:
@@ -213,7 +216,7 @@ class _Search:
         if not self._method.is_open:
             return TOO_SMALL if self._method.left else ""
         if self._has_counterexample():
-            return f"F is {self._form.sign * self.incumbent.value:.10g} at a point of the box"
+            return f"F is {self._form.objective_of(self.incumbent.value):.10g} at a point of the box"
         return None
 
     def _report(self, seconds: float) -> None:
@@ -224,7 +227,7 @@ class _Search:
 
     def _noted(self, seconds: float) -> tuple[float, float]:
         """Return bound and incumbent, added to the history; a full one loses every second entry."""
-        bound, incumbent = self._form.sign * self._bound, self._form.sign * self.incumbent.value
+        bound, incumbent = map(self._form.objective_of, (self._bound, self.incumbent.value))
         if math.isfinite(bound) and math.isfinite(incumbent):
             if len(self._history) >= _HISTORY:
                 del self._history[1::2]
@@ -248,6 +251,7 @@ class _Search:
         else:
             status, reason = CertificateStatus.INCOMPLETE, "the bounds of the limbs do not add up to the one asked for"
         allowed, is_relative = self._allowed_gap()
+        allowed = self._gap * abs(incumbent) if is_relative else allowed
         return Certificate(
             status=status,
             nlp=nlp,

@@ -6,6 +6,7 @@ The tasks, their weights and senses, poses, limits and dimensions are those of t
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 
@@ -167,9 +168,20 @@ def claim_words(case: Case, statement: Statement, bound: float | None) -> str:
         where += " in home's working mode" if statement.in_home_mode else " in every working mode"
     if bound is None:
         return f"there is no feasible point {where}"
+    measure = case.tasks[0].measure
+    if measure:  # the tree bounds squares
+        words, count = measure.replace("_", " "), case.pose_count
+        over = f"over all actuators{' and loads' if measure != 'actuator_speed' else ''}"
+        over += f", at {count} poses" if count > 1 else ""
+        return f"the largest {words} {over} is at least {outward(root_below(-bound), up=False)} {where}"
     is_minimum = _has_minimum(case, statement)
     side = f"at least {outward(-bound, up=False)}" if is_minimum else f"at most {outward(bound, up=True)}"
     return f"F is {side} {where}, F being {_objective_words(case, statement)}{_pose_words(case)}"
+
+
+def root_below(square: float) -> float:
+    """Return a number not above the root of another one; 0 for a negative one."""
+    return math.nextafter(math.sqrt(max(square, 0.0)), 0.0)
 
 
 def _has_minimum(case: Case, statement: Statement) -> bool:

@@ -11,6 +11,7 @@ and any number from 0 to 1 is a generalised derivative there. Values that jump h
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -120,6 +121,27 @@ class StandardForm:
         return -self.nlp.sign
 
     @property
+    def power(self) -> int:
+        """Power of the program's objective to which the values that are maximised are proportional."""
+        return power_of(self.nlp)
+
+    @property
+    def size(self) -> float:
+        """Size of these values."""
+        return float(self.nlp.objective_size**self.power)
+
+    def objective_of(self, value: float) -> float:
+        """Return the program's objective of a value that is maximised, no larger than it is where that is a square."""
+        found = self.sign * value
+        if self.power == 1 or not math.isfinite(found):
+            return found
+        return math.nextafter(math.sqrt(max(found, 0.0)), 0.0)
+
+    def value_of(self, objective: float) -> float:
+        """Return the value that is maximised of the program's objective."""
+        return self.sign * objective**self.power
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the variables."""
         return tuple(self.nlp.program.variables[i].name for i in self._index)
@@ -194,6 +216,12 @@ class StandardForm:
         if self.lift is not None:
             return _kernel(self.lift.x, [self.lift.signs])
         return _kernel(self.x, [each.expression for each in self.conditions if each.kind is Kind.ASSEMBLY])
+
+
+def power_of(nlp: Nlp) -> int:
+    """Return the power of a program's objective to which the values of its standard form are proportional."""
+    epigraph = nlp.program.places.epigraph
+    return 1 if epigraph is None else epigraph.power
 
 
 def dependence_of(expressions: SX, x: SX) -> NDArray[np.bool_]:

@@ -112,9 +112,13 @@ def _ends_of_names(nlp: Nlp) -> list[str]:
 
 
 def _function_of_epigraph(expression: SX, level: SX, sign: float) -> SX:
-    """Return the function that bounds the level in a constraint ``expression >= 0``, which is linear in the level."""
-    slope = ca.jacobian(expression, level)
+    """Return the function that bounds the level in a constraint ``expression >= 0``, which is linear in the level.
+
+    Of one that is linear in the square of the level, it is the function that bounds the square.
+    """
     without = ca.substitute(expression, level, 0)
+    slope = ca.jacobian(expression, level)
+    slope = slope if not ca.depends_on(slope, level) else ca.substitute(slope, level, 0.5)
     # Maximum: level <= -without / slope, slope < 0. Minimum: level >= -without / slope, slope > 0; negated.
     return -without / slope if sign < 0 else without / slope
 
