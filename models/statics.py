@@ -16,6 +16,7 @@ found from the normal equations, with one step of refinement, in which no row is
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import casadi as ca
@@ -181,23 +182,18 @@ def _cofactors(matrix: SX) -> SX:
     """Return the cofactors (6, 6) of a matrix (6, 6), from minors of its first and of its last three columns."""
     rows, found = range(6), SX(6, 6)
     blocks = (matrix[:, :3], matrix[:, 3:])
-    thirds = [{s: ca.det(block[list(s), :]) for s in itertools.combinations(rows, 3)} for block in blocks]
+    thirds = [{s: ca.det(block[list(s), :]) for s in _subsets(rows, 3)} for block in blocks]
     for half, c in itertools.product(range(2), range(3)):
-        columns = [j for j in range(3) if j != c]
-        pairs = {
-            s: blocks[half][s[0], columns[0]] * blocks[half][s[1], columns[1]]
-            - blocks[half][s[0], columns[1]] * blocks[half][s[1], columns[0]]
-            for s in itertools.combinations(rows, 2)
-        }
+        a, b = (blocks[half][:, j] for j in range(3) if j != c)
+        pairs = {s: a[s[0]] * b[s[1]] - b[s[0]] * a[s[1]] for s in _subsets(rows, 2)}
         for k in rows:
             others = [i for i in rows if i != k]
             value = SX(0)
-            for s in itertools.combinations(range(5), 2):
-                two = tuple(others[i] for i in s)
-                three = tuple(i for i in others if i not in two)
-                # Laplace's expansion: the two rows belong to the block without its column, before or behind the other.
-                sign = (-1) ** (sum(s) + (1 if half == 0 else 7))
-                value += sign * pairs[two] * thirds[1 - half][three]
+            for s in _subsets(others, 2):
+                rest = tuple(i for i in others if i not in s)
+                # Laplace's expansion: the two rows belong to the block without its column, in front or behind.
+                sign = (-1) ** (others.index(s[0]) + others.index(s[1]) + (1 if half == 0 else 7))
+                value += sign * pairs[s] * thirds[1 - half][rest]
             found[k, 3 * half + c] = (-1) ** (k + 3 * half + c) * value
     return found
 
@@ -235,3 +231,7 @@ def _solved(factors: tuple[SX, SX], right: SX) -> SX:
         for j in range(i + 1, n):
             found[i, :] -= L[j, i] * found[j, :]
     return found
+
+
+def _subsets(numbers: Iterable[int], size: int) -> list[tuple[int, ...]]:
+    return list(itertools.combinations(numbers, size))
