@@ -29,7 +29,9 @@ from .wrench import couple_about
 _THIRD = 2 * math.pi / 3
 
 
-def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model:
+def three_upu(
+    *, axes: Literal["free", "limb", "snu", "tsai"] = "free", azimuth: Literal["fixed", "free"] = "fixed"
+) -> Model:
     """Return the 3-UPU robot (Section 4.4).
 
     Args:
@@ -37,23 +39,30 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
             within a limb. ``limb`` makes the first axes parameters and takes the second perpendicular to the first and
             to the limb. ``snu`` and ``tsai`` fix the first axes radially or tangentially, with the second as in
             ``limb``.
+        azimuth: ``free`` makes the azimuth of the first limb a parameter, about which all limbs turn together.
 
     Raises:
-        ModelError: there is no such choice of axes.
+        ModelError: there is no such choice of axes, or of the azimuth.
     """
     if axes not in ("free", "limb", "snu", "tsai"):
         raise ModelError(f"model 'three-upu': axes must be 'free', 'limb', 'snu' or 'tsai', got {axes!r}")
+    if azimuth not in ("fixed", "free"):
+        raise ModelError(f"model 'three-upu': azimuth must be 'fixed' or 'free', got {azimuth!r}")
     base_radius, platform_radius = SX.sym("base_radius"), SX.sym("platform_radius")
+    turned = SX.sym("azimuth") if azimuth == "free" else SX(0)
     pose = PoseSymbols()
     parameters = [
         Parameter("base_radius", base_radius, Dimension.LENGTH, "radius of the base's joint circle", (50.0,), 0.0),
         Parameter("platform_radius", platform_radius, Dimension.LENGTH, "radius of the platform's", (25.0,), 0.0),
     ]
-    legs = [Leg(str(k + 1), base_radius * _radial(k), platform_radius * _radial(k)) for k in range(3)]
+    if azimuth == "free":
+        parameters.append(Parameter("azimuth", turned, Dimension.ANGLE, "azimuth of the first limb", (0.0,)))
+    radial = [_turned(_radial(k), turned) for k in range(3)]
+    legs = [Leg(str(k + 1), base_radius * each, platform_radius * each) for k, each in enumerate(radial)]
     parts = legged_platform(legs, pose)
     couples, built, closure, directions = [], [], [], []
     for k, (row, row_built) in enumerate(zip(parts.wrenches, parts.built, strict=True)):
-        first = {"snu": _radial(k), "tsai": _tangential(k)}.get(axes)
+        first = {"snu": radial[k], "tsai": _turned(_tangential(k), turned)}.get(axes)
         if first is None:
             parameters.append(
                 _direction_parameter(
@@ -89,7 +98,7 @@ def three_upu(*, axes: Literal["free", "limb", "snu", "tsai"] = "free") -> Model
     return Model(
         name="three-upu",
         description="3-UPU: three limbs, each with a force along it and a couple about its upper joint's normal",
-        options={"axes": axes},
+        options={"axes": axes, **({"azimuth": azimuth} if azimuth == "free" else {})},
         parameters=tuple(parameters),
         pose=pose,
         home=(0.0, 0.0, 50.0),
@@ -115,6 +124,14 @@ def _add_circles(scene: Scene, legs: Sequence[Leg], pose: PoseSymbols) -> Scene:
     radii = (("base_radius", base), ("platform_radius", platform))
     marks = (Mark(name, MarkKind.LENGTH, (each.centre, each.through), each.body) for name, each in radii)
     return replace(scene, circles=(base, platform), marks=tuple(marks))
+
+
+def _turned(direction: SX, angle: SX) -> SX:
+    """Return a horizontal direction (3, 1) turned about z."""
+    if angle.is_zero():
+        return direction
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(c * direction[0] - s * direction[1], s * direction[0] + c * direction[1], 0)
 
 
 def _radial(k: int) -> SX:
