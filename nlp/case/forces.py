@@ -123,6 +123,13 @@ def _size(vector: SX) -> SX:
     return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + _SMOOTH**2)
 
 
+def dimension_of_measure(measure: str, joint: DrivenJoint) -> Dimension:
+    """Return the dimension of a number of an actuator: ``actuator_force``, ``actuator_speed`` or ``actuator_power``."""
+    if measure == "actuator_power":
+        return Dimension.POWER
+    return dimension_of_force(joint) if measure == "actuator_force" else dimension_of_speed(joint)
+
+
 def dimension_of_force(joint: DrivenJoint) -> Dimension:
     """Return the dimension of an actuator's force: a torque where it turns."""
     return Dimension.TORQUE if joint.dimension is Dimension.ANGLE else Dimension.FORCE

@@ -24,10 +24,11 @@ from ..results.comparison import (
 )
 from ..results.evidence import certificate_data
 from ..results.jsondata import finite_or_none
+from ..results.objective import unit_of_objective
 from ..results.parts import SCHEMA, UnitsData
 from ..results.point import versions, violations
 from ..solver.status import Status
-from ..units import objective_unit, rate_unit
+from ..units import rate_unit
 from .compare import Comparison, part_of
 from .entry import Entry, TaskFit, driven_wrenches
 
@@ -239,7 +240,7 @@ def _task(case: Case, index: int, fit: TaskFit) -> ComparedTaskData:
     units, twist = case.units, frozen_array(case.tasks[index].twist, (6,))
     return ComparedTaskData.of(
         fit,
-        unit=objective_unit([twist], units),
+        unit=unit_of_objective(case, index),
         rates=tuple(
             ComparedRateData.of(rate, unit=rate_unit(twist, units, rate.dimension), rate=finite_or_none(rate.value))
             for rate in fit.rates

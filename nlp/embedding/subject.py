@@ -125,6 +125,8 @@ def _rounded(nlp: Nlp) -> Nlp:
 def objective_words(nlp: Nlp) -> str:
     """Return the objective of a program in words."""
     case, poses = nlp.case, nlp.case.pose_count
+    if case.tasks[0].measure:
+        return f"the largest {case.tasks[0].measure.replace('_', ' ')}, the level that is the last variable"
     over = f" over {poses} poses" if poses > 1 else ""
     if nlp.program.places.weights:
         if case.method is Method.WEIGHTED_SUM:

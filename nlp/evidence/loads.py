@@ -69,6 +69,15 @@ def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseL
     return PoseLoads(loads, _numbers(found.speeds, state))
 
 
+def largest_of(found: PoseLoads, measure: str) -> float:
+    """Return the largest number of the actuators at a pose: ``actuator_force``, ``actuator_speed`` or ``..._power``."""
+    if measure == "actuator_speed":
+        return float(found.speeds.max())
+    factor = found.speeds if measure == "actuator_power" else 1.0
+    forces = np.array([np.maximum(np.abs(each.smallest), np.abs(each.largest)) for each in found.loads])
+    return float((factor * forces).max())
+
+
 def _load(case: CaseForces, state: RobotState, statics: Statics, held: Mapping[str, FloatArray | None]) -> LoadState:
     """Return what holds one load case; ``held`` has the matrix from row forces to the wrench of each limb."""
     phi = _numbers(statics.row_forces(case.wrench), state) if held else np.zeros(0)

@@ -80,6 +80,8 @@ def _read_goal(text: str, case: Case) -> Goal:
     sense = Sense(word)
     if label.startswith(_LIMIT):
         return Goal(sense, label, key=label.removeprefix(_LIMIT))
+    if case.tasks[0].measure:
+        raise InputError(f"--goals {text!r}: the case optimises {case.tasks[0].measure} instead of F")
     names = [task.name for task in case.tasks]
     name = label.removeprefix(_TASK) if label != "F" else (names[0] if len(names) == 1 else "")
     if name not in names:

@@ -12,6 +12,7 @@ from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
 from ..system.strictjson import Size
 from .jsondata import Absent, Inline, JsonObject, Vector
+from .objective import ObjectiveData
 from .parts import (
     Bound,
     HeadData,
@@ -155,6 +156,7 @@ class SolveResult(JsonObject):
         sense: whether F is maximised or minimised.
         status: of the solve.
         F: objective; null unless the solve gave an answer.
+        objective: what is optimised instead of F; absent for F.
         reached: the best point of a solve that failed; else absent.
         relaxation: for an infeasible case, the limits that would have to move; else absent.
         robot: at the point; absent where its equations have no value.
@@ -175,6 +177,7 @@ class SolveResult(JsonObject):
     sense: Sense
     status: Status
     F: float | None
+    objective: Absent[ObjectiveData]
     reached: Absent[ReachedData]
     relaxation: Absent[tuple[RelaxationData, ...]]
     robot: Inline[RobotData | None]

@@ -8,7 +8,8 @@ from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from .design import limits_data, margins_data
 from .jointdata import MotionData, motion_data
-from .jsondata import Inline, JsonObject, Vector, vector
+from .jsondata import Absent, Inline, JsonObject, Vector, vector
+from .objective import ObjectiveData, case_number, objective_data
 from .parts import HeadData, LimitData, MarginData, RobotData, TaskData, VersionsData, ViolationData
 from .point import head_data, objective, robot_data, task_data, versions, violations
 
@@ -59,6 +60,7 @@ class EvaluationResult(JsonObject):
     Attributes:
         head: the case.
         F: objective of the first task.
+        objective: what a solve optimises instead of F; absent for F.
         robot: at the point, with the first task.
         tasks: every task at the point.
         violated: bounds and constraints that the point lies outside of.
@@ -70,6 +72,7 @@ class EvaluationResult(JsonObject):
 
     head: Inline[HeadData]
     F: float
+    objective: Absent[ObjectiveData]
     robot: Inline[RobotData]
     tasks: tuple[EvaluatedTaskData, ...]
     violated: tuple[ViolationData, ...]
@@ -92,7 +95,8 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
     margins = margins_data(nlp, x, optimal=False)
     return EvaluationResult(
         head=head_data(case),
-        F=objective(nlp, x, states[0]),
+        F=case_number(case, objective(nlp, x, states[0])),
+        objective=objective_data(case, objective(nlp, x, states[0])),
         robot=robot_data(nlp, x, states[0], 0),
         tasks=tuple(
             EvaluatedTaskData(
@@ -102,6 +106,7 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
                 task_is_free=state.is_zero,
             )
             for j, state in enumerate(states)
+            if not case.tasks[j].measure
         ),
         violated=violations(nlp, x),
         margins=margins,

@@ -16,12 +16,14 @@ from ..case.case import Case
 from ..case.loads import NO_LOADING
 from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
+from ..evidence.loads import loads_at
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from .jointdata import joints_data, motion_data
 from .jsondata import Vector, matrix, vector
 from .loaddata import loading_data
+from .objective import pose_objective
 from .parts import (
     SCHEMA,
     ByOwner,
@@ -75,6 +77,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         EvaluationError: a number is not finite at another pose.
     """
     case = nlp.case
+    task = None if case.tasks[0].measure else task  # its motion is none that is asked for
     limited = _limited_quantities(nlp, x)
     several = _poses_data(nlp, x, limited)
     dependence = None if task is None else dependence_of(nlp, x)
@@ -135,16 +138,15 @@ def _poses_data(nlp: Nlp, x: FloatArray, limited: Sequence[Mapping[str, ByOwner]
     return PosesData(
         stated_poses=tuple(pose_data(case, pose) for pose in stated_poses(nlp, x)),
         over_poses=case.over_poses,
-        poses=tuple(
-            _pose_state(case, evaluate(nlp, x, k), limited[k] if limited else None)
-            for k in range(len(nlp.program.robots))
-        ),
+        poses=tuple(_pose_state(nlp, x, k, limited[k] if limited else None) for k in range(len(nlp.program.robots))),
     )
 
 
-def _pose_state(case: Case, state: RobotState, limited: Mapping[str, ByOwner] | None) -> PoseStateData:
+def _pose_state(nlp: Nlp, x: FloatArray, k: int, limited: Mapping[str, ByOwner] | None) -> PoseStateData:
+    case, state = nlp.case, evaluate(nlp, x, k)
     return PoseStateData.of(
         state,
+        F=pose_objective(case, loads_at(nlp, x, state, k)) if case.tasks[0].measure else state.F,
         pose=pose_data(case, state),
         singular=state.is_singular,
         quantities=_quantities(case, state),
@@ -201,7 +203,8 @@ def _by_owner(case: Case, quantity: Quantity, values: FloatArray) -> ByOwner:
 
 def objective(nlp: Nlp, x: FloatArray, state: RobotState | None) -> float:
     """Return F at a point (n,): the state's F, or the sum, mean or worst over several poses."""
-    return nlp.evaluate(x)[0] if state is None or len(nlp.program.robots) > 1 else state.F
+    measure = nlp.case.tasks[0].measure
+    return nlp.evaluate(x)[0] if state is None or measure or len(nlp.program.robots) > 1 else state.F
 
 
 def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:

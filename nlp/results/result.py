@@ -26,6 +26,7 @@ from .data import (
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data
 from .jsondata import finite_or_none, vector
+from .objective import case_number, objective_data
 from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
@@ -56,7 +57,8 @@ def task_result(
         solution,
         head=head_data(nlp.case),
         sense=nlp.sense,
-        F=objective(nlp, x, state) if solved else None,
+        F=case_number(nlp.case, objective(nlp, x, state)) if solved else None,
+        objective=objective_data(nlp.case, objective(nlp, x, state) if solved else None, certificate),
         reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
         relaxation=relaxation_data(nlp, solution.relaxation),
         robot=None if state is None else robot_data(nlp, x, state, task),

@@ -27,6 +27,7 @@ from .wording import (
     combined_value_lines,
     evidence_lines,
     heading_lines,
+    objective_lines,
     singularity_lines,
     starts_lines,
     task_lines,
@@ -122,6 +123,9 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     """Yield the robot at one point, with its Jacobian."""
     robot = result.robot
     yield title_line(case)
+    if result.objective is not None:
+        yield from objective_lines(case)
+        yield Line(f"{number(result.F)} {result.objective.unit}", label="F")
     for each in result.tasks:
         yield from task_lines(each.task, case.units)
         is_free = each.task_is_free and robot.several is None

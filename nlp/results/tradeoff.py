@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ...models import component_names, frozen_array
+from ...models import component_names
 from ..case.case import Case
 from ..case.task import Sense
 from ..errors import CaseError
@@ -14,7 +14,7 @@ from ..solver.solution import Solution
 from ..solver.status import Status
 from ..solver.tradeoff import Tradeoff, TradeoffPoint, tradeoff
 from ..system.csvtext import csv_text
-from ..units import objective_unit, slope_unit
+from ..units import slope_unit
 from .data import CaseResult, SolveResult
 from .jsondata import Absent, Inline, JsonObject, Vector, finite_or_none
 from .parts import HeadData, LimitData, PoseData, VersionsData
@@ -307,23 +307,6 @@ def _status_words(result: TradeoffResult, status: Status) -> str:
     if status is Status.INTERRUPTED:
         return f"stopped before the end: {len(result.points) - len(own)} of {len(result.points)} values are solved"
     return f"{status.value} at {', '.join(f'{value:.5g}' for value in own)} {result.unit}".rstrip()
-
-
-def unit_of_objective(case: Case, task: int | None = None) -> str:
-    """Return the unit of F.
-
-    Args:
-        case: the case.
-        task: index of the task whose F it is; all tasks together for None, which have a unit where they agree in it.
-    """
-    tasks = case.tasks if task is None else [case.tasks[task]]
-    return objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
-
-
-def objective_label(case: Case, task: int | None = None) -> str:
-    """Return F with its unit, for an axis; arguments are those of :func:`unit_of_objective`."""
-    unit = unit_of_objective(case, task)
-    return f"F, {unit}" if unit else "F"
 
 
 def tradeoff_csv(result: TradeoffResult) -> str:

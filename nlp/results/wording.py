@@ -12,6 +12,7 @@ from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
 from ..units import Units, objective_unit, slope_unit
 from .jointwording import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
+from .objective import objective_words
 from .rounding import number, ordered, residual, robot_size, settled, task_F
 from .text import Line, Tone
 
@@ -84,7 +85,9 @@ def headline(result: SolveResult, case: Case) -> Line:
     """
     robot = result.robot
     task = None if robot is None else robot.task
+    measured = result.objective
     unit = "" if task is None else f" {objective_unit([task.motion.twist], case.units)}"
+    unit = unit if measured is None else f" {measured.unit}"
     if result.status is Status.INTERRUPTED:
         best = (
             ""
@@ -95,7 +98,8 @@ def headline(result: SolveResult, case: Case) -> Line:
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several
-    over = "" if several is None else f", {several.over_poses.value} over {len(several.poses)} poses"
+    how = "" if several is None else "largest" if measured is not None else several.over_poses.value
+    over = "" if several is None else f", {how} over {len(several.poses)} poses"
     word, status = "fixed point:", result.status.value
     if result.status is Status.OPTIMAL:
         word = "largest" if result.sense is Sense.MAX else "smallest"
@@ -121,7 +125,15 @@ def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
     yield title_line(case)
     if result.robot is not None and result.robot.task is not None:
         yield from task_lines(result.robot.task, case.units)
+    yield from objective_lines(case)
     yield headline(result, case)
+
+
+def objective_lines(case: Case) -> Iterator[Line]:
+    """Yield what F stands for where it is no work rate."""
+    words = objective_words(case)
+    if words:
+        yield Line(f"{words}, to be as small as possible", label="F is")
 
 
 def evidence_lines(result: SolveResult) -> Iterator[Line]:

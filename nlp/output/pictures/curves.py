@@ -14,7 +14,8 @@ from ....models import FloatArray
 from ...case.case import Case
 from ...front.data import goal_units, goal_values
 from ...front.front import Front
-from ...results.tradeoff import TradeoffResult, objective_label, tradeoff_words
+from ...results.objective import objective_label
+from ...results.tradeoff import TradeoffResult, tradeoff_words
 from ..fronttable import goal_names
 from .canvas import INK, RED, draw_edges
 

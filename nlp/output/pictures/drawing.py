@@ -223,7 +223,7 @@ def drawing_of(
             LimbRate(row.limb, row.kind, row.member, float(rate), float(share), float(driving))
             for row, rate, share, driving in zip(model.rows, rates, shares, posture.driving, strict=True)
         ),
-        motion=_motion_of_twist(twist, drawing, chosen.name),
+        motion=_motion_of_twist(twist, drawing, chosen.name) if chosen.is_stated else None,
         free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),
         reference=_reference(nlp, posture, drawing.size, pose),
         headline=headline,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ....models import frozen_array
 from ...case.task import Sense
+from ...results.objective import unit_of_objective
 from ...solver.solution import Solution, TaskOutcome
 from ...solver.status import Status
 from ...units import objective_unit
@@ -72,4 +73,7 @@ def _headline(outcome: TaskOutcome) -> str:
 
 def _unit(outcome: TaskOutcome) -> str:
     """Return the unit of F of a task."""
-    return objective_unit([frozen_array(outcome.task.twist, (6,))], outcome.own.nlp.case.units)
+    case = outcome.own.nlp.case
+    if outcome.task.measure:
+        return unit_of_objective(case)
+    return objective_unit([frozen_array(outcome.task.twist, (6,))], case.units)

@@ -15,8 +15,9 @@ from ...case.case import Case
 from ...errors import InputError
 from ...program.formulation import formulate_each
 from ...results.design import limits_data, margins_data
+from ...results.objective import objective_label
 from ...results.parts import LimitData
-from ...results.tradeoff import objective_label, unit_of_number
+from ...results.tradeoff import unit_of_number
 from ...sweeps.points import Points
 from ..sweeptable import TablePoint
 from .canvas import INK, MUTED, draw_edges

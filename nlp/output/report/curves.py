@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ...case.case import Case
+from ...results.objective import objective_label
 from ...results.tradeoff import (
     TradeoffResult,
-    objective_label,
     over_words,
     throughout_words,
     tradeoff_table,

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...evidence.state import ZERO_F
 from ...results.data import SolveResult
+from ...results.objective import objective_label, unit_of_objective
 from ...results.parts import LimitData, RobotData
 from ...results.rounding import number, settled, task_F
 from ...results.tables import MOST_OPTIMA, optimum_table
-from ...results.tradeoff import objective_label, unit_of_objective
 from ...results.wording import counted
 from ...solver.multistart import ProgramSolution
 from ...solver.starts import StartStatus

@@ -16,9 +16,10 @@ from ...case.case import Case
 from ...program.nlp import Nlp
 from ...results.data import CaseResult
 from ...results.jsondata import json_data
+from ...results.objective import objective_label, unit_of_objective
 from ...results.regression import CaseCheck
 from ...results.rounding import number
-from ...results.tradeoff import TradeoffResult, objective_label, unit_of_objective
+from ...results.tradeoff import TradeoffResult
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution, TaskOutcome
 from ..pictures.drawing import Drawing, drawing_of

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...case.case import Case
 from ...program.formulation import formulate
+from ...results.objective import unit_of_objective
 from ...results.rounding import number
 from ...results.tables import sizes_of_variables
 from ...results.text import TextTable
-from ...results.tradeoff import unit_of_objective
 from ...sweeps.columns import SweepColumns, stated_pose_note
 from ...sweeps.points import Points
 from ..pictures.figures import picture_of

@@ -1,0 +1,91 @@
+"""What is optimised: F of a task, or the largest force, speed or power of the actuators; its unit and its words."""
+
+from ...models import frozen_array
+from ...models.statics import driven_joints
+from ..case.case import Case
+from ..case.forces import dimension_of_measure
+from ..evidence.loads import PoseLoads, largest_of
+from ..proof.certificate.certificate import Certificate
+from ..units import objective_unit
+from .jsondata import Absent, JsonObject, finite_or_none
+
+
+class ObjectiveData(JsonObject):
+    """A number of the actuators that is optimised instead of F.
+
+    Attributes:
+        minimise: its name.
+        value: the largest over loads, actuators and poses; null without an answer.
+        unit: of these numbers.
+        bound: that no design within the limits is below; absent where none was asked for.
+        gap: distance of the bound from the value.
+    """
+
+    minimise: str
+    value: float | None
+    unit: str
+    bound: Absent[float]
+    gap: Absent[float]
+
+
+def objective_data(case: Case, value: float | None, certificate: Certificate | None = None) -> ObjectiveData | None:
+    """Return the number of the actuators that a case optimises; None for F.
+
+    Args:
+        case: the case.
+        value: of the number; None without an answer.
+        certificate: proven bound of it.
+    """
+    measure = case.tasks[0].measure
+    if not measure:
+        return None
+    bound = None if certificate is None else finite_or_none(case_number(case, certificate.bound))
+    shown = None if value is None else case_number(case, value)
+    return ObjectiveData(
+        minimise=measure,
+        value=shown,
+        unit=unit_of_objective(case),
+        bound=bound,
+        gap=None if bound is None or shown is None else shown - bound,
+    )
+
+
+def case_number(case: Case, value: float) -> float:
+    """Return what is optimised in the case's units: F as it is, an angular speed in its unit of angles."""
+    measure = case.tasks[0].measure
+    if not measure:
+        return value
+    return case.units.shown(value, dimension_of_measure(measure, driven_joints(case.model)[0]))
+
+
+def objective_words(case: Case) -> str:
+    """Return what is optimised instead of F, in words; empty for F."""
+    measure = case.tasks[0].measure
+    if not measure:
+        return ""
+    over = "actuators" if measure == "actuator_speed" else "actuators and loads"
+    return f"the largest {measure.replace('_', ' ')} over all {over}"
+
+
+def pose_objective(case: Case, found: PoseLoads) -> float:
+    """Return the number of the actuators that a case optimises, at one pose."""
+    return case_number(case, largest_of(found, case.tasks[0].measure))
+
+
+def unit_of_objective(case: Case, task: int | None = None) -> str:
+    """Return the unit of F, or of what is optimised instead.
+
+    Args:
+        case: the case.
+        task: index of the task whose F it is; all tasks together for None, which have a unit where they agree in it.
+    """
+    tasks = case.tasks if task is None else [case.tasks[task]]
+    if tasks[0].measure:
+        return case.units.label(dimension_of_measure(tasks[0].measure, driven_joints(case.model)[0]))
+    return objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
+
+
+def objective_label(case: Case, task: int | None = None) -> str:
+    """Return F with its unit, for an axis; arguments are those of :func:`unit_of_objective`."""
+    unit = unit_of_objective(case, task)
+    return f"F, {unit}" if unit else "F"
