@@ -15,9 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...models.statics import driven_joints
 from .. import __version__
-from ..case.forces import dimension_of_measure
 from ..errors import InputError
 from ..program.nlp import Nlp
 from ..system.reading import read_limited
@@ -60,8 +58,6 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
     units = replace(case.units, angle="rad")
     twists = [np.asarray(task.twist, dtype=np.float64).tolist() for task in case.tasks]
     F = objective_unit(twists, units)
-    if case.tasks[0].measure:
-        F = units.label(dimension_of_measure(case.tasks[0].measure, driven_joints(case.model)[0]))
     of_variables, of_parameters, of_limits = (
         [units.label(each.dimension) for each in numbers] for numbers in (program.variables, program.arguments, limits)
     )

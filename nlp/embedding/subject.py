@@ -51,6 +51,9 @@ def find_subject(case: Case) -> Subject:
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
         fault = "optimises nothing, so C is not generated for it: must be 'weighted-sum' or 'worst-case'"
         raise CaseError("combine.method", fault, case.method.value, case.source)
+    if case.tasks[0].measure:
+        fault = "has no C: that is generated for F, with limits on forces, speeds and powers"
+        raise CaseError("objective.minimise", fault, case.tasks[0].measure, case.source)
     _refuse_nested_loops(case)
     _check_pairs(formulate(case))
     if len(case.tasks) == 1 or case.method is Method.WEIGHTED_SUM:
@@ -125,8 +128,6 @@ def _rounded(nlp: Nlp) -> Nlp:
 def objective_words(nlp: Nlp) -> str:
     """Return the objective of a program in words."""
     case, poses = nlp.case, nlp.case.pose_count
-    if case.tasks[0].measure:
-        return f"the largest {case.tasks[0].measure.replace('_', ' ')}, the level that is the last variable"
     over = f" over {poses} poses" if poses > 1 else ""
     if nlp.program.places.weights:
         if case.method is Method.WEIGHTED_SUM:

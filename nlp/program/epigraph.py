@@ -189,8 +189,9 @@ def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
         at = np.array(points)
         at[epigraph.level if epigraph else -1] = level
         ends.append(slacks(at, nlp.arguments).full())
-    levels = ends[0] / (ends[0] - ends[1])
-    levels = np.sqrt(levels) if epigraph and epigraph.power == 2 else levels
+    with np.errstate(all="ignore"):  # where the robot has no value
+        levels = ends[0] / (ends[0] - ends[1])
+        levels = np.sqrt(levels) if epigraph and epigraph.power == 2 else levels
     return np.asarray(levels.min(axis=0) if nlp.sense is Sense.MAX else levels.max(axis=0))
 
 
