@@ -55,16 +55,21 @@ def statics_hindrance(model: Model) -> str:
     count, freedoms = len(driven_joints(model)), freedoms_of(model)
     if not count:
         return "its actuators are not known"
+    if not freedoms:
+        return "its platform cannot move"
     if count > freedoms:
-        return (
-            f"it has {count} actuators for {freedoms} freedoms, so that they can load each other with forces that no "
-            "load determines"
-        )
+        surplus = f"it has {_counted(count, 'actuator')} for {_counted(freedoms, 'freedom')}"
+        return f"{surplus}, so that they can load each other with forces that no load determines"
     if count < freedoms:
-        return f"its {count} actuators do not hold the {freedoms} freedoms of its platform"
+        held = f"{_counted(freedoms, 'freedom')} of its platform"
+        return f"its {_counted(count, 'actuator')} {'do' if count > 1 else 'does'} not hold the {held}"
     if model.generic is not None and model.generic.jacobian < 6:
         return "its platform can move with locked actuators"
     return ""
+
+
+def _counted(count: int, word: str) -> str:
+    return f"{count} {word}{'s' if count > 1 else ''}"
 
 
 class Statics(NamedTuple):

@@ -21,13 +21,18 @@ import numpy as np
 import pytest
 from builders import EACH_KIND, Array, turn_about
 from casadi import SX
+from engine_comparison import is_regular, unknowns_at
+from mechanism_robots import Engine
 from mujoco_robots import Oracle, null_space
+from random_mechanisms import random_mechanism
 from robot_files import robot_of
 from robot_gallery import GALLERY, LENGTH, RANKS, random_displacements, table
 
 from screwsynth.models import Dimension, Model, Substitution, hexapod, robot, three_upu
 from screwsynth.models.catalog import gallery_names
 from screwsynth.models.instance import instantiate
+from screwsynth.models.mechanism import mechanism_of
+from screwsynth.models.mechanism.singularities import closed_configurations
 from screwsynth.models.statics import driven_joints, freedoms_of, statics_hindrance
 from screwsynth.nlp.case.forces import forces_at
 from screwsynth.nlp.case.loads import Load, Loading, Motion
@@ -144,6 +149,53 @@ def test_all_24_robots_of_the_gallery_have_as_many_actuators_as_freedoms() -> No
 @pytest.mark.parametrize("name", [*GALLERY, *OTHERS])
 def test_forces_equal_those_of_virtual_work_in_mujoco(name: str) -> None:
     check_robot(name, DRIVEN_POSES)
+
+
+#: Random mechanisms with nested, serial and coupled loops that have as many actuators as freedoms, up to five.
+MECHANISMS = (14, 18, 46, 101, 103, 105, 106, 109, 110)
+
+
+@pytest.mark.parametrize("seed", MECHANISMS)
+def test_forces_of_mechanisms_of_any_topology_equal_those_of_virtual_work_in_mujoco(seed: int) -> None:
+    """Every link is a free body of the engine, and every joint rows on its Jacobians (``mechanism_robots``)."""
+    tables = random_mechanism(seed)
+    model, home = robot(**tables), mechanism_of(tables)
+    loads = random_loads(np.random.default_rng(seed))
+    package = Package(model, Loading(tuple(loads)))
+    count = 0
+    for there in (home, *closed_configurations(home, count=3)):
+        engine = Engine(there)
+        if not is_regular(engine, 1e-4):
+            continue
+        (plate,) = (each for each in there.links if each.name == there.platform)
+        R, p = plate.rotation, plate.position
+        names = [each.name for each in there.joints if each.actuated]
+        order = [names.index(each.name) for each in model.joints if each.name in names]
+        assert len(order) == len(package.names)
+        twists = engine.platform_twists(locked=False).T
+        omega, v = twists[:, :3], twists[:, 3:]
+        rates = np.array([engine.rates(each) for each in twists])[:, order]
+        motions = Feasible(rates, np.hstack([omega, v + np.cross(omega, p)]))
+        expected = motions.forces(wrenches_of(loads, R))
+        found = package.numbers(package.typical, unknowns_at(model, home, there), R, p)[1].full()
+        # Their singular values go down to 1e-4 of the largest, which takes four digits.
+        assert (np.abs(found - expected).max(axis=0) / np.abs(expected).max(axis=0)).max() < 1e-9
+        count += 1
+    assert count >= 2
+
+
+#: Tables of mechanisms whose forces no load determines, by their seeds, and why.
+HINDERED = {
+    0: "its platform cannot move",
+    12: "it has 2 actuators for 1 freedom, so that they can load each other with forces that no load determines",
+    20: "its 2 actuators do not hold the 4 freedoms of its platform",
+    112: "its 1 actuator does not hold the 2 freedoms of its platform",
+}
+
+
+@pytest.mark.parametrize("seed", HINDERED)
+def test_mechanisms_whose_forces_are_not_determined_say_why(seed: int) -> None:
+    assert statics_hindrance(robot(**random_mechanism(seed))) == HINDERED[seed]
 
 
 @pytest.mark.parametrize("name", ["6-rus", "3-rps", "delta", "planar-3-rrr", "six legs"])
