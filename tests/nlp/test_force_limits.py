@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, case_from, starter_tables, turn_about
+from builders import Array, case_from, edited, starter_tables, turn_about
 from measures import circle_joints
 
 from screwsynth.models import Dimension
 from screwsynth.nlp import Case, Limits, Margin, Nlp, Status, formulate, margins_of, solve
 from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 LEGS = ("1-", "1+", "2-", "2+", "3-", "3+")
 #: A weight that is always there, a force of both signs at a tool that also has one of any direction, and a gust.
@@ -290,3 +292,75 @@ def test_a_robot_joint_by_joint_keeps_an_active_limit(name: str, dimension: Dime
     slope = (ends[0].F - ends[1].F) / (2e-4 * number)
     assert sum(row.cost or 0.0 for row in active) == pytest.approx(slope, rel=1e-3)
     assert slope > 0
+
+
+# -- over a workspace
+
+#: The designs' numbers fixed, and a box of positions.
+FIXED = edited(
+    CASE,
+    ("x1 = { min = 1.0, max = 2.0, start = 1.4 }", "x1 = 1.4"),
+    ("x2 = { min = 0.5, max = 1.0, start = 0.7 }", "x2 = 0.7"),
+    ("x3 = { min = 2, max = 25, start = 8 }", "x3 = 8"),
+    ("x4 = { min = 2, max = 25, start = 12 }", "x4 = 12"),
+    ("[0.1, { min = -0.4, max = 0.4 }, { min = 1.0, max = 2.0, start = 1.5 }]", "[0, 0, 1.5]"),
+    ("rotation = { angle = { min = -20, max = 20 } }\n", ""),
+    (
+        "[limits]",
+        "[workspace]\n"
+        "position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 1.4, max = 1.6 }]\n"
+        "[limits]",
+    ),
+    ("actuator_speed = { max = 0.9 }\nactuator_power = { max = 300 }", ""),
+)
+
+
+def test_proven_largest_forces_over_a_workspace_are_above_all_samples_and_near_the_largest() -> None:
+    rng = np.random.default_rng(6)
+    x = {"x1": 1.4, "x2": 0.7, "x3": np.radians(8), "x4": np.radians(12)}
+    ends = np.array(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1])).reshape(3, -1).T
+    points = np.vstack([ends, rng.uniform(-1, 1, (1500, 3))]) * 0.1 + [0, 0, 1.5]
+    sampled = [Expected(x, np.eye(3), p).constraints for p in points]
+    found = {each.name: each for each in judge_workspace(case_from(FIXED), jobs=1).extremes if each.key}
+    names = [name for name in sampled[0] if name.startswith("actuator_force")]
+    assert found.keys() == set(names)
+    for name in names:
+        most = max(each[name] for each in sampled)
+        claim = found[name]
+        assert (claim.key, claim.outcome) == ("actuator_force.max", Outcome.PROVED)
+        assert claim.bound >= most
+        assert claim.bound == pytest.approx(most, abs=2.0)
+        assert claim.reached <= claim.bound
+
+
+#: A published 3-UPU: its largest force in a box of 0.2 x 0.2 x 0.1 is 8.08803 N, at a corner.
+UPU = """\
+[robot]
+model = "three-upu"
+axes = "tsai"
+parameters = { base_radius = 0.5, platform_radius = 0.12 }
+[pose]
+position = [0, 0, 0.45]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[[load]]
+force = [2, 2, -10]
+[limits]
+actuator_force = { max = MAX }
+[workspace]
+position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 0.4, max = 0.5 }]
+"""
+
+
+def test_the_largest_force_of_a_published_robot_is_proved_and_a_smaller_limit_refuted() -> None:
+    for number, outcome in (("8.09", Outcome.PROVED), ("8.08", Outcome.REFUTED)):
+        claims = judge_workspace(case_from(UPU.replace("MAX", number)), jobs=1).extremes
+        (worst,) = [each for each in claims if each.name == "actuator_force actuator 1 load load 1"]
+        assert worst.outcome is outcome
+        assert worst.reached == pytest.approx(8.08803, abs=5e-6)
+        assert 8.08803 - 5e-6 <= worst.bound <= 8.09
+        assert worst.pose is not None
+        x, y, z = worst.pose.position
+        assert (x, abs(y), z) == pytest.approx((0.1, 0.1, 0.4), abs=1e-6)
