@@ -296,7 +296,8 @@ def test_a_robot_joint_by_joint_keeps_an_active_limit(name: str, dimension: Dime
 
 # -- over a workspace
 
-#: The designs' numbers fixed, and a box of positions.
+BOX = "[{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 1.4, max = 1.6 }]"
+#: The design's numbers fixed, over a box of positions.
 FIXED = edited(
     CASE,
     ("x1 = { min = 1.0, max = 2.0, start = 1.4 }", "x1 = 1.4"),
@@ -305,12 +306,7 @@ FIXED = edited(
     ("x4 = { min = 2, max = 25, start = 12 }", "x4 = 12"),
     ("[0.1, { min = -0.4, max = 0.4 }, { min = 1.0, max = 2.0, start = 1.5 }]", "[0, 0, 1.5]"),
     ("rotation = { angle = { min = -20, max = 20 } }\n", ""),
-    (
-        "[limits]",
-        "[workspace]\n"
-        "position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 1.4, max = 1.6 }]\n"
-        "[limits]",
-    ),
+    ("[limits]", f"[workspace]\nposition = {BOX}\n[limits]"),
     ("actuator_speed = { max = 0.9 }\nactuator_power = { max = 300 }", ""),
 )
 
