@@ -26,7 +26,7 @@ from mechanism_robots import Engine
 from mujoco_robots import Oracle, null_space
 from random_mechanisms import random_mechanism
 from robot_files import robot_of
-from robot_gallery import GALLERY, LENGTH, RANKS, random_displacements, table
+from robot_gallery import FILES, GALLERY, LENGTH, RANKS, random_displacements, table
 
 from screwsynth.models import Dimension, Model, Substitution, hexapod, robot, three_upu
 from screwsynth.models.catalog import gallery_names
@@ -41,8 +41,6 @@ DRIVEN_POSES = 5
 LOADS = 20
 #: Largest difference of a force, as a part of the largest of the robot's forces under the load.
 AGREEMENT = 1e-10
-#: Robots of no kind of the gallery: an actuated screw, cylindrical joints, two actuators in a limb, a limb more.
-OTHERS = ("3-hps", "3-pprs", "3-rps-ups", "6-cps", "6-hus", "planar-centre")
 
 
 class Package:
@@ -146,8 +144,9 @@ def test_all_24_robots_of_the_gallery_have_as_many_actuators_as_freedoms() -> No
         assert statics_hindrance(model) == ""
 
 
-@pytest.mark.parametrize("name", [*GALLERY, *OTHERS])
+@pytest.mark.parametrize("name", FILES)
 def test_forces_equal_those_of_virtual_work_in_mujoco(name: str) -> None:
+    """Also of files with actuated screws, cylindrical joints, two actuators in a limb, and limbs without any."""
     check_robot(name, DRIVEN_POSES)
 
 

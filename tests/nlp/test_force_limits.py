@@ -16,7 +16,7 @@ from builders import Array, case_from, edited, starter_tables, turn_about
 from measures import circle_joints
 
 from screwsynth.models import Dimension
-from screwsynth.nlp import Case, Limits, Margin, Nlp, Status, formulate, margins_of, solve
+from screwsynth.nlp import Case, Limits, Margin, Nlp, Status, Units, formulate, json_data, margins_of, result_of, solve
 from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
@@ -360,3 +360,17 @@ def test_the_largest_force_of_a_published_robot_is_proved_and_a_smaller_limit_re
         assert worst.pose is not None
         x, y, z = worst.pose.position
         assert (x, abs(y), z) == pytest.approx((0.1, 0.1, 0.4), abs=1e-6)
+
+
+def test_a_limit_on_the_speed_of_cranks_costs_the_same_in_radians() -> None:
+    case = case_from({**starter_tables("6-rus"), **LOADED})
+    case = replace(case, limits=Limits(ActuatorSpeed(max=3.4)))
+    (degrees,), (radians,) = (
+        json_data(result_of(best(replace(case, units=Units(case.units.length, unit, "N")))))["limits"]
+        for unit in ("deg", "rad")
+    )
+    assert (degrees["unit"], radians["unit"]) == ("deg/s", "rad/s")
+    assert (degrees["limit"], radians["limit"]) == (pytest.approx(np.degrees(3.4)), 3.4)
+    assert (degrees["value"], radians["value"]) == pytest.approx((np.degrees(3.4), 3.4), rel=1e-9)
+    assert radians["cost"] == pytest.approx(np.degrees(degrees["cost"]), rel=1e-6)
+    assert radians["cost"] > 0
