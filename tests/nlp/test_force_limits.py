@@ -164,6 +164,22 @@ def test_the_numbers_of_the_limits_are_those_of_the_legs() -> None:
         )
 
 
+def test_a_smallest_and_a_largest_force_are_signed_and_may_both_be_below_0() -> None:
+    text = edited(CASE, ("actuator_force = { max = 400 }", "actuator_force = { min = -70, max = -5 }"))
+    nlp = formulate(case_from(text))
+    index = {each.name: k for k, each in enumerate(nlp.program.constraints)}
+    assert not [name for name in index if name.startswith("actuator_force") and "backwards" in name]
+    for x in random_points(nlp, 3, 7):
+        at, g = expected_at(nlp, x), nlp.evaluate(x).g
+        for load in CASES:
+            for k, leg in enumerate(LEGS):
+                largest = index[f"actuator_force actuator {leg} load {load}"]
+                smallest = index[f"actuator_force actuator {leg} smallest load {load}"]
+                assert g[largest] == pytest.approx(at.centre[load][k] + at.spread[load][k], rel=1e-9, abs=1e-9)
+                assert g[smallest] == pytest.approx(at.centre[load][k] - at.spread[load][k], rel=1e-9, abs=1e-9)
+                assert (nlp.g_upper[largest], nlp.g_lower[smallest]) == (-5.0, -70.0)
+
+
 def test_the_derivatives_of_the_limits_are_differences_of_the_legs_forces() -> None:
     nlp = legs_nlp()
     names = [each.name for each in nlp.program.constraints]
