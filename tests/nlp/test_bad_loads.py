@@ -299,8 +299,7 @@ def test_what_a_robot_does_not_have_is_one_sentence(name: str, tmp_path: Path, c
     assert err.startswith(f"screwsynth: case.toml: {sentence}"), err
 
 
-def test_every_fault_is_a_fault_of_its_tables_alone(tmp_path: Path) -> None:
-    """The robot with actuators of two kinds has limits by actuator, and one power for all."""
+def test_a_robot_with_actuators_of_two_kinds_has_limits_by_actuator_and_one_power(tmp_path: Path) -> None:
     limits = '[limits]\nactuator_force = { "1" = { max = 3 }, "3" = { min = -5 } }\nactuator_power = { max = 9 }'
     path = saved_with_robot(tmp_path, MIXED, f"{PLANE}{LOAD}{MOVED}{limits}")
     assert [each.name for each in load_case(path).limits] == [
