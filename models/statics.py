@@ -109,6 +109,17 @@ class Statics(NamedTuple):
         weighted = motions * ca.repmat(weights, 1, motions.shape[1])
         return _solved(_factors(motions.T @ weighted), weighted.T)
 
+    def compliance(self, stiffness: SX) -> SX:
+        """Return the motion (6, 6) of the platform for a unit of each component of a load: its moment, then its force.
+
+        Links and joints are rigid: the actuators alone give way.
+
+        Args:
+            stiffness: (a, 1) force, or torque, of each actuator by its displacement.
+        """
+        motions = self.motions
+        return motions @ (motions / ca.repmat(stiffness.T, 6, 1)).T
+
     def row_forces(self, load: SX) -> SX:
         """Return forces (m, 1) of the rows that hold a load (6, 1), force and moment about the platform's origin.
 
@@ -144,7 +155,8 @@ def posed_statics(model: Model, robot: RobotInstance) -> Statics:
         robot: the robot at the pose.
     """
     found = statics_of(model, robot.jacobian, robot.driven, robot.position)
-    quotient = _quotient_of_minors(robot)
+    # Rows of a robot given joint by joint may be forces of constraints.
+    quotient = None if model.actuators else _quotient_of_minors(robot)
     return found if quotient is None else found._replace(numerators=quotient[0], divisor=quotient[1])
 
 

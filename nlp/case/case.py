@@ -186,11 +186,15 @@ def _check_loading(case: Case) -> None:
         CaseError: in the words of a case file.
     """
     case.loading.check(case.units)
-    stated = [key for key, given in (("load", case.loading.loads), ("motion", case.loading.motion)) if given]
+    loading = case.loading
+    parts = (("load", loading.loads), ("motion", loading.motion), ("robot.actuator_stiffness", loading.stiffness))
+    stated = [key for key, given in parts if given]
     if stated:
         hindrance = statics_hindrance(case.model)
         if hindrance:
             raise CaseError(stated[0], f"is not for {case.model.name!r}: {hindrance}")
+    if loading.stiffness is not None:
+        loading.stiffness_of([joint.name for joint in driven_joints(case.model)])
 
 
 def _check_measure(case: Case, task: Task) -> None:

@@ -67,12 +67,35 @@ class PosedForces(NamedTuple):
         statics: motions of the platform by each of them.
         cases: their forces under each load case.
         speeds: (a, 1) their largest speeds; empty without a motion.
+        stiffness: (a, 1) force of each by its displacement; empty where it is not known.
     """
 
     joints: tuple[DrivenJoint, ...]
     statics: Statics
     cases: tuple[CaseForces, ...]
     speeds: SX
+    stiffness: SX
+
+    @property
+    def compliance(self) -> SX:
+        """Displacement (6, 6) of the platform, turn and translation of its origin, by moment and force of a load."""
+        return self.statics.compliance(self.stiffness)
+
+    def displacement(self, case: CaseForces) -> SX:
+        """Return the platform's displacement (6, 1), turn and translation of its origin, by the fixed part of loads."""
+        return -self.statics.motions @ (case.centre / case.divisor / self.stiffness)
+
+    def deflection(self, case: CaseForces) -> SX:
+        """Return an upper bound of the translation (1, 1) of the platform's origin; exact for loads without any part.
+
+        Changes of the actuators' forces by loads of any direction add up in it, although no one direction may be the
+        worst for all.
+        """
+        found = _size(self.displacement(case)[3:])
+        if not case.spread.is_zero():
+            sizes = [_size(each[3:]) for each in ca.horzsplit(self.statics.motions)]
+            found += ca.dot(ca.vertcat(*sizes), case.spread / ca.fabs(case.divisor) / self.stiffness)
+        return found
 
 
 def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading) -> PosedForces:
@@ -86,7 +109,9 @@ def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading) ->
     """
     cases = tuple(_case_forces(case, statics, rotation) for case in loading.cases)
     speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion)
-    return PosedForces(driven_joints(model), statics, cases, speeds)
+    joints = driven_joints(model)
+    known = [] if loading.stiffness is None else loading.stiffness_of([joint.name for joint in joints])
+    return PosedForces(joints, statics, cases, speeds, SX(known) if known else SX(0, 1))
 
 
 def _case_forces(case: LoadCase, statics: Statics, rotation: SX) -> CaseForces:

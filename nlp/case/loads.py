@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
-from ..errors import CaseError
+from ..errors import CaseError, nearest
 from ..units import Units
 from .checks import check_real, check_size, check_vector
 
@@ -164,11 +164,14 @@ class Loading(NamedTuple):
         loads: the loads.
         motion: its fastest motions; None where none are stated.
         gravity: (3,) acceleration of gravity, force over mass; None for that in metres, newtons and kilograms.
+        stiffness: force of each actuator by its displacement, or torque by radian, by its name; of all under an empty
+            name; None where it is not known.
     """
 
     loads: tuple[Load, ...] = ()
     motion: Motion | None = None
     gravity: Sequence[float] | None = None
+    stiffness: Mapping[str, float] | None = None
 
     def check(self, units: Units) -> None:
         """Refuse loads, motions and a gravity that mean nothing.
@@ -187,6 +190,10 @@ class Loading(NamedTuple):
         if self.motion is not None:
             self.motion.check()
         self._check_gravity(units)
+        for name, value in (self.stiffness or {}).items():
+            key = f"robot.actuator_stiffness{f'.{name}' if name else ''}"
+            if not (math.isfinite(check_real(value, key)) and value > 0):
+                raise CaseError(key, "must be above 0 and finite", value)
 
     def _check_cases(self) -> None:
         """Refuse more loads that act together than can be told apart, by their number or by their names."""
@@ -210,6 +217,24 @@ class Loading(NamedTuple):
             fault = f"is missing: a mass times it is a weight in {units.force}"
             known = ", [0, 0, -9.81] for a mass in kg" if units.force == _KNOWN[1] else ""
             raise CaseError("gravity.acceleration", fault + known)
+
+    def stiffness_of(self, actuators: Sequence[str]) -> list[float]:
+        """Return the stiffness of actuators by their names.
+
+        Raises:
+            CaseError: one has none, or there is no actuator of a name.
+        """
+        given = self.stiffness or {}
+        if given.keys() == {""}:
+            return [given[""]] * len(actuators)
+        for name in given:
+            if name not in actuators:
+                fault = f"is no actuator of the robot; {nearest(name, actuators)}"
+                raise CaseError(f"robot.actuator_stiffness.{name}", fault)
+        missing = next((name for name in actuators if name not in given), None)
+        if missing is not None:
+            raise CaseError("robot.actuator_stiffness", f"has none for actuator {missing}")
+        return [given[name] for name in actuators]
 
     @property
     def cases(self) -> tuple[LoadCase, ...]:

@@ -124,7 +124,7 @@ def _parse(tables: dict[str, Any]) -> Document:
 
 def _kind_of(tables: dict[str, Any]) -> type[Document]:
     """Return the schema of a document: with the tables of limits, workspace and loads where it states one of them."""
-    if tables.keys().isdisjoint(("limits", "workspace", "load", "motion", "gravity", "objective")):
+    if tables.keys() <= Document.model_fields.keys() - {"limits", "workspace"}:
         return Document
     from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
 

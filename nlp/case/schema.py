@@ -63,6 +63,12 @@ VectorOrValue = Annotated[
 ]
 
 
+NumberOrTable = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[dict[str, FiniteFloat], Tag("<range>")],
+    Discriminator(_tag_of_number),
+]
+
+
 class UnitsTable(Table):
     """Units of every number in the file."""
 
@@ -89,6 +95,9 @@ class RobotTable(Table):
         default=Case.characteristic_length,
         gt=0,
         description="length by which unit couples are made comparable with unit forces",
+    )
+    actuator_stiffness: NumberOrTable | None = Field(
+        default=None, description="force of an actuator by its displacement, of all or by name"
     )
 
     @model_validator(mode="after")
@@ -341,10 +350,13 @@ class Document(Table):
         """
         return list(tasks)
 
-    def read_loading(self, units: Units) -> Loading:  # noqa: ARG002 - it has none
-        """Return the loads, the motions and the gravity that the document states.
+    def read_loading(self, units: Units) -> Loading:  # noqa: ARG002 - it has no angular speed
+        """Return the loads, the motions and the gravity that the document states, and the actuators' stiffness.
 
         Args:
             units: the document's units.
         """
-        return NO_LOADING
+        given = self.robot.actuator_stiffness
+        if given is None:
+            return NO_LOADING
+        return Loading(stiffness=given if isinstance(given, dict) else {"": given})

@@ -105,8 +105,9 @@ class WholeDocument(Document):
         return [replace(task, measure=self.objective.minimise) for task in tasks]
 
     def read_loading(self, units: Units) -> Loading:
-        """Return the loads, the motions and the gravity that the document states."""
-        return loading_of(self.load, self.motion, self.gravity, units)
+        """Return the loads, the motions and the gravity that the document states, and the actuators' stiffness."""
+        stiffness = super().read_loading(units).stiffness
+        return loading_of(self.load, self.motion, self.gravity, units)._replace(stiffness=stiffness)
 
 
 def _turns(rotation: WorkspaceRotationTable | None, units: Units) -> Turns:

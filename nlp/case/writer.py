@@ -65,7 +65,9 @@ def _lines(case: Case) -> Iterator[str]:
     length = case.characteristic_length if model.has_couples else None
     options: dict[str, TomlValue | None] = {key: plain_value(value) for key, value in model.options.items()}
     name = None if "definition" in options else model.name
-    yield from toml_table("[robot]", {"model": name, **options, "characteristic_length": length})
+    yield from toml_table(
+        "[robot]", {"model": name, **options, "characteristic_length": length, **_stiffness(case.loading)}
+    )
     parameters: dict[str, TomlValue] = {}
     for item in model.parameters:
         values = case.components(item.name)
@@ -97,6 +99,12 @@ def _units(units: Units) -> dict[str, TomlValue | None]:
     """Return the table of the units; a file without forces has none for them."""
     force = None if units.force == Units.force else units.force
     return {"length": units.length, "angle": units.angle, "force": force}
+
+
+def _stiffness(loading: Loading) -> dict[str, TomlValue]:
+    """Return the actuators' stiffness, one number or one by actuator."""
+    given = loading.stiffness
+    return {} if given is None else {"actuator_stiffness": given[""] if given.keys() == {""} else dict(given)}
 
 
 def _loading(loading: Loading, units: Units) -> Iterator[str]:

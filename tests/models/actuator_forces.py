@@ -25,6 +25,7 @@ from robot_gallery import LENGTH, table
 
 from screwsynth.models import Model, Substitution, robot
 from screwsynth.models.instance import instantiate
+from screwsynth.models.statics import posed_statics
 from screwsynth.nlp.case.forces import forces_at
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 
@@ -37,7 +38,7 @@ class Package:
     def __init__(self, model: Model, loading: Loading) -> None:
         own = Substitution.identity(model)
         posed = instantiate(model, own, SX(LENGTH), [SX.zeros(6)])
-        found = forces_at(model, posed, loading)
+        found = forces_at(model, posed_statics(model, posed), posed.rotation, loading)
         self.model, self.unknowns = model, len(model.unknowns)
         self.names = [joint.name for joint in found.joints]
         self.typical = np.concatenate([np.ravel(item.typical) for item in model.parameters] or [np.zeros(0)])

@@ -41,7 +41,9 @@ from screwsynth.nlp import (
     result_of,
     solve,
 )
+from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed, Deflection
 from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
+from screwsynth.nlp.case.loads import Load, Loading, Motion
 
 WAYS: dict[str, Callable[[object], object]] = {
     "pickle": lambda value: pickle.loads(pickle.dumps(value)),  # noqa: S301 - our own bytes
@@ -63,8 +65,13 @@ EVERY_LIMIT = Limits(
     SmallestSingularValue(1e-3, 20),
     ActuatorRate(100),
     RateShare(0.9),
+    ActuatorForce(max=400),
+    ActuatorSpeed(max=10),
+    ActuatorPower(max=3000),
+    Deflection(2),
     Relations("x1 - x2 >= 1"),
 )
+LOADING = Loading((Load(force=(1, 2, -30), any_force=5.0),), Motion(1.0, 0.5), stiffness={"": 1e3})
 
 
 @pytest.mark.parametrize("model", [stewart_gough(layout="octahedral"), hexapod(), three_upu()], ids=lambda m: m.name)
@@ -115,6 +122,7 @@ def test_a_program_with_every_limit_is_the_same_program(again: Callable[[Nlp], N
         rotation=case.rotation,
         tasks=case.tasks,
         limits=EVERY_LIMIT,
+        loading=LOADING,
         joint_centre_tolerance=0.01,
     )
     # Every type but the robot's own measures, which are limited as lengths of legs are, and those of limbs given joint

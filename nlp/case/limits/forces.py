@@ -21,7 +21,7 @@ from ...units import Units
 from ..forces import PosedForces, dimension_of_force, dimension_of_speed
 from ..table import Table, fault_of
 from ..toml import TomlValue
-from .constraint import BoundedConstraint, Reading, between
+from .constraint import LENGTH, BoundedConstraint, Reading, between
 from .interval import AtMost, IntervalTable
 from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, Written
 
@@ -278,3 +278,44 @@ class ActuatorPower(_LargestOfActuator):
             if self.max is not None:
                 yield self.at_most(f"{name} {at}", case.largest[k] * forces.speeds[k], reading, self.max)
                 yield self.at_most(f"{name} backwards {at}", -case.smallest[k] * forces.speeds[k], reading, self.max)
+
+
+@dataclass(frozen=True)
+class Deflection(Limit[AtMost]):
+    """Largest displacement of the platform's origin under every load, at every pose, as the actuators give way.
+
+    Attributes:
+        max: largest displacement, length.
+    """
+
+    max: float
+
+    key: ClassVar[str] = "deflection"
+    table: ClassVar[Any] = AtMost
+    description: ClassVar[str] = "of the platform's origin under the loads, as actuators give way"
+    numbers: ClassVar[Ranges] = {"max": NumberRange(Dimension.LENGTH)}
+    order: ClassVar[int] = 1
+
+    @classmethod
+    def is_for(cls, model: Model) -> bool:
+        """Return whether a robot's actuators are known."""
+        return bool(driven_joints(model))
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse a number out of its range, and a case without loads or without stiffness.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        super().check(case)
+        if not case.loading.loads:
+            raise CaseError(f"limits.{self.key}", "means nothing without [[load]]")
+        if case.loading.stiffness is None:
+            raise CaseError(f"limits.{self.key}", "needs robot.actuator_stiffness")
+
+    def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
+        """Return the displacement under each load case."""
+        for case in pose.forces.cases:
+            name = f"{self.key} load {case.case.name}{pose.where}"
+            number = pose.forces.deflection(case)
+            yield between(name, number, LENGTH, ("", f"{self.key}.max"), upper=self.max)

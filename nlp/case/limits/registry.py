@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, create_model
 
 from ..table import Table
 from .clearance import LegClearance, LinkClearance
-from .forces import ActuatorForce, ActuatorPower, ActuatorSpeed
+from .forces import ActuatorForce, ActuatorPower, ActuatorSpeed, Deflection
 from .interval import IntervalTable, QuantityLimit
 from .joint_motion import JointCone, JointMotion
 from .joints import BaseJointAngle, PlatformJointAngle
@@ -40,6 +40,7 @@ LIMIT_TYPES: tuple[type[Limit[Any]], ...] = (
     ActuatorForce,
     ActuatorSpeed,
     ActuatorPower,
+    Deflection,
     JointMotion,
     JointCone,
     RateShare,
