@@ -7,6 +7,7 @@ of all others; else limbs can load each other with wrenches that no load determi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ from casadi import SX
 
 from ...models import FloatArray, rank_of_rows
 from ...models.statics import Statics, statics_of
-from ..case.forces import CaseForces, forces_at
+from ..case.forces import CaseForces, PosedForces, forces_at
 from ..program.nlp import Nlp
 from .paths import velocities_at
 from .state import RobotState
@@ -34,6 +35,9 @@ class LoadState(NamedTuple):
         smallest, largest: (a,) forces of the actuators, torques of those that turn; not numbers at a singular pose.
         constraints: (6,) wrench of each limb's constraints on the platform for the fixed part, force, then moment about
             the world origin; None where statics does not determine it. Limbs without constraints are left out.
+        displacement: (6,) of the platform for the fixed part, turn, radians, then translation of its origin; empty
+            where the actuators' stiffness is not known.
+        deflection: upper bound of the translation, with loads of any direction; not a number where it is not known.
     """
 
     name: str
@@ -41,13 +45,23 @@ class LoadState(NamedTuple):
     smallest: FloatArray
     largest: FloatArray
     constraints: Mapping[str, FloatArray | None]
+    displacement: FloatArray
+    deflection: float
 
 
 class PoseLoads(NamedTuple):
-    """Forces of all load cases at a pose, and (a,) the largest speeds of the actuators, empty without a motion."""
+    """Forces of all load cases at a pose, and what does not depend on loads.
+
+    Attributes:
+        loads: the load cases.
+        speeds: (a,) the largest speeds of the actuators; empty without a motion.
+        compliance: (6, 6) displacement of the platform, turn and translation of its origin, by moment and force about
+            it; empty where the actuators' stiffness is not known.
+    """
 
     loads: tuple[LoadState, ...]
     speeds: FloatArray
+    compliance: FloatArray
 
 
 def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseLoads:
@@ -65,8 +79,10 @@ def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseL
     statics = statics_of(model, J, D, p)
     found = forces_at(model, statics, R, loading)
     held = {} if state.is_singular else _constraints(nlp, statics)
-    loads = tuple(_load(case, state, statics, held) for case in found.cases)
-    return PoseLoads(loads, _numbers(found.speeds, state))
+    loads = tuple(_load(case, state, found, held) for case in found.cases)
+    is_elastic = bool(found.stiffness.numel())
+    compliance = _numbers(ca.vec(found.compliance), state).reshape(6, 6) if is_elastic else np.zeros((0, 0))
+    return PoseLoads(loads, _numbers(found.speeds, state), compliance)
 
 
 def largest_of(found: PoseLoads, measure: str) -> float:
@@ -78,15 +94,18 @@ def largest_of(found: PoseLoads, measure: str) -> float:
     return float((factor * forces).max())
 
 
-def _load(case: CaseForces, state: RobotState, statics: Statics, held: Mapping[str, FloatArray | None]) -> LoadState:
+def _load(case: CaseForces, state: RobotState, posed: PosedForces, held: Mapping[str, FloatArray | None]) -> LoadState:
     """Return what holds one load case; ``held`` has the matrix from row forces to the wrench of each limb."""
-    phi = _numbers(statics.row_forces(case.wrench), state) if held else np.zeros(0)
+    phi = _numbers(posed.statics.row_forces(case.wrench), state) if held else np.zeros(0)
+    is_elastic = bool(posed.stiffness.numel())
     return LoadState(
         case.case.name,
         _about_world(np.array(ca.DM(case.wrench)).ravel(), state.position),
         _numbers(case.smallest, state),
         _numbers(case.largest, state),
         {limb: None if matrix is None else _about_world(matrix @ phi, state.position) for limb, matrix in held.items()},
+        _numbers(posed.displacement(case), state) if is_elastic else np.zeros(0),
+        float(_numbers(posed.deflection(case), state)[0]) if is_elastic else math.nan,
     )
 
 

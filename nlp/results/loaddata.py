@@ -1,13 +1,15 @@
 """Forces, powers and speeds of actuators, and the wrenches of constraints that hold loads, as data."""
 
-from ...models import FloatArray
+import numpy as np
+
+from ...models import Dimension, FloatArray
 from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_force, dimension_of_speed
 from ..evidence.loads import LoadState, loads_at
 from ..evidence.state import RobotState, evaluate
 from ..program.nlp import Nlp
-from .jsondata import Absent, JsonObject, Vector6, finite_or_none, vector
+from .jsondata import Absent, JsonObject, Matrix, Vector3, Vector6, finite_or_none, matrix, vector
 
 
 class ActuatorForceData(JsonObject):
@@ -43,6 +45,20 @@ class ConstraintWrenchData(JsonObject):
     wrench: Vector6 | None
 
 
+class DeflectionData(JsonObject):
+    """Displacement of the platform under a load, as its actuators give way.
+
+    Attributes:
+        translation: of its origin, without the part of any direction; null at a singular pose.
+        rotation: vector of the turn, in the unit of angles.
+        largest: upper bound of the size of the translation with loads of any direction.
+    """
+
+    translation: Vector3 | None
+    rotation: Vector3 | None
+    largest: float | None
+
+
 class LoadData(JsonObject):
     """A load and what holds it.
 
@@ -52,6 +68,7 @@ class LoadData(JsonObject):
         wrench: force, then moment about the world origin, without its part of any direction.
         actuators: forces of the actuators.
         constraints: wrenches of the limbs' constraints; absent for a robot without any.
+        deflection: of the platform; absent where the actuators' stiffness is not known.
     """
 
     name: str
@@ -59,6 +76,7 @@ class LoadData(JsonObject):
     wrench: Vector6
     actuators: tuple[ActuatorForceData, ...]
     constraints: Absent[tuple[ConstraintWrenchData, ...]]
+    deflection: Absent[DeflectionData]
 
 
 class ActuatorSpeedData(JsonObject):
@@ -83,10 +101,13 @@ class LoadingData(JsonObject):
     Attributes:
         loads: every load at every pose; absent without loads.
         speeds: every actuator at every pose; absent without motions.
+        compliance: at the first pose, displacement of the platform, translation of its origin and turn in radians, by
+            force and moment about it; absent where the actuators' stiffness is not known, and at a singular pose.
     """
 
     loads: Absent[tuple[LoadData, ...]]
     speeds: Absent[tuple[ActuatorSpeedData, ...]]
+    compliance: Absent[Matrix]
 
 
 def loading_data(nlp: Nlp, x: FloatArray, state: RobotState) -> LoadingData | None:
@@ -98,21 +119,25 @@ def loading_data(nlp: Nlp, x: FloatArray, state: RobotState) -> LoadingData | No
         state: the robot there, at the first pose.
     """
     case = nlp.case
-    if not (case.loading.loads or case.loading.motion):
+    if not (case.loading.loads or case.loading.motion or case.loading.stiffness):
         return None
     loads: list[LoadData] = []
+    compliance: Matrix | None = None
     speeds: list[ActuatorSpeedData] = []
     joints = driven_joints(case.model)
     for k in range(len(nlp.program.robots)):
         found = loads_at(nlp, x, evaluate(nlp, x, k) if k else state, k)
         pose = k + 1 if len(nlp.program.robots) > 1 else None
+        if not k and found.compliance.size and np.isfinite(found.compliance).all():
+            order = [3, 4, 5, 0, 1, 2]  # force before moment, and translation before turn
+            compliance = matrix(found.compliance[np.ix_(order, order)])
         loads += [_load(case, each, found.speeds, pose) for each in found.loads]
         for joint, speed in zip(joints, found.speeds.tolist(), strict=False):
             dimension = dimension_of_speed(joint)
             shown = case.units.shown(speed, dimension)
             unit = case.units.label(dimension)
             speeds.append(ActuatorSpeedData(actuator=joint.name, pose=pose, value=finite_or_none(shown), unit=unit))
-    return LoadingData(loads=tuple(loads) or None, speeds=tuple(speeds) or None)
+    return LoadingData(loads=tuple(loads) or None, speeds=tuple(speeds) or None, compliance=compliance)
 
 
 def _load(case: Case, load: LoadState, speeds: FloatArray, pose: int | None) -> LoadData:
@@ -135,5 +160,21 @@ def _load(case: Case, load: LoadState, speeds: FloatArray, pose: int | None) -> 
         for limb, wrench in load.constraints.items()
     )
     return LoadData(
-        name=load.name, pose=pose, wrench=vector(load.wrench), actuators=tuple(actuators), constraints=held or None
+        name=load.name,
+        pose=pose,
+        wrench=vector(load.wrench),
+        actuators=tuple(actuators),
+        constraints=held or None,
+        deflection=_deflection(case, load) if load.displacement.size else None,
+    )
+
+
+def _deflection(case: Case, load: LoadState) -> DeflectionData:
+    """Return the platform's displacement under a load."""
+    known = bool(np.isfinite(load.displacement).all())
+    turn = [case.units.shown(float(part), Dimension.ANGLE) for part in load.displacement[:3]]
+    return DeflectionData(
+        translation=vector(load.displacement[3:]) if known else None,
+        rotation=tuple(turn) if known else None,
+        largest=finite_or_none(load.deflection),
     )

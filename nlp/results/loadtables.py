@@ -21,6 +21,7 @@ def loading_tables(case: Case, data: LoadingData | None) -> Iterator[TextTable]:
     if data.loads is not None:
         yield _force_table(case, data.loads)
         yield from _constraint_table(case, data.loads)
+        yield from _deflection_table(case, data.loads)
     if data.speeds is not None:
         size = max((each.value or 0.0 for each in data.speeds), default=0.0)
         rows = [(*_pose(each), each.actuator, _text(each.value, size), each.unit) for each in data.speeds]
@@ -62,6 +63,26 @@ def _constraint_table(case: Case, loads: Sequence[LoadData]) -> Iterator[TextTab
         parts += [f"m_{axis}\n{case.units.label(Dimension.TORQUE)}" for axis in "xyz"]
         headers = (*_pose_header(loads), "load", "limb", *parts)
         yield TextTable(headers, tuple(rows), "constraints", "wrenches of the limbs' constraints on the platform")
+
+
+def _deflection_table(case: Case, loads: Sequence[LoadData]) -> Iterator[TextTable]:
+    """Yield the platform's displacement under every load, where the actuators' stiffness is known."""
+    rows = []
+    for load in loads:
+        if load.deflection is None:
+            continue
+        found, none = load.deflection, ("none",) * 3
+        sizes = [max(map(abs, part), default=0.0) for part in (found.translation or (), found.rotation or ())]
+        parts = [
+            none if part is None else tuple(number(each, size, digits=5, signed=True) for each in part)
+            for part, size in zip((found.translation, found.rotation), sizes, strict=True)
+        ]
+        rows.append((*_pose(load), load.name, *parts[0], _text(found.largest), *parts[1]))
+    if rows:
+        names = [f"{name}\n{case.units.label(Dimension.LENGTH)}" for name in ("x", "y", "z", "at most")]
+        names += [f"about {name}\n{case.units.label(Dimension.ANGLE)}" for name in "xyz"]
+        title = "displacement of the platform as its actuators give way"
+        yield TextTable((*_pose_header(loads), "load", *names), tuple(rows), "deflections", title)
 
 
 def _text(value: float | None, size: float = 0.0, *, signed: bool = False) -> str:

@@ -177,6 +177,7 @@ def table_names(case: Case, *, at_point: bool) -> tuple[str, ...]:
         names += [plural_name(name) for name in dict.fromkeys(measured)]
     if case.loading.loads:
         names.append("forces")
+        names += ["deflections"] if case.loading.stiffness is not None else []
     if case.loading.motion is not None:
         names.append("speeds")
     if case.model.generic is not None and (at_point or len(case.tasks) == 1):
