@@ -6,7 +6,8 @@ squares, which are smooth where a force changes its sense, and are what a search
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,7 +17,7 @@ from casadi import SX
 
 from ...models.statics import posed_statics
 from ..case.forces import PosedForces, forces_at
-from ..case.limits.constraint import Form
+from ..case.limits.constraint import BoundedConstraint, Call, Form
 from ..case.pose import Free
 from ..case.task import Sense
 from .epigraph import EpigraphBuilder, below_squared_level
@@ -28,6 +29,10 @@ from .sampling import starting_points
 _SIZE_POINTS = 32
 #: Upper bound of the level, as a multiple of the median of that size.
 _LEVEL_BOUND = 8.0
+
+
+#: End of the name of the square of a force in the other sense.
+OTHER_SENSE = ", other sense"
 
 
 class Measured(NamedTuple):
@@ -74,8 +79,30 @@ def squares_of(forces: PosedForces, measure: str) -> Iterator[Measured]:
             continue
         factor = forces.speeds[k] ** 2 if measure == "actuator_power" else SX(1)
         for each in forces.cases:
-            for sense, square in zip(("", " other sense"), each.squares, strict=False):
+            for sense, square in zip(("", OTHER_SENSE), each.squares, strict=False):
                 yield Measured(f"{name} load {each.case.name}{sense}", factor * square[k])
+
+
+def level_constraints(nlp: Nlp, forces: PosedForces, names: Collection[str], where: str) -> list[BoundedConstraint]:
+    """Return the constraints by which the level of a program bounds numbers of actuators at a further pose.
+
+    Args:
+        nlp: the program that minimises them.
+        forces: of the actuators at the pose.
+        names: of the numbers that are meant.
+        where: end of the names of the constraints.
+    """
+    epigraph, program = nlp.program.places.epigraph, nlp.program
+    if epigraph is None:
+        return []
+    found = []
+    for each in squares_of(forces, nlp.case.tasks[0].measure):
+        if each.name.removesuffix(OTHER_SENSE) in names:
+            inputs = ca.vertcat(program.p[epigraph.ceiling], program.x[epigraph.level], each.value)
+            call = Call(Form(below_squared_level), inputs)
+            one = replace(epigraph.constraints[0], name=f"{each.name}{where}", expression=call.value, call=call)
+            found.append(BoundedConstraint(one, 0.0, math.inf))
+    return found
 
 
 def _size(nlp: Nlp, values: list[SX]) -> float:

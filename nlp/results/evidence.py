@@ -14,6 +14,7 @@ from ..proof.certificate.certificate import Certificate
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
 from .jsondata import Absent, Inline, JsonObject, vector
+from .objective import ObjectiveData, certified_objective
 from .parts import HeadData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 
@@ -89,6 +90,7 @@ class CertifiedResult(JsonObject):
     Attributes:
         head: the case.
         certificate: of the one task, or of the program that combines several; null where there is no such program.
+        objective: what is optimised instead of F; absent for F.
         point: the best point known, by the names of the program's variables; null where there is none.
         tasks: each task by itself.
         notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
@@ -98,6 +100,7 @@ class CertifiedResult(JsonObject):
 
     head: Inline[HeadData]
     certificate: CertificateData | None
+    objective: Absent[ObjectiveData]
     point: Mapping[str, float] | None
     tasks: tuple[CertifiedTaskData, ...]
     notice: Absent[str]
@@ -110,6 +113,7 @@ def certified_of(certified: "Certified") -> CertifiedResult:
     return CertifiedResult(
         head=head_data(case),
         certificate=certificate_data(certified.certificate),
+        objective=certified_objective(certified),
         point=incumbent_data(certified.certificate),
         tasks=tuple(
             CertifiedTaskData(

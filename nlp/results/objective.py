@@ -1,5 +1,8 @@
 """What is optimised: F of a task, or the largest force, speed or power of the actuators; its unit and its words."""
 
+import math
+from typing import TYPE_CHECKING
+
 from ...models import frozen_array
 from ...models.statics import driven_joints
 from ..case.case import Case
@@ -8,6 +11,13 @@ from ..evidence.loads import PoseLoads, largest_of
 from ..proof.certificate.certificate import Certificate
 from ..units import objective_unit
 from .jsondata import Absent, JsonObject, finite_or_none
+
+if TYPE_CHECKING:
+    from ..proof.workspace.judge import Judgement
+    from ..solver.certified import Certified
+
+if TYPE_CHECKING:
+    pass
 
 
 class ObjectiveData(JsonObject):
@@ -48,6 +58,23 @@ def objective_data(case: Case, value: float | None, certificate: Certificate | N
         bound=bound,
         gap=None if bound is None or shown is None else shown - bound,
     )
+
+
+def certified_objective(certified: "Certified") -> ObjectiveData | None:
+    """Return the number of the actuators that a certificate bounds, proved over the workspace where there is one."""
+    certificate, solution = certified.certificate, certified.solution
+    if certificate is None:
+        return None
+    value = None if math.isnan(certificate.incumbent) else certificate.incumbent
+    if solution.workspace is not None and value is not None and solution.case.tasks[0].measure:
+        value = over_workspace(solution.case, solution.workspace.judgement)
+    return objective_data(solution.case, value, certificate)
+
+
+def over_workspace(case: Case, judged: "Judgement") -> float:
+    """Return a proven bound, for every pose of a workspace, of the number of the actuators that a case minimises."""
+    start = f"{case.tasks[0].measure}."
+    return max(abs(each.bound) for each in judged.extremes if each.key.startswith(start))
 
 
 def case_number(case: Case, value: float) -> float:

@@ -50,7 +50,9 @@ def head_data(case: Case) -> HeadData:
 
 def stated_pose_notice(case: Case) -> str | None:
     """Return the notice that limits over the workspace are taken at the stated pose alone; None for other cases."""
-    return None if case.workspace is None else case.workspace.stated_pose_notice or None
+    if case.workspace is None or case.tasks[0].measure:  # which is bounded from poses of the workspace
+        return None
+    return case.workspace.stated_pose_notice or None
 
 
 @cache

@@ -26,7 +26,7 @@ from .data import (
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data
 from .jsondata import finite_or_none, vector
-from .objective import case_number, objective_data
+from .objective import case_number, objective_data, over_workspace
 from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
@@ -53,12 +53,15 @@ def task_result(
     answer = solution.status.is_answer
     margins = () if state is None else margins_data(nlp, x, optimal=answer)
     solved = answer and state is not None
+    value = objective(nlp, x, state) if solved else math.nan
+    if solved and workspace is not None and nlp.case.tasks[0].measure:
+        value = over_workspace(nlp.case, workspace.judgement)
     return SolveResult.of(
         solution,
         head=head_data(nlp.case),
         sense=nlp.sense,
         F=case_number(nlp.case, objective(nlp, x, state)) if solved else None,
-        objective=objective_data(nlp.case, objective(nlp, x, state) if solved else None, certificate),
+        objective=objective_data(nlp.case, value if solved else None, certificate),
         reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
         relaxation=relaxation_data(nlp, solution.relaxation),
         robot=None if state is None else robot_data(nlp, x, state, task),

@@ -108,6 +108,7 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
     """Yield the proven bounds of a case."""
     several = len(result.tasks) > 1
     yield title_line(case)
+    yield from objective_lines(case)
     if result.notice is not None:
         yield Line(result.notice, label="note", tone=Tone.CAUTION)
     for task in result.tasks:

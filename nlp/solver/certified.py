@@ -24,8 +24,9 @@ from ..proof.statement.form import power_of
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
+from .pose_constraints import with_stated_limits
 from .solution import Answer, Solution
-from .solve import solve_programs
+from .solve import solve, solve_programs
 
 
 class OptionError(InputError):
@@ -129,7 +130,13 @@ def certify(
         InputError: the C kernel was not built.
     """
     options = CertifyOptions(gap, above, time_limit, jobs)
+    case = found.case if isinstance(found, Solution) else found
     with within(time_limit):
+        if case.tasks[0].measure and case.workspace is not None and case.workspace.has_limits:
+            if with_proof:
+                raise OptionError("proof: the poses of a workspace from which the bound follows are in no case file")
+            solution = found if isinstance(found, Solution) else solve(case, starts=starts, seed=seed, jobs=jobs)
+            return _certify_from_poses(solution, options, progress)
         return _certify(found, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=with_proof)
 
 
@@ -203,6 +210,27 @@ def _certify(
     certificate = certify_one(combined, case.method.value, writer)
     statement = replace(_combined_statement(case, combined), in_home_mode=certificate.nlp.in_home_mode)
     return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
+
+
+def _certify_from_poses(
+    solution: Solution, options: CertifyOptions, progress: Callable[[str], CertifyProgress] | None
+) -> Certified:
+    """Return a bound of a number of the actuators over a workspace: it is that at the poses of the exchange.
+
+    Limits at these poses are those of the case, which the exchange has tightened.
+    """
+    own = solution.outcomes[0].own
+    x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
+    certificate = certify_program(
+        with_stated_limits(own.nlp),
+        x,
+        claimed=claimed,
+        gap=options.gap,
+        above=options.above,
+        jobs=options.jobs,
+        progress=None if progress is None else progress(solution.case.tasks[0].name),
+    )
+    return Certified(solution, (certificate,), None, Statement(), None)
 
 
 def proof_of(certified: Certified, text: str) -> Proof:

@@ -27,6 +27,7 @@ from ..case.case import Case
 from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.joints import JointAngle
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ..program.actuators import level_constraints
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..proof.statement.machine import workspace_of_case
@@ -113,10 +114,11 @@ class _ClosedPose:
 
 
 class _PosedClaim(NamedTuple):
-    """A claim as constraints of a program, with the robot at its poses."""
+    """A claim as constraints of a program, and of its level where that is minimised, with the robot at its poses."""
 
     poses: tuple[_ClosedPose, ...]
     constraints: tuple[BoundedConstraint, ...]
+    of_level: tuple[BoundedConstraint, ...] = ()
 
 
 class PoseConstraints:
@@ -144,11 +146,16 @@ class PoseConstraints:
         nlp, program = self._nlp, self._nlp.program
         poses = [pose for claim in self._claims for pose in claim.poses]
         count = sum(len(each.variables) for each in poses)
+        of_level = [item for claim in self._claims for item in claim.of_level]
+        epigraph = program.places.epigraph
+        if epigraph is not None:
+            own = (*epigraph.constraints, *(item.constraint for item in of_level))
+            epigraph = replace(epigraph, constraints=own)
         wider = replace(
             program,
             variables=(*program.variables, *(item for each in poses for item in each.variables)),
             x=ca.vertcat(program.x, *[each.symbols for each in poses]),
-            places=replace(program.places, further=tuple(range(nlp.n, nlp.n + count))),
+            places=replace(program.places, further=tuple(range(nlp.n, nlp.n + count)), epigraph=epigraph),
         )
         wide = replace(
             nlp,
@@ -158,7 +165,8 @@ class PoseConstraints:
             start=frozen_vector([*nlp.start, *(value for each in poses for value in each.start)]),
         )
         equations = [item for each in poses for item in each.equations]
-        return wide.with_constraints([*equations, *(item for each in self._claims for item in each.constraints)])
+        limits = [item for each in self._claims for item in each.constraints]
+        return wide.with_constraints([*equations, *limits, *of_level])
 
     def added(self, design: Case, fresh: Sequence[BindingPose], x: FloatArray) -> list[BindingPose]:
         """Add further claims as constraints, and return those that are added.
@@ -185,7 +193,7 @@ class PoseConstraints:
                 continue
             values = self._values(claim, points)
             # Limits of one size on joints of different limbs repeat each other too.
-            key = repr([(item.lower, item.upper) for item in claim.constraints])
+            key = repr([(item.lower, item.upper) for item in (*claim.constraints, *claim.of_level)])
             if not any(key == one and _are_alike(values, other) for one, other in known):
                 known.append((key, values))
                 kept.append(each)
@@ -204,7 +212,10 @@ class PoseConstraints:
         symbols = ca.vertcat(SX(0, 1), *[each.symbols for each in claim.poses])
         equations, values = (
             ca.vertcat(SX(0, 1), *[item.constraint.expression for item in items])
-            for items in ([item for each in claim.poses for item in each.equations], claim.constraints)
+            for items in (
+                [item for each in claim.poses for item in each.equations],
+                (*claim.constraints, *claim.of_level),
+            )
         )
         outputs = [ca.densify(each) for each in (equations, ca.jacobian(equations, symbols), values)]
         function, found = ca.Function("claim", [program.x, program.p, symbols], outputs), list[FloatArray]()
@@ -228,7 +239,12 @@ class PoseConstraints:
                 return None
             poses.append(closed)
         found = tuple(self._constraints(binding, poses, x, where))
-        return _PosedClaim(tuple(poses), found) if found else None
+        of_level: tuple[BoundedConstraint, ...] = ()
+        measure = self._case.tasks[0].measure
+        if measure and binding.name.startswith(f"{measure} actuator "):
+            posed = PosedRobot(poses[0].model, poses[0].robot, (), where, self._case.loading)
+            of_level = tuple(level_constraints(self._nlp, posed.forces, (binding.name,), where))
+        return _PosedClaim(tuple(poses), found, of_level) if found or of_level else None
 
     def _closed_pose(
         self, pose: PoseNumbers, errors: FloatArray | None, problem: Problem, x: FloatArray, where: str
@@ -350,6 +366,16 @@ class PoseConstraints:
                 for item in family.pair(0, 1):
                     if name == f"{item.constraint.name.partition(' ')[0]} limb {leg.name}":
                         yield BoundedConstraint(replace(item.constraint, name=name), item.lower, item.upper)
+
+
+def with_stated_limits(nlp: Nlp) -> Nlp:
+    """Return a program with the limits of the case in the place of tighter ones."""
+    stated = [each.stated for each in nlp.program.constraints]
+    lower, upper = (
+        [own if each is None else each[k] for each, own in zip(stated, bounds, strict=True)]
+        for k, bounds in enumerate((nlp.g_lower.tolist(), nlp.g_upper.tolist()))
+    )
+    return replace(nlp, g_lower=frozen_vector(lower), g_upper=frozen_vector(upper))
 
 
 def _rows(robot: RobotInstance, length: float) -> SX:

@@ -20,6 +20,8 @@ import numpy as np
 from ...models import FloatArray
 from ...models.joints.closedform import closed_form
 from ..case.case import Case
+from ..case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
+from ..case.limits.limits import Limits
 from ..case.task import Sense
 from ..errors import CaseError
 from ..interruption import is_requested, one_call
@@ -38,6 +40,8 @@ from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
 
 #: Gap of the proofs: several of them fit between a limit of the constraints and that of the case.
 _GAP = 2e-4
+#: Part of a minimised level by which the same number over the workspace may be larger.
+LEVEL_ROOM = 1e-3
 #: Reason for ranks that are not judged.
 _UNREACHED = "a limb does not reach every pose, so that J is not judged"
 #: Largest number of exchanges.
@@ -97,7 +101,7 @@ def solve_over_workspace(
     found = solve_one(nlp, ())
     while found.status.is_answer:
         design = design_of(case, nlp, found.x)
-        judged = _judged(design)
+        judged = _judged(_with_objective(design, found.F))
         first = judged if first is None else first
         faults = _faults(judged)
         history.append((found.F, len(faults)))
@@ -111,6 +115,19 @@ def solve_over_workspace(
         nlp = constraints.program
         found = solve_one(nlp, [np.concatenate([found.x, nlp.start[len(found.x) :]])])
     return found, None
+
+
+def _with_objective(design: Case, level: float) -> Case:
+    """Return a design with a limit on the numbers of its actuators that are minimised: the level and a little more."""
+    measure = design.tasks[0].measure
+    kinds = {each.key: each for each in (ActuatorForce, ActuatorSpeed, ActuatorPower)}
+    if not measure:
+        return design
+    own = next((each for each in design.limits if each.name == measure), None)
+    most = level * (1 + LEVEL_ROOM)
+    ends = {end: getattr(own, end) for end in ("min", "max") if getattr(own, end, None) is not None}
+    limit = kinds[measure](**{**ends, "max": min(most, ends.get("max", most))})
+    return replace(design, limits=Limits(*(each for each in design.limits if each is not own), limit))
 
 
 def _judged(case: Case) -> Judgement:
