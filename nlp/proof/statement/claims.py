@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
@@ -15,6 +16,7 @@ from ....models import Dimension
 from ...case.case import Case
 from ...case.limits.clearance import LegClearance
 from ...case.limits.constraint import LENGTH, NUMBER, SQUARED_LENGTH, Reading
+from ...case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from ...case.limits.legs import Actuator, LegLength
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...case.task import Sense
@@ -27,8 +29,10 @@ REGULAR, CONSTRAINTS = "regular", "constraints regular"
 REACH = "reach"
 #: Names of the measures that are no quantities of a robot.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
+#: Names of the measures that are coordinates of actuators.
+ACTUATED = ("actuator_length", "actuator_angle")
 #: Keys of limits whose expressions are not searched as they are, because another search has better bounds.
-_OWN_SEARCHES = (LegClearance.key, *SPECTRAL)
+_OWN_SEARCHES = (LegClearance.key, *SPECTRAL, ActuatorForce.key, ActuatorSpeed.key, ActuatorPower.key)
 
 
 class ClaimKind(enum.Enum):
@@ -40,6 +44,34 @@ class ClaimKind(enum.Enum):
     CLEARANCE = "distance between two legs"
     SPECTRUM = "smallest singular value of J, or its condition number"
     ERROR = "error of the pose"
+    MOTOR = "force, speed or power of an actuator"
+
+
+class MotorNumber(enum.Enum):
+    """A number of an actuator; each value is the word in results."""
+
+    COORDINATE = "coordinate"
+    FORCE = "force"
+    SPEED = "speed"
+    POWER = "power"
+
+
+class Motor(NamedTuple):
+    """A number of an actuator.
+
+    Attributes:
+        number: the number.
+        place: index of the actuator.
+        actuator: its name.
+        load: name of the load case; empty for a number that depends on none.
+        is_backwards: whether a power is that of forces below 0.
+    """
+
+    number: MotorNumber = MotorNumber.FORCE
+    place: int = 0
+    actuator: str = ""
+    load: str = ""
+    is_backwards: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +89,7 @@ class Claim:
         legs: index of the leg whose length, or lengths, the number is; of the two legs of a clearance; else empty.
         weights: of the longest and of the shortest length of this leg, where they are combined.
         length: by which moments are divided in a spectrum, length.
+        motor: the actuator and its number, of claims about motors.
         uncovered: reason for a claim about the exact machine where others are meant; else empty.
     """
 
@@ -70,6 +103,7 @@ class Claim:
     legs: tuple[int, ...] = ()
     weights: tuple[float, float] = (0.0, 0.0)
     length: float = 1.0
+    motor: Motor | None = None
     uncovered: str = ""
 
     @property
@@ -184,7 +218,10 @@ def _of_legs(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
 def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
     """Yield the smallest and the largest value of measures of the robot, at each of their owners."""
     known = {quantity.name: k for k, quantity in enumerate(layout.case.model.quantities)}
-    for name in dict.fromkeys(names):
+    # Loads and motions ask for the ranges of the actuators too.
+    loading = layout.case.loading
+    own = [name for name in ACTUATED if name in known] if loading.loads or loading.motion else []
+    for name in dict.fromkeys((*names, *own)):
         if name == LegLength.key and layout.robots[0].legs:
             continue  # among the claims already
         if name not in known:

@@ -22,7 +22,7 @@ from .numbers.bound_search import Minimum
 from .numbers.extremes import GAP, Extreme, extreme_of, prove_extreme
 from .numbers.machines import Machines
 from .numbers.pose_error import pose_errors
-from .numbers.searched import Subject, searched_extremes
+from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
 from .robot.pose_box import pose_box
@@ -114,7 +114,7 @@ def judge_workspace(
             search takes at most half of what is left.
         jobs: threads.
         with_limits: whether numbers are bounded at all, and not regularity alone.
-        with_objective: whether F of each task is bounded.
+        with_objective: whether F of each task is bounded, and numbers of actuators without a limit are.
         leg_error: largest error of a leg's length, length. With it, or with a tolerance of the case for joint centres,
             the errors of the platform's pose are bounded, where F is.
         until_fault: whether the work ends at the first rank or limit that is not proved.
@@ -208,6 +208,7 @@ class _Numbers:
         self.found, strokes = whole[:count], whole[count:]
         yield from strokes
         yield from searched_extremes(subject, self.quantities, gap=self.gap, paper=self.paper)
+        yield from motor_extremes(subject, with_all=self.with_objective, show=self.progress)
         if has_straight_legs(self.case.model) and self.with_objective:
             yield from pose_errors(subject, self.leg_error, paper=self.paper)
 

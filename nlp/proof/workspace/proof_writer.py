@@ -103,6 +103,8 @@ class _Writer:
             raise ProofError(_AS_BUILT)
         if each.kind is ClaimKind.RANK:
             return self._rank(each.name)
+        if each.kind is ClaimKind.MOTOR:
+            raise ProofError(_NO_RULES)
         if each.label not in self.extremes:
             raise ProofError(_NOT_JUDGED)
         found = self.extremes[each.label]

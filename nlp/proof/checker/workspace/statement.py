@@ -29,6 +29,7 @@ from ...statement.claims import (
     searched_claims,
 )
 from ...statement.machine import Legs, legs_of
+from ...statement.motors import motor_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
 from ..premises import exact
@@ -151,7 +152,7 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
     every = [*(Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in ranks), *robot.reaches, *claims]
-    every += [*length_claims(case), *searched_claims(case, quantities)]
+    every += [*length_claims(case), *searched_claims(case, quantities), *motor_claims(case)]
     if robot.legs is None:
         return [each for each in every if each.kind is not ClaimKind.SPECTRUM]
     return [*every, *(ERRORS if leg_error_of(case, leg_error) > 0 else ())]

@@ -21,7 +21,7 @@ from ....program.nlp import Nlp
 from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
-from ...statement.claims import Claim
+from ...statement.claims import Claim, Motor
 from ...statement.machine import JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers
@@ -63,6 +63,7 @@ class Extreme:
         seconds: wall time.
         reason: for an open outcome; else empty.
         errors: of the joint centres of the machine that reaches the value; None for the exact machine.
+        motor: the actuator and its number, of claims about motors.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Extreme:
     seconds: float
     reason: str
     errors: JointErrors | None = None
+    motor: Motor | None = None
 
     @property
     def fails(self) -> bool:
@@ -123,6 +125,7 @@ def extreme_of(
         seconds=found.seconds,
         reason=reason if outcome is Outcome.OPEN else "",
         errors=errors,
+        motor=claim.motor,
     )
 
 

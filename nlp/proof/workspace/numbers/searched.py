@@ -1,9 +1,10 @@
-"""Branch and bound for singular values and condition numbers of J, and for the clearance of legs."""
+"""Branch and bound for singular values and condition numbers of J, clearances of legs, and numbers of actuators."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -16,11 +17,13 @@ from ....case.task import Sense
 from ....errors import UncoveredError
 from ...statement.claims import Claim, ClaimKind, searched_claims
 from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
+from ...statement.motors import motor_claims
 from ..robot.posed_robot import NotJudgedError, Problem
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
 from .extremes import Extreme, extreme_of, goal_of
 from .jacobian_numbers import SingularValues, change_of_rows
+from .motors import Motors
 
 if TYPE_CHECKING:
     from ..paper_record import PaperRecord
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 _NEAR_ZERO = 0.1
 #: Reason for a measure of which nothing is known of every machine.
 _TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
+#: Gap of numbers of actuators as a part of the largest size of the same number.
+MOTOR_GAP = 0.01
 #: Number of poses at which the width of a bound over machines is taken, and as many near corners.
 _POINTS, _SEED = 64, 0
 
@@ -129,18 +134,68 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
     return extreme_of(claim, found, problem.box.pose(y), errors=errors)
 
 
+def motor_extremes(
+    subject: Subject, *, with_all: bool = True, show: Callable[[str, int, int], None] | None = None
+) -> Iterator[Extreme]:
+    """Yield the extremes of :func:`~.motors.motor_claims`, those of an actuator and a load by one search.
+
+    Args:
+        subject: the robot.
+        with_all: whether numbers without a limit are among them.
+        show: called before each search with the name of a number, how many are done, and how many there are.
+    """
+    claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
+    done = 0
+    for _, group in itertools.groupby(claims, lambda claim: claim.motor and (claim.motor.place, claim.motor.load)):
+        own = list(group)
+        if show is not None:
+            show(own[0].name, done, len(claims))
+        yield from _motor_answers(subject, own)
+        done += len(own)
+
+
+def _motor_answers(subject: Subject, claims: Sequence[Claim]) -> Iterator[Extreme]:
+    """Yield the extremes of numbers of an actuator, each to a part of the largest size of its kind at some poses."""
+    try:
+        if subject.machines is None:
+            raise NotJudgedError(subject.reason)
+        number, problem = Motors(subject.machines, subject.case, claims), subject.machines.problem
+        z = np.tile(subject.machines.start, (2 * _POINTS, 1))
+        z[:, : len(problem.free)] = _points(problem)[:, list(problem.free)]
+        values = np.nan_to_num(number.values(number.closed(z)), posinf=0.0, neginf=0.0)
+        kinds = [claim.motor and claim.motor.number for claim in claims]
+        sizes = np.array([np.abs(values[:, [other is kind for other in kinds]]).max() for kind in kinds])
+        allowed = MOTOR_GAP * sizes
+        if subject.machines.names and not problem.dependent:
+            z = z[:, : len(problem.start)]
+            allowed = allowed + np.nan_to_num(values - number.bounds(z, z), posinf=0.0).max(axis=0)
+        goals = [goal_of(claim, gap, is_enough=False) for claim, gap in zip(claims, allowed.tolist(), strict=True)]
+        every = smallest_values(number, goals)
+    except (UncoveredError, NotJudgedError) as error:
+        every = [Minimum(reason=str(error))] * len(claims)
+    for claim, found in zip(claims, every, strict=True):
+        is_known = math.isfinite(found.value)
+        pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
+        yield extreme_of(claim, found, pose)
+
+
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:
     """Return the gap of a number without a limit: wider by how far the bound at a pose is from the worst machine there.
 
     A bound of the change of J is wider than its change in any one machine, and no smaller boxes make it less wide. The
     most at a few poses is taken.
     """
-    problem, box = number.problem, number.problem.box
+    problem = number.problem
     allowed = gap * (abs(float(number.values(problem.start[None])[0, 0])) or 1.0)
     if not subject.case.joint_centre_tolerance or problem.dependent:
         return allowed
-    rng = np.random.default_rng(_SEED)
-    points = box.random(_POINTS, rng)
-    points = np.concatenate([points, box.clipped(np.where(rng.uniform(size=points.shape) < 0.5, box.lower, box.upper))])
-    z = points[:, list(problem.free)]
+    z = _points(problem)[:, list(problem.free)]
     return allowed + float(np.nanmax(number.values(problem.exact(z)) - number.bounds(z, z), initial=0.0))
+
+
+def _points(problem: Problem) -> FloatArray:
+    """Return random poses (P, 6) of a workspace, and as many near its corners."""
+    rng, box = np.random.default_rng(_SEED), problem.box
+    points = box.random(_POINTS, rng)
+    corners = box.clipped(np.where(rng.uniform(size=points.shape) < 0.5, box.lower, box.upper))
+    return np.concatenate([points, corners])

@@ -215,6 +215,19 @@ class PosedModel:
         """The matrix with free actuators."""
         return ca.sparsify(self.plain(free_matrix(self.limbs)))
 
+    @property
+    def driven_rows(self) -> tuple[SX, SX]:
+        """A (m, n) and D (m, a) with ``A y = D u`` for the rates u of actuators, and the platform's twist first in y.
+
+        The actuators of a robot without given ones are its legs, whose rates are those of its rows of forces.
+        """
+        limbs = self.limbs
+        if limbs.actuators:
+            whole = self.polynomial(_matrix(replace(limbs, loops=()), limbs.actuators))
+            return whole[:, : -len(limbs.actuators)], -whole[:, -len(limbs.actuators) :]
+        legs = [k for k, row in enumerate(limbs.wrenches) if row.kind is WrenchKind.FORCE]
+        return self.scaled.rows, ca.diag(self.scaled.sizes)[:, legs]
+
     @cached_property
     def scaled(self) -> ScaledRows:
         """J with moments about the platform's origin divided by the length of the limbs."""

@@ -1,0 +1,214 @@
+"""Force, speed and power of an actuator over boxes of poses, for every load case.
+
+With ``A y = D u`` for the rates u of the actuators, the platform's motion by a unit rate of actuator k is ``x_k`` in
+the solution of ``A y_k = D_k``, and the actuator holds a load W with the force ``-(W . x_k)``, by virtual work. Of a
+robot without given actuators A has the rows of J times their sizes, and D the sizes of those of legs; else y has the
+platform's motion and the rates of passive joints, and D the screws of the actuators. Forms of second order of the
+solution are kept: what they leave is of third order in the widths of a box.
+
+Loads of any direction add the size of a velocity. All numbers are bounded from above; a smallest force from that of its
+opposite.
+
+Rotations about any axis lie in a ball, ``|r|^2 <= b``, so that a bound may have a multiple of ``b - |r|^2`` added.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .....models import FloatArray, rate_relations
+from .....models.arrays import values_at
+from .....models.statics import freedoms_of
+from ....case.case import Case
+from ....case.loads import Motion
+from ....case.task import Sense
+from ...enclosure.forms import Forms
+from ...statement.claims import Claim, Motor, MotorNumber
+from ..ranks.krawczyk import ROUNDING
+from ..robot.posed_robot import NotJudgedError, Problem
+from .bound_search import Bounds, Number
+from .quadratic_forms import Quadratics, solved
+
+#: Numbers of a matrix, times squared coordinates, above which forms of second order cost more than they save.
+_LARGE = 8000
+#: More than underflow can cost a sum.
+_TINY = 1e-290
+
+
+class _Part(NamedTuple):
+    """A part of a number: the force in a sense, upwards or that of its opposite, under a load; or the speed, None."""
+
+    sense: Sense | None = None
+    load: int = 0
+
+
+class Motors(Number):
+    """Forces, speed and powers of one actuator: smallest ones, and minus the largest ones.
+
+    Args:
+        problem: the design, or all machines that are meant.
+        case: with its loads and motions.
+        claims: the numbers, of one actuator.
+
+    Raises:
+        NotJudgedError: loops demand relations of the actuators' rates.
+    """
+
+    def __init__(self, problem: Problem, case: Case, claims: Sequence[Claim]) -> None:
+        posed, self._loading = problem.posed, case.loading
+        if rate_relations(case.model.actuators).shape[0]:
+            raise NotJudgedError("loops demand relations of its actuators' rates, for which there is no rule")
+        motor, R = claims[0].motor or Motor(), posed.turned[0]
+        self._actuator, self._length, self._is_six = motor.place, problem.length, freedoms_of(case.model) == 6
+        self._numbers = [_parts_of(case, claim) for claim in claims]
+        self._parts = list(dict.fromkeys(itertools.chain(*self._numbers)))
+        A, D = posed.driven_rows
+        moments = SX(3, 0)
+        if not case.model.actuators and self._is_six:
+            # A leg's speed follows from its row, and its force from its own column.
+            row = [each.limb for each in posed.limbs.wrenches].index(motor.actuator)
+            moments, D = posed.scaled.jacobian[row, 3:].T, D[:, row]
+        self._column = 0 if D.shape[1] == 1 else self._actuator
+        free, loading = problem.free, self._loading
+        is_ball = math.isfinite(problem.box.ball)
+        turn = [problem.z[j] for j, k in enumerate(free) if k >= 3 and is_ball]
+        arms = [R @ SX([float(part) for part in each.point]) for each in loading.loads]
+        loads = [each.wrench(R) for each in loading.cases]
+        scaled = [ca.vertcat(each[:3], each[3:] / problem.length) for each in loads]
+        parts = [A, D, moments, ca.horzcat(SX(3, 0), *arms), ca.horzcat(SX(6, 0), *scaled), ca.horzcat(SX(1, 0), *turn)]
+        parts = [ca.densify(each) for each in parts]
+        self._shapes = [each.shape for each in parts]
+        super().__init__(problem, ca.vertcat(SX(0, 1), *map(ca.vec, parts)), len(claims))
+        self._entries = ca.Function("entries", [problem.z], [self.entries])
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return the values (P, K) at closed points (P, n)."""
+        c = values_at(self._entries, z)[0][:, :, 0]
+        with np.errstate(all="ignore"):
+            found = self._bounded(self._matrices(Forms(c, np.zeros((*c.shape, 0)), np.zeros_like(c)), 0))[0]
+        return -self._of_claims([np.where(np.isfinite(each.r), each.c, np.nan)[0, 0] for each in found])
+
+    def over(self, forms: Forms, count: int) -> Bounds:
+        """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
+        matrices = self._matrices(forms, count)
+        with np.errstate(all="ignore"):
+            found, of = self._bounded(matrices)
+            upper = self._of_claims([self._upper(each, matrices[-1]) for each in found])
+            every = [_shares(each, of, count) for each in found]
+        shares = np.stack([every[self._parts.index(number[0])] for number in self._numbers])
+        return Bounds(np.where(np.isfinite(upper), -upper, -np.inf), shares.transpose(2, 0, 1))
+
+    def _of_claims(self, ends: Sequence[FloatArray]) -> FloatArray:
+        """Return the numbers (B, K), each the product of its parts at their largest, (B,) each."""
+        every = dict(zip(self._parts, ends, strict=True))
+        columns = []
+        for first, *others in self._numbers:
+            found = every[first]
+            for other in others:
+                # The power of a force below 0 counts as 0.
+                found = np.maximum(found, 0.0) * every[other]
+            columns.append(found)
+        return np.asarray(np.stack(columns, axis=1))
+
+    def _upper(self, of: Quadratics, turn: Quadratics) -> FloatArray:
+        """Return upper bounds (B,) of a number; rotations, if they are given, lie in the ball."""
+        upper, ball = of.upper()[0, 0], self.problem.box.ball
+        which = np.flatnonzero((turn.size**2).sum(axis=(0, 1)) > ball)
+        if not (which.size and of.q.shape[2] and turn.c.size):
+            return np.asarray(upper)
+        of, turn = of[..., which], turn[..., which]
+        inside = turn.by(turn).sums(1).times(-1.0)
+        inside = replace(inside, c=inside.c + ball, r=inside.r + ROUNDING * ball)
+        # The multiple with which the number does not change along r in the middle.
+        r, half = turn.c[0], turn.a[0]
+        slopes = (of.a[0, 0] * half / np.maximum((half**2).sum(axis=0), _TINY)).sum(axis=1)
+        factor = (slopes * r).sum(axis=0) / np.maximum(2 * (r**2).sum(axis=0), _TINY)
+        factor = np.where(np.isfinite(factor), np.maximum(factor, 0.0), 0.0)
+        upper[which] = np.fmin(upper[which], of.plus(inside.times(factor[None, None])).upper()[0, 0])
+        return np.asarray(upper)
+
+    def _matrices(self, forms: Forms, count: int) -> list[Quadratics]:
+        """Return A, D, moment of the leg, arms and wrenches of loads, and rotations, from forms of them."""
+        ends = np.cumsum([0, *(rows * columns for rows, columns in self._shapes)]).tolist()
+        errors = len(self.problem.of_errors) if count else 0
+        is_first = self._shapes[0][0] * self._shapes[0][1] * count**2 > _LARGE
+        return [
+            Quadratics.of(forms.part(slice(begin, end)), count, errors, shape, is_first=is_first)
+            for begin, end, shape in zip(ends, ends[1:], self._shapes, strict=False)
+        ]
+
+    def _bounded(self, matrices: Sequence[Quadratics]) -> tuple[list[Quadratics], FloatArray]:
+        """Return the parts that are bounded from above, (1, 1) each, and shares (t, B) of coordinates in their rest."""
+        A, D, moments, arms, wrenches, _ = matrices
+        solution, k = solved(A, D), self._column
+        every = solution.Y[:6]
+        x = every[:, k : k + 1]
+        found = []
+        for sense, load in self._parts:
+            if sense is None:
+                found.append(self._speed(every, moments))
+                continue
+            held = wrenches[:, load : load + 1].transposed.matmul(x).times(-sense.sign)
+            found.append(held.plus(self._spread(load, x, arms)))
+        return found, solution.shares
+
+    def _spread(self, case: int, x: Quadratics, arms: Quadratics) -> Quadratics:
+        """Return the largest change (1, 1) of the force by the loads of any direction in a load case."""
+        found, turned = x[:1].times(0.0), x[3:]
+        for load, _ in self._loading.cases[case].parts:
+            k = self._loading.loads.index(load)
+            if load.any_force:
+                arm = arms[:, k : k + 1].skew().times(-1 / self._length)
+                found = found.plus(x[:3].plus(arm.matmul(turned)).lengths().times(load.any_force))
+            if load.any_moment:
+                found = found.plus(turned.lengths().times(load.any_moment / self._length))
+        return found
+
+    def _speed(self, x: Quadratics, moments: Quadratics) -> Quadratics:
+        """Return the largest speed (1, 1), from the motions of the platform by all actuators, or from a leg's row."""
+        motion = self._loading.motion or Motion()
+        linear, angular = motion.linear, motion.angular * self._length
+        if moments.c.size:
+            # The force of a leg has unit size.
+            speed = moments.lengths().times(angular)
+            return replace(speed, c=speed.c + linear, r=speed.r + ROUNDING * linear)
+        if self._is_six:
+            eye = np.broadcast_to(np.eye(6)[:, :, None], x.c.shape)
+            rates = solved(x, Quadratics(eye, 0 * x.a, 0 * x.q, 0 * x.r, x.errors)).Y.transposed
+        else:
+            length = motion.linear / angular if linear and angular else 1 / self._length
+            weighted = x.times(np.repeat([1.0, length**2], 3)[:, None, None])
+            rates = solved(x.transposed.matmul(weighted), weighted.transposed).Y.transposed
+        own = rates[:, self._actuator : self._actuator + 1]
+        moved, turned = (part.lengths() for part in (own[:3], own[3:]))
+        return moved.times(linear).plus(turned.times(angular))
+
+
+def _parts_of(case: Case, claim: Claim) -> list[_Part]:
+    """Return the parts of the number of a claim."""
+    motor, cases = claim.motor or Motor(), case.loading.cases
+    if motor.number is MotorNumber.SPEED:
+        return [_Part()]
+    load = next(k for k, each in enumerate(cases) if each.name == motor.load)
+    sense = Sense.MIN if motor.is_backwards else claim.sense
+    if not any(each.is_fixed for each, _ in cases[load].parts):
+        sense = Sense.MAX  # loads of any direction alone have forces of one size in both
+    return [_Part(sense, load), *([_Part()] if motor.number is MotorNumber.POWER else [])]
+
+
+def _shares(found: Quadratics, of: FloatArray, count: int) -> FloatArray:
+    """Return the shares (f, B) of coordinates in what a bound of a number (1, 1) may be too large by."""
+    shares = found.r[0, 0] * (of / np.maximum(of.sum(axis=0), _TINY))[:count] + 1e-200 * of[:count]
+    q = np.abs(found.q[0, 0])
+    rows, columns = np.triu_indices(count if len(q) else 0)
+    for i in range(count if len(q) else 0):
+        shares[i] += q[(rows == i) | (columns == i)].sum(axis=0)
+    return np.asarray(np.nan_to_num(shares, posinf=0.0))

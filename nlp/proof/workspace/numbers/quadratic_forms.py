@@ -1,0 +1,276 @@
+"""Forms of second order of many numbers over boxes: sums, products, sizes, and solutions of linear systems.
+
+A number is ``c + a.e + sum q_ij e_i e_j + [-r, r]`` with ``|e_i| <= 1`` for each coordinate of the pose, or, where no
+more than the first order is known, without products; then the last e may be errors of joint centres, vectors of at most
+unit size. What a product has of higher order is in r, and so is rounding. Boxes are the last axis of all arrays.
+
+The solution Y of ``A Y = D``, where A may have more rows than columns, is that of ``(I + E) Y = Z``, ``E = C A - I``,
+``Z = C D``, with C near a left inverse of A in the middle of the box. Let Y' be its terms up to the second order. The
+rest of Y is ``(I + E)^-1 (Z - (I + E) Y')`` with terms of third order, and at most V where ``(I - |E|) V`` is at least
+``|Z - (I + E) Y'|`` (an M-matrix).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from .....models import FloatArray
+from ...enclosure.forms import Forms, QuadraticModel
+from ..ranks.krawczyk import ROUNDING, by_centres
+from ..robot.closed_loops import inverses
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Part of C below which a singular value of the middle matrix is zero.
+_ZERO = 1e-14
+#: Part by which a computed bound of an inverse is made larger, so that it surely is one.
+_ROOM = 1e-6
+#: More than underflow can cost a sum or a product.
+_TINY = 1e-290
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratics:
+    """Matrices of numbers over B boxes.
+
+    Attributes:
+        c: (n, m, B) values at the centres.
+        a: (n, m, t, B) linear parts.
+        q: (n, m, p, B) factors of products of two of f coordinates, ``e_i e_j`` with i <= j, row by row; or p is 0.
+        r: (n, m, B) bounds of the rest; infinite where nothing is known.
+        errors: number of the last linear terms that are errors of joint centres.
+    """
+
+    c: FloatArray
+    a: FloatArray
+    q: FloatArray
+    r: FloatArray
+    errors: int = 0
+
+    @classmethod
+    def of(cls, forms: Forms, count: int, errors: int, shape: tuple[int, int], *, is_first: bool = False) -> Quadratics:
+        """Return the entries of a matrix from forms of them, column by column, in which squares are ``1/2 + 1/2 e``.
+
+        Args:
+            forms: of the entries.
+            count: number f of coordinates, the first terms.
+            errors: number of the last terms that are errors.
+            shape: of the matrix.
+            is_first: whether products of coordinates count as rest.
+        """
+        c, a, r = forms.c.T, forms.a.transpose(1, 2, 0), forms.r.T
+        end = a.shape[1] - errors
+        q = a[:, count:end]
+        if is_first:
+            r, q = (r + np.abs(q).sum(axis=1)) * (1 + ROUNDING), q[:, :0]
+        if q.shape[1]:
+            square = np.equal(*np.triu_indices(count))
+            q, c = q.copy(), c - q[:, square].sum(axis=1)
+            r = r + ROUNDING * (np.abs(c) + np.abs(q[:, square]).sum(axis=1))
+            q[:, square] *= 2.0
+        a = np.concatenate([a[:, :count], a[:, end:]], axis=1) if errors else a[:, :count]
+        rows, columns = shape
+        c, a, q, r = (each.reshape(columns, rows, *each.shape[1:]).swapaxes(0, 1) for each in (c, a, q, r))
+        return cls(c, a, q, r, errors)
+
+    @property
+    def parts(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """The four arrays."""
+        return self.c, self.a, self.q, self.r
+
+    @cached_property
+    def linear(self) -> FloatArray:
+        """Largest sizes (n, m, B) of the linear parts."""
+        t = self.a.shape[2] - self.errors
+        sizes = np.abs(self.a[:, :, :t]).sum(axis=2)
+        return np.asarray(sizes + by_centres(np.moveaxis(self.a[:, :, t:], 2, 3)) if self.errors else sizes)
+
+    @cached_property
+    def varying(self) -> FloatArray:
+        """Largest sizes (n, m, B) of linear parts and products together."""
+        return np.asarray(self.linear + np.abs(self.q).sum(axis=2)) if self.q.shape[2] else self.linear
+
+    @cached_property
+    def size(self) -> FloatArray:
+        """Largest sizes (n, m, B)."""
+        return np.asarray((np.abs(self.c) + self.varying + self.r) * (1 + ROUNDING))
+
+    def made(self, parts: Iterable[FloatArray]) -> Quadratics:
+        """Return forms of other four arrays."""
+        c, a, q, r = parts
+        return Quadratics(c, a, q, r, self.errors)
+
+    def __getitem__(self, which: slice | tuple[Any, ...]) -> Quadratics:
+        """Return some of the rows, of the columns, or, after an ellipsis, of the boxes."""
+        return self.made(each[which] for each in self.parts)
+
+    @property
+    def transposed(self) -> Quadratics:
+        """The transposed matrices."""
+        return self.made(each.swapaxes(0, 1) for each in self.parts)
+
+    def skew(self) -> Quadratics:
+        """Return the matrices (3, 3) of the cross products of vectors (3, 1)."""
+        found = []
+        for each in self.parts:
+            matrix = np.zeros((3, 3, *each.shape[2:]))
+            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                matrix[k, j], matrix[j, k] = each[i, 0], -each[i, 0]
+            found.append(matrix)
+        return self.made((*found[:3], np.abs(found[3])))
+
+    def sums(self, axis: int) -> Quadratics:
+        """Return the sums along an axis, 0 or 1, which stays with length 1."""
+        found = self.made(each.sum(axis=axis, keepdims=True) for each in self.parts)
+        return replace(found, r=found.r + ROUNDING * self.size.sum(axis=axis, keepdims=True))
+
+    def times(self, factors: FloatArray | float) -> Quadratics:
+        """Return the entries times factors that broadcast to (n, m, B)."""
+        by = np.atleast_3d(factors)
+        c, a, q = self.c * by, self.a * by[:, :, None], self.q * by[:, :, None]
+        return Quadratics(c, a, q, np.abs(by) * (self.r + ROUNDING * self.size), self.errors)
+
+    def plus(self, other: Quadratics) -> Quadratics:
+        """Return the sums of the entries."""
+        c, a, q, r = (one + two for one, two in zip(self.parts, other.parts, strict=True))
+        return Quadratics(c, a, q, r + ROUNDING * (self.size + other.size), self.errors)
+
+    def by(self, other: Quadratics) -> Quadratics:
+        """Return the products of the entries, which broadcast."""
+        (c, a, q, r), (d, b, p, s) = self.parts, other.parts
+        new = c[:, :, None] * b + a * d[:, :, None]
+        square = c[:, :, None] * p + q * d[:, :, None]
+        rest = np.abs(c) * s + np.abs(d) * r + (self.varying + r) * (other.varying + s)
+        if q.shape[2]:
+            _add_products(square, a, b)
+            rest = np.maximum(rest - self.linear * other.linear, 0.0)
+        return Quadratics(c * d, new, square, rest + 4 * ROUNDING * self.size * other.size + _TINY, self.errors)
+
+    def matmul(self, other: Quadratics) -> Quadratics:
+        """Return the matrix products, entry by entry of what is summed."""
+        (c, a, q, r), (d, b, p, s) = self.parts, other.parts
+        new, square = _contracted(a, d[:, :, None]), _contracted(q, d[:, :, None])
+        if c.any():
+            new += _contracted(c[:, :, None], b)
+            square += _contracted(c[:, :, None], p)
+        rest = _product(np.abs(c), s) + _product(r, np.abs(d)) + _product(self.varying + r, other.varying + s)
+        if q.shape[2]:
+            for k in range(c.shape[1]):
+                _add_products(square, a[:, k : k + 1], b[None, k])
+            rest = np.maximum(rest - _product(self.linear, other.linear), 0.0)
+        rest += 4 * ROUNDING * _product(self.size, other.size) + _TINY
+        return Quadratics(_product(c, d), new, square, rest, self.errors)
+
+    def lengths(self) -> Quadratics:
+        """Return forms (1, m) of which the upper ends are no smaller than the sizes of the columns.
+
+        A size is at most ``(g / t + t) / 2``, with its square g and any t, here the largest one.
+        """
+        g = self.by(self).sums(0)
+        with np.errstate(all="ignore"):
+            t = np.sqrt(np.maximum(g.upper(), _TINY))
+            found = _where(np.isfinite(t), g).times(np.where(np.isfinite(t), 0.5 / t, 0.0))
+        return replace(found, c=found.c + 0.5 * t, r=found.r + ROUNDING * t)
+
+    def upper(self) -> FloatArray:
+        """Return upper bounds (n, m, B); infinite where nothing is known."""
+        f, total = self.a.shape[2] - self.errors, self.c + self.r
+        if not self.q.shape[2]:
+            return np.asarray(total + self.varying + 4 * ROUNDING * self.size)
+        b, q = (np.moveaxis(each, 2, 0).reshape(each.shape[2], -1) for each in (self.a, self.q))
+        H, (rows, columns) = np.zeros((f, f, b.shape[1])), np.triu_indices(f)
+        H[rows, columns] += q
+        H[columns, rows] += q
+        across, rounding = np.abs(H).sum(axis=1), 16 * ROUNDING * self.size.ravel()
+        slopes = b - across - rounding, b + across + rounding
+        model = QuadraticModel(total.ravel(), b, H, np.zeros_like(b), *slopes, rounding)
+        return model.bound().reshape(total.shape)
+
+
+def _add_products(square: FloatArray, a: FloatArray, b: FloatArray) -> None:
+    """Add the products of two linear parts (n, m, f, B), which broadcast, to factors (n, m, p, B)."""
+    f, begin = a.shape[2], 0
+    for i in range(f):
+        end = begin + f - i
+        square[:, :, begin:end] += a[:, :, i : i + 1] * b[:, :, i:]
+        square[:, :, begin + 1 : end] += a[:, :, i + 1 :] * b[:, :, i : i + 1]
+        begin = end
+
+
+def _contracted(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return products of matrices of terms (n, k, t, B) and (k, m, t, B), of which one has a single term."""
+    return np.asarray(sum(one[:, k, None] * other[None, k] for k in range(one.shape[1])))
+
+
+def _product(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return products of matrices (n, k, B) and (k, m, B)."""
+    return np.asarray(np.einsum("nkb,kmb->nmb", one, other))
+
+
+class Solved(NamedTuple):
+    """Solutions of linear systems.
+
+    Attributes:
+        Y: (n, k), of infinite rest where nothing is known.
+        shares: (t, B) parts of the coordinates in how much the matrices vary.
+    """
+
+    Y: Quadratics
+    shares: FloatArray
+
+
+def solved(A: Quadratics, D: Quadratics) -> Solved:
+    """Return the solutions Y of ``A Y = D`` for matrices (m, n) of full column rank, where there are some."""
+    known = np.asarray(np.isfinite(A.size).all(axis=(0, 1)) & np.isfinite(D.size).all(axis=(0, 1)))
+    A, D, n = _where(known, A), _where(known, D), A.c.shape[1]
+    eye = np.eye(n)
+    with np.errstate(all="ignore"):
+        middle = np.where(known[:, None, None], A.c.transpose(2, 0, 1), np.eye(*A.c.shape[:2]))
+        inverse = np.linalg.inv if n == A.c.shape[0] and not _is_singular(middle) else np.linalg.pinv
+        C = np.ascontiguousarray(inverse(middle).transpose(1, 2, 0))
+        E, Z = _fixed_times(C, A), _fixed_times(C, D)
+        # What C A differs from I by in the middle is rest.
+        E = replace(E, c=np.zeros_like(E.c), r=E.r + np.abs(E.c - eye[:, :, None]) * (1 + ROUNDING))
+        # Up to the second order both sides of (I + E) Y = Z agree.
+        new, square = Z.a - _contracted(E.a, Z.c[:, :, None]), Z.q - _contracted(E.q, Z.c[:, :, None])
+        if square.shape[2]:
+            for k in range(n):
+                _add_products(square, -E.a[:, k : k + 1], new[None, k])
+        Y = Quadratics(Z.c, new, square, np.zeros_like(Z.r), Z.errors)
+        squares, others = Y.varying - Y.linear, E.varying - E.linear
+        left = Z.r + _product(E.r, Y.size) + _product(others, Y.varying)
+        left += _product(E.linear, squares if square.shape[2] else Y.linear)
+        left += 4 * ROUNDING * (Z.size + _product(E.size, Y.size)) + _TINY
+        right = np.concatenate([left, np.ones((n, 1, len(known)))], axis=1) * (1 + ROUNDING)
+        size = np.where(np.isfinite(E.size), E.size, 0.0)
+        V = inverses((eye[:, :, None] - size).transpose(2, 0, 1)).transpose(1, 2, 0)
+        V = _product(V, right) * (1 + _ROOM)
+        known &= (V >= 0).all(axis=(0, 1)) & (right <= (V - _product(size, V)) * (1 - ROUNDING)).all(axis=(0, 1))
+        rest = V[:, :-1]
+    rest = np.where(known & np.isfinite(rest) & np.isfinite(E.size).all(axis=(0, 1)), rest, np.inf)
+    return Solved(replace(Y, r=rest), (E.a**2).sum(axis=(0, 1)))
+
+
+def _is_singular(matrices: FloatArray) -> bool:
+    """Return whether one of some matrices has no inverse."""
+    return bool((np.linalg.slogdet(matrices)[0] == 0).any())
+
+
+def _fixed_times(factors: FloatArray, of: Quadratics) -> Quadratics:
+    """Return constant matrices (k, n, B) times forms (n, m)."""
+    size = np.abs(factors)
+    a, q = (np.einsum("knb,nmtb->kmtb", factors, each) for each in (of.a, of.q))
+    rest = _product(size, of.r) + 2 * ROUNDING * _product(size, of.size) + _TINY
+    return Quadratics(_product(factors, of.c), a, q, rest, of.errors)
+
+
+def _where(known: NDArray[np.bool_], of: Quadratics) -> Quadratics:
+    """Return the forms where they are known, and else zeros."""
+    each = known if known.ndim == 1 else known[:, :, None]
+    return of.made(np.where(each if part.ndim == 4 else known, part, 0.0) for part in of.parts)

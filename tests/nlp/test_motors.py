@@ -1,0 +1,298 @@
+"""Forces, speeds and powers of actuators over a workspace, held to statics of six legs in NumPy alone, and to poses."""
+
+import json
+import math
+import re
+import shlex
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import Array, turn_about
+from hexapods import case_of_legs
+from test_workspace_claims import at_home
+from typer.testing import CliRunner
+
+from screwsynth.models import three_upu
+from screwsynth.nlp import Case, Free, Rotation, Task, load_case
+from screwsynth.nlp.case.loads import Load, Loading, Motion
+from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
+from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.loads import loads_at
+from screwsynth.nlp.evidence.state import evaluate
+from screwsynth.nlp.program.formulation import formulate
+from screwsynth.nlp.proof.statement.claims import Motor
+from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.workspace.judge import judge_workspace
+from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
+from screwsynth.nlp.proof.workspace.verdict import Outcome
+
+#: Key of a number: what, of which actuator, under which load, and the sense.
+Numbers = dict[tuple[str, int, str, Sense], Extreme]
+
+
+def motors_of(case: Case, **options: float) -> Numbers:
+    """The extremes of the numbers of actuators."""
+    found = judge_workspace(case, jobs=1, **options)
+    every = [(each.motor, each) for each in found.extremes if each.motor is not None]
+    return {(_word(motor), motor.place, motor.load, each.sense): each for motor, each in every}
+
+
+def _word(motor: Motor) -> str:
+    return "braking" if motor.is_backwards else motor.number.value
+
+
+def columns_at(robot: Legs, position: Array, rotation: Array) -> tuple[Array, Array]:
+    """Rows (6, 6) of legs, direction, then moment about the platform's origin; and their inverse."""
+    arms = robot.platform @ rotation.T
+    spans = position + arms - robot.base
+    n = spans / np.linalg.norm(spans, axis=1, keepdims=True)
+    rows = np.hstack([n, np.cross(arms, n)])
+    return rows, np.linalg.inv(rows)
+
+
+def numbers_at(
+    robot: Legs, loading: Loading, position: Array, rotation: Array
+) -> dict[tuple[str, int, str, Sense], float]:
+    """The numbers of six legs at a pose: each leg's largest force in both senses, speed and power."""
+    rows, inverse = columns_at(robot, position, rotation)
+    found, motion = dict[tuple[str, int, str, Sense], float](), loading.motion
+    assert motion is not None
+    speeds = motion.linear + motion.angular * np.linalg.norm(rows[:, 3:], axis=1)
+    for load in loading.loads:
+        arm = rotation @ np.array(load.point)
+        force, moment = np.array(load.force), np.array(load.moment)
+        held = -inverse.T @ np.concatenate([force, moment + np.cross(arm, force)])
+        moved = inverse[:3] + np.cross(inverse[3:], arm, axisa=0).T
+        spread = load.any_force * np.linalg.norm(moved, axis=0) + load.any_moment * np.linalg.norm(inverse[3:], axis=0)
+        for k in range(6):
+            low, high = held[k] - spread[k], held[k] + spread[k]
+            found["force", k, load.name, Sense.MIN], found["force", k, load.name, Sense.MAX] = low, high
+            found["power", k, load.name, Sense.MAX] = max(high, 0.0) * speeds[k]
+            found["braking", k, load.name, Sense.MAX] = max(-low, 0.0) * speeds[k]
+    for k in range(6):
+        found["speed", k, "", Sense.MAX] = speeds[k]
+    return found
+
+
+LOADING = Loading(
+    (
+        Load("tool", (1.0, -2.0, -9.0), (0.1, 0.0, 0.3), point=(0.1, 0.0, 0.2), any_force=2.0, any_moment=0.2),
+        Load("any", any_force=3.0),
+    ),
+    Motion(0.4, 0.7),
+)
+_TURNS = (
+    Turns(TurnKind.ANY_AXIS, (Free(-0.25, 0.25),)),
+    Turns(TurnKind.ROLL_PITCH_YAW, (Free(-0.2, 0.2), Free(-0.1, 0.2), 0.1)),
+    Turns(TurnKind.AXIS, (Free(-0.4, 0.3),), (0.6, 0.0, 0.8)),
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_pose_of_six_legs_has_a_larger_number_than_its_bound(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    angles = np.radians([-5, 5, 115, 125, 235, 245])
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+    turned = np.roll(np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1), 1, axis=0)
+    turned = 0.5 * turned @ turn_about([0, 0, 1], math.radians(-60)).T
+    robot = Legs(ring + rng.normal(0, 0.05, (6, 3)), turned + rng.normal(0, 0.05, (6, 3)))
+    place = [Free(-0.15, 0.15), Free(-0.15, 0.1), Free(0.9, 1.1)]
+    turns = _TURNS[seed]
+    case = replace(case_of_legs(robot), loading=LOADING, workspace=Workspace(place, turns))
+    found = motors_of(case)
+    assert len(found) == 6 * (2 * 4 + 1)
+    assert all(each.outcome is Outcome.PROVED for each in found.values())
+
+    def rotation_at(turn: Array) -> Array:
+        if turns.kind is TurnKind.ANY_AXIS:
+            angle = float(np.linalg.norm(turn))
+            return turn_about(turn if angle else [0, 0, 1], angle)
+        if turns.kind is TurnKind.AXIS:
+            return turn_about(turns.axis, float(turn[0]))
+        x, y, z = (turn_about(axis, float(each)) for axis, each in zip(np.eye(3), turn, strict=True))
+        return np.asarray(z @ y @ x)
+
+    ends = [(each.lower, each.upper) if isinstance(each, Free) else (each, each) for each in (*place, *turns.angles)]
+    if turns.kind is TurnKind.ANY_AXIS:
+        ends += ends[-1:] * 2
+    lower, upper = np.array(ends).T
+
+    def moved(y: Array, step: float) -> Array:
+        new = np.clip(y + step * (upper - lower) * rng.normal(size=y.shape), lower, upper)
+        if turns.kind is TurnKind.ANY_AXIS:
+            new[3:] *= min(1.0, 0.25 / max(float(np.linalg.norm(new[3:])), 1e-9))
+        return np.asarray(new)
+
+    samples = [moved(rng.uniform(lower, upper), 0.0) for _ in range(200)]
+    values = [numbers_at(robot, LOADING, y[:3], rotation_at(y[3:])) for y in samples]
+    for key, each in found.items():
+        sign = each.sense.sign
+        best = max(range(len(samples)), key=lambda k: sign * values[k][key])
+        y, value, step = samples[best], values[best][key], 0.3
+        for _ in range(60):  # ascent
+            other = moved(y, step)
+            new = numbers_at(robot, LOADING, other[:3], rotation_at(other[3:]))[key]
+            y, value, step = (other, new, step) if sign * new > sign * value else (y, value, 0.9 * step)
+        assert sign * value <= sign * each.bound, key
+        assert each.pose is not None
+        at = numbers_at(robot, LOADING, np.asarray(each.pose.position), np.asarray(each.pose.rotation))[key]
+        assert at == pytest.approx(each.reached, rel=1e-9)
+        size = max(abs(found[*key[:3], sense].bound) for sense in Sense if (*key[:3], sense) in found)
+        size = (
+            max(found[word, *key[1:]].bound for word in ("power", "braking"))
+            if key[0] in ("power", "braking")
+            else size
+        )
+        assert sign * (each.bound - each.reached) <= 0.0101 * size
+        assert sign * (value - each.reached) <= 0.0101 * size
+
+
+@pytest.mark.parametrize("name", ["6-pus", "delta", "3-puu", "tricept", "planar-3-prr"])
+def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name: str) -> None:
+    """With six freedoms or fewer, with loops in closed form and others: forces and torques from J at single poses."""
+    load = Load("push", (1.0, 2.0, -10.0), point=(0.0, 0.1, 0.1), any_force=2.0)
+    case = replace(at_home(name, part=0.01, degrees=3), loading=Loading((load,), Motion(1.0, 0.5)))
+    found = motors_of(case)
+    assert all(each.outcome is Outcome.PROVED for each in found.values())
+
+    def at(position: list[float], rotation: Rotation) -> dict[tuple[str, int, str, Sense], float]:
+        nlp = formulate(replace(case, position=position, rotation=rotation, workspace=None))
+        x = closed_start(nlp)
+        (one,), speeds = loads_at(nlp, x, evaluate(nlp, x))
+        numbers = dict[tuple[str, int, str, Sense], float]()
+        for k, (low, high, speed) in enumerate(zip(one.smallest, one.largest, speeds, strict=True)):
+            numbers["force", k, "push", Sense.MIN], numbers["force", k, "push", Sense.MAX] = low, high
+            numbers["speed", k, "", Sense.MAX], numbers["power", k, "push", Sense.MAX] = speed, max(0.0, high) * speed
+            numbers["braking", k, "push", Sense.MAX] = max(0.0, -low) * speed
+        return numbers
+
+    assert case.workspace is not None
+    rng = np.random.default_rng(1)
+    for _ in range(6):
+        place = [rng.uniform(each.lower, each.upper) for each in case.workspace.position if isinstance(each, Free)]
+        if name.startswith("planar"):
+            place[2] = case.model.home[2]
+        shown = at(place, Rotation((0, 0, 1), 0.0))
+        assert set(shown) == set(found)
+        for key, each in found.items():
+            assert each.sense.sign * shown[key] <= each.sense.sign * each.bound, key
+    for key, each in found.items():
+        assert each.pose is not None
+        axis = [float(part) for part in each.pose.axis]
+        shown = at([float(part) for part in each.pose.position], Rotation(axis, float(each.pose.angle)))
+        assert shown[key] == pytest.approx(each.reached, rel=1e-7)
+        size = max(abs(found[*key[:3], sense].bound) for sense in Sense if (*key[:3], sense) in found)
+        size = (
+            max(found[word, *key[1:]].bound for word in ("power", "braking"))
+            if key[0] in ("power", "braking")
+            else size
+        )
+        assert each.sense.sign * (each.bound - each.reached) <= 0.011 * size
+
+
+def tripod(load: Load, radius: float, platform: float, height: float, **options: float) -> Numbers:
+    """A 3-UPU robot that translates, over a box of 0.2 m by 0.2 m by 0.1 m."""
+    place = [Free(-0.1, 0.1), Free(-0.1, 0.1), Free(height - 0.05, height + 0.05)]
+    workspace = Workspace(place, Turns(TurnKind.AXIS, (0.0,), (0, 0, 1)))
+    numbers = {"base_radius": radius, "platform_radius": platform}
+    case = Case(three_upu(axes="tsai"), numbers, [0, 0, height], [Task([0, 0, 0, 0, 0, 1])], workspace=workspace)
+    return motors_of(replace(case, loading=Loading((load,))), **options)
+
+
+def test_a_translating_tripod_has_the_published_largest_force() -> None:
+    """Prause and others: 8.08803 N is the largest of this robot, at a corner of the box."""
+    found = tripod(Load("load", (2.0, 2.0, -10.0)), 0.5, 0.12, 0.45)
+    largest = max(abs(each.reached) for each in found.values())
+    bound = max(abs(each.bound) for each in found.values())
+    assert largest == pytest.approx(8.08803, abs=1e-5)
+    assert largest <= bound <= 1.0101 * largest
+    d, w = 0.38, np.array([2.0, 2.0, -10.0])
+    grid = np.stack(np.meshgrid(*[np.linspace(-0.1, 0.1, 9)] * 2, np.linspace(0.4, 0.5, 9)), axis=-1).reshape(-1, 3)
+    for k in range(3):
+        e = np.array([math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0.0])
+        bracket = 2 * (w[2] * (grid @ e) - grid[:, 2] * (w @ e)) / d + w[2]
+        forces = -np.linalg.norm(grid - d * e, axis=1) * bracket / (3 * grid[:, 2])
+        low, high = (found["force", k, "load", sense] for sense in (Sense.MIN, Sense.MAX))
+        assert low.bound <= forces.min()
+        assert forces.max() <= high.bound
+        for each, extreme in ((low, forces.min()), (high, forces.max())):
+            assert abs(each.bound - extreme) <= 0.02 * largest
+
+
+def test_nothing_is_proved_where_a_force_has_no_bound() -> None:
+    """A robot whose base and platform have one radius is singular at every pose; another at some poses."""
+    found = tripod(Load("load", (2.0, 2.0, -10.0)), 0.3, 0.3, 0.45, time_limit=2.0)
+    assert all(each.outcome is Outcome.OPEN and math.isinf(each.bound) for each in found.values())
+    angles = np.radians([-5, 5, 115, 125, 235, 245])
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+    turns = Turns(TurnKind.AXIS, (Free(-2.0, 2.0),), (0, 0, 1))
+    case = case_of_legs(Legs(ring, 0.5 * ring))
+    workspace = Workspace([0.0, 0.0, 1.0], turns)  # singular with plates turned to each other by 90 degrees
+    case = replace(case, loading=Loading((Load("turn", moment=(0.0, 0.0, 1.0)),)), workspace=workspace)
+    found = motors_of(case, time_limit=3.0)
+    assert not any(each.outcome is Outcome.PROVED for each in found.values())
+
+
+_CASE = """
+[[load]]
+name = "push"
+point = [0, 0, 2]
+any = { force = 100 }
+[motion]
+linear = 10
+angular = 0.5
+"""
+
+
+def loaded(folder: Path, limits: str) -> Path:
+    """LinuxCNC's hexapod over a smaller box with a load, a motion and limits."""
+    text = find_case("hexapod-linuxcnc").read_text(encoding="utf-8")
+    text = re.sub(r"\[limits\]\n.*\n", f"[limits]\n{limits}\n", text)
+    text = text.replace("min = -5, max = 5", "min = -2, max = 2").replace("min = -20, max = 20", "min = -8, max = 8")
+    path = folder / "loaded.toml"
+    path.write_text(text + _CASE, encoding="utf-8")
+    return path
+
+
+def test_limits_on_actuators_are_proved_refuted_by_a_pose_that_evaluate_shows_and_left_open(tmp_path: Path) -> None:
+    plain = motors_of(load_case(str(loaded(tmp_path, ""))))
+    force = max(each.reached for (number, *_), each in plain.items() if number == "force")
+    wide = "actuator_force = {{ max = {0} }}\nactuator_speed = {{ max = 11 }}\nactuator_power.2- = {{ max = 2000 }}"
+    path = loaded(tmp_path, wide.format(1.003 * force))
+    found = judge_workspace(load_case(str(path)), jobs=1)
+    limited = [each for each in found.extremes if each.key]
+    assert found.is_proved
+    assert Counter(each.key for each in limited) == {
+        "actuator_force.max": 12,
+        "actuator_speed.max": 6,
+        "actuator_power.2-.max": 2,
+    }
+    assert not any(each.key for each in found.extremes if each.name.startswith("actuator_power actuator 1"))
+    # The gap of the numbers alone would leave a limit this near undecided.
+    assert max(abs(each.bound) for each in limited if each.key == "actuator_force.max") <= 1.003 * force * (1 + 1e-9)
+
+    tight = loaded(tmp_path, f"actuator_force = {{ min = -{2 * force}, max = {0.999 * force} }}")
+    ended = CliRunner().invoke(app, ["workspace", str(tight)])
+    assert ended.exit_code == 1
+    command = next(line for line in ended.stdout.splitlines() if "screwsynth evaluate" in line)
+    words = shlex.split(command[command.index("screwsynth evaluate") :])[1:]
+    worst = max(
+        (each for each in motors_of(load_case(str(tight))).values() if each.outcome is Outcome.REFUTED),
+        key=lambda each: each.reached,
+    )
+    shown = json.loads(CliRunner().invoke(app, [*words, "--json", "-"]).stdout)
+    (load,) = shown["loads"]
+    largest = max(load["actuators"], key=lambda each: each["largest"])
+    assert worst.motor is not None
+    assert largest["actuator"] == worst.motor.actuator
+    assert largest["largest"] == pytest.approx(worst.reached, rel=1e-9)
+    assert largest["largest"] > 0.999 * force
+
+    found = motors_of(load_case(str(loaded(tmp_path, wide.format(1.003 * force)))), time_limit=1e-4)
+    assert {each.outcome for each in found.values() if each.key} == {Outcome.OPEN}
