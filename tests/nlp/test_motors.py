@@ -164,7 +164,7 @@ def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name:
     def at(position: list[float], rotation: Rotation) -> dict[tuple[str, int, str, Sense], float]:
         nlp = formulate(replace(case, position=position, rotation=rotation, workspace=None))
         x = closed_start(nlp)
-        (one,), speeds = loads_at(nlp, x, evaluate(nlp, x))
+        (one,), speeds, _ = loads_at(nlp, x, evaluate(nlp, x))
         numbers = dict[tuple[str, int, str, Sense], float]()
         for k, (low, high, speed) in enumerate(zip(one.smallest, one.largest, speeds, strict=True)):
             numbers["force", k, "push", Sense.MIN], numbers["force", k, "push", Sense.MAX] = low, high
