@@ -235,6 +235,8 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
 def _of_tasks(layout: Layout) -> Iterator[Claim]:
     """Yield the smallest and the largest F of each task."""
     for j, task in enumerate(layout.case.tasks):
+        if task.measure:
+            continue  # F of its motion is not what the case is about
         name = "F" if len(layout.case.tasks) == 1 else f"F of {task.name}"
         for sense in (Sense.MIN, Sense.MAX):
             yield Claim(name, sense, layout.robots[0].F[j], Reading(Dimension.NUMBER))
