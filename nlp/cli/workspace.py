@@ -8,6 +8,7 @@ import typer
 
 from .options import (
     CaseName,
+    CsvFile,
     Jobs,
     JsonFile,
     LegError,
@@ -18,6 +19,7 @@ from .options import (
     console,
     number_option,
     read_settings,
+    write_csv,
     write_json,
 )
 from .progress import spinner
@@ -46,6 +48,7 @@ def workspace(
     proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
     jobs: Jobs = None,
     json_file: JsonFile = None,
+    csv_file: CsvFile = None,
     plot: Annotated[
         str | None,
         typer.Option("--plot", metavar="FILE", help="Draw slices of the workspace: a .png, .svg or .pdf file."),
@@ -72,7 +75,7 @@ def workspace(
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
     workspace_of_case(loaded)
-    files = Outputs(json=json_file, plot=plot, picture=picture, html=page, proof=proof)
+    files = Outputs(json=json_file, csv=csv_file, plot=plot, picture=picture, html=page, proof=proof)
     files.check(inputs)
     slices = _slices(loaded, files)
     judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs, record)
@@ -88,6 +91,11 @@ def workspace(
         return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
 
     write_json(json_file, result)
+    if csv_file is not None:
+        from ..results.text import TextTable
+        from ..results.workspacewording import workspace_summary
+
+        write_csv(csv_file, [each for each in workspace_summary(loaded, result) if isinstance(each, TextTable)], None)
     if plot is not None:
         from ..output.pictures.workspaces import slices_figure
 

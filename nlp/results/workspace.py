@@ -1,11 +1,14 @@
 """Verdicts on a workspace as a result: the types and their construction."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
+from ...models.statics import driven_joints
+from ..case.loads import NO_LOADING
 from ..case.task import Sense
+from ..proof.statement.claims import ACTUATED, MotorNumber
 from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.verdict import Outcome
 from ..units import Units
@@ -22,6 +25,9 @@ if TYPE_CHECKING:
     from ..proof.workspace.scale import Scale
     from ..proof.workspace.verdict import RankVerdict
     from ..solver.semi_infinite import WorkspaceProof
+
+#: Outcomes, the worst one last.
+_WORSE = (Outcome.PROVED, Outcome.OPEN, Outcome.REFUTED)
 
 
 class WorkspacePose(JsonObject):
@@ -128,6 +134,45 @@ class ExtremeData(JsonObject):
     machine: Absent[MachineData]
 
 
+class MotorEndData(JsonObject):
+    """The smallest or the largest value of a number of an actuator.
+
+    Attributes:
+        bound: proven: no pose has a smaller, or larger, value; null where nothing is proved.
+        reached: the smallest or largest value known; null without one.
+        outcome: of the limit, or, without one, of the gap.
+        limit: the limit; absent without one.
+        pose: at which the value is reached; null without one.
+    """
+
+    bound: float | None
+    reached: float | None
+    outcome: Outcome
+    limit: Absent[float]
+    pose: WorkspacePose | None
+
+
+class MotorData(JsonObject):
+    """A number of an actuator over the workspace.
+
+    Attributes:
+        actuator: its name.
+        number: its coordinate, the length of a leg for one; its force, or torque, positive in the sense of its rate;
+            its speed, or its power, the larger one of both senses of the force.
+        unit: of the values.
+        load: name of the loads; absent for a number that depends on none.
+        smallest: smallest value; absent of speeds and powers.
+        largest: largest value.
+    """
+
+    actuator: str
+    number: MotorNumber
+    unit: str
+    load: Absent[str]
+    smallest: Absent[MotorEndData]
+    largest: MotorEndData
+
+
 class ScaleData(JsonObject):
     """The largest factor by which the box of poses can grow about its centre with everything proved.
 
@@ -155,7 +200,8 @@ class WorkspaceResult(JsonObject):
         proved: whether J is regular at every pose, and every limit holds; numbers without a limit are information.
         regular: whether J has full rank at every pose.
         constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without.
-        extremes: smallest and largest values.
+        extremes: smallest and largest values; those of actuators under loads where they have a limit.
+        motors: numbers of actuators; absent for a case without loads and motions.
         scale: the largest box; absent where it was not asked for.
         versions: of the programs.
     """
@@ -167,6 +213,7 @@ class WorkspaceResult(JsonObject):
     regular: RegularData
     constraints: Absent[RegularData]
     extremes: tuple[ExtremeData, ...]
+    motors: Absent[tuple[MotorData, ...]]
     scale: Absent[ScaleData]
     versions: VersionsData
 
@@ -250,9 +297,54 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
         proved=judged.is_proved,
         regular=_regular_data(judged.regularity, case),
         constraints=None if judged.constraints is None else _regular_data(judged.constraints, case),
-        extremes=tuple(_extreme_data(each, case) for each in judged.extremes),
+        extremes=tuple(_extreme_data(each, case) for each in judged.extremes if each.motor is None or each.key),
+        motors=tuple(_motors(judged)) or None,
         scale=scale,
         versions=versions(),
+    )
+
+
+def _motors(judged: "Judgement") -> Iterator[MotorData]:
+    """Yield the numbers of each actuator, for a case with loads or motions."""
+    case = judged.case
+    if case.loading == NO_LOADING:
+        return
+    found: dict[tuple[MotorNumber, str, str], list[Extreme]] = {}
+    for each in judged.extremes:
+        if each.motor is not None:
+            found.setdefault((each.motor.number, each.motor.actuator, each.motor.load), []).append(each)
+    for joint in driven_joints(case.model):
+        names = [f"{measure} limb {joint.name}" for measure in ("leg_length", *ACTUATED)]
+        own = {each.sense: each for each in judged.extremes if each.name in names}
+        if len(own) == len(Sense):
+            found[MotorNumber.COORDINATE, joint.name, ""] = list(own.values())
+    order, names = list(MotorNumber), [joint.name for joint in driven_joints(case.model)]
+    for key in sorted(found, key=lambda key: (names.index(key[1]), order.index(key[0]))):
+        (what, actuator, load), every = key, found[key]
+        ends = {sense: [each for each in every if each.sense is sense] for sense in Sense}
+        yield MotorData(
+            actuator=actuator,
+            number=what,
+            unit=case.units.label(every[0].dimension),
+            load=load or None,
+            smallest=_motor_end(ends[Sense.MIN], case) if ends[Sense.MIN] else None,
+            largest=_motor_end(ends[Sense.MAX], case),
+        )
+
+
+def _motor_end(parts: "Sequence[Extreme]", case: "Case") -> MotorEndData:
+    """Return an end of a number of an actuator: the farthest of its parts, and the worst of their outcomes."""
+    every = [_extreme_data(each, case) for each in parts]
+    farthest = max(parts, key=lambda each: each.sense.sign * each.reached if math.isfinite(each.reached) else -math.inf)
+    shown = every[list(parts).index(farthest)]
+    bounds = [each.bound for each in every]
+    sign = farthest.sense.sign
+    return MotorEndData(
+        bound=None if None in bounds else sign * max(sign * each for each in bounds if each is not None),
+        reached=shown.reached,
+        outcome=max((each.outcome for each in every), key=_WORSE.index),
+        limit=shown.limit,
+        pose=shown.pose,
     )
 
 

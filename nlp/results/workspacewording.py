@@ -9,11 +9,13 @@ from ...models import Dimension
 from ..case.case import Case
 from ..case.pose import Free
 from ..case.task import Sense
+from ..proof.statement.claims import MotorNumber
 from ..proof.workspace.verdict import Outcome
 from .jointwording import triple
 from .rounding import TURNED, number, ordered
 from .text import Line, TextTable, Tone
 from .wording import title_line
+from .workspacemotors import TONES, ends_of_motor, motor_tables
 from .workspaceposes import seeing_lines
 
 if TYPE_CHECKING:
@@ -27,8 +29,6 @@ if TYPE_CHECKING:
         WorkspaceResult,
     )
 
-#: Tone of each outcome.
-TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: Tone.CAUTION}
 #: So many claims are in the digest.
 _TIGHTEST = 5
 _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
@@ -51,7 +51,11 @@ def verdict_words(result: WorkspaceResult) -> str:
     claims += [each.outcome for each in result.extremes if each.limit is not None]
     counts = ", ".join(f"{claims.count(each)} {each.value}" for each in _ORDER)
     words = "everything is proved for every pose" if result.proved else f"not everything is proved: {counts}"
+    ends = [
+        end for each in result.motors or () if each.number is not MotorNumber.COORDINATE for end in ends_of_motor(each)
+    ]
     shown = sum(each.limit is None and each.outcome is Outcome.OPEN for each in result.extremes)
+    shown += sum(each.limit is None and each.outcome is Outcome.OPEN for each in ends)
     if not shown:
         return words
     return f"{words}; {shown} number{' without a limit stays' if shown == 1 else 's without a limit stay'} open"
@@ -150,6 +154,7 @@ def workspace_summary(
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
     yield from _machine_lines(case, result.extremes)
+    yield from motor_tables(case, result.motors or ())
     yield from _tables(case, result.extremes)
 
 

@@ -1,5 +1,6 @@
 """Forces, speeds and powers of actuators over a workspace, held to statics of six legs in NumPy alone, and to poses."""
 
+import csv
 import json
 import math
 import re
@@ -31,6 +32,9 @@ from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.verdict import Outcome
+from screwsynth.nlp.results.workspace import workspace_of
+from screwsynth.nlp.results.workspacemotors import motor_tables
+from screwsynth.nlp.results.workspacewording import verdict_words
 
 #: Key of a number: what, of which actuator, under which load, and the sense.
 Numbers = dict[tuple[str, int, str, Sense], Extreme]
@@ -296,3 +300,69 @@ def test_limits_on_actuators_are_proved_refuted_by_a_pose_that_evaluate_shows_an
 
     found = motors_of(load_case(str(loaded(tmp_path, wide.format(1.003 * force)))), time_limit=1e-4)
     assert {each.outcome for each in found.values() if each.key} == {Outcome.OPEN}
+
+
+def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
+    path, files = loaded(tmp_path, "actuator_force = { min = -200, max = 100 }"), {}
+    for option in ("json", "csv", "html"):
+        files[option] = tmp_path / f"out.{option}"
+    asked = [word for option, file in files.items() for word in (f"--{option}", str(file))]
+    ended = CliRunner().invoke(app, ["workspace", str(path), *asked])
+    assert ended.exit_code == 0
+    result = json.loads(files["json"].read_text(encoding="utf-8"))
+    motors = result["motors"]
+    assert Counter((each["number"], each.get("load")) for each in motors) == {
+        ("coordinate", None): 6,
+        ("force", "push"): 6,
+        ("speed", None): 6,
+        ("power", "push"): 6,
+    }
+    by = {(each["actuator"], each["number"]): each for each in motors}
+    assert by["1-", "force"]["smallest"]["limit"] == -200
+    assert "smallest" not in by["1-", "speed"]
+    assert "limit" not in by["1-", "power"]["largest"]
+    # What has a limit is among the limits too, and nothing else of the motors.
+    names = [each["name"] for each in result["extremes"] if each["name"].startswith("actuator_")]
+    assert len(names) == 12
+    assert all(name.startswith("actuator_force actuator") for name in names)
+    lengths = {each["sense"]: each for each in result["extremes"] if each["name"] == "leg_length limb 1-"}
+    assert by["1-", "coordinate"]["smallest"]["bound"] == lengths["min"]["bound"]
+    rows = list(
+        csv.DictReader(files["csv"].read_text(encoding="utf-8").split("motors\n")[1].split("\n\n")[0].splitlines())
+    )
+    assert [row["actuator"] for row in rows] == ["1-", "1+", "2-", "2+", "3-", "3+"]
+    for row in rows:
+        own = {number: by[row["actuator"], number] for number in ("coordinate", "force", "speed", "power")}
+        shown = [
+            float(row[key]) for key in ("from, in", "to, in", "push, N", "pull, N", "speed, in/s", "power, N in/s")
+        ]
+        assert shown == pytest.approx(
+            [
+                own["coordinate"]["smallest"]["bound"],
+                own["coordinate"]["largest"]["bound"],
+                own["force"]["largest"]["bound"],
+                -own["force"]["smallest"]["bound"],
+                own["speed"]["largest"]["bound"],
+                own["power"]["largest"]["bound"],
+            ],
+            rel=1e-15,
+        )
+        assert row["outcome"] == "proved"
+        worst = (
+            max(own["force"]["largest"]["bound"], -own["force"]["smallest"]["bound"]) * own["speed"]["largest"]["bound"]
+        )
+        assert own["power"]["largest"]["bound"] <= worst
+    page = files["html"].read_text(encoding="utf-8")
+    assert 'id="workspace-motors"' in page
+    assert f"{by['2-', 'force']['largest']['bound']:.7g}" in page
+    assert "motors: what each actuator needs" in ended.stdout
+    plain = json.loads(CliRunner().invoke(app, ["workspace", "hexapod-linuxcnc", "--json", "-"]).stdout)
+    assert "motors" not in plain
+
+
+def test_a_numbers_bound_that_is_missing_is_said_in_the_sheet() -> None:
+    found = judge_workspace(replace(at_home("3-rrs"), loading=Loading((Load("w", (0.0, 0.0, -1.0)),))), time_limit=1e-4)
+    (table,) = motor_tables(found.case, workspace_of(found).motors or ())
+    assert [header.partition("\n")[0] for header in table.headers][3:5] == ["largest torque", "backwards"]
+    assert {str(row[3]) for row in table.rows} == {"no bound"}
+    assert "without a limit stay open" in verdict_words(workspace_of(found))
