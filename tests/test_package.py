@@ -247,7 +247,8 @@ def test_the_limits_of_the_documentation_are_valid() -> None:
     of_joints = {key for kind in LIMIT_TYPES if kind.needs_joints for key in kind.fields()}
     for key in of_joints:
         del written["limits"][key]
-    case = screwsynth.nlp.case_from_tables(starter | written, name="shown", source="limits.md")
+    elastic = {"robot": starter["robot"] | {"actuator_stiffness": 1000.0}}
+    case = screwsynth.nlp.case_from_tables(starter | written | elastic, name="shown", source="limits.md")
     assert {type(limit) for limit in case.limits} == {
         kind for kind in LIMIT_TYPES if kind.key and not kind.needs_joints
     }
