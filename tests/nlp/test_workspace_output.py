@@ -275,7 +275,10 @@ def test_the_shipped_hexapod_is_proved(cli: Run) -> None:
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--html", "-", "--json", "-"], "standard output can take one of --json -, --csv -, --html - and --proof - only"),
+        (
+            ["--html", "-", "--json", "-"],
+            "standard output can take one of --json -, --csv -, --html - and --proof - only",
+        ),
         (["--picture", "a.txt"], "a.txt"),
         (["--html", "nowhere/page.html"], "nowhere/page.html"),
     ],

@@ -24,6 +24,7 @@ from ...errors import EvaluationError
 from ...evidence.kkt import close_equations
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
+from .loads import DrawnForces, drawn_forces
 from .posture import Linkage, Posture, state_at_pose
 
 #: The path around the axis: turns at most, part of the axis at most, and radius in parts of the robot's size.
@@ -101,6 +102,7 @@ class Drawing:
         motion: the task.
         free: motions that no limb resists.
         reference: posture at the start; None where it is the one shown.
+        forces: arrows of the first load, and of the forces that hold it; None without loads.
         size: half of the diagonal of the robot's bounding box, length.
         headline: the result in one line.
         is_answer: whether the solve answers the case, rather than ending at some point.
@@ -117,6 +119,7 @@ class Drawing:
     motion: Motion | None = None
     free: tuple[Motion, ...] = ()
     reference: Posture | None = None
+    forces: DrawnForces | None = None
     size: float = 1.0
     headline: str = ""
     is_answer: bool = True
@@ -222,10 +225,12 @@ def drawing_of(
         rows=tuple(
             LimbRate(row.limb, row.kind, row.member, float(rate), float(share), float(driving))
             for row, rate, share, driving in zip(model.rows, rates, shares, posture.driving, strict=True)
+            if chosen.is_stated
         ),
         motion=_motion_of_twist(twist, drawing, chosen.name) if chosen.is_stated else None,
         free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),
         reference=_reference(nlp, posture, drawing.size, pose),
+        forces=drawn_forces(nlp, x, state, pose, drawing.size),
         headline=headline,
         is_answer=is_answer,
     )

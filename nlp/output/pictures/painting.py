@@ -17,6 +17,7 @@ from ...units import rate_unit
 from .canvas import FAINT, INK, MUTED, RED, Canvas, Colour, arc
 from .drawing import Drawing, Motion
 from .joints import Handles, paint_joint_symbols, symbol_legend
+from .loads import DrawnForces, ForceArrow
 from .posture import Posture
 from .style import RATE_COLOURS, rate_text
 from .view import View, painting_order
@@ -24,11 +25,15 @@ from .view import View, painting_order
 BASE_FACE, PLATFORM_FACE, JOINT_FACE = "#e6eaee", "#dbe6ef", "#ffffff"
 VELOCITY, FREE = "#6d2a8c", "#0b6b57"
 RAIL, PLAIN = "#8a949d", "#7d8a96"
+FORCE_COLOURS = {"load": "#007a87", "push": "#b5005b", "pull": "#00703c"}
+_FORCE_WIDTHS = {"load": 3.0, "push": 2.4, "pull": 2.4}
 #: Width of a link with its edges, in points.
 _WIDTHS = {LinkKind.BAR: 7.0, LinkKind.ROD: 4.4}
 #: Length of the longest velocity arrow, of the frames' axes and of a couple's arrow, in parts of the robot's size.
 _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
+#: Distance of the arrow of a force from its leg, in parts of the robot's size.
+_BESIDE = 0.045
 #: Places on a limb, in parts of its length, that its label may point to.
 _ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72)
 #: The same for the arrow of a length.
@@ -87,6 +92,8 @@ class Panel:
         if drawing.rows:
             self._paint_couples()
             self._paint_velocities()
+        if drawing.forces is not None:
+            self._paint_forces(drawing.forces)
         self._paint_directions()
         if drawing.case is None:
             self._paint_parameters()
@@ -274,6 +281,32 @@ class Panel:
         handle = Line2D([], [], color=VELOCITY, linewidth=1.5, marker=">")
         words = f"velocity of the platform's corners, not to scale (fastest {fastest:.4g} {self._rate_unit()})"
         self.legend.append((handle, words))
+
+    def _paint_forces(self, forces: DrawnForces) -> None:
+        """Paint a load and the forces of legs that hold it: pushes and pulls differ in colour, and pulls are open."""
+        for arrow in forces.arrows:
+            start, end = arrow.ends + self._beside(arrow)
+            name = f"{arrow.kind} {arrow.name}"
+            self._canvas.arrow(start, end, name, FORCE_COLOURS[arrow.kind], _FORCE_WIDTHS[arrow.kind], 52)
+            if arrow.kind == "pull":
+                self._canvas.marker(start, name, "o", color=FORCE_COLOURS["pull"], markersize=5, zorder=52)
+        for kind, words in (("load", forces.words), ("push", "leg in compression"), ("pull", "leg in tension")):
+            if any(arrow.kind == kind for arrow in forces.arrows) or kind == "load":
+                mark = "o" if kind == "pull" else ">"
+                line = Line2D([], [], color=FORCE_COLOURS[kind], linewidth=_FORCE_WIDTHS[kind], marker=mark)
+                self.legend.append((line, words))
+        if forces.torques:
+            self.legend.append((Line2D([], [], linestyle="none"), f"held by {forces.torques}"))
+
+    def _beside(self, arrow: ForceArrow) -> FloatArray:
+        """Return by how much (3,) the arrow of a leg lies beside it on paper, away from the middle; 0 for a load."""
+        if arrow.kind == "load":
+            return np.zeros(3)
+        right, up, _ = self._canvas.view.axes
+        flat = self._canvas.view.project(arrow.ends[1] - arrow.ends[0])
+        across = np.array([-flat[1], flat[0]]) / (np.linalg.norm(flat) or 1.0)
+        across *= 1.0 if across @ self._canvas.outwards(arrow.ends[0]) >= 0 else -1.0
+        return np.asarray(_BESIDE * self.drawing.size * (across[0] * right + across[1] * up))
 
     def _paint_directions(self) -> None:
         """Paint named directions, such as joints' axes."""

@@ -54,6 +54,8 @@ def _pose_words(outcome: TaskOutcome, index: int) -> str:
     if len(states) == 1:
         return ""
     state, case = states[index], outcome.own.nlp.case
+    if outcome.task.measure:
+        return f" (largest over {len(states)} poses). Shown: pose {index + 1}"
     own = "" if state is None else f", F = {state.F:.7g} there"
     worst = ", the worst" if worst_pose(states, outcome.task.sense) == index else ""
     return f" ({case.over_poses.value} over {len(states)} poses). Shown: pose {index + 1}{own}{worst}"

@@ -1,0 +1,80 @@
+"""Arrows of loads and forces in pictures: their places, senses and scale, from the legs and the forces in results."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from builders import case_from
+
+from screwsynth.nlp import load_case, solve
+from screwsynth.nlp.output.pictures.solutions import drawings_of
+from screwsynth.nlp.results.result import result_of
+
+HEXAPOD = """\
+[robot]
+model = "stewart-gough"
+layout = "octahedral"
+parameters = { x1 = 26.5, x2 = 11.543, x3 = 0, x4 = 5 }
+[pose]
+position = [1, 2, 20]
+rotation = { axis = [1, 2, 3], angle = 10 }
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[[load]]
+name = "side"
+force = [200, 20, -100]
+point = [0, 1, 2]
+"""
+
+
+def test_arrows_push_and_pull_the_platform_along_the_legs_to_one_scale() -> None:
+    solution = solve(case_from(HEXAPOD))
+    (drawing,) = drawings_of(solution)
+    assert drawing.forces is not None
+    robot = result_of(solution).robot
+    (load,) = robot.loading.loads
+    wanted = {each.actuator: each.value for each in load.actuators}
+    lengths = {arrow.name: arrow.ends[1] - arrow.ends[0] for arrow in drawing.forces.arrows}
+    scale = np.linalg.norm(lengths["side"]) / np.linalg.norm([200, 20, -100])
+    assert lengths["side"] == pytest.approx(scale * np.array([200.0, 20.0, -100.0]), rel=1e-9)
+    total = np.zeros(3)
+    rows = {row.limb: row for row in solution.nlp.program.model.rows}
+    for k, name in enumerate(rows):
+        arrow = next(each for each in drawing.forces.arrows if each.name == name)
+        assert arrow.kind == ("push" if wanted[name] > 0 else "pull")
+        along = np.array(robot.jacobian[k][:3])
+        assert lengths[name] == pytest.approx(scale * wanted[name] * along, rel=1e-6)
+        total += lengths[name]
+    # The arrows of legs and load together are no force.
+    assert total + lengths["side"] == pytest.approx(np.zeros(3), abs=1e-9 * float(np.linalg.norm(lengths["side"])))
+    assert {arrow.kind for arrow in drawing.forces.arrows} == {"load", "push", "pull"}
+    assert "load side" in drawing.forces.words
+
+
+def test_torques_are_told_in_words_and_a_case_without_loads_has_no_arrows() -> None:
+    text = """\
+[robot]
+model = "delta"
+parameters = { rb = 0.164, rp = 0.044, arm = 0.524, rod = 1.244, w = 0.131, tilt = 20 }
+[pose]
+position = [0.1, 0, -1.2]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+"""
+    (without,) = drawings_of(solve(case_from(text)))
+    assert without.forces is None
+    (drawing,) = drawings_of(solve(case_from(text + "[[load]]\nforce = [0, 0, -30]\n")))
+    assert drawing.forces is not None
+    assert [arrow.kind for arrow in drawing.forces.arrows] == ["load"]
+    assert drawing.forces.torques.count("N m") == 3
+
+
+def test_a_picture_of_an_objective_of_actuators_has_no_rates_of_a_motion() -> None:
+    drawing = drawings_of(solve(load_case("handling-3-upu")), 3)[0]
+    assert drawing.motion is None
+    assert drawing.rows == ()
+    assert "smallest F = 7.532144 N (largest over 8 poses). Shown: pose 3" in drawing.headline
