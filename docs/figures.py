@@ -40,6 +40,7 @@ CASES = {
     "free-wrist": "free-wrist",
     "haptic-device": "haptic-device",
     "flight-simulator": "flight-simulator",
+    "handling-3-upu": "handling-3-upu",
 }
 
 

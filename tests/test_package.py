@@ -238,6 +238,19 @@ def test_the_case_file_of_the_documentation_is_valid() -> None:
     assert case.tasks[0].name == "drive the screw"
 
 
+def test_the_loads_of_the_documentation_are_valid() -> None:
+    loads, objective = re.findall(r"```toml\n(.*?)```", text_of("loads.md"), flags=re.DOTALL)
+    starter = tomllib.loads(starter_case(screwsynth.models.stewart_gough()))
+    starter["units"]["length"] = "m"
+    tables = starter | {**tomllib.loads(loads), "units": starter["units"]}
+    case = screwsynth.nlp.case_from_tables(tables, name="shown", source="loads.md")
+    assert [each.name for each in case.loading.cases] == ["cutting", "cutting reversed"]
+    assert len(case.limits) == 3
+    task = {"task": [{**starter["task"][0], "sense": "min"}]}
+    least = screwsynth.nlp.case_from_tables(tables | task | tomllib.loads(objective), name="shown", source="loads.md")
+    assert least.tasks[0].measure == "actuator_force"
+
+
 def test_the_limits_of_the_documentation_are_valid() -> None:
     limits, joints, poses = re.findall(r"```toml\n(.*?)```", text_of("limits.md"), flags=re.DOTALL)
     starter = tomllib.loads(starter_case(screwsynth.models.stewart_gough()))
