@@ -238,6 +238,9 @@ def _limits(case: Case, bare: Case) -> tuple[Limits, list[LeftOut]]:
     for limit in case.limits:
         try:
             Limits(limit).check(bare.as_limited)
+            own, other = (limit.ranges(each.model) for each in (case, bare))
+            if [each.dimension for each in own.values()] != [each.dimension for each in other.values()]:
+                raise CaseError(f"limits.{limit.name}", "is a number of another kind of actuators")
         except CaseError as error:
             left_out.append(LeftOut(f"limits.{limit.name}", error.fault, limit.needs_legs))
         else:

@@ -135,7 +135,9 @@ class ActuatorLimit(Limit[Table], abc.ABC):
         """Return the number of each actuator, and under each load case where it depends on loads."""
         for k, joint in self.limited(pose.model):
             name = f"{self.key} actuator {joint.name}"
-            yield from self.of_actuator(pose.forces, k, name, pose.where, Reading(self.dimension(joint)))
+            # A largest number alone bounds a size.
+            above = 0.0 if getattr(self, "min", None) is None else -math.inf
+            yield from self.of_actuator(pose.forces, k, name, pose.where, Reading(self.dimension(joint), above=above))
 
     @abc.abstractmethod
     def of_actuator(
