@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from ...models import Dimension
 from ...models.statics import driven_joints
 from ..case.loads import NO_LOADING
+from ..case.motors import MotorNumber
 from ..case.task import Sense
-from ..proof.statement.claims import ACTUATED, MotorNumber
+from ..proof.statement.claims import ACTUATED
 from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.verdict import Outcome
 from ..units import Units

@@ -9,8 +9,8 @@ from ...models import Dimension
 from ...models.statics import DrivenJoint, driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_force, dimension_of_speed
+from ..case.motors import MotorNumber
 from ..case.task import Sense
-from ..proof.statement.claims import MotorNumber
 from ..proof.workspace.verdict import Outcome
 from .rounding import number
 from .text import Line, TextTable, Tone

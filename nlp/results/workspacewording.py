@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.case import Case
+from ..case.motors import MotorNumber
 from ..case.pose import Free
 from ..case.task import Sense
-from ..proof.statement.claims import MotorNumber
 from ..proof.workspace.verdict import Outcome
 from .jointwording import triple
 from .rounding import TURNED, number, ordered

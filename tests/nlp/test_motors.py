@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 from screwsynth.models import three_upu
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case
 from screwsynth.nlp.case.loads import Load, Loading, Motion
+from screwsynth.nlp.case.motors import Motor
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
@@ -27,10 +28,10 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.loads import loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.proof.statement.claims import Motor
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
+from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacemotors import motor_tables
@@ -366,3 +367,46 @@ def test_a_numbers_bound_that_is_missing_is_said_in_the_sheet() -> None:
     assert [header.partition("\n")[0] for header in table.headers][3:5] == ["largest torque", "backwards"]
     assert {str(row[3]) for row in table.rows} == {"no bound"}
     assert "without a limit stay open" in verdict_words(workspace_of(found))
+
+
+def test_with_a_tolerance_every_machine_keeps_the_bounds() -> None:
+    angles = np.radians([-5, 5, 115, 125, 235, 245])
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+    platform = 0.5 * np.roll(ring, 1, axis=0) @ turn_about([0, 0, 1], math.radians(-60)).T
+    t, turns = 2e-3, Turns(TurnKind.AXIS, (Free(-0.1, 0.1),), (0.0, 0.6, 0.8))
+    robot = Legs(ring, platform, t)
+    place = [Free(-0.05, 0.05), 0.02, Free(0.95, 1.05)]
+    case = replace(case_of_legs(robot), loading=LOADING, workspace=Workspace(place, turns))
+    found = motors_of(case)
+    exact = motors_of(replace(case, joint_centre_tolerance=None))
+    assert all(each.outcome is Outcome.PROVED for each in found.values())
+    rng, worst = np.random.default_rng(5), dict.fromkeys(found, -math.inf)
+    for k in range(1500):
+        ends = rng.uniform([-0.05, 0.95, -0.1], [0.05, 1.05, 0.1]) if k % 2 else rng.choice([0.05, -0.05], 3)
+        x, z, turn = ends if k % 2 else (ends[0], 1 + ends[1], 2 * ends[2])
+        errors = rng.normal(size=(2, 6, 3))
+        errors *= t / np.linalg.norm(errors, axis=2, keepdims=True)
+        machine = Legs(robot.base + errors[0], robot.platform + errors[1])
+        shown = numbers_at(machine, LOADING, np.array([x, 0.02, z]), turn_about(turns.axis, float(turn)))
+        for key, value in shown.items():
+            worst[key] = max(worst[key], key[3].sign * value)
+    for key, each in found.items():
+        sign, design = each.sense.sign, exact[key]
+        assert worst[key] <= sign * each.bound, key
+        # The design is one of the machines, and the change by errors of all centres is of first order.
+        assert sign * design.reached <= sign * each.bound
+    forces = [key for key in found if key[0] == "force"]
+    # Some machine that was sampled is worse than any pose of the design.
+    assert any(worst[key] > key[3].sign * exact[key].bound for key in forces)
+    changes = [key[3].sign * (found[key].bound - exact[key].reached) for key in forces]
+    assert max(changes) <= 0.08 * max(abs(found[key].bound) for key in forces)
+
+
+def test_machines_that_are_not_judged_leave_their_motors_open_with_the_reason() -> None:
+    case = replace(at_home("exechon"), loading=Loading((Load("push", (0.0, 0.0, -10.0)),)))
+    found = list(motor_extremes(Subject(case, case.model, None, "errors take freedoms from the robot")))
+    assert len(found) == 6
+    for each in found:
+        assert each.outcome is Outcome.OPEN
+        assert math.isinf(each.bound)
+        assert each.reason == "errors take freedoms from the robot"

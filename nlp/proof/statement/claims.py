@@ -7,7 +7,6 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
@@ -19,6 +18,7 @@ from ...case.limits.constraint import LENGTH, NUMBER, SQUARED_LENGTH, Reading
 from ...case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from ...case.limits.legs import Actuator, LegLength
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
+from ...case.motors import Motor
 from ...case.task import Sense
 from ...errors import InputError, nearest
 from ...program.layout import Layout
@@ -45,33 +45,6 @@ class ClaimKind(enum.Enum):
     SPECTRUM = "smallest singular value of J, or its condition number"
     ERROR = "error of the pose"
     MOTOR = "force, speed or power of an actuator"
-
-
-class MotorNumber(enum.Enum):
-    """A number of an actuator; each value is the word in results."""
-
-    COORDINATE = "coordinate"
-    FORCE = "force"
-    SPEED = "speed"
-    POWER = "power"
-
-
-class Motor(NamedTuple):
-    """A number of an actuator.
-
-    Attributes:
-        number: the number.
-        place: index of the actuator.
-        actuator: its name.
-        load: name of the load case; empty for a number that depends on none.
-        is_backwards: whether a power is that of forces below 0.
-    """
-
-    number: MotorNumber = MotorNumber.FORCE
-    place: int = 0
-    actuator: str = ""
-    load: str = ""
-    is_backwards: bool = False
 
 
 @dataclass(frozen=True, eq=False)

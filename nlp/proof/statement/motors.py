@@ -10,8 +10,9 @@ from ...case.case import Case
 from ...case.forces import dimension_of_force, dimension_of_speed
 from ...case.limits.constraint import Reading
 from ...case.limits.forces import ActuatorForce, ActuatorLimit, ActuatorPower, ActuatorSpeed
+from ...case.motors import Motor, MotorNumber
 from ...case.task import Sense
-from .claims import Claim, ClaimKind, Motor, MotorNumber
+from .claims import Claim, ClaimKind
 
 
 def motor_claims(case: Case) -> Iterator[Claim]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .....models import Dimension, FloatArray, axis_angle_from_matrix, frozen_array
+from ....case.motors import Motor
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ....interruption import is_requested, one_search, why_stopped
@@ -21,7 +22,7 @@ from ....program.nlp import Nlp
 from ...boxes.tree import TreeRecord
 from ...certificate.branch_and_bound import certify_program
 from ...certificate.certificate import Certificate, CertificateStatus
-from ...statement.claims import Claim, Motor
+from ...statement.claims import Claim
 from ...statement.machine import JointErrors
 from ...statement.posed_layout import extreme_program, varies
 from ..robot.pose_box import PoseNumbers

@@ -6,9 +6,7 @@ robot without given actuators A has the rows of J times their sizes, and D the s
 platform's motion and the rates of passive joints, and D the screws of the actuators. Forms of second order of the
 solution are kept: what they leave is of third order in the widths of a box.
 
-Loads of any direction add the size of a velocity. All numbers are bounded from above; a smallest force from that of its
-opposite.
-
+Loads of any direction add the size of a velocity. All numbers are bounded from above, a smallest force by its opposite.
 Rotations about any axis lie in a ball, ``|r|^2 <= b``, so that a bound may have a multiple of ``b - |r|^2`` added.
 """
 
@@ -29,16 +27,15 @@ from .....models.arrays import values_at
 from .....models.statics import freedoms_of
 from ....case.case import Case
 from ....case.loads import Motion
+from ....case.motors import Motor, MotorNumber
 from ....case.task import Sense
 from ...enclosure.forms import Forms
-from ...statement.claims import Claim, Motor, MotorNumber
+from ...statement.claims import Claim
 from ..ranks.krawczyk import ROUNDING
 from ..robot.posed_robot import NotJudgedError, Problem
 from .bound_search import Bounds, Number
 from .quadratic_forms import Quadratics, solved
 
-#: Numbers of a matrix, times squared coordinates, above which forms of second order cost more than they save.
-_LARGE = 8000
 #: More than underflow can cost a sum.
 _TINY = 1e-290
 
@@ -80,7 +77,8 @@ class Motors(Number):
         free, loading = problem.free, self._loading
         is_ball = math.isfinite(problem.box.ball)
         turn = [problem.z[j] for j, k in enumerate(free) if k >= 3 and is_ball]
-        arms = [R @ SX([float(part) for part in each.point]) for each in loading.loads]
+        # Minus the matrices of cross products with arms, in parts of the length by which rotations are multiplied.
+        arms = [-ca.skew(R @ SX([float(part) for part in each.point])) / problem.length for each in loading.loads]
         loads = [each.wrench(R) for each in loading.cases]
         scaled = [ca.vertcat(each[:3], each[3:] / problem.length) for each in loads]
         parts = [A, D, moments, ca.horzcat(SX(3, 0), *arms), ca.horzcat(SX(6, 0), *scaled), ca.horzcat(SX(1, 0), *turn)]
@@ -139,26 +137,24 @@ class Motors(Number):
         """Return A, D, moment of the leg, arms and wrenches of loads, and rotations, from forms of them."""
         ends = np.cumsum([0, *(rows * columns for rows, columns in self._shapes)]).tolist()
         errors = len(self.problem.of_errors) if count else 0
-        is_first = self._shapes[0][0] * self._shapes[0][1] * count**2 > _LARGE
         return [
-            Quadratics.of(forms.part(slice(begin, end)), count, errors, shape, is_first=is_first)
+            Quadratics.of(forms.part(slice(begin, end)), count, errors, shape)
             for begin, end, shape in zip(ends, ends[1:], self._shapes, strict=False)
         ]
 
     def _bounded(self, matrices: Sequence[Quadratics]) -> tuple[list[Quadratics], FloatArray]:
         """Return the parts that are bounded from above, (1, 1) each, and shares (t, B) of coordinates in their rest."""
         A, D, moments, arms, wrenches, _ = matrices
-        solution, k = solved(A, D), self._column
-        every = solution.Y[:6]
+        every, k = solved(A, D)[:6], self._column
         x = every[:, k : k + 1]
         found = []
         for sense, load in self._parts:
             if sense is None:
                 found.append(self._speed(every, moments))
                 continue
-            held = wrenches[:, load : load + 1].transposed.matmul(x).times(-sense.sign)
+            held = wrenches[:, load : load + 1].by(x).sums(0).times(-sense.sign)
             found.append(held.plus(self._spread(load, x, arms)))
-        return found, solution.shares
+        return found, (A.a**2).sum(axis=(0, 1))
 
     def _spread(self, case: int, x: Quadratics, arms: Quadratics) -> Quadratics:
         """Return the largest change (1, 1) of the force by the loads of any direction in a load case."""
@@ -166,8 +162,8 @@ class Motors(Number):
         for load, _ in self._loading.cases[case].parts:
             k = self._loading.loads.index(load)
             if load.any_force:
-                arm = arms[:, k : k + 1].skew().times(-1 / self._length)
-                found = found.plus(x[:3].plus(arm.matmul(turned)).lengths().times(load.any_force))
+                moved = x[:3].plus(arms[:, 3 * k : 3 * k + 3].matmul(turned))
+                found = found.plus(moved.lengths().times(load.any_force))
             if load.any_moment:
                 found = found.plus(turned.lengths().times(load.any_moment / self._length))
         return found
@@ -182,11 +178,11 @@ class Motors(Number):
             return replace(speed, c=speed.c + linear, r=speed.r + ROUNDING * linear)
         if self._is_six:
             eye = np.broadcast_to(np.eye(6)[:, :, None], x.c.shape)
-            rates = solved(x, Quadratics(eye, 0 * x.a, 0 * x.q, 0 * x.r, x.errors)).Y.transposed
+            rates = solved(x, Quadratics(eye, 0 * x.a, 0 * x.q, 0 * x.r, x.errors)).transposed
         else:
             length = motion.linear / angular if linear and angular else 1 / self._length
             weighted = x.times(np.repeat([1.0, length**2], 3)[:, None, None])
-            rates = solved(x.transposed.matmul(weighted), weighted.transposed).Y.transposed
+            rates = solved(x.transposed.matmul(weighted), weighted.transposed).transposed
         own = rates[:, self._actuator : self._actuator + 1]
         moved, turned = (part.lengths() for part in (own[:3], own[3:]))
         return moved.times(linear).plus(turned.times(angular))

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class Quadratics:
     errors: int = 0
 
     @classmethod
-    def of(cls, forms: Forms, count: int, errors: int, shape: tuple[int, int], *, is_first: bool = False) -> Quadratics:
+    def of(cls, forms: Forms, count: int, errors: int, shape: tuple[int, int]) -> Quadratics:
         """Return the entries of a matrix from forms of them, column by column, in which squares are ``1/2 + 1/2 e``.
 
         Args:
@@ -62,13 +62,10 @@ class Quadratics:
             count: number f of coordinates, the first terms.
             errors: number of the last terms that are errors.
             shape: of the matrix.
-            is_first: whether products of coordinates count as rest.
         """
         c, a, r = forms.c.T, forms.a.transpose(1, 2, 0), forms.r.T
         end = a.shape[1] - errors
         q = a[:, count:end]
-        if is_first:
-            r, q = (r + np.abs(q).sum(axis=1)) * (1 + ROUNDING), q[:, :0]
         if q.shape[1]:
             square = np.equal(*np.triu_indices(count))
             q, c = q.copy(), c - q[:, square].sum(axis=1)
@@ -114,16 +111,6 @@ class Quadratics:
     def transposed(self) -> Quadratics:
         """The transposed matrices."""
         return self.made(each.swapaxes(0, 1) for each in self.parts)
-
-    def skew(self) -> Quadratics:
-        """Return the matrices (3, 3) of the cross products of vectors (3, 1)."""
-        found = []
-        for each in self.parts:
-            matrix = np.zeros((3, 3, *each.shape[2:]))
-            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-                matrix[k, j], matrix[j, k] = each[i, 0], -each[i, 0]
-            found.append(matrix)
-        return self.made((*found[:3], np.abs(found[3])))
 
     def sums(self, axis: int) -> Quadratics:
         """Return the sums along an axis, 0 or 1, which stays with length 1."""
@@ -213,26 +200,14 @@ def _product(one: FloatArray, other: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nkb,kmb->nmb", one, other))
 
 
-class Solved(NamedTuple):
-    """Solutions of linear systems.
-
-    Attributes:
-        Y: (n, k), of infinite rest where nothing is known.
-        shares: (t, B) parts of the coordinates in how much the matrices vary.
-    """
-
-    Y: Quadratics
-    shares: FloatArray
-
-
-def solved(A: Quadratics, D: Quadratics) -> Solved:
-    """Return the solutions Y of ``A Y = D`` for matrices (m, n) of full column rank, where there are some."""
+def solved(A: Quadratics, D: Quadratics) -> Quadratics:
+    """Return the solutions (n, k) of ``A Y = D`` for matrices (m, n), of infinite rest where nothing is known."""
     known = np.asarray(np.isfinite(A.size).all(axis=(0, 1)) & np.isfinite(D.size).all(axis=(0, 1)))
     A, D, n = _where(known, A), _where(known, D), A.c.shape[1]
     eye = np.eye(n)
     with np.errstate(all="ignore"):
         middle = np.where(known[:, None, None], A.c.transpose(2, 0, 1), np.eye(*A.c.shape[:2]))
-        inverse = np.linalg.inv if n == A.c.shape[0] and not _is_singular(middle) else np.linalg.pinv
+        inverse = inverses if n == A.c.shape[0] else partial(np.linalg.pinv, rcond=_ZERO)
         C = np.ascontiguousarray(inverse(middle).transpose(1, 2, 0))
         E, Z = _fixed_times(C, A), _fixed_times(C, D)
         # What C A differs from I by in the middle is rest.
@@ -254,12 +229,7 @@ def solved(A: Quadratics, D: Quadratics) -> Solved:
         known &= (V >= 0).all(axis=(0, 1)) & (right <= (V - _product(size, V)) * (1 - ROUNDING)).all(axis=(0, 1))
         rest = V[:, :-1]
     rest = np.where(known & np.isfinite(rest) & np.isfinite(E.size).all(axis=(0, 1)), rest, np.inf)
-    return Solved(replace(Y, r=rest), (E.a**2).sum(axis=(0, 1)))
-
-
-def _is_singular(matrices: FloatArray) -> bool:
-    """Return whether one of some matrices has no inverse."""
-    return bool((np.linalg.slogdet(matrices)[0] == 0).any())
+    return replace(Y, r=rest)
 
 
 def _fixed_times(factors: FloatArray, of: Quadratics) -> Quadratics:

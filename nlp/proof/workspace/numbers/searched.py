@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -134,24 +134,11 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
     return extreme_of(claim, found, problem.box.pose(y), errors=errors)
 
 
-def motor_extremes(
-    subject: Subject, *, with_all: bool = True, show: Callable[[str, int, int], None] | None = None
-) -> Iterator[Extreme]:
-    """Yield the extremes of :func:`~.motors.motor_claims`, those of an actuator and a load by one search.
-
-    Args:
-        subject: the robot.
-        with_all: whether numbers without a limit are among them.
-        show: called before each search with the name of a number, how many are done, and how many there are.
-    """
+def motor_extremes(subject: Subject, *, with_all: bool = True) -> Iterator[Extreme]:
+    """Yield the extremes of :func:`~.motors.motor_claims`, all or those with limits, for each actuator and load."""
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
-    done = 0
     for _, group in itertools.groupby(claims, lambda claim: claim.motor and (claim.motor.place, claim.motor.load)):
-        own = list(group)
-        if show is not None:
-            show(own[0].name, done, len(claims))
-        yield from _motor_answers(subject, own)
-        done += len(own)
+        yield from _motor_answers(subject, list(group))
 
 
 def _motor_answers(subject: Subject, claims: Sequence[Claim]) -> Iterator[Extreme]:

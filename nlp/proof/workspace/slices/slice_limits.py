@@ -24,13 +24,12 @@ from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
 from ...enclosure.forms import Encloser
-from ...statement.claims import Claim, ClaimKind, searched_claims
+from ...statement.claims import Claim, searched_claims
 from ...statement.motors import motor_claims
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
 from ..numbers.jacobian_numbers import SingularValues
 from ..numbers.machines import Machines
-from ..numbers.motors import Motors
 from ..numbers.searched import Subject
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
@@ -103,9 +102,9 @@ class SliceLimits:
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
         subject = Subject(case, closed.model, problem)
         self._others: list[_Other] = []
-        for claim in (*searched_claims(case), *(each for each in motor_claims(case) if each.key)):
-            key, is_motor = claim.key, claim.kind is ClaimKind.MOTOR
-            number = Motors(problem, case, [claim]) if is_motor else subject.number(claim)
+        uncovered.update((each.key, None) for each in motor_claims(case) if each.key)
+        for claim in searched_claims(case):
+            key, number = claim.key, subject.number(claim)
             try:
                 examiner = None if problem.dependent else number.examiner
             except UncoveredError:
@@ -192,7 +191,7 @@ def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[
 class _Other:
     """A limit on a number with bounds of its own, and no dependent coordinates."""
 
-    def __init__(self, key: str, number: SingularValues | Clearance | Motors, least: float) -> None:
+    def __init__(self, key: str, number: SingularValues | Clearance, least: float) -> None:
         self.key, self._number, self._least = key, number, least
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
