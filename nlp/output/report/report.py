@@ -135,7 +135,8 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
             drawing = drawing_of(nlp, outcome.x, each, task, pose=k, is_answer=is_answer)
             drawings.append(drawing)
             shown = PoseView(task, k, count, k == worst, count * tasks, nlp.objective_size)
-            views.append(view_data(drawing, each.rates, shown))
+            if outcome.task.is_stated:  # the view moves along the task's motion
+                views.append(view_data(drawing, each.rates, shown))
     can_move = state is not None and nlp.n > 0 and not has_loops(nlp)
     slices: Sequence[Slice] = slices_of(nlp, x) if can_move else []
     planes: Sequence[Plane] = planes_of(nlp, x, _PLANES // tasks) if can_move else []

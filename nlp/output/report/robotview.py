@@ -59,6 +59,10 @@ def drawings(report: Report) -> Markup:
 def robot_section(report: Report) -> Markup:
     """Return the 3-D view with its controls, its legend and the rates."""
     views = [view for part in report.parts for view in part.views]
+    drawn = report.parts[0].drawings
+    if not views and drawn:
+        source = image_source(_with_fewer_digits(picture([drawn[0]], ".svg")))
+        return tag("figure", tag("img", src=source, alt="The robot at its first pose; the tables have its numbers."))
     if not views:
         return paragraphs(["The robot does not exist at the point reached, so there is no picture of it."])
     first = views[0]
@@ -90,7 +94,7 @@ def robot_section(report: Report) -> Markup:
         role="group",
         aria_label="View",
     )
-    picture = tag(
+    shown = tag(
         "figure",
         script_frame("view", "picture", "The robot in three dimensions; the table below says the same in numbers."),
         drawings(report),
@@ -99,7 +103,7 @@ def robot_section(report: Report) -> Markup:
         tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),
     )
-    content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
+    content = [*head, moving, shown, tag("h3", "Rates at this position"), _rates(first)]
     note = "Without a script nothing moves; every number is in the tables."
     return join_markup([*content, tag("noscript", tag("p", note))])
 
