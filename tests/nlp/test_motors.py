@@ -18,6 +18,8 @@ from typer.testing import CliRunner
 
 from screwsynth.models import three_upu
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case
+from screwsynth.nlp.case.limits.forces import ActuatorForce
+from screwsynth.nlp.case.limits.limits import Limits
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.motors import Motor
 from screwsynth.nlp.case.source import find_case
@@ -29,6 +31,7 @@ from screwsynth.nlp.evidence.loads import loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.statement.machine import Legs
+from screwsynth.nlp.proof.statement.motors import motor_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
@@ -410,3 +413,15 @@ def test_machines_that_are_not_judged_leave_their_motors_open_with_the_reason() 
         assert each.outcome is Outcome.OPEN
         assert math.isinf(each.bound)
         assert each.reason == "errors take freedoms from the robot"
+
+
+def test_a_limit_for_all_actuators_and_one_of_its_own_are_both_claims() -> None:
+    case = at_home("delta")
+    every = Limits(ActuatorForce(max=3.0), ActuatorForce("2", max=2.0))
+    claims = list(motor_claims(replace(case, loading=Loading((Load("w", (0.0, 0.0, -1.0)),)), limits=every)))
+    assert Counter((each.key, each.limit) for each in claims) == {
+        ("actuator_force.max", 3.0): 3,
+        ("actuator_force.max", -3.0): 3,
+        ("actuator_force.2.max", 2.0): 1,
+        ("actuator_force.2.max", -2.0): 1,
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from ....models import Dimension
@@ -22,24 +23,31 @@ def motor_claims(case: Case) -> Iterator[Claim]:
     """
     loading = case.loading
     for k, joint in enumerate(driven_joints(case.model) if loading.loads or loading.motion else ()):
-        limits = [each for each in case.limits if isinstance(each, ActuatorLimit)]
-        own = {type(each): each for each in limits if each.actuator in ("", joint.name)}
-        force, reading = own.get(ActuatorForce), Reading(dimension_of_force(joint))
-        low, high = (force.min, force.max) if isinstance(force, ActuatorForce) else (None, None)
-        is_size = low is None and high is not None  # a largest force alone is one in both senses
-        if loading.motion is not None:
+        kinds = ActuatorForce, ActuatorSpeed, ActuatorPower
+        forces, speeds, powers = (_limits(case, kind, joint.name) for kind in kinds)
+        reading = Reading(dimension_of_force(joint))
+        for limit in speeds if loading.motion is not None else ():
             speed = Motor(MotorNumber.SPEED, k, joint.name)
-            yield _claim(speed, "", Sense.MAX, Reading(dimension_of_speed(joint)), own.get(ActuatorSpeed))
+            yield _claim(speed, "", Sense.MAX, Reading(dimension_of_speed(joint)), limit)
         for load in loading.cases:
             motor = Motor(MotorNumber.FORCE, k, joint.name, load.name)
-            if is_size and high is not None:
-                yield _claim(motor, " backwards", Sense.MIN, reading, force, "max", -high)
-            else:
-                yield _claim(motor, " smallest", Sense.MIN, reading, force, "min", low)
-            yield _claim(motor, "", Sense.MAX, reading, force)
-            for senses in ("", " backwards") if loading.motion is not None else ():
-                power = Motor(MotorNumber.POWER, k, joint.name, load.name, is_backwards=bool(senses))
-                yield _claim(power, senses, Sense.MAX, Reading(Dimension.POWER), own.get(ActuatorPower))
+            for limit in forces:
+                low, high = (limit.min, limit.max) if isinstance(limit, ActuatorForce) else (None, None)
+                if low is None and high is not None:  # a largest force alone is one in both senses
+                    yield _claim(motor, " backwards", Sense.MIN, reading, limit, "max", -high)
+                else:
+                    yield _claim(motor, " smallest", Sense.MIN, reading, limit, "min", low)
+                yield _claim(motor, "", Sense.MAX, reading, limit)
+            for limit, part in itertools.product(powers if loading.motion is not None else (), ("", " backwards")):
+                power = Motor(MotorNumber.POWER, k, joint.name, load.name, is_backwards=bool(part))
+                yield _claim(power, part, Sense.MAX, Reading(Dimension.POWER), limit)
+
+
+def _limits(case: Case, kind: type[ActuatorLimit], actuator: str) -> list[ActuatorLimit | None]:
+    """Return the limits of a kind on an actuator, that for all and one of its own; None for a number without any."""
+    found: list[ActuatorLimit | None] = []
+    found += [each for each in case.limits if isinstance(each, kind) and each.actuator in ("", actuator)]
+    return found or [None]
 
 
 def _claim(
