@@ -99,7 +99,8 @@ def robot_section(report: Report) -> Markup:
         tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),
     )
-    content = [*head, moving, picture, tag("h3", "Rates at this position"), _rates(first)]
+    content = [*head, moving, picture] if first["motion"] else [*head, picture]
+    content += [tag("h3", "Rates at this position"), _rates(first)] if first["rows"] else []
     note = "Without a script nothing moves; every number is in the tables."
     return join_markup([*content, tag("noscript", tag("p", note))])
 
@@ -108,6 +109,10 @@ def _legend(view: ViewData) -> Markup:
     """Return what the colours and lines of the view mean."""
     gradient = f"background:linear-gradient(90deg,{','.join(RATE_COLOURS)})"
     bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
+    forces = tag("span", view["forces_words"], id="forces-words") if view["forces_words"] else ""
+    joints = " Joints: dark where an actuator drives them." if view["joints"] else ""
+    if not view["rows"]:
+        return join_markup([forces, " Dotted grey: the start." if view["reference"] else "", joints])
     words = [
         "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive.",
         " Bold black: the axis of the task's motion",
@@ -119,9 +124,10 @@ def _legend(view: ViewData) -> Markup:
         " Nothing moves: the loops open along the task's motion."
         if view["motion"] and len(view["frames"]) == 1
         else "",
-        " Joints: dark where an actuator drives them." if view["joints"] else "",
+        joints,
         f" Point at a limb for its {view['measure']['words']}, rate, share of F and wrench",
-        ", at a joint for its kind." if view["joints"] else ".",
+        ", at a joint for its kind. " if view["joints"] else ". ",
+        forces,
     ]
     return join_markup([bar, *words])
 
