@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from builders import case_from
 
 from screwsynth.nlp import load_case, solve
 from screwsynth.nlp.output.pictures.solutions import drawings_of
+from screwsynth.nlp.output.report.report import report_of
+from screwsynth.nlp.output.report.sections import sections
 from screwsynth.nlp.results.result import result_of
 
 HEXAPOD = """\
@@ -78,3 +82,46 @@ def test_a_picture_of_an_objective_of_actuators_has_no_rates_of_a_motion() -> No
     assert drawing.motion is None
     assert drawing.rows == ()
     assert "smallest F = 7.532144 N (largest over 8 poses). Shown: pose 3" in drawing.headline
+
+
+def test_a_load_without_forces_has_no_scale_of_arrows() -> None:
+    text = """\
+[robot]
+model = "delta"
+parameters = { rb = 0.164, rp = 0.044, arm = 0.524, rod = 1.244, w = 0.131, tilt = 20 }
+[pose]
+position = [0.1, 0, -1.2]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[[load]]
+any = { force = 5 }
+"""
+    (drawing,) = drawings_of(solve(case_from(text)))
+    assert drawing.forces is not None
+    assert drawing.forces.arrows == ()
+    assert "longest arrow" not in drawing.forces.words
+
+
+def test_a_page_has_the_arrows_beside_the_legs_and_the_forces_of_each_pose() -> None:
+    solution = solve(load_case("handling-3-upu"))
+    report = report_of("", solution, result_of(solution))
+    (part,) = report.parts
+    forces = [pose.F for pose in result_of(solution).robot.several.poses]
+    worst = [round(force, 5) for force in forces].index(round(max(forces), 5))
+    assert [view["is_worst"] for view in part.views] == [k == worst for k in range(8)]
+    for k, (view, drawing) in enumerate(zip(part.views, part.drawings, strict=True)):
+        assert view["pose_words"] == f"pose {k + 1} of 8, F = {forces[k]:.7g} N"
+        for shown, arrow in zip(view["forces"], drawing.forces.arrows, strict=True):
+            ends, way = np.array(shown["ends"]), arrow.ends[1] - arrow.ends[0]
+            assert ends[1] - ends[0] == pytest.approx(way, abs=1e-12)
+            aside = ends[0] - arrow.ends[0]
+            assert abs(aside @ way) <= 1e-12
+            wanted = 0.0 if arrow.kind == "load" else 0.045 * drawing.size
+            assert float(np.linalg.norm(aside)) == pytest.approx(wanted, rel=1e-9, abs=1e-15)
+    words = re.sub(r"<[^>]*>", "", "".join(str(content) for _, _, content in sections(report)))
+    assert "the largest actuator force over all actuators and loads" in words
+    assert "translation along" not in words
+    assert "Rates at this position" not in words
+    assert "longest arrow 10.39 N" in words

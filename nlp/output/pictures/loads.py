@@ -27,11 +27,13 @@ class ForceArrow(NamedTuple):
         kind: the load, or a leg that pushes or pulls the platform.
         name: of the load or of the limb.
         ends: (2, 3) its start and its head, in the world frame.
+        words: whose force it is, and how large.
     """
 
     kind: Literal["load", "push", "pull"]
     name: str
     ends: FloatArray
+    words: str
 
 
 class DrawnForces(NamedTuple):
@@ -70,7 +72,12 @@ def drawn_forces(nlp: Nlp, x: FloatArray, state: RobotState, pose: int, size: fl
     largest = max([*map(abs, forces.values()), *(float(np.linalg.norm(force)) for _, force in given)], default=0.0)
     scale = _LONGEST * size / largest if largest > 0 else 0.0
     arrows = [
-        ForceArrow("load", cases[0].name, frozen_array(np.stack([at - scale * force, at]), (2, 3)))
+        ForceArrow(
+            "load",
+            cases[0].name,
+            frozen_array(np.stack([at - scale * force, at]), (2, 3)),
+            f"load {cases[0].name}: {float(np.linalg.norm(force)):.4g} {units.label(Dimension.FORCE)}",
+        )
         for at, force in given
     ]
     for joint in joints:
@@ -80,13 +87,15 @@ def drawn_forces(nlp: Nlp, x: FloatArray, state: RobotState, pose: int, size: fl
             # The arrow of a push ends at the joint on the platform, that of a pull begins there.
             ends = np.stack([head - along, head]) if forces[joint.name] > 0 else np.stack([head, head + along])
             kind: Literal["push", "pull"] = "push" if forces[joint.name] > 0 else "pull"
-            arrows.append(ForceArrow(kind, joint.name, frozen_array(ends, (2, 3))))
+            words = f"leg {joint.name}: {forces[joint.name]:+.4g} {units.label(Dimension.FORCE)}"
+            arrows.append(ForceArrow(kind, joint.name, frozen_array(ends, (2, 3)), words))
     turning = [(joint, value) for joint, value in zip(joints, values, strict=True) if joint.name not in forces]
     torques = ", ".join(
         f"{joint.name} {value:+.4g} {units.label(dimension_of_force(joint))}" for joint, value in turning
     )
     more = "" if len(nlp.case.loading.cases) == 1 else f", the first of {len(nlp.case.loading.cases)}"
-    words = f"load {held.name}{more}: longest arrow {largest:.4g} {units.label(Dimension.FORCE)}{_any_words(held)}"
+    longest = f": longest arrow {largest:.4g} {units.label(Dimension.FORCE)}" if arrows else ""
+    words = f"load {held.name}{more}{longest}{_any_words(held)}"
     return DrawnForces(tuple(arrows), words, torques)
 
 

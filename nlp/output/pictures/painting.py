@@ -19,21 +19,18 @@ from .drawing import Drawing, Motion
 from .joints import Handles, paint_joint_symbols, symbol_legend
 from .loads import DrawnForces, ForceArrow
 from .posture import Posture
-from .style import RATE_COLOURS, rate_text
+from .style import BESIDE, FORCE_COLOURS, RATE_COLOURS, rate_text
 from .view import View, painting_order
 
 BASE_FACE, PLATFORM_FACE, JOINT_FACE = "#e6eaee", "#dbe6ef", "#ffffff"
 VELOCITY, FREE = "#6d2a8c", "#0b6b57"
 RAIL, PLAIN = "#8a949d", "#7d8a96"
-FORCE_COLOURS = {"load": "#007a87", "push": "#b5005b", "pull": "#00703c"}
 _FORCE_WIDTHS = {"load": 3.0, "push": 2.4, "pull": 2.4}
 #: Width of a link with its edges, in points.
 _WIDTHS = {LinkKind.BAR: 7.0, LinkKind.ROD: 4.4}
 #: Length of the longest velocity arrow, of the frames' axes and of a couple's arrow, in parts of the robot's size.
 _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
-#: Distance of the arrow of a force from its leg, in parts of the robot's size.
-_BESIDE = 0.045
 #: Places on a limb, in parts of its length, that its label may point to.
 _ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72)
 #: The same for the arrow of a length.
@@ -306,7 +303,7 @@ class Panel:
         flat = self._canvas.view.project(arrow.ends[1] - arrow.ends[0])
         across = np.array([-flat[1], flat[0]]) / (np.linalg.norm(flat) or 1.0)
         across *= 1.0 if across @ self._canvas.outwards(arrow.ends[0]) >= 0 else -1.0
-        return np.asarray(_BESIDE * self.drawing.size * (across[0] * right + across[1] * up))
+        return np.asarray(BESIDE * self.drawing.size * (across[0] * right + across[1] * up))
 
     def _paint_directions(self) -> None:
         """Paint named directions, such as joints' axes."""

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 #: Blue shortens, grey stays, orange lengthens: distinct with any colour blindness, and never as light as paper.
 RATE_COLOURS = ("#08519c", "#3f86c4", "#9aa3ab", "#e08a3c", "#b34700")
+#: Loads, and forces of legs that push and that pull the platform.
+FORCE_COLOURS = {"load": "#007a87", "push": "#b5005b", "pull": "#00703c"}
+#: Distance of the arrow of a force from its leg, in parts of the robot's size.
+BESIDE = 0.045
 
 
 def signed_text(value: float) -> str:

@@ -13,8 +13,9 @@ from ...results.robottables import rate_word
 from ...results.rounding import settled
 from ...units import Units, objective_unit, rate_unit
 from ..pictures.drawing import Drawing, Motion
+from ..pictures.loads import DrawnForces
 from ..pictures.posture import Posture
-from ..pictures.style import RATE_COLOURS, signed_text
+from ..pictures.style import BESIDE, FORCE_COLOURS, RATE_COLOURS, signed_text
 from ..pictures.view import View, clearest_view
 
 
@@ -152,6 +153,16 @@ class MotionData(TypedDict):
     path: list[list[float]]
 
 
+class ForceData(TypedDict):
+    """An arrow of a force: of the load, or of a leg that pushes or pulls the platform, beside which it lies."""
+
+    kind: str
+    name: str
+    words: str
+    colour: str
+    ends: list[list[float]]
+
+
 class FrameData(TypedDict):
     """The robot at one posture.
 
@@ -203,6 +214,8 @@ class ViewData(TypedDict):
     directions: list[str]
     motion: MotionData | None
     free: list[MotionData]
+    forces: list[ForceData]
+    forces_words: str
     reference: list[list[float]] | None
     colours: list[str]
     eye: list[float]
@@ -234,6 +247,7 @@ class PoseView(NamedTuple):
         is_worst: whether F is the worst there.
         views: number of views of the page, which share its size.
         size: of F without cancellation: F is shown as 0 where it is rounding error beside this.
+        words: the number of the actuators that is optimised instead of F, there and with its unit; empty for F.
     """
 
     task: int = 0
@@ -242,6 +256,7 @@ class PoseView(NamedTuple):
     is_worst: bool = False
     views: int = 1
     size: float = 0.0
+    words: str = ""
 
 
 def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView()) -> ViewData:  # noqa: B008 - immutable
@@ -261,7 +276,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "name": "" if motion is None else motion.name,
         "task": shown.task,
         "pose": shown.pose,
-        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {F:.7g} {unit_of_F}".rstrip(),
+        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {shown.words or f'{F:.7g} {unit_of_F}'}".rstrip(),
         "is_worst": shown.is_worst,
         "headline": drawing.headline,
         "is_answer": drawing.is_answer,
@@ -280,6 +295,8 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "directions": [item.name for item in model.scene.directions],
         "motion": None if motion is None else _motion_data(motion, units),
         "free": [_motion_data(each, units) for each in drawing.free],
+        "forces": _force_data(drawing, drawing.forces),
+        "forces_words": _forces_words(drawing.forces),
         "reference": None if drawing.reference is None else drawing.reference.points.tolist(),
         "colours": list(RATE_COLOURS),
         "eye": View(clearest_view(drawing).azimuth, _ELEVATION).axes[2].tolist(),
@@ -291,6 +308,35 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
             for k, (t, posture) in enumerate(postures)
         ],
     }
+
+
+def _force_data(drawing: Drawing, forces: DrawnForces | None) -> list[ForceData]:
+    """Return the arrows of forces; those of legs lie beside these, away from the robot's middle."""
+    found: list[ForceData] = []
+    for arrow in () if forces is None else forces.arrows:
+        ends = arrow.ends
+        if arrow.kind != "load":
+            way = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+            out = ends[0] - np.mean(drawing.posture.points, axis=0)
+            out -= (out @ way) * way
+            ends = ends + BESIDE * drawing.size * out / (float(np.linalg.norm(out)) or 1.0)
+        colour = FORCE_COLOURS[arrow.kind]
+        found.append(
+            {"kind": arrow.kind, "name": arrow.name, "words": arrow.words, "colour": colour, "ends": ends.tolist()}
+        )
+    return found
+
+
+def _forces_words(forces: DrawnForces | None) -> str:
+    """Return what arrows of forces mean; empty without a load."""
+    if forces is None:
+        return ""
+    kinds = {arrow.kind for arrow in forces.arrows}
+    words = [f"Arrows at the pose found: {forces.words} (teal)"]
+    words += ["legs in compression (magenta)"] if "push" in kinds else []
+    words += ["legs in tension (green, from a dot)"] if "pull" in kinds else []
+    words += [f"held by {forces.torques}"] if forces.torques else []
+    return "; ".join(words) + "."
 
 
 def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:

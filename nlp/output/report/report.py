@@ -13,12 +13,14 @@ import numpy as np
 
 from ....models import FloatArray
 from ...case.case import Case
+from ...evidence.loads import loads_at
+from ...evidence.state import RobotState
 from ...program.nlp import Nlp
 from ...results.data import CaseResult
 from ...results.jsondata import json_data
-from ...results.objective import objective_label, unit_of_objective
+from ...results.objective import objective_label, pose_objective, unit_of_objective
 from ...results.regression import CaseCheck
-from ...results.rounding import number
+from ...results.rounding import number, ordered
 from ...results.tradeoff import TradeoffResult
 from ...solver.multistart import ProgramSolution
 from ...solver.solution import Solution, TaskOutcome
@@ -128,15 +130,19 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
     """Return the content about one of several tasks at a point (n,)."""
     nlp, state, own = outcome.own.nlp, outcome.state, outcome.own
     states = states_at_poses(outcome)
+    values = _measured(nlp, outcome.x, states) if outcome.task.measure else []
     worst, count = worst_pose(states, outcome.task.sense), len(states)
+    if values:
+        worst = None if count == 1 or len(values) < count else _first_largest(values)
+    unit = unit_of_objective(nlp.case, task)
     drawings, views = [], []
     for k, each in enumerate(states):
         if each is not None:
             drawing = drawing_of(nlp, outcome.x, each, task, pose=k, is_answer=is_answer)
             drawings.append(drawing)
-            shown = PoseView(task, k, count, k == worst, count * tasks, nlp.objective_size)
-            if outcome.task.is_stated:  # the view moves along the task's motion
-                views.append(view_data(drawing, each.rates, shown))
+            words = f"{values[k]:.7g} {unit}" if len(values) == count else ""
+            shown = PoseView(task, k, count, k == worst, count * tasks, nlp.objective_size, words)
+            views.append(view_data(drawing, each.rates, shown))
     can_move = state is not None and nlp.n > 0 and not has_loops(nlp)
     slices: Sequence[Slice] = slices_of(nlp, x) if can_move else []
     planes: Sequence[Plane] = planes_of(nlp, x, _PLANES // tasks) if can_move else []
@@ -144,7 +150,7 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
     return Part(
         name=nlp.case.tasks[task].name,
         label=objective_label(nlp.case, task),
-        unit=unit_of_objective(nlp.case, task),
+        unit=unit,
         nlp=nlp,
         x=x,
         solution=own,
@@ -154,6 +160,17 @@ def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answ
         planes=tuple(planes),
         pairs=count * (count - 1) // 2,
     )
+
+
+def _measured(nlp: Nlp, x: FloatArray, states: Sequence[RobotState | None]) -> list[float]:
+    """Return the number of the actuators that is optimised instead of F, at each pose where the robot exists."""
+    return [pose_objective(nlp.case, loads_at(nlp, x, state, k)) for k, state in enumerate(states) if state is not None]
+
+
+def _first_largest(values: Sequence[float]) -> int:
+    """Return the index of the largest value, the first of those that differ by rounding."""
+    rounded = [ordered(value) for value in values]
+    return rounded.index(max(rounded))
 
 
 def _plane(part: Part, plane: Plane) -> dict[str, Any]:

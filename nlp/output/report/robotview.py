@@ -59,10 +59,6 @@ def drawings(report: Report) -> Markup:
 def robot_section(report: Report) -> Markup:
     """Return the 3-D view with its controls, its legend and the rates."""
     views = [view for part in report.parts for view in part.views]
-    drawn = report.parts[0].drawings
-    if not views and drawn:
-        source = image_source(_with_fewer_digits(picture([drawn[0]], ".svg")))
-        return tag("figure", tag("img", src=source, alt="The robot at its first pose; the tables have its numbers."))
     if not views:
         return paragraphs(["The robot does not exist at the point reached, so there is no picture of it."])
     first = views[0]
@@ -94,7 +90,7 @@ def robot_section(report: Report) -> Markup:
         role="group",
         aria_label="View",
     )
-    shown = tag(
+    picture = tag(
         "figure",
         script_frame("view", "picture", "The robot in three dimensions; the table below says the same in numbers."),
         drawings(report),
@@ -103,7 +99,8 @@ def robot_section(report: Report) -> Markup:
         tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),
     )
-    content = [*head, moving, shown, tag("h3", "Rates at this position"), _rates(first)]
+    content = [*head, moving, picture] if first["motion"] else [*head, picture]
+    content += [tag("h3", "Rates at this position"), _rates(first)] if first["rows"] else []
     note = "Without a script nothing moves; every number is in the tables."
     return join_markup([*content, tag("noscript", tag("p", note))])
 
@@ -112,6 +109,10 @@ def _legend(view: ViewData) -> Markup:
     """Return what the colours and lines of the view mean."""
     gradient = f"background:linear-gradient(90deg,{','.join(RATE_COLOURS)})"
     bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
+    forces = tag("span", view["forces_words"], id="forces-words") if view["forces_words"] else ""
+    joints = " Joints: dark where an actuator drives them." if view["joints"] else ""
+    if not view["rows"]:
+        return join_markup([forces, " Dotted grey: the start." if view["reference"] else "", joints])
     words = [
         "Limbs by their rate, scaled to the largest here: blue is negative, grey none, orange positive.",
         " Bold black: the axis of the task's motion",
@@ -123,9 +124,10 @@ def _legend(view: ViewData) -> Markup:
         " Nothing moves: the loops open along the task's motion."
         if view["motion"] and len(view["frames"]) == 1
         else "",
-        " Joints: dark where an actuator drives them." if view["joints"] else "",
+        joints,
         f" Point at a limb for its {view['measure']['words']}, rate, share of F and wrench",
-        ", at a joint for its kind." if view["joints"] else ".",
+        ", at a joint for its kind. " if view["joints"] else ". ",
+        forces,
     ]
     return join_markup([bar, *words])
 

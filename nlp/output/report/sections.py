@@ -179,13 +179,25 @@ def answer(report: Report) -> Markup:
     return tag("div", paragraphs(lines), class_=kind, id="answer")
 
 
-def _pose_words(case: Case) -> str:
-    """Return how F is taken over several poses, and what the picture shows."""
-    if objective_words(case):
-        return f"The robot works at {case.pose_count} poses; F is their largest. The picture is of the first."
+def _objective_lines(case: Case) -> Iterator[str]:
+    """Yield what is optimised: F of each task, or a number of the actuators."""
+    measured = objective_words(case)
+    if measured:
+        yield f"F is {measured}, to be as small as possible."
+        return
+    for k, task in enumerate(case.tasks):
+        word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
+        yield f"Task “{task.name}”: make F {word} for a {task_words(task_data(case, k), case.units)}."
+    yield "F is the sum of the squares of the rates at which the limbs' unit wrenches do work in the task's motion."
+
+
+def _poses_line(case: Case) -> str:
+    """Return how F is combined over the poses of a case, and which pose is shown."""
+    is_measured = bool(case.tasks[0].measure)
+    over = "largest" if is_measured else case.over_poses.value
+    shown = "The picture begins" if is_measured else "The picture and its rates begin"
     return (
-        f"The robot works at {case.pose_count} poses; F is their {case.over_poses.value}. "
-        "The picture and its rates begin with the first; a slider shows each."
+        f"The robot works at {case.pose_count} poses; F is their {over}. {shown} with the first; a slider shows each."
     )
 
 
@@ -193,16 +205,7 @@ def _case(report: Report) -> Markup:
     """Return the case in words."""
     case, first = report.case, report.parts[0]
     lines = [f"{case.model.description}.", *(f"Note: {remark}." for remark in case.model.remarks)]
-    objective = objective_words(case)
-    for k, task in enumerate(case.tasks if not objective else ()):
-        word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        lines.append(f"Task “{task.name}”: make F {word} for a {task_words(task_data(case, k), case.units)}.")
-    if objective:
-        lines.append(f"F is {objective}, which is made as small as possible.")
-    else:
-        lines.append(
-            "F is the sum of the squares of the rates at which the limbs' unit wrenches do work in the task's motion."
-        )
+    lines += _objective_lines(case)
     if len(case.tasks) > 1:
         lines.append(f"The tasks are brought together by the method {case.method.value}.")
     program = first.nlp.program
@@ -221,7 +224,7 @@ def _case(report: Report) -> Markup:
     else:
         lines.append("Nothing is free: the robot is evaluated where it stands.")
     if case.pose_count > 1:
-        lines.append(_pose_words(case))
+        lines.append(_poses_line(case))
     limits = report.result.limits
     if limits:
         listed = ", ".join(f"{row.key} {row.limit:g} {row.unit}".strip() for row in limits)

@@ -115,6 +115,8 @@
       found.push(lines(`couple ${row.limb}`, [[start, tip]], { color: colour(frame.rates[k]), width: 6 }));
       found.push(heads(`couple heads ${row.limb}`, [tip, plus(tip, way, -0.06 * size)], [way, way], 0.07 * size, colour(frame.rates[k])));
     });
+    // Forces belong to the pose found: elsewhere they are others.
+    if (index === view.zero) found.push(...forceTraces(view, INK));
     if (view.rows.length) {
       const top = largest();
       found.push({
@@ -161,6 +163,7 @@
         every.push(plus(frame.points[row.at], moment, 0.24 * view.size / norm(moment)));
       });
     }
+    every.push(...view.forces.flatMap((each) => each.ends));
     if (view.reference) every.push(...view.reference);
     if (view.motion) every.push(...view.motion.line, ...view.motion.path);
     const room = 0.08 * view.size;
@@ -201,8 +204,12 @@
 
   function tell() {
     const frame = view.frames[index];
-    byId("travelled").textContent = frame.words;
-    byId("travel").setAttribute("aria-valuetext", frame.words);
+    if (byId("travel")) {
+      byId("travelled").textContent = frame.words;
+      byId("travel").setAttribute("aria-valuetext", frame.words);
+    }
+    if (byId("forces-words")) byId("forces-words").textContent = view.forces_words;
+    if (!byId("rates")) return;
     byId("where").textContent = frame.words;
     byId("F-there").textContent = `${shown(frame.F, 7)} ${view.objective_unit}`.trim();
     document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
@@ -234,8 +241,10 @@
       return;
     }
     view = found;
-    byId("travel").max = view.frames.length - 1;
-    byId("travel").value = view.zero;
+    if (byId("travel")) {
+      byId("travel").max = view.frames.length - 1;
+      byId("travel").value = view.zero;
+    }
     document.querySelectorAll("img.still").forEach((each) => each.classList.toggle("chosen", Number(each.dataset.view) === data.views.indexOf(view)));
     if (byId("pose")) tellPose();
     if (window.Plotly && layout) layout = newLayout();
@@ -302,7 +311,7 @@
 
   byId("copy").addEventListener("click", copy);
   if (view) {
-    byId("travel").addEventListener("input", (event) => {
+    if (byId("travel")) byId("travel").addEventListener("input", (event) => {
       if (!isMoved && layout) {
         isMoved = true;
         layout = newLayout();
