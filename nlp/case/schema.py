@@ -299,8 +299,17 @@ class Document(Table):
         title="screwsynth case file",
         json_schema_extra={
             "allOf": [
-                {"oneOf": [{"required": [key]}, {"required": [file]}]}
-                for key, file in (("pose", "poses"), ("task", "tasks"))
+                {"oneOf": [{"required": ["pose"]}, {"required": ["poses"]}]},
+                {
+                    "oneOf": [
+                        {"required": ["task"]},
+                        {"required": ["tasks"]},
+                        {
+                            "required": ["objective"],
+                            "not": {"anyOf": [{"required": ["task"]}, {"required": ["tasks"]}]},
+                        },
+                    ]
+                },
             ]
         },
     )
