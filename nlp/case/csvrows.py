@@ -1,14 +1,15 @@
 """Poses and tasks from CSV files: each row becomes the table that a case file would have.
 
 The first row names the columns. Numbers are fixed, and in the units of the case. A fault is told with the file, the row
-as a spreadsheet counts it, and the column.
+as a spreadsheet counts it, and the column. Files of paths have the columns of poses too, and are read by the same
+functions.
 """
 
 from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ _MOST_BYTES, _MOST_ROWS = 4_000_000, 1_000
 _Columns = Mapping[str, tuple[str, ...]]
 
 
-class _Kind(NamedTuple):
+class RowKind(NamedTuple):
     """What rows of a file become.
 
     Attributes:
@@ -47,21 +48,23 @@ class _Kind(NamedTuple):
         return [column for part in (self.needed, self.others) for names in part.values() for column in names]
 
 
+#: Rows that are poses.
+POSE_ROWS = RowKind(
+    "pose",
+    needed={"position": ("x", "y", "z")},
+    others={
+        "rpy": ("roll", "pitch", "yaw"),
+        "quaternion": ("qw", "qx", "qy", "qz"),
+        "axis": ("axis_x", "axis_y", "axis_z"),
+        "angle": ("angle",),
+    },
+    alternatives=(("rpy",), ("quaternion",), ("axis", "angle")),
+    nested="rotation",
+)
 #: By the key that names the file.
-_KINDS: Mapping[str, _Kind] = {
-    "poses": _Kind(
-        "pose",
-        needed={"position": ("x", "y", "z")},
-        others={
-            "rpy": ("roll", "pitch", "yaw"),
-            "quaternion": ("qw", "qx", "qy", "qz"),
-            "axis": ("axis_x", "axis_y", "axis_z"),
-            "angle": ("angle",),
-        },
-        alternatives=(("rpy",), ("quaternion",), ("axis", "angle")),
-        nested="rotation",
-    ),
-    "tasks": _Kind(
+_KINDS: Mapping[str, RowKind] = {
+    "poses": POSE_ROWS,
+    "tasks": RowKind(
         "task",
         needed={"sense": ("sense",)},
         others={
@@ -164,31 +167,60 @@ def insert_rows(tables: dict[str, Any], folder: Path) -> TableOrigins:
     return TableOrigins(sources)
 
 
-def _read_rows(file: str, folder: Path, kind: _Kind, name: str) -> tuple[list[dict[str, Any]], _Source]:
+def _read_rows(file: str, folder: Path, kind: RowKind, name: str) -> tuple[list[dict[str, Any]], _Source]:
     """Return the tables of a file's rows, and where they come from.
 
     Raises:
         CaseError: the file cannot be read, or has a fault.
         InputError: the file is no table at all.
     """
-    import csv  # noqa: PLC0415 - most cases name no files
-
-    text = _text_of(folder / file, file, name)
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    lines = csv.reader(io.StringIO(text, newline=""), delimiter=";" if ";" in first and "," not in first else ",")
-    try:
-        records = [(number, [cell.strip() for cell in record]) for number, record in enumerate(lines, 1)]
-    except csv.Error as error:
-        raise InputError(f"{file}: is not CSV: {error}") from None
-    records = [(number, record) for number, record in records if any(record)]
+    records = list(csv_rows(_text_of(folder / file, file, name), file))
     if len(records) < 2:
         raise InputError(f"{file}: has no rows below a row that names the columns")
     if len(records) - 1 > _MOST_ROWS:
         raise InputError(f"{file}: has {len(records) - 1} rows, of which at most {_MOST_ROWS} are allowed")
     (top, header), *body = records
-    columns = _check_header(header, kind, lambda fault: CaseError(f"row {top}", fault, source=file))
+    columns = check_header(header, kind, lambda fault: CaseError(f"row {top}", fault, source=file))
     tables = [_table_of(number, record, header, columns, kind, file) for number, record in body]
     return tables, _Source(file, tuple(number for number, _ in body), columns, kind.nested)
+
+
+def csv_rows(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield the cells of every row that is not empty, without the spaces around them, and its number.
+
+    Args:
+        text: of the file; commas or semicolons separate its cells.
+        file: its name, for messages.
+
+    Raises:
+        InputError: the text is no table at all.
+    """
+    import csv  # noqa: PLC0415 - most cases name no files
+
+    lines = io.StringIO(text, newline="")
+    first = next((line for line in lines if line.strip()), "")
+    lines.seek(0)
+    records = csv.reader(lines, delimiter=";" if ";" in first and "," not in first else ",")
+    try:
+        for number, record in enumerate(records, 1):
+            cells = [cell.strip() for cell in record]
+            if any(cells):
+                yield number, cells
+    except csv.Error as error:
+        raise InputError(f"{file}: is not CSV: {error}") from None
+
+
+def number_in(text: str, row: int, column: str, file: str) -> float:
+    """Return the number of a cell.
+
+    Raises:
+        CaseError: the cell holds none.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        fault = "must be a number" if text else "is empty; it must be a number"
+        raise CaseError(f"row {row}, column {column}", fault, text or None, file) from None
 
 
 def _text_of(path: Path, file: str, name: str) -> str:
@@ -210,7 +242,7 @@ def _text_of(path: Path, file: str, name: str) -> str:
         raise CaseError(name, f"cannot be read: {fault}", file) from None
 
 
-def _check_header(header: Sequence[str], kind: _Kind, error: Callable[[str], CaseError]) -> _Columns:
+def check_header(header: Sequence[str], kind: RowKind, error: Callable[[str], CaseError]) -> _Columns:
     """Return the columns that a file has, by key within a table.
 
     Raises:
@@ -237,7 +269,7 @@ def _check_header(header: Sequence[str], kind: _Kind, error: Callable[[str], Cas
 
 
 def _table_of(
-    number: int, record: Sequence[str], header: Sequence[str], columns: _Columns, kind: _Kind, file: str
+    number: int, record: Sequence[str], header: Sequence[str], columns: _Columns, kind: RowKind, file: str
 ) -> dict[str, Any]:
     """Return the table of a row.
 
@@ -249,14 +281,7 @@ def _table_of(
     cells = dict(zip(header, record, strict=True))
 
     def value(column: str) -> float | str:
-        text = cells[column]
-        if column in kind.words:
-            return text
-        try:
-            return float(text)
-        except ValueError:
-            fault = "must be a number" if text else "is empty; it must be a number"
-            raise CaseError(f"row {number}, column {column}", fault, text or None, file) from None
+        return cells[column] if column in kind.words else number_in(cells[column], number, column, file)
 
     table: dict[str, Any] = {}
     for key, names in columns.items():
