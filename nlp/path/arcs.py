@@ -1,0 +1,147 @@
+"""Circular arcs and helices in a plane of two axes: centre, radius and angle, by the rules of LinuxCNC.
+
+The radius grows linearly with the angle where the two ends differ in their distance from the centre by rounding. An
+angle is positive from the plane's first axis to its second.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import FloatArray
+
+#: The two axes of a plane, then the one along which a helix advances, by the code that selects it: 0, 1, 2 for x, y, z.
+PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+#: Largest part of the radius by which those of the two ends may differ.
+_SPIRAL = 0.001
+#: Part by which a chord may be longer than the diameter that is programmed, and angle, that count as rounding.
+_TINY = 1e-12
+#: Nodes, between 0 and 1, and weights by which lengths of arcs are integrated: exact but for rounding where the radius
+#: does not grow.
+_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(5)[k] / 2 + (0.5, 0)[k] for k in range(2))
+
+
+class ArcError(Exception):
+    """Error of an arc that does not exist; the message says why."""
+
+
+class Tolerances(NamedTuple):
+    """Lengths below which ends of arcs agree.
+
+    Attributes:
+        radius: smallest radius, and excess of half a chord over it.
+        spiral: difference of the distances of both ends from the centre, allowed for large radii too.
+        closed: distance of the ends of a full circle.
+    """
+
+    radius: float
+    spiral: float
+    closed: float
+
+    def times(self, scale: float) -> Tolerances:
+        """Return the same lengths in another unit."""
+        return Tolerances(self.radius * scale, self.spiral * scale, self.closed * scale)
+
+
+#: By the code of the unit in which a program is written, in that unit.
+TOLERANCES = {
+    20: Tolerances(5e-5, 0.002 * math.sqrt(2), 1e-8),
+    21: Tolerances(5e-5 * 25.4, 0.02 * math.sqrt(2), 1e-8),
+}
+
+
+class Arc(NamedTuple):
+    """An arc from an angle on, in a plane.
+
+    Attributes:
+        first, second: coordinates of the centre along the plane's axes.
+        radius: at the start.
+        growth: of the radius, up to the end.
+        angle: of the start, radians.
+        sweep: from the start to the end, radians; its sign is the sense.
+    """
+
+    first: float
+    second: float
+    radius: float
+    growth: float
+    angle: float
+    sweep: float
+
+
+Point = tuple[float, float]
+
+
+def arc_about(centre: Point, start: Point, end: Point, turns: int, tolerances: Tolerances) -> Arc:
+    """Return the arc about a centre.
+
+    Args:
+        centre: coordinates in the plane.
+        start: first point.
+        end: last point; the first one again for a full circle.
+        turns: 1 for at most one turn, 2 for one more, and so on; negative for clockwise.
+        tolerances: in the unit of the coordinates.
+
+    Raises:
+        ArcError: an end is at the centre, or the ends are at different distances from it.
+    """
+    from_start, from_end = (start[0] - centre[0], start[1] - centre[1]), (end[0] - centre[0], end[1] - centre[1])
+    radius, last = math.hypot(*from_start), math.hypot(*from_end)
+    if min(radius, last) < tolerances.radius:
+        raise ArcError("the centre of the arc is at one of its ends")
+    gap = abs(last - radius)
+    if gap > 100 * tolerances.spiral or (gap > tolerances.spiral and gap > _SPIRAL * max(radius, last)):
+        raise ArcError(
+            f"the ends of the arc are {radius:.7g} and {last:.7g} from its centre; they may differ by"
+            f" {max(tolerances.spiral, min(100 * tolerances.spiral, _SPIRAL * max(radius, last))):.3g}"
+        )
+    angle = math.atan2(from_start[1], from_start[0])
+    sense = math.copysign(1, turns)
+    sweep = sense * (math.atan2(from_end[1], from_end[0]) - angle)
+    if math.dist(start, end) <= tolerances.closed:
+        sweep = math.tau
+    elif sweep <= _TINY:
+        sweep += math.tau
+    return Arc(*centre, radius, last - radius, angle, sense * (sweep + (abs(turns) - 1) * math.tau))
+
+
+def centre_of_radius(radius: float, start: Point, end: Point, is_clockwise: bool, tolerances: Tolerances) -> Point:
+    """Return the centre of an arc that is given by its radius.
+
+    Args:
+        radius: positive for at most half a turn, negative for more.
+        start: first point.
+        end: last point.
+        is_clockwise: the sense.
+        tolerances: in the unit of the coordinates.
+
+    Raises:
+        ArcError: the ends are one point, or farther apart than two radii.
+    """
+    chord = (end[0] - start[0], end[1] - start[1])
+    length, size = math.hypot(*chord), abs(radius)
+    if length <= tolerances.closed:
+        raise ArcError("an arc with R ends where it starts, so that its centre is not determined; state it by I, J, K")
+    if length / 2 - size > tolerances.radius:
+        raise ArcError(f"the ends of the arc are {length:.7g} apart, more than two radii of {size:.7g}")
+    height = 0.0 if length / 2 > size * (1 - _TINY) else math.sqrt((size - length / 2) * (size + length / 2))
+    # The centre is on the right of the chord of a clockwise arc of less than half a turn.
+    height = (-height if is_clockwise == (radius > 0) else height) / length
+    return (start[0] + chord[0] / 2 - height * chord[1], start[1] + chord[1] / 2 + height * chord[0])
+
+
+def arc_lengths(radius: FloatArray, growth: FloatArray, sweep: FloatArray, rise: FloatArray) -> FloatArray:
+    """Return the lengths (n,) of arcs and helices.
+
+    Args:
+        radius: (n,) at the start.
+        growth: (n,) of the radius.
+        sweep: (n,) radians.
+        rise: (n,) along the axis.
+    """
+    along = (radius[:, None] + growth[:, None] * _NODES) * sweep[:, None]
+    speeds = np.sqrt(along**2 + growth[:, None] ** 2 + rise[:, None] ** 2)
+    return np.asarray(speeds @ _WEIGHTS)

@@ -1,0 +1,102 @@
+"""Options of reading a path, and the units of its file.
+
+Numbers of a path are in the length unit of the case, and angles of options in degrees, as in programs.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from ..errors import InputError, listing, nearest
+from ..units import Units
+from .orientation import order_named
+
+#: Lengths in millimetres of the units of programs, by the code that selects them.
+MILLIMETRES = {20: Fraction(127, 5), 21: Fraction(1)}
+#: Lengths in millimetres of the units of cases, by their labels.
+_LABELS = {
+    "um": Fraction(1, 1000), "mm": Fraction(1), "cm": Fraction(10), "dm": Fraction(100), "m": Fraction(1000),
+    "in": MILLIMETRES[20], "ft": 12 * MILLIMETRES[20],
+}  # fmt: skip
+#: Names of coordinate systems in LinuxCNC, the first of which is number 1.
+SYSTEMS = (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3)
+
+
+class Between(enum.Enum):
+    """Motion between two points of a path.
+
+    ``ANGLES``: the three angles change linearly, as LinuxCNC moves the axes A, B and C; ``SLERP``: one turn about a
+    fixed axis by the smallest angle. The position changes linearly, or along an arc, in both.
+    """
+
+    ANGLES = "angles"
+    SLERP = "slerp"
+
+
+@dataclass(frozen=True)
+class PathOptions:
+    """Choices that a path's file leaves open.
+
+    Attributes:
+        between: motion between two points; None for linear angles, and for ``SLERP`` where a table of poses states
+            quaternions, or axes and angles.
+        angles: convention of a program's A, B and C; see :data:`.orientation.ORDERS`.
+        unit: ``"mm"`` or ``"in"``, of a program before G20 or G21; None for that of the case if it is one of these.
+        start: (6,) X, Y, Z, A, B, C at which the machine stands before a program, in machine coordinates; None where
+            this is not known: the path then begins at the first point of which the program has stated X, Y and Z.
+        offsets: (6,) origins of the coordinate systems in machine coordinates, by their names, such as ``"G54"``; those
+            left out are 0.
+        skips_deleted: whether lines that begin with a slash are left out, as LinuxCNC does unless told otherwise.
+
+    Raises:
+        InputError: an option has another value.
+    """
+
+    between: Between | None = None
+    angles: str = "rpy"
+    unit: str | None = None
+    start: Sequence[float] | None = None
+    offsets: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    skips_deleted: bool = True
+
+    def __post_init__(self) -> None:
+        order_named(self.angles)
+        if self.unit not in (None, "mm", "in"):
+            raise InputError(f"unit = {self.unit!r}: must be mm or in")
+        names = [f"G{code}" for code in SYSTEMS]
+        for name, numbers in (*self.offsets.items(), *([] if self.start is None else [("start", self.start)])):
+            if name not in ("start", *names):
+                raise InputError(f"offset {name!r}: no such coordinate system; {nearest(name, names)}")
+            if len(numbers) != 6 or not all(math.isfinite(number) for number in numbers):
+                raise InputError(f"{name} = {listing(map(str, numbers))}: must be six finite numbers: X, Y, Z, A, B, C")
+
+
+def code_of_unit(unit: str | None, units: Units) -> int | None:
+    """Return the code of the unit in which a program begins; None where it is not known.
+
+    Args:
+        unit: as in :class:`PathOptions`.
+        units: of the case.
+    """
+    return {"mm": 21, "in": 20}.get(unit or units.length)
+
+
+def program_unit(code: int, units: Units, source: str) -> Fraction:
+    """Return the length of a program's unit in the unit of the case.
+
+    Args:
+        code: of the program's unit, 20 or 21.
+        units: of the case.
+        source: name of the program, for messages.
+
+    Raises:
+        InputError: the case's unit has no known length.
+    """
+    if units.length not in _LABELS:
+        fault = f"the case's unit of lengths, {units.length!r}, has no known length in millimetres"
+        raise InputError(f"{source}: cannot be read: {fault}; {nearest(units.length, _LABELS)}")
+    return MILLIMETRES[code] / _LABELS[units.length]

@@ -1,0 +1,293 @@
+"""Programmed paths: points, and the lines, arcs, helices and dwells between them, in columns of numbers.
+
+A path of a million segments is a few arrays; a :class:`Segment` is a view of one of them that is made when it is asked
+for. Along each segment a parameter goes from 0 to 1: the position is a linear or circular function of it, and so is the
+orientation. Poses are those of the platform frame in the world frame; machine coordinates of a program are the world's.
+Angles are radians.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import FloatArray
+from ...models.rotation import matrix_from_axis_angle
+from .arcs import PLANES, Arc, arc_lengths
+from .options import Between
+from .orientation import (
+    Order,
+    matrices_from_quaternions,
+    quaternions_from_angles,
+    shortest_turns,
+    symbolic_rotation,
+    turned,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+#: Axes of each plane, from code 17 on.
+_AXES = np.array(list(PLANES.values()))
+
+
+class Kind(enum.IntEnum):
+    """Kind of a segment."""
+
+    LINE = 0
+    ARC = 1
+    DWELL = 2
+
+
+class Idle(NamedTuple):
+    """A word of a program that moves nothing, or a line that is no part of the path.
+
+    Attributes:
+        line: the first line that has it.
+        word: the word, or what is left out.
+        lines: number of lines that have it.
+    """
+
+    line: int
+    word: str
+    lines: int
+
+
+class Poses(NamedTuple):
+    """Positions (n, 3) and rotation matrices (n, 3, 3)."""
+
+    positions: FloatArray
+    rotations: FloatArray
+
+
+class SymbolicPose(NamedTuple):
+    """Position (3, 1) and rotation matrix (3, 3) as expressions."""
+
+    position: SX
+    rotation: SX
+
+
+class Shape(NamedTuple):
+    """What segments share whose poses are the same expressions of their numbers.
+
+    Attributes:
+        plane: code of the plane of an arc; None for a line and a dwell.
+        order: convention of angles that change linearly; None for a turn about an axis.
+    """
+
+    plane: int | None
+    order: Order | None
+
+    @property
+    def size(self) -> int:
+        """Number of a segment's numbers."""
+        return (6 if self.plane is None else 8) + (13 if self.order is None else 6)
+
+    def pose(self, numbers: SX, s: SX) -> SymbolicPose:
+        """Return the pose at a parameter of a segment.
+
+        Args:
+            numbers: (size, 1) of the segment, as numbers or symbols; see :attr:`Segment.numbers`.
+            s: (1, 1) from 0 at the start to 1 at the end.
+        """
+        count = 6 if self.plane is None else 8
+        return SymbolicPose(self._position(numbers[:count], s), self._rotation(numbers[count:], s))
+
+    def _position(self, numbers: SX, s: SX) -> SX:
+        if self.plane is None:
+            return numbers[:3] + s * numbers[3:]
+        first, second, radius, growth, angle, sweep, height, rise = (numbers[k] for k in range(8))
+        radius, angle = radius + s * growth, angle + s * sweep
+        position = SX(3, 1)
+        along = (first + radius * ca.cos(angle), second + radius * ca.sin(angle), height + s * rise)
+        for axis, coordinate in zip(PLANES[self.plane], along, strict=True):
+            position[axis] = coordinate
+        return position
+
+    def _rotation(self, numbers: SX, s: SX) -> SX:
+        if self.order is not None:
+            return symbolic_rotation(numbers[:3] + s * numbers[3:], self.order)
+        return matrix_from_axis_angle(numbers[9:12], s * numbers[12]) @ ca.reshape(numbers[:9], 3, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class ProgrammedPath:
+    """A path of n segments, of which m are arcs.
+
+    Attributes:
+        source: name of the file.
+        knots: (n + 1, 6) position and angles of the ends: segment k goes from knot k to knot k + 1.
+        lines: (n,) lines of the file, or rows of a table, that make the segments.
+        kinds: (n,) kinds of the segments.
+        durations: (n,) seconds; NaN where the file states neither time nor feed, as for rapid motions.
+        arcs: (m, 6) centre, radius, growth of the radius, angle and sweep of every arc; see :class:`.arcs.Arc`.
+        planes: (m,) codes of their planes.
+        order: convention of the angles.
+        between: motion between two points.
+        idle: what moves nothing.
+    """
+
+    source: str
+    knots: FloatArray
+    lines: NDArray[np.int32]
+    kinds: NDArray[np.uint8]
+    durations: FloatArray
+    arcs: FloatArray
+    planes: NDArray[np.uint8]
+    order: Order
+    between: Between
+    idle: tuple[Idle, ...] = ()
+
+    def __post_init__(self) -> None:
+        for array in (self.knots, self.lines, self.kinds, self.durations, self.arcs, self.planes):
+            array.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __getitem__(self, index: int) -> Segment:
+        return Segment(self, range(len(self))[index])
+
+    def __iter__(self) -> Iterator[Segment]:
+        return (self[index] for index in range(len(self)))
+
+    @cached_property
+    def arc_segments(self) -> NDArray[np.intp]:
+        """Indices (m,) of the segments that are arcs."""
+        return np.flatnonzero(self.kinds == Kind.ARC)
+
+    @cached_property
+    def lengths(self) -> FloatArray:
+        """Lengths (n,) of the ways of the position."""
+        lengths = np.asarray(np.linalg.norm(np.diff(self.knots[:, :3], axis=0), axis=1))
+        k, axis = self.arc_segments, _AXES[self.planes - 17, 2]
+        rises = self.knots[k + 1, axis] - self.knots[k, axis]
+        lengths[k] = arc_lengths(self.arcs[:, 2], self.arcs[:, 3], self.arcs[:, 5], rises)
+        return lengths
+
+    def poses_at(self, segments: Sequence[int] | NDArray[np.intp], s: ArrayLike) -> Poses:
+        """Return the poses at points of segments, in NumPy.
+
+        Args:
+            segments: (k,) indices of segments.
+            s: (k,) parameters, from 0 to 1, or one for all.
+        """
+        index = np.asarray(segments, dtype=np.intp)
+        parameter = np.broadcast_to(np.asarray(s, dtype=np.float64), index.shape)[:, None]
+        start, end = self.knots[index], self.knots[index + 1]
+        points = start + parameter * (end - start)
+        on_arcs = np.flatnonzero(self.kinds[index] == Kind.ARC)
+        rows = np.searchsorted(self.arc_segments, index[on_arcs])
+        first, second, radius, growth, angle, sweep = self.arcs[rows].T
+        size, turn = radius + parameter[on_arcs, 0] * growth, angle + parameter[on_arcs, 0] * sweep
+        axes = _AXES[self.planes[rows] - 17]
+        points[on_arcs, axes[:, 0]] = first + size * np.cos(turn)
+        points[on_arcs, axes[:, 1]] = second + size * np.sin(turn)
+        quaternions = quaternions_from_angles(points[:, 3:], self.order)
+        if self.between is Between.SLERP:
+            first_one = quaternions_from_angles(start[:, 3:], self.order)
+            about, angles = shortest_turns(first_one, quaternions_from_angles(end[:, 3:], self.order))
+            quaternions = turned(first_one, about, parameter[:, 0] * angles)
+        return Poses(points[:, :3], matrices_from_quaternions(quaternions))
+
+    def arc_of(self, segment: int) -> tuple[Arc, int]:
+        """Return the arc of a segment that is one, and the code of its plane."""
+        row = int(np.searchsorted(self.arc_segments, segment))
+        return Arc(*self.arcs[row].tolist()), int(self.planes[row])
+
+    def shapes(self) -> dict[Shape, NDArray[np.intp]]:
+        """Return the indices of the segments of each shape: as many expressions describe the whole path."""
+        order = None if self.between is Between.SLERP else self.order
+        found = {Shape(None, order): np.flatnonzero(self.kinds != Kind.ARC)}
+        found |= {Shape(plane, order): self.arc_segments[self.planes == plane] for plane in PLANES}
+        return {shape: segments for shape, segments in found.items() if len(segments)}
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A segment of a path.
+
+    Attributes:
+        path: the path.
+        index: of the segment in it.
+    """
+
+    path: ProgrammedPath
+    index: int
+
+    @property
+    def line(self) -> int:
+        """Line of the file, or row of a table."""
+        return int(self.path.lines[self.index])
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the segment."""
+        return Kind(int(self.path.kinds[self.index]))
+
+    @property
+    def start(self) -> FloatArray:
+        """Position and angles (6,) at the start."""
+        return np.asarray(self.path.knots[self.index])
+
+    @property
+    def end(self) -> FloatArray:
+        """Position and angles (6,) at the end."""
+        return np.asarray(self.path.knots[self.index + 1])
+
+    @property
+    def length(self) -> float:
+        """Length of the way of the position."""
+        return float(self.path.lengths[self.index])
+
+    @property
+    def duration(self) -> float | None:
+        """Seconds; None where the file does not state them."""
+        seconds = float(self.path.durations[self.index])
+        return None if np.isnan(seconds) else seconds
+
+    @property
+    def shape(self) -> Shape:
+        """Shape of the segment's expressions."""
+        order = None if self.path.between is Between.SLERP else self.path.order
+        return Shape(self.path.arc_of(self.index)[1] if self.kind is Kind.ARC else None, order)
+
+    @property
+    def numbers(self) -> FloatArray:
+        """The numbers (size,) from which :meth:`Shape.pose` makes this segment's pose.
+
+        Of a line the start and the change of the position; of an arc its six numbers, and start and change along the
+        axis. Then start and change of the angles, or the first rotation matrix column by column, axis and angle.
+        """
+        start, change = self.start, self.end - self.start
+        position = [start[:3], change[:3]]
+        if self.kind is Kind.ARC:
+            arc, plane = self.path.arc_of(self.index)
+            axis = PLANES[plane][2]
+            position = [np.array([*arc, start[axis], change[axis]])]
+        if self.path.between is Between.ANGLES:
+            return np.concatenate([*position, start[3:], change[3:]])
+        first, last = (quaternions_from_angles(end[None, 3:], self.path.order) for end in (start, self.end))
+        axes, angles = shortest_turns(first, last)
+        return np.concatenate([*position, matrices_from_quaternions(first)[0].ravel(order="F"), axes[0], angles])
+
+    def pose_at(self, s: float) -> Poses:
+        """Return position (3,) and rotation matrix (3, 3) at a parameter from 0 to 1."""
+        positions, rotations = self.path.poses_at([self.index], s)
+        return Poses(positions[0], rotations[0])
+
+    def expressions(self, s: SX) -> SymbolicPose:
+        """Return the pose as expressions of the parameter (1, 1)."""
+        return self.shape.pose(SX(self.numbers), s)
+
+
+def idle_words(counts: dict[str, list[int]]) -> tuple[Idle, ...]:
+    """Return what moves nothing, in the order of the first lines, from first line and count of each word."""
+    return tuple(sorted(Idle(line, word, lines) for word, (line, lines) in counts.items()))

@@ -1,0 +1,188 @@
+"""Paths as tables of poses: each row of a CSV file is a point, in the columns of a case's poses.
+
+Columns ``t``, seconds, or ``feed``, lengths or angles per second, state the times. Numbers are in the units of the
+case.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...models import Dimension, FloatArray
+from ..case.csvrows import POSE_ROWS, check_header, csv_rows, number_in
+from ..case.pose import LARGEST
+from ..errors import CaseError, InputError
+from ..units import Units
+from .options import Between, PathOptions
+from .orientation import ORDERS, quaternions_from_angles, roll_pitch_yaw, shortest_turns
+from .path import Kind, ProgrammedPath
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Columns of poses, and of the time.
+_ROWS = POSE_ROWS._replace(others={**POSE_ROWS.others, "t": ("t",), "feed": ("feed",)})
+#: Cells of a rotation that a row leaves out; 0 for all others.
+_LEFT_OUT = {"qw": "1", "axis_z": "1"}
+#: Largest distance of a quaternion's size from 1, as in a case file.
+_ROUNDING = 1e-6
+
+
+class _Table(NamedTuple):
+    """Numbers of a file.
+
+    Attributes:
+        source: name of the file.
+        rows: (n,) numbers of the rows, as a spreadsheet counts.
+        columns: (n,) numbers of each column, by its name.
+    """
+
+    source: str
+    rows: NDArray[np.int32]
+    columns: Mapping[str, FloatArray]
+
+    def block(self, names: str) -> FloatArray:
+        """Return columns (n, k) by their names, which spaces separate."""
+        return np.stack([self.columns[name] for name in names.split()], axis=1)
+
+    def refuse(self, is_wrong: NDArray[np.bool_], name: str, fault: str) -> None:
+        """Refuse the first row at which something is wrong.
+
+        Args:
+            is_wrong: (n,) whether it is, at each row.
+            name: of the columns, for messages.
+            fault: the fault, in words.
+
+        Raises:
+            CaseError: there is such a row.
+        """
+        if is_wrong.any():
+            at = int(np.argmax(is_wrong))
+            value = float(self.columns[name][at]) if name in self.columns else None
+            raise CaseError(f"row {self.rows[at]}, column{'s' * (value is None)} {name}", fault, value, self.source)
+
+
+def read_poses(text: str, source: str, units: Units, options: PathOptions) -> ProgrammedPath:
+    """Return the path through the rows of a table.
+
+    Args:
+        text: of the file.
+        source: its name, for messages.
+        units: of the case.
+        options: of which the motion between two rows counts here.
+
+    Raises:
+        InputError: the table has a fault, or fewer than two points.
+    """
+    table = _read_table(text, source)
+    has_angles = not {"qw", "axis_x", "angle"} & table.columns.keys()
+    between = options.between or (Between.ANGLES if has_angles else Between.SLERP)
+    if between is Between.ANGLES and not has_angles:
+        raise InputError(f"{source}: linear angles need columns roll, pitch, yaw; other rotations are joined by slerp")
+    knots = np.hstack([table.block("x y z"), _angles(table, units)])
+    moves = np.any(np.diff(knots, axis=0) != 0, axis=1)
+    # A point that is there twice is a dwell where its time is stated, and no segment where it is not.
+    keeps = np.ones_like(moves) if "t" in table.columns else moves
+    if not keeps.any():
+        raise InputError(f"{source}: there is no path: fewer than two points below a row that names the columns")
+    return ProgrammedPath(
+        source,
+        knots[np.concatenate([[True], keeps])],
+        table.rows[1:][keeps],
+        np.where(moves, Kind.LINE, Kind.DWELL).astype(np.uint8)[keeps],
+        _durations(table, knots, between, units)[keeps],
+        np.empty((0, 6)),
+        np.empty(0, dtype=np.uint8),
+        ORDERS["rpy"],
+        between,
+    )
+
+
+def _check_columns(top: int, header: list[str], source: str) -> list[list[int]]:
+    """Return the places of the columns of a rotation that a row may leave empty together.
+
+    Args:
+        top: number of the row that names the columns.
+        header: their names.
+        source: name of the file.
+
+    Raises:
+        InputError: there are none, or not those of a path.
+    """
+    if not header:
+        raise InputError(f"{source}: has no rows below a row that names the columns")
+    found = check_header(header, _ROWS, lambda fault: CaseError(f"row {top}", fault, source=source))
+    if {"t", "feed"} <= found.keys():
+        raise CaseError(f"row {top}", "column 'feed' cannot stand beside 't'; state the time in one way", source=source)
+    return [[header.index(name) for name in names] for key, names in found.items() if key in POSE_ROWS.others]
+
+
+def _read_table(text: str, source: str) -> _Table:
+    """Return the numbers of a file.
+
+    Raises:
+        InputError: it is no table, or a cell is no number.
+    """
+    records = csv_rows(text, source)
+    top, header = next(records, (0, []))
+    optional = _check_columns(top, header, source)
+    rows, numbers = array("i"), array("d")
+    for row, cells in records:
+        if len(cells) != len(header):
+            raise CaseError(f"row {row}", f"must have {len(header)} cells, got {len(cells)}", source=source)
+        for places in optional:
+            if not any(cells[place] for place in places):
+                for place in places:
+                    cells[place] = _LEFT_OUT.get(header[place], "0")
+        try:
+            numbers.extend([float(cell) for cell in cells])
+        except ValueError:
+            for cell, name in zip(cells, header, strict=True):
+                number_in(cell, row, name, source)  # of which one raises
+        rows.append(row)
+    columns = np.array(numbers).reshape(-1, len(header)).T
+    table = _Table(source, np.array(rows, dtype=np.int32), dict(zip(header, columns, strict=True)))
+    for name, column in table.columns.items():
+        table.refuse(~(np.abs(column) <= LARGEST), name, f"must be finite, of a size of at most {LARGEST:g}")
+    return table
+
+
+def _angles(table: _Table, units: Units) -> FloatArray:
+    """Return roll, pitch and yaw (n, 3) of the rows."""
+    columns, zeros = table.columns, np.zeros(len(table.rows))
+    unit = units.to_internal(1, Dimension.ANGLE)
+    if "roll" in columns:
+        return table.block("roll pitch yaw") * unit
+    if "qw" in columns:
+        quaternions = table.block("qw qx qy qz")
+        sizes = np.linalg.norm(quaternions, axis=1)
+        table.refuse(~(np.abs(sizes - 1) <= _ROUNDING), "qw, qx, qy, qz", "must be a unit quaternion (w, x, y, z)")
+        return roll_pitch_yaw(quaternions / sizes[:, None])
+    axes = table.block("axis_x axis_y axis_z") if "axis_x" in columns else np.array([[0.0, 0.0, 1.0]])
+    sizes = np.linalg.norm(axes, axis=1)
+    table.refuse(~(sizes > 0), "axis_x, axis_y, axis_z", "must be an axis of any length but zero")
+    half = columns.get("angle", zeros)[:, None] * unit / 2
+    return roll_pitch_yaw(np.hstack([np.cos(half), np.sin(half) * axes / sizes[:, None]]))
+
+
+def _durations(table: _Table, knots: FloatArray, between: Between, units: Units) -> FloatArray:
+    """Return the times (n - 1,) from each row to the next, in seconds; NaN where none is stated."""
+    durations = np.full(len(knots) - 1, np.nan)
+    if "t" in table.columns:
+        durations = np.diff(table.columns["t"])
+        wrong = np.concatenate([[False], ~(durations > 0)])
+        table.refuse(wrong, "t", "must be later than that of the row before")
+    elif "feed" in table.columns:
+        feeds = table.columns["feed"]
+        table.refuse(~(feeds > 0), "feed", "must be positive")
+        change = np.diff(knots, axis=0)
+        ways, turns = np.linalg.norm(change[:, :3], axis=1), np.linalg.norm(change[:, 3:], axis=1)
+        if between is Between.SLERP:
+            quaternions = quaternions_from_angles(knots[:, 3:], ORDERS["rpy"])
+            _, turns = shortest_turns(quaternions[:-1], quaternions[1:])
+        durations = np.where(ways > 0, ways, turns / units.to_internal(1, Dimension.ANGLE)) / feeds[1:]
+    return durations

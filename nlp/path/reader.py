@@ -1,0 +1,67 @@
+"""Files of paths: G-code, and tables of poses, whose names end in ``.csv``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..system.reading import read_limited, text_of_bytes
+from ..units import Units
+from .gcode import read_program
+from .options import Between, PathOptions
+from .orientation import quaternions_from_angles, shortest_turns
+from .path import ProgrammedPath
+from .poses_csv import read_poses
+
+#: Size of the largest file, bytes: some ten million lines.
+_LARGEST = 2**28
+#: Smallest distance of a shortest turn from half a turn, radians: nearer, rounding would choose its sense.
+_HALF_TURN = 1e-9
+
+
+def read_path(file: str | Path, units: Units, options: PathOptions | None = None) -> ProgrammedPath:
+    """Return the path in a file.
+
+    Args:
+        file: name of the file.
+        units: of the case.
+        options: choices that the file leaves open.
+
+    Raises:
+        InputError: the file cannot be read, or holds anything that is not read.
+    """
+    options = options or PathOptions()
+    content = read_limited(file, _LARGEST)
+    if str(file).lower().endswith(".csv"):
+        try:
+            text = text_of_bytes(content)
+        except UnicodeDecodeError:
+            raise InputError(f"{file}: cannot be read: it is not UTF-8 text") from None
+        path = read_poses(text, str(file), units, options)
+    else:
+        # Comments may be in any encoding; a word of a program is ASCII.
+        text = content.removeprefix(b"\xef\xbb\xbf").decode("ascii", "replace")
+        del content
+        lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        del text
+        path = read_program(lines, str(file), units, options)
+    if path.between is Between.SLERP:
+        _check_turns(path)
+    return path
+
+
+def _check_turns(path: ProgrammedPath) -> None:
+    """Refuse a segment between orientations that two shortest turns join.
+
+    Raises:
+        InputError: there is one.
+    """
+    quaternions = quaternions_from_angles(path.knots[:, 3:], path.order)
+    _, angles = shortest_turns(quaternions[:-1], quaternions[1:])
+    if (angles > np.pi - _HALF_TURN).any():
+        line = path.lines[int(np.argmax(angles))]
+        raise InputError(
+            f"{path.source}: line {line}: turns by half a turn, which may go either way; add a point between"
+        )
