@@ -7,9 +7,9 @@ angle is positive from the plane's first axis to its second.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
-import numpy as np
+from numpy.polynomial.legendre import leggauss
 
 from ...models import FloatArray
 
@@ -19,9 +19,11 @@ PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 _SPIRAL = 0.001
 #: Part by which a chord may be longer than the diameter that is programmed, and angle, that count as rounding.
 _TINY = 1e-12
-#: Nodes, between 0 and 1, and weights by which lengths of arcs are integrated: exact but for rounding where the radius
-#: does not grow.
-_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(5)[k] / 2 + (0.5, 0)[k] for k in range(2))
+#: Nodes, between 0 and 1, and weights by which lengths of arcs are integrated (Gauss and Legendre): exact but for
+#: rounding where the radius does not grow.
+_NODES = [(float(node + 1) / 2, float(weight) / 2) for node, weight in zip(*leggauss(5), strict=True)]
+#: A number, or as many as there are arcs.
+_Numbers = TypeVar("_Numbers", float, FloatArray)
 
 
 class ArcError(Exception):
@@ -133,15 +135,17 @@ def centre_of_radius(radius: float, start: Point, end: Point, is_clockwise: bool
     return (start[0] + chord[0] / 2 - height * chord[1], start[1] + chord[1] / 2 + height * chord[0])
 
 
-def arc_lengths(radius: FloatArray, growth: FloatArray, sweep: FloatArray, rise: FloatArray) -> FloatArray:
-    """Return the lengths (n,) of arcs and helices.
+def arc_length(radius: _Numbers, growth: _Numbers, sweep: _Numbers, rise: _Numbers) -> _Numbers:
+    """Return the length of an arc or a helix, or of several.
 
     Args:
-        radius: (n,) at the start.
-        growth: (n,) of the radius.
-        sweep: (n,) radians.
-        rise: (n,) along the axis.
+        radius: at the start.
+        growth: of the radius.
+        sweep: radians.
+        rise: along the axis.
     """
-    along = (radius[:, None] + growth[:, None] * _NODES) * sweep[:, None]
-    speeds = np.sqrt(along**2 + growth[:, None] ** 2 + rise[:, None] ** 2)
-    return np.asarray(speeds @ _WEIGHTS)
+    length = 0 * radius
+    for node, weight in _NODES:
+        around = (radius + node * growth) * sweep
+        length = length + weight * (around * around + growth * growth + rise * rise) ** 0.5
+    return length

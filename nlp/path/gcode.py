@@ -16,7 +16,7 @@ import numpy as np
 from ..case.pose import LARGEST
 from ..errors import InputError
 from ..units import Units
-from .arcs import PLANES, TOLERANCES, Arc, ArcError, Tolerances, arc_about, arc_lengths, centre_of_radius
+from .arcs import PLANES, TOLERANCES, Arc, ArcError, Tolerances, arc_about, arc_length, centre_of_radius
 from .options import SYSTEMS, Between, PathOptions, code_of_unit, program_unit
 from .orientation import order_named
 from .path import Kind, ProgrammedPath, idle_words
@@ -141,11 +141,12 @@ class _Machine:
             _check_letters(codes, words, motion)
         if stops or "S" in words or "T" in words:
             self._note_all(block)
-        if codes:
+        has_modes = len(codes) > ("motion" in codes)
+        if has_modes:
             self._set_modes(codes, words)
         if "F" in words:
             self._set_feed(words["F"], motion)
-        if codes:
+        if has_modes:
             self._act(codes, words)
         if motion is not None:
             self._move(motion, words, codes.get("once") == 53)
@@ -328,8 +329,8 @@ class _Machine:
         else:
             centre = centre_of_radius(self._length(words["R"]), start, last, motion == 2, self.tolerances)
         arc = arc_about(centre, start, last, int(turns if motion == 3 else -turns), self.tolerances)
-        numbers = np.array([[arc.radius], [arc.growth], [arc.sweep], [end[along] - self.now[along]]])
-        self._add(Kind.ARC, end, self._seconds(float(arc_lengths(*numbers)[0]), end, words), arc)
+        length = arc_length(arc.radius, arc.growth, arc.sweep, end[along] - self.now[along])
+        self._add(Kind.ARC, end, self._seconds(length, end, words), arc)
 
     def _centre(self, words: dict[str, float], given: list[str], first: int, second: int) -> tuple[float, float]:
         """Return the centre that I, J and K state."""

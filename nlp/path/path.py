@@ -20,7 +20,7 @@ from casadi import SX
 
 from ...models import FloatArray
 from ...models.rotation import matrix_from_axis_angle
-from .arcs import PLANES, Arc, arc_lengths
+from .arcs import PLANES, Arc, arc_length
 from .options import Between
 from .orientation import (
     Order,
@@ -169,7 +169,7 @@ class ProgrammedPath:
         lengths = np.asarray(np.linalg.norm(np.diff(self.knots[:, :3], axis=0), axis=1))
         k, axis = self.arc_segments, _AXES[self.planes - 17, 2]
         rises = self.knots[k + 1, axis] - self.knots[k, axis]
-        lengths[k] = arc_lengths(self.arcs[:, 2], self.arcs[:, 3], self.arcs[:, 5], rises)
+        lengths[k] = arc_length(self.arcs[:, 2], self.arcs[:, 3], self.arcs[:, 5], rises)
         return lengths
 
     def poses_at(self, segments: Sequence[int] | NDArray[np.intp], s: ArrayLike) -> Poses:

@@ -383,6 +383,31 @@ def test_programs_without_a_path_are_refused(text: str, words: str, options: Pat
         program(text, options, Units(unit))
 
 
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(
+        st.one_of(
+            st.sampled_from(
+                ["G0", "G1", "G2", "G3", "G4", "G10", "G53", "G91", "G92", "G93", "F9", "L2", "R", "\n", "M2"]
+            ),
+            st.tuples(st.sampled_from("XYZABCIJKRPFGMN"), st.integers(-3, 99)).map(lambda word: f"{word[0]}{word[1]}"),
+            st.text(st.characters(max_codepoint=300), max_size=3),
+        ),
+        max_size=25,
+    )
+)
+def test_any_text_is_a_path_or_one_sentence(words: list[str]) -> None:
+    path, sentence = None, "part.ngc: no fault"
+    try:
+        path = program(" ".join(["G94 F5", *words, "\nM2"]))
+    except InputError as error:
+        sentence = str(error)
+    assert re.fullmatch(r"part\.ngc: .+", sentence)
+    if path is not None:
+        assert np.isfinite(path.poses_at(range(len(path)), 0.5).positions).all()
+        assert np.isfinite(path.lengths).all()
+
+
 def table(text: str, options: PathOptions | None = None, units: Units = MM) -> ProgrammedPath:
     return read_poses(text, "way.csv", units, options or PathOptions())
 
