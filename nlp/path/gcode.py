@@ -259,8 +259,10 @@ class _Machine:
             )
         system = int(number) - 1 if number else self.system
         for axis, value in self._axis_words(words, "G10").items():
-            at_point = self._stated(axis, "G10 L20") - self.axis_offsets[axis] if words["L"] == 20 else 2 * value
-            self.origins[system][axis] = at_point - value
+            origin = value
+            if words["L"] == 20:  # the point has this coordinate
+                origin = self._stated(axis, "G10 L20") - self.axis_offsets[axis] - value
+            self.origins[system][axis] = origin
 
     def _set_axis_offsets(self, words: dict[str, float]) -> None:
         """Set the offsets of axes, so that the point has the coordinates of the line (G92)."""
