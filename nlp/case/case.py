@@ -193,6 +193,7 @@ def _check_loading(case: Case) -> None:
         hindrance = statics_hindrance(case.model)
         if hindrance:
             raise CaseError(stated[0], f"is not for {case.model.name!r}: {hindrance}")
+        loading.check_work(case.model)
     if loading.stiffness is not None:
         loading.stiffness_of([joint.name for joint in driven_joints(case.model)])
 

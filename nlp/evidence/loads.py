@@ -16,6 +16,7 @@ import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, rank_of_rows
+from ...models.basis import is_apart
 from ...models.statics import Statics, statics_of
 from ..case.forces import CaseForces, PosedForces, forces_at
 from ..program.nlp import Nlp
@@ -127,7 +128,6 @@ def _constraints(nlp: Nlp, statics: Statics) -> dict[str, FloatArray | None]:
     limbs = np.array([row.limb for row in model.frame_rows])
     wrenches = rows[:, [3, 4, 5, 0, 1, 2]]
     origin, length = np.zeros(3), float(np.abs(wrenches[:, 3:]).max(initial=0.0)) or 1.0
-    whole = rank_of_rows(wrenches, origin, length)
     found: dict[str, FloatArray | None] = {}
     for limb in model.limbs:
         own = limbs == limb
@@ -138,6 +138,5 @@ def _constraints(nlp: Nlp, statics: Statics) -> dict[str, FloatArray | None]:
             continue
         matrix = np.zeros((6, len(limbs)))
         matrix[:, own] = wrenches[own].T @ free @ free.T
-        parts = [rank_of_rows(wrenches[each], origin, length) for each in (own, ~own)]
-        found[limb] = matrix if sum(parts) == whole else None
+        found[limb] = matrix if is_apart(wrenches, own, origin, length) else None
     return found
