@@ -49,6 +49,11 @@ class LoadState(NamedTuple):
     displacement: FloatArray
     deflection: float
 
+    @property
+    def forces(self) -> FloatArray:
+        """Force (a,) of each actuator with the largest size."""
+        return np.where(np.abs(self.largest) >= np.abs(self.smallest), self.largest, self.smallest)
+
 
 class PoseLoads(NamedTuple):
     """Forces of all load cases at a pose, and what does not depend on loads.
@@ -91,8 +96,7 @@ def largest_of(found: PoseLoads, measure: str) -> float:
     if measure == "actuator_speed":
         return float(found.speeds.max())
     factor = found.speeds if measure == "actuator_power" else 1.0
-    forces = np.array([np.maximum(np.abs(each.smallest), np.abs(each.largest)) for each in found.loads])
-    return float((factor * forces).max())
+    return float((factor * np.abs([each.forces for each in found.loads])).max())
 
 
 def _load(case: CaseForces, state: RobotState, posed: PosedForces, held: Mapping[str, FloatArray | None]) -> LoadState:

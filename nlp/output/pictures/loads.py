@@ -65,7 +65,7 @@ def drawn_forces(nlp: Nlp, x: FloatArray, state: RobotState, pose: int, size: fl
         return None
     held, units = loads_at(nlp, x, state, pose).loads[0], nlp.case.units
     joints = driven_joints(nlp.case.model)
-    values = np.where(np.abs(held.largest) >= np.abs(held.smallest), held.largest, held.smallest)
+    values = held.forces
     legs = _legs(nlp, x, pose)
     forces = {joint.name: float(value) for joint, value in zip(joints, values, strict=True) if joint.limb in legs}
     given = _points_and_forces(nlp, state)
