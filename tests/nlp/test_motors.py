@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from screwsynth.models import three_upu
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case
-from screwsynth.nlp.case.limits.forces import ActuatorForce
+from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorSpeed
 from screwsynth.nlp.case.limits.limits import Limits
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.motors import Motor
@@ -415,13 +415,22 @@ def test_machines_that_are_not_judged_leave_their_motors_open_with_the_reason() 
         assert each.reason == "errors take freedoms from the robot"
 
 
-def test_a_limit_for_all_actuators_and_one_of_its_own_are_both_claims() -> None:
-    case = at_home("delta")
-    every = Limits(ActuatorForce(max=3.0), ActuatorForce("2", max=2.0))
-    claims = list(motor_claims(replace(case, loading=Loading((Load("w", (0.0, 0.0, -1.0)),)), limits=every)))
-    assert Counter((each.key, each.limit) for each in claims) == {
-        ("actuator_force.max", 3.0): 3,
-        ("actuator_force.max", -3.0): 3,
-        ("actuator_force.2.max", 2.0): 1,
-        ("actuator_force.2.max", -2.0): 1,
-    }
+def test_the_tighter_of_a_limit_for_all_actuators_and_one_of_its_own_is_a_claim() -> None:
+    """No two claims have one name and sense: a checker would hold the number to one of their limits alone."""
+    every, loading = (
+        [ActuatorForce(max=3.0), ActuatorSpeed(max=5.0)],
+        Loading((Load("w", (0.0, 0.0, -1.0)),), Motion(1)),
+    )
+    own = [ActuatorForce("1", min=-9.0, max=2.0), ActuatorForce("2", max=4.0), ActuatorForce("3", min=-1.0)]
+    for limits in ([*every, *own], [*reversed(own), *reversed(every)]):
+        claims = list(motor_claims(replace(at_home("delta"), loading=loading, limits=Limits(*limits))))
+        assert len({each.label for each in claims}) == len(claims)
+        assert {(each.name, each.key): each.limit for each in claims if each.limit is not None} == {
+            **{(f"actuator_speed actuator {k}", "actuator_speed.max"): 5.0 for k in (1, 2, 3)},
+            **{(f"actuator_force actuator {k} backwards load w", "actuator_force.max"): -3.0 for k in (1, 2, 3)},
+            ("actuator_force actuator 1 load w", "actuator_force.1.max"): 2.0,
+            ("actuator_force actuator 2 load w", "actuator_force.max"): 3.0,
+            ("actuator_force actuator 3 load w", "actuator_force.max"): 3.0,
+            ("actuator_force actuator 1 smallest load w", "actuator_force.1.min"): -9.0,
+            ("actuator_force actuator 3 smallest load w", "actuator_force.3.min"): -1.0,
+        }
