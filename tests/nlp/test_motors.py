@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from screwsynth.models import three_upu
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case
-from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorSpeed
+from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from screwsynth.nlp.case.limits.limits import Limits
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.motors import Motor
@@ -35,6 +35,8 @@ from screwsynth.nlp.proof.statement.motors import motor_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
+from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
+from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacemotors import motor_tables
@@ -102,14 +104,18 @@ _TURNS = (
 )
 
 
+def six_legs(rng: np.random.Generator) -> Legs:
+    """A hexapod that is not quite regular."""
+    angles = np.radians([-5, 5, 115, 125, 235, 245])
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+    turned = 0.5 * np.roll(ring, 1, axis=0) @ turn_about([0, 0, 1], math.radians(-60)).T
+    return Legs(ring + rng.normal(0, 0.05, (6, 3)), turned + rng.normal(0, 0.05, (6, 3)))
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_no_pose_of_six_legs_has_a_larger_number_than_its_bound(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    angles = np.radians([-5, 5, 115, 125, 235, 245])
-    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
-    turned = np.roll(np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1), 1, axis=0)
-    turned = 0.5 * turned @ turn_about([0, 0, 1], math.radians(-60)).T
-    robot = Legs(ring + rng.normal(0, 0.05, (6, 3)), turned + rng.normal(0, 0.05, (6, 3)))
+    robot = six_legs(rng)
     place = [Free(-0.15, 0.15), Free(-0.15, 0.1), Free(0.9, 1.1)]
     turns = _TURNS[seed]
     case = replace(case_of_legs(robot), loading=LOADING, workspace=Workspace(place, turns))
@@ -413,6 +419,48 @@ def test_machines_that_are_not_judged_leave_their_motors_open_with_the_reason() 
         assert each.outcome is Outcome.OPEN
         assert math.isinf(each.bound)
         assert each.reason == "errors take freedoms from the robot"
+
+
+def test_slices_show_where_limits_on_actuators_hold() -> None:
+    """A random pose of each box against numbers in NumPy alone."""
+    rng = np.random.default_rng(3)
+    robot = six_legs(rng)
+    limits = Limits(ActuatorForce(max=13.0, min=-6.0), ActuatorSpeed(max=0.7585), ActuatorPower("1", max=5.0))
+    turns = Turns(TurnKind.ROLL_PITCH_YAW, (0.0, 0.0, 0.0))
+    workspace = Workspace((Free(-0.2, 0.2), 0.1, Free(0.9, 1.2)), turns)
+    case = replace(case_of_legs(robot), loading=LOADING, limits=limits, workspace=workspace)
+    (found,) = slices_of(case)
+    assert found.left_out == ()
+    assert {each.key: each.limit for each in found.limits} == {
+        "actuator_force.max": 13.0,
+        "actuator_force.min": -6.0,
+        "actuator_speed.max": 0.7585,
+        "actuator_power.1.max": 5.0,
+    }
+    low, high = found.boxes[:, :2], found.boxes[:, 2:]
+    points = low + rng.uniform(size=low.shape) * (high - low)
+    over = np.zeros((len(points), len(found.limits)))
+    for row, (x, z) in zip(over, points.tolist(), strict=True):
+        values = numbers_at(robot, LOADING, np.array([x, 0.1, z]), np.eye(3))
+        for k, each in enumerate(found.limits):
+            _, what, *own, end = re.split("[_.]", each.key)
+            sense = Sense(end)
+            row[k] = max(
+                sense.sign * (value - each.limit)
+                for (word, leg, _, side), value in values.items()
+                if side is sense
+                and word in (("power", "braking") if what == "power" else (what,))
+                and (not own or leg == int(own[0]) - 1)
+            )
+    is_large = (high - low).min(axis=1) > 2 * (high - low).min()
+    assert (over[found.binding == KEPT] <= 0).all()
+    for k in range(len(found.limits)):
+        own = over[(found.binding == k) & is_large, k]
+        assert len(own) > 10
+        assert (own > 0).all()
+    size = np.prod(high - low, axis=1)
+    assert size[found.binding == KEPT].sum() > 0.1 * size.sum()
+    assert size[found.binding == UNDECIDED].sum() < 0.05 * size.sum()
 
 
 def test_the_tighter_of_a_limit_for_all_actuators_and_one_of_its_own_is_a_claim() -> None:

@@ -1,14 +1,15 @@
 """Reach and limits over the boxes of a slice: each kept, or violated, at every pose of a box, or open.
 
 Reach and limits on expressions are decided by their ranges, those on the clearance of legs by its bounds from below and
-from above. A limit on singular values is proved to be kept by its bound; it counts as violated where it is so at the
-corners and at the middle of the box, which is no proof.
+from above. A limit on singular values, or on a number of an actuator, is proved to be kept by its bound; it counts as
+violated where it is so at the corners and at the middle of the box, which is no proof.
 """
 
 from __future__ import annotations
 
 import enum
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,15 +27,16 @@ from ....errors import UncoveredError
 from ...enclosure.forms import Encloser
 from ...statement.claims import Claim, searched_claims
 from ...statement.motors import motor_claims
+from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
-from ..numbers.jacobian_numbers import SingularValues
 from ..numbers.machines import Machines
+from ..numbers.motors import Motors
 from ..numbers.searched import Subject
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import PoseBox
-from ..robot.posed_robot import build_problem
+from ..robot.posed_robot import NotJudgedError, build_problem
 from ..verdict import slack_of
 
 #: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
@@ -102,20 +104,24 @@ class SliceLimits:
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
         subject = Subject(case, closed.model, problem)
         self._others: list[_Other] = []
-        uncovered.update((each.key, None) for each in motor_claims(case) if each.key)
-        for claim in searched_claims(case):
-            key, number = claim.key, subject.number(claim)
+        motors = [each for each in motor_claims(case) if each.limit is not None]
+        groups = [[each] for each in searched_claims(case)]
+        groups += [list(group) for _, group in itertools.groupby(motors, lambda each: each.motor and each.motor.place)]
+        for group in groups:
             try:
+                number = Motors(problem, case, group) if group[0].motor else subject.number(group[0])
                 examiner = None if problem.dependent else number.examiner
-            except UncoveredError:
+            except (NotJudgedError, UncoveredError):
                 examiner = None
             if examiner is None:
-                uncovered[key] = None
+                uncovered |= dict.fromkeys(each.key for each in group)
                 continue
-            is_enclosed = isinstance(number, Clearance)
-            limits[key] = SliceLimit(key, claim.limit or 0.0, claim.reading.dimension, is_enclosed=is_enclosed)
-            self._others.append(_Other(key, number, _least(claim)))
-        keys = [*(each.key for each in known), *(each.key for each in self._others)]
+            for claim in group:
+                limit = claim.limit or 0.0
+                shown = SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=isinstance(number, Clearance))
+                limits[claim.key] = shown
+            self._others.append(_Other([each.key for each in group], number, np.array(list(map(_least, group)))))
+        keys = [*(each.key for each in known), *(key for each in self._others for key in each.keys)]
         self._places, self._reaches = [list(limits).index(key) for key in keys], len(reaches)
         self.uncovered, self.limits = tuple(uncovered), tuple(limits.values())
         self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
@@ -149,10 +155,13 @@ class SliceLimits:
             lower, upper = ranges(with_relation(forms.part(slice(k, -1)), own, self._of))
             found = _states_of(lower >= self._leasts, upper < self._leasts)
             states[rows, :enclosed] = np.where(is_open[rows, :enclosed], found, states[rows, :enclosed])
-        for j, claim in enumerate(self._others, enclosed):
-            rows = np.flatnonzero(is_open[:, j])
+        last = enclosed
+        for each in self._others:
+            first, last = last, last + len(each.keys)
+            rows = np.flatnonzero(is_open[:, first:last].any(axis=1))
             if rows.size:
-                states[rows, j] = claim.states(boxes.lower[rows], boxes.upper[rows])
+                found = each.states(boxes.lower[rows], boxes.upper[rows])
+                states[rows, first:last] = np.where(is_open[rows, first:last], found, states[rows, first:last])
         return states
 
     def reached(self, states: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -171,7 +180,8 @@ class SliceLimits:
         found = np.zeros((len(self.limits), len(z)), dtype=np.bool_)
         with np.errstate(all="ignore"):
             numbers = values_at(self._function, z)[0][:, :, 0].T
-            claims = [*(numbers < self._leasts[:, None])[self._reaches :], *(each.violated(z) for each in self._others)]
+            claims = [*(numbers < self._leasts[:, None])[self._reaches :]]
+            claims += [row for each in self._others for row in each.violated(z).T]
         for place, claim in zip(self._places, claims, strict=True):
             found[place] |= claim
         return found
@@ -189,19 +199,19 @@ def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[
 
 
 class _Other:
-    """A limit on a number with bounds of its own, and no dependent coordinates."""
+    """Limits on numbers with bounds of their own, and no dependent coordinates: K keys and least values."""
 
-    def __init__(self, key: str, number: SingularValues | Clearance, least: float) -> None:
-        self.key, self._number, self._least = key, number, least
+    def __init__(self, keys: Sequence[str], number: Number, leasts: FloatArray) -> None:
+        self.keys, self._number, self._leasts = keys, number, leasts
 
     def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
-        """Return the states (B,) over boxes (B, n).
+        """Return the states (B, K) over boxes (B, n).
 
         A number that is bounded from below only is violated where it is so at the corners and the middle of a box.
         """
-        kept = self._number.bounds(lower, upper)[:, 0] >= self._least
+        kept = self._number.bounds(lower, upper) >= self._leasts
         if isinstance(self._number, Clearance):
-            return _states_of(kept, self._number.most(lower, upper) < self._least)
+            return _states_of(kept, self._number.most(lower, upper)[:, None] < self._leasts)
         free = np.flatnonzero((upper > lower).any(axis=0))
         violated = self.violated(0.5 * lower + 0.5 * upper)
         for sides in itertools.product((False, True), repeat=len(free)):
@@ -212,8 +222,8 @@ class _Other:
         return _states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return whether it is violated at points (P, n): (P,)."""
-        return np.asarray(self._number.values(points)[:, 0] < self._least)
+        """Return whether each is violated at points (P, n): (P, K)."""
+        return np.asarray(self._number.values(points) < self._leasts)
 
 
 class FirstViolated:
