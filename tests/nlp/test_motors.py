@@ -27,7 +27,7 @@ from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.closing import closed_start
-from screwsynth.nlp.evidence.loads import loads_at
+from screwsynth.nlp.evidence.loads import LoadState, loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.statement.machine import Legs
@@ -167,6 +167,14 @@ def test_no_pose_of_six_legs_has_a_larger_number_than_its_bound(seed: int) -> No
         assert sign * (value - each.reached) <= 0.0101 * size
 
 
+def held_at(case: Case, position: list[float], rotation: Rotation) -> tuple[LoadState, Array]:
+    """Forces under the only load at a pose, and speeds."""
+    nlp = formulate(replace(case, position=position, rotation=rotation, workspace=None))
+    x = closed_start(nlp)
+    (one,), speeds, _ = loads_at(nlp, x, evaluate(nlp, x))
+    return one, speeds
+
+
 @pytest.mark.parametrize("name", ["6-pus", "delta", "tricept"])
 def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name: str) -> None:
     """With six freedoms or fewer, with loops in closed form and others: forces and torques from J at single poses."""
@@ -176,9 +184,7 @@ def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name:
     assert all(each.outcome is Outcome.PROVED for each in found.values())
 
     def at(position: list[float], rotation: Rotation) -> dict[tuple[str, int, str, Sense], float]:
-        nlp = formulate(replace(case, position=position, rotation=rotation, workspace=None))
-        x = closed_start(nlp)
-        (one,), speeds, _ = loads_at(nlp, x, evaluate(nlp, x))
+        one, speeds = held_at(case, position, rotation)
         numbers = dict[tuple[str, int, str, Sense], float]()
         for k, (low, high, speed) in enumerate(zip(one.smallest, one.largest, speeds, strict=True)):
             numbers["force", k, "push", Sense.MIN], numbers["force", k, "push", Sense.MAX] = low, high
@@ -461,6 +467,26 @@ def test_slices_show_where_limits_on_actuators_hold() -> None:
     size = np.prod(high - low, axis=1)
     assert size[found.binding == KEPT].sum() > 0.1 * size.sum()
     assert size[found.binding == UNDECIDED].sum() < 0.05 * size.sum()
+
+
+def test_slices_show_limits_on_actuators_where_loops_are_followed() -> None:
+    """A random pose of some boxes of a Delta, whose rotation follows from its position, against single poses."""
+    case, rng = at_home("delta", part=0.05), np.random.default_rng(4)
+    assert case.workspace is not None
+    place = [case.workspace.position[0], 0.0, case.workspace.position[2]]
+    load = Loading((Load("w", (3.0, 2.0, -1.0), any_force=2.0),))
+    case = replace(case, workspace=replace(case.workspace, position=place), loading=load)
+    limit = 1.01 * float(np.abs(held_at(case, case.position, Rotation())[0].forces).max())  # type: ignore[arg-type]
+    (found,) = slices_of(replace(case, limits=Limits(ActuatorForce(max=limit))))
+    assert found.left_out == ()
+    size = np.prod(found.boxes[:, 2:] - found.boxes[:, :2], axis=1)
+    for state in (KEPT, 0):
+        own = np.flatnonzero(found.binding == state)
+        assert size[own].sum() > 0.1 * size.sum()
+        for low, high in found.boxes[own[np.argsort(size[own])[-16:]]].reshape(-1, 2, 2):
+            x, z = low + rng.uniform(size=2) * (high - low)
+            largest = float(np.abs(held_at(case, [x, 0.0, z], Rotation())[0].forces).max())
+            assert (largest <= limit) == (state == KEPT)
 
 
 def test_the_tighter_of_a_limit_for_all_actuators_and_one_of_its_own_is_a_claim() -> None:

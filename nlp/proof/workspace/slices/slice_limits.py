@@ -24,6 +24,7 @@ from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
+from ...boxes.search import some
 from ...enclosure.forms import Encloser
 from ...statement.claims import Claim, searched_claims
 from ...statement.motors import motor_claims
@@ -110,17 +111,14 @@ class SliceLimits:
         for group in groups:
             try:
                 number = Motors(problem, case, group) if group[0].motor else subject.number(group[0])
-                examiner = None if problem.dependent else number.examiner
+                other = _Other([each.key for each in group], number, np.array(list(map(_least, group))))
             except (NotJudgedError, UncoveredError):
-                examiner = None
-            if examiner is None:
                 uncovered |= dict.fromkeys(each.key for each in group)
                 continue
             for claim in group:
-                limit = claim.limit or 0.0
-                shown = SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=isinstance(number, Clearance))
-                limits[claim.key] = shown
-            self._others.append(_Other([each.key for each in group], number, np.array(list(map(_least, group)))))
+                limit, dimension = claim.limit or 0.0, claim.reading.dimension
+                limits[claim.key] = SliceLimit(claim.key, limit, dimension, is_enclosed=other.is_enclosed)
+            self._others.append(other)
         keys = [*(each.key for each in known), *(key for each in self._others for key in each.keys)]
         self._places, self._reaches = [list(limits).index(key) for key in keys], len(reaches)
         self.uncovered, self.limits = tuple(uncovered), tuple(limits.values())
@@ -160,7 +158,7 @@ class SliceLimits:
             first, last = last, last + len(each.keys)
             rows = np.flatnonzero(is_open[:, first:last].any(axis=1))
             if rows.size:
-                found = each.states(boxes.lower[rows], boxes.upper[rows])
+                found = each.states(some(boxes, rows))
                 states[rows, first:last] = np.where(is_open[rows, first:last], found, states[rows, first:last])
         return states
 
@@ -199,30 +197,45 @@ def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[
 
 
 class _Other:
-    """Limits on numbers with bounds of their own, and no dependent coordinates: K keys and least values."""
+    """Limits on numbers with bounds of their own.
+
+    Args:
+        keys: of the limits, K.
+        number: the numbers.
+        leasts: (K,) their smallest values allowed.
+
+    Attributes:
+        keys: as given.
+        is_enclosed: whether boxes where they are violated are proved so, and not by samples.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
 
     def __init__(self, keys: Sequence[str], number: Number, leasts: FloatArray) -> None:
-        self.keys, self._number, self._leasts = keys, number, leasts
+        self.keys, self._number, self._leasts, self._examiner = keys, number, leasts, number.examiner
+        self.is_enclosed = isinstance(number, Clearance) and not number.problem.dependent
 
-    def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
-        """Return the states (B, K) over boxes (B, n).
+    def states(self, boxes: LoopBoxes) -> NDArray[np.int8]:
+        """Return the states (B, K) over boxes whose dependent coordinates are known.
 
         A number that is bounded from below only is violated where it is so at the corners and the middle of a box.
         """
-        kept = self._number.bounds(lower, upper) >= self._leasts
-        if isinstance(self._number, Clearance):
-            return _states_of(kept, self._number.most(lower, upper)[:, None] < self._leasts)
-        free = np.flatnonzero((upper > lower).any(axis=0))
-        violated = self.violated(0.5 * lower + 0.5 * upper)
-        for sides in itertools.product((False, True), repeat=len(free)):
-            corner = lower.copy()
-            for k, is_upper in zip(free, sides, strict=True):
-                corner[:, k] = upper[:, k] if is_upper else lower[:, k]
-            violated &= self.violated(corner)
+        kept = self._examiner.examine(boxes).smallest >= self._leasts
+        if isinstance(self._number, Clearance) and self.is_enclosed:
+            return _states_of(kept, self._number.most(boxes.lower, boxes.upper)[:, None] < self._leasts)
+        middle = self._number.closed(0.5 * boxes.lower + 0.5 * boxes.upper)
+        violated = self.violated(middle)
+        free = [k for k in self._number.problem.independent if (boxes.upper > boxes.lower)[:, k].any()]
+        for sides in itertools.product((boxes.lower, boxes.upper), repeat=len(free)):
+            corner = middle.copy()
+            for k, ends in zip(free, sides, strict=True):
+                corner[:, k] = ends[:, k]
+            violated &= self.violated(self._number.closed(corner))
         return _states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return whether each is violated at points (P, n): (P, K)."""
+        """Return whether each is violated at points (P, n) with closed loops: (P, K)."""
         return np.asarray(self._number.values(points) < self._leasts)
 
 
