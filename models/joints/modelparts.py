@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..actuation import Velocities, limb_drive
+from ..actuation import LimbDrive, Velocities, limb_drive
 from ..arrays import FloatArray
 from ..basis import basis_of_member, constraint_rows, is_apart, rank_of_rows
 from ..instance import Substitution, driven, jacobian
@@ -72,7 +72,7 @@ def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint])
             count = len(model.actuators) - sum(len(limb.actuators) - limb.drive.idle.shape[1] for limb in limbs)
             names = tuple(each.name for k, each in enumerate(model.actuators) if k not in known)
             idle.append((count, names))
-            is_shared = is_shared and ranks[-1][1] > 0 and not _is_determined(model, velocities, point, reach)
+            is_shared = is_shared and ranks[-1][1] > 0 and not _is_determined(model, velocities, limbs, point, reach)
     jacobian_rank, constraints_rank = (int(most) for most in np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0))
     usual = [each for each, (_, rank) in zip(motions, ranks, strict=True) if rank and rank == constraints_rank]
     count, names = min(idle, default=(0, ()))
@@ -89,13 +89,14 @@ def _platform_motions(constraints: FloatArray, rank: int, point: ClosedPoint, re
     return PlatformMotions(point.rotation, np.vstack([twists[:3] / reach, twists[3:]]))
 
 
-def _is_determined(model: Model, velocities: Velocities, point: ClosedPoint, reach: float) -> bool:
+def _is_determined(
+    model: Model, velocities: Velocities, drives: Sequence[LimbDrive], point: ClosedPoint, reach: float
+) -> bool:
     """Return whether statics determines the constraints of a limb."""
-    J, limbs = velocities.jacobian, np.array([row.limb for row in model.frame_rows])
-    for limb in model.limbs:
-        rows, _, drive = limb_drive(model, velocities, point.position, limb)
+    J, names = velocities.jacobian, np.array([row.limb for row in model.frame_rows])
+    for limb, (rows, _, drive) in zip(model.limbs, drives, strict=True):
         constraints = drive.constraints @ J[rows]
-        if rank_of_rows(constraints, point.position, reach) and is_apart(J, limbs == limb, point.position, reach):
+        if rank_of_rows(constraints, point.position, reach) and is_apart(J, names == limb, point.position, reach):
             return True
     return False
 
