@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .actuation import Velocities, limb_drive
+from .actuation import Flags, Velocities, limb_drive
 from .arrays import FloatArray, first_largest
 from .model import Model
 from .rows import rank_of
@@ -98,6 +98,19 @@ def rank_of_rows(rows: FloatArray, centre: FloatArray, length: float) -> int:
     scaled = np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / length])
     values = np.linalg.svd(scaled, compute_uv=False)
     return rank_of(values, max(1.0, float(values[0])))
+
+
+def is_apart(rows: FloatArray, own: Flags, centre: FloatArray, length: float) -> bool:
+    """Return whether the wrenches of a limb are independent of all others, so that statics determines them.
+
+    Args:
+        rows: (m, 6) wrenches of all limbs.
+        own: (m,) whether each is of the limb.
+        centre: (3,) of moments, which count in parts of the length.
+        length: the length.
+    """
+    parts = [rank_of_rows(rows[each], centre, length) for each in (own, ~own)]
+    return sum(parts) == rank_of_rows(rows, centre, length)
 
 
 def _split(rows: FloatArray, part: slice) -> tuple[FloatArray, FloatArray]:

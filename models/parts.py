@@ -5,9 +5,12 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
+
+from .arrays import FloatArray
 
 _AXES = ("x", "y", "z")
 
@@ -266,6 +269,18 @@ class JointScrews:
         return [k for k in range(self.all.shape[1]) if k not in self.driven]
 
 
+class PlatformMotions(NamedTuple):
+    """Motions that a platform can make at a configuration.
+
+    Attributes:
+        rotation: (3, 3) platform to world coordinates.
+        twists: (6, f) basis of them: angular velocity, then velocity of the platform's origin, in the world frame.
+    """
+
+    rotation: FloatArray
+    twists: FloatArray
+
+
 @dataclass(frozen=True)
 class GenericRanks:
     """Ranks of a robot given joint by joint, at almost all dimensions and closed configurations.
@@ -276,12 +291,16 @@ class GenericRanks:
             this rank.
         idle: dimension of the actuators' rates with which the platform does not move.
         undetermined: names of the actuators that have such a rate.
+        motions: of the platform at some of these configurations; empty where it has six freedoms.
+        is_shared: whether limbs share all constraints, so that statics does not determine those of any limb.
     """
 
     jacobian: int
     constraints: int
     idle: int = 0
     undetermined: tuple[str, ...] = ()
+    motions: tuple[PlatformMotions, ...] = field(default=(), compare=False, repr=False)
+    is_shared: bool = field(default=False, compare=False)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,9 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ..actuation import Velocities, limb_drive
-from ..basis import basis_of_member, constraint_rows, rank_of_rows
+from ..actuation import LimbDrive, Velocities, limb_drive
+from ..arrays import FloatArray
+from ..basis import basis_of_member, constraint_rows, is_apart, rank_of_rows
 from ..instance import Substitution, driven, jacobian
 from ..member import Member, resisted_parts, scaled_twists
 from ..model import Model
@@ -25,6 +26,7 @@ from ..parts import (
     JointScrews,
     Parameter,
     PathStructure,
+    PlatformMotions,
     Quantity,
     rate_relations,
 )
@@ -36,10 +38,18 @@ from .resistance import Ranks
 
 #: A member with so many wrenches resists nearly every motion alike.
 _MANY_WRENCHES = 5
+#: Components of orthonormal motions below this are none.
+_ROUNDING = 1e-9
 
 
 def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint]) -> GenericRanks:
-    """Return the largest ranks of a robot's rows and constraints over closed configurations, and its idle actuators."""
+    """Return the largest ranks of a robot's rows and constraints over closed configurations, and what it can do there.
+
+    Args:
+        model: the robot.
+        robot: at home.
+        points: the configurations.
+    """
     own = Substitution.identity(model)
     size = ca.Function("size", [robot.symbols], [robot.size])
     length = SX.sym("length")
@@ -47,7 +57,8 @@ def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint])
     works = driven(model.wrenches, model.actuators, length, model.members)
     outputs = [ca.densify(each) for each in (rows, works, rate_relations(model.actuators))]
     function = ca.Function("rows", [*own.all, length], outputs)
-    ranks, idle = [], []
+    ranks, idle, motions = [], [], []
+    is_shared = True
     for point in points:
         reach = float(size(point.dimensions))
         values = function(*point, reach)
@@ -55,13 +66,39 @@ def generic_ranks(model: Model, robot: HomeRobot, points: Sequence[ClosedPoint])
         if all(np.isfinite(each).all() for each in velocities):
             constraints = constraint_rows(model, velocities, point.position)
             ranks.append([rank_of_rows(each, point.position, reach) for each in (velocities.jacobian, constraints)])
+            motions.append(_platform_motions(constraints, ranks[-1][1], point, reach))
             limbs = [limb_drive(model, velocities, point.position, limb) for limb in model.limbs]
             known = {limb.actuators[k] for limb in limbs for k in np.flatnonzero(~limb.drive.is_undetermined)}
             count = len(model.actuators) - sum(len(limb.actuators) - limb.drive.idle.shape[1] for limb in limbs)
             names = tuple(each.name for k, each in enumerate(model.actuators) if k not in known)
             idle.append((count, names))
-    most = np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0)
-    return GenericRanks(int(most[0]), int(most[1]), *min(idle, default=(0, ())))
+            is_shared = is_shared and ranks[-1][1] > 0 and not _is_determined(model, velocities, limbs, point, reach)
+    jacobian_rank, constraints_rank = (int(most) for most in np.max(np.array(ranks).reshape(-1, 2), axis=0, initial=0))
+    usual = [each for each, (_, rank) in zip(motions, ranks, strict=True) if rank and rank == constraints_rank]
+    count, names = min(idle, default=(0, ()))
+    return GenericRanks(jacobian_rank, constraints_rank, count, names, tuple(usual), is_shared and bool(usual))
+
+
+def _platform_motions(constraints: FloatArray, rank: int, point: ClosedPoint, reach: float) -> PlatformMotions:
+    """Return the motions in which constraints (k, 6) do no work."""
+    moments = constraints[:, 3:] - np.cross(point.position, constraints[:, :3])
+    _, _, right = np.linalg.svd(np.hstack([moments / reach, constraints[:, :3]]))
+    twists = right[rank:].T
+    # Rounding is no motion: a robot whose platform cannot turn has no angular velocities.
+    twists = np.where(np.abs(twists) > _ROUNDING, twists, 0.0)
+    return PlatformMotions(point.rotation, np.vstack([twists[:3] / reach, twists[3:]]))
+
+
+def _is_determined(
+    model: Model, velocities: Velocities, drives: Sequence[LimbDrive], point: ClosedPoint, reach: float
+) -> bool:
+    """Return whether statics determines the constraints of a limb."""
+    J, names = velocities.jacobian, np.array([row.limb for row in model.frame_rows])
+    for limb, (rows, _, drive) in zip(model.limbs, drives, strict=True):
+        constraints = drive.constraints @ J[rows]
+        if rank_of_rows(constraints, point.position, reach) and is_apart(J, names == limb, point.position, reach):
+            return True
+    return False
 
 
 def actuator_name(robot: HomeRobot, limb: Limb, joint: Joint, number: int) -> str:

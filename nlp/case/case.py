@@ -15,11 +15,11 @@ import numpy as np
 
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ...models.shown import Shown
-from ...models.statics import driven_joints, statics_hindrance
+from ...models.statics import driven_joints
 from ...models.whole import Whole
 from ..errors import CaseError, listing, nearest
 from ..units import Units
-from .checks import check_direction, check_real, check_reals, check_value, check_vector
+from .checks import check_direction, check_real, check_reals, check_statics, check_value, check_vector
 from .limits.limit import LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
@@ -190,9 +190,8 @@ def _check_loading(case: Case) -> None:
     parts = (("load", loading.loads), ("motion", loading.motion), ("robot.actuator_stiffness", loading.stiffness))
     stated = [key for key, given in parts if given]
     if stated:
-        hindrance = statics_hindrance(case.model)
-        if hindrance:
-            raise CaseError(stated[0], f"is not for {case.model.name!r}: {hindrance}")
+        check_statics(case.model, stated[0])
+        loading.check_work(case.model)
     if loading.stiffness is not None:
         loading.stiffness_of([joint.name for joint in driven_joints(case.model)])
 
@@ -217,9 +216,7 @@ def _check_measure(case: Case, task: Task) -> None:
         raise CaseError(key, "needs a [[load]]", task.measure)
     if needs_motion and case.loading.motion is None:
         raise CaseError(key, "needs [motion]", task.measure)
-    hindrance = statics_hindrance(case.model)
-    if hindrance:
-        raise CaseError(key, f"is not for {case.model.name!r}: {hindrance}", task.measure)
+    check_statics(case.model, key, task.measure)
     joints = driven_joints(case.model)
     if task.measure != "actuator_power" and len({joint.dimension for joint in joints}) > 1:
         raise CaseError(key, "means nothing where some actuators turn and others slide", task.measure)

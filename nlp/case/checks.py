@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from ...models import Dimension, FloatArray
+from ...models import Dimension, FloatArray, Model
 from ..errors import CaseError
 from ..units import Units
 from .pose import LARGEST, Free, Value
@@ -155,3 +155,21 @@ def check_direction(values: ArrayLike | Sequence[Value], key: str) -> FloatArray
     if not vector.any():
         raise CaseError(key, "must not be zero: it gives no direction", vector.tolist())
     return vector
+
+
+def check_statics(model: Model, key: str, value: str | None = None) -> None:
+    """Refuse a robot whose actuators' forces no load determines.
+
+    Args:
+        model: the robot.
+        key: dotted key of what needs them, for the message.
+        value: its value there; None where the message does not show it.
+
+    Raises:
+        CaseError: in the words of a case file.
+    """
+    from ...models.statics import statics_hindrance  # noqa: PLC0415 - a case without loads starts without it
+
+    hindrance = statics_hindrance(model)
+    if hindrance:
+        raise CaseError(key, f"is not for {model.name!r}: {hindrance}", value)

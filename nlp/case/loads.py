@@ -13,8 +13,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
+from ...models import Model
+from ...models.parts import PlatformMotions
 from ..errors import CaseError, nearest
 from ..units import Units
 from .checks import check_real, check_size, check_vector
@@ -26,6 +29,8 @@ _KNOWN = ("m", "N")
 #: Largest number of loads with both signs that are always there: each doubles the loads that act together.
 _MOST_SIGNS = 6
 _NONE = (0.0, 0.0, 0.0)
+#: Work below this part of what force and moment could do is none.
+_NO_WORK = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,6 +223,27 @@ class Loading(NamedTuple):
             known = ", [0, 0, -9.81] for a mass in kg" if units.force == _KNOWN[1] else ""
             raise CaseError("gravity.acceleration", fault + known)
 
+    def check_work(self, model: Model) -> None:
+        """Refuse a load that does no work in any motion of the platform, where statics does not say what holds it.
+
+        Its actuators hold nothing of it, as a robot in a plane nothing of a force out of the plane.
+
+        Args:
+            model: the robot.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        if model.generic is None or not model.generic.is_shared:
+            return
+        for index, load in enumerate(self.loads):
+            alone = next(self._signed([load], []))
+            if not any(_does_work(alone, each) for each in model.generic.motions):
+                key, value = _given_part(load)
+                fault = f"load {load.name!r} does no work in any motion of {model.name!r}: its actuators do not hold it"
+                allowed = _working_parts(model.generic.motions)
+                raise CaseError(f"load[{index}]{key}", f"{fault}; allowed is a load with {allowed}", value)
+
     def stiffness_of(self, actuators: Sequence[str]) -> list[float]:
         """Return the stiffness of actuators by their names.
 
@@ -253,6 +279,41 @@ class Loading(NamedTuple):
             ends = [" reversed"] if turned == [whole] else [f", {each} reversed" for each in turned]
             gravity = GRAVITY if self.gravity is None else self.gravity
             yield LoadCase("".join([whole, *ends]), parts, gravity)
+
+
+def _does_work(case: LoadCase, at: PlatformMotions) -> bool:
+    """Return whether one load, or a part of it of any direction, does work in a motion at a configuration."""
+    ((load, _),) = case.parts
+    force, moment = np.split(np.array(ca.DM(case.wrench(SX(at.rotation)))).ravel(), 2)
+    omega, v = np.split(at.twists, 2)
+    arm = at.rotation @ np.array(load.point)
+    turn, way, moved = (np.linalg.norm(each, axis=0) for each in (omega, v, v - np.cross(arm, omega.T).T))
+    size = np.linalg.norm
+    parts = (
+        (np.abs(force @ v + moment @ omega), size(force) * way + size(moment) * turn),
+        (load.any_force * moved, load.any_force * (way + size(arm) * turn)),
+        (load.any_moment * turn, load.any_moment * turn),
+    )
+    return any(bool((work > _NO_WORK * most).any()) for work, most in parts)
+
+
+def _given_part(load: Load) -> tuple[str, object]:
+    """Return key and value of the only part of a load; empty ones where there are several."""
+    parts = {
+        key: getattr(load, key.replace(".", "_")) for key in ("force", "moment", "any.force", "any.moment", "mass")
+    }
+    given = [(f".{key}", np.array(value).tolist()) for key, value in parts.items() if np.any(value)]
+    return given[0] if len(given) == 1 else ("", None)
+
+
+def _working_parts(motions: Sequence[PlatformMotions]) -> str:
+    """Return the forces and moments along the world's axes that do work in a motion, in words."""
+    every = np.hstack([each.twists for each in motions])
+    found = []
+    for words, along, rows in (("a force", "along", every[3:]), ("a moment", "about", every[:3])):
+        axes = [axis for axis, row in zip("xyz", rows, strict=True) if row.any()]
+        found += [words if len(axes) == len(rows) else f"{words} {along} {' or '.join(axes)}"] if axes else []
+    return ", or ".join(found)
 
 
 #: No loads, and no motions.

@@ -31,3 +31,8 @@ class Motor(NamedTuple):
     actuator: str = ""
     load: str = ""
     is_backwards: bool = False
+
+    @property
+    def whose(self) -> tuple[int, str]:
+        """The actuator and the load, whose numbers are searched together."""
+        return self.place, self.load

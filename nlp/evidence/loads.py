@@ -16,6 +16,7 @@ import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, rank_of_rows
+from ...models.basis import is_apart
 from ...models.statics import Statics, statics_of
 from ..case.forces import CaseForces, PosedForces, forces_at
 from ..program.nlp import Nlp
@@ -47,6 +48,11 @@ class LoadState(NamedTuple):
     constraints: Mapping[str, FloatArray | None]
     displacement: FloatArray
     deflection: float
+
+    @property
+    def forces(self) -> FloatArray:
+        """Force (a,) of each actuator with the largest size."""
+        return np.where(np.abs(self.largest) >= np.abs(self.smallest), self.largest, self.smallest)
 
 
 class PoseLoads(NamedTuple):
@@ -90,8 +96,7 @@ def largest_of(found: PoseLoads, measure: str) -> float:
     if measure == "actuator_speed":
         return float(found.speeds.max())
     factor = found.speeds if measure == "actuator_power" else 1.0
-    forces = np.array([np.maximum(np.abs(each.smallest), np.abs(each.largest)) for each in found.loads])
-    return float((factor * forces).max())
+    return float((factor * np.abs([each.forces for each in found.loads])).max())
 
 
 def _load(case: CaseForces, state: RobotState, posed: PosedForces, held: Mapping[str, FloatArray | None]) -> LoadState:
@@ -127,7 +132,6 @@ def _constraints(nlp: Nlp, statics: Statics) -> dict[str, FloatArray | None]:
     limbs = np.array([row.limb for row in model.frame_rows])
     wrenches = rows[:, [3, 4, 5, 0, 1, 2]]
     origin, length = np.zeros(3), float(np.abs(wrenches[:, 3:]).max(initial=0.0)) or 1.0
-    whole = rank_of_rows(wrenches, origin, length)
     found: dict[str, FloatArray | None] = {}
     for limb in model.limbs:
         own = limbs == limb
@@ -138,6 +142,5 @@ def _constraints(nlp: Nlp, statics: Statics) -> dict[str, FloatArray | None]:
             continue
         matrix = np.zeros((6, len(limbs)))
         matrix[:, own] = wrenches[own].T @ free @ free.T
-        parts = [rank_of_rows(wrenches[each], origin, length) for each in (own, ~own)]
-        found[limb] = matrix if sum(parts) == whole else None
+        found[limb] = matrix if is_apart(wrenches, own, origin, length) else None
     return found

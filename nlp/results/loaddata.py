@@ -144,15 +144,15 @@ def _load(case: Case, load: LoadState, speeds: FloatArray, pose: int | None) -> 
     """Return a load at a pose."""
     actuators = []
     for k, joint in enumerate(driven_joints(case.model)):
-        low, high = float(load.smallest[k]), float(load.largest[k])
+        force = float(load.forces[k])
         actuators.append(
             ActuatorForceData(
                 actuator=joint.name,
-                value=finite_or_none(high if abs(high) >= abs(low) else low),
-                smallest=finite_or_none(low),
-                largest=finite_or_none(high),
+                value=finite_or_none(force),
+                smallest=finite_or_none(load.smallest[k]),
+                largest=finite_or_none(load.largest[k]),
                 unit=case.units.label(dimension_of_force(joint)),
-                power=finite_or_none(max(abs(low), abs(high)) * float(speeds[k])) if len(speeds) else None,
+                power=finite_or_none(abs(force) * float(speeds[k])) if len(speeds) else None,
             )
         )
     held = tuple(

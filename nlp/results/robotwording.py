@@ -50,6 +50,8 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
             yield Line(words, label="legs")
     rows = [(str(index + 1), row.member, row.kind.value) for index, row in enumerate(model.rows)]
     yield TextTable(("row", "limb", "wrench"), tuple(rows))
+    words = "rows with forces of the norm f exert at most f sqrt(F) along a task"
+    yield Line(words if not model.actuators else f"{words}; [[load]] tells those of actuators", label="forces")
     if model.quantities:
         rows = [(item.name, item.dimension.value, item.description) for item in model.quantities]
         yield TextTable(("quantity", "measures", "meaning"), tuple(rows))

@@ -19,6 +19,7 @@ from screwsynth.models.mechanism import mechanism_of
 from screwsynth.models.mechanism.singularities import closed_configurations
 from screwsynth.models.statics import driven_joints, freedoms_of, statics_hindrance
 from screwsynth.nlp.case.loads import Load, Loading, Motion
+from screwsynth.nlp.errors import CaseError
 
 DRIVEN_POSES = 5
 #: Largest difference of a force, as a part of the largest of the robot's forces under the load.
@@ -208,3 +209,38 @@ def test_no_motion_within_the_fastest_ones_drives_an_actuator_faster(name: str) 
             if np.abs(twists).max(initial=0.0) > 1e-9:
                 reached += size * np.linalg.norm(rates @ np.linalg.pinv(twists, rcond=1e-9), axis=1)
         np.testing.assert_allclose(speeds, reached, rtol=1e-9)
+
+
+def is_refused(load: Load, name: str) -> bool:
+    try:
+        Loading((load,)).check_work(robot(**table(name)))
+    except CaseError:
+        return True
+    return False
+
+
+#: Robots whose limbs share their constraints; and two of whose limbs each has wrenches of its own.
+SHARED = ("4-upu", "delta-parallelogram", "five-bar", "planar-3-rpr", "spherical-3-rrr", "tripteron")
+APART = ("3-upu", "delta")
+
+
+@pytest.mark.parametrize("name", [*SHARED, *APART])
+def test_loads_are_refused_that_no_actuator_feels_and_no_limb_is_said_to_hold(name: str) -> None:
+    oracle = Oracle(robot_of(table(name)), LENGTH)
+    oracle.drive(random_displacements(oracle.robot, np.random.default_rng([15, *name.encode()])))
+    there, R = feasible(oracle), oracle.rotation
+    units = [tuple(row) for row in np.eye(3).tolist()]
+    for load in (
+        *(Load(force=unit) for unit in units),
+        *(Load(moment=unit) for unit in units),
+        Load(force=(0, 0, 2), moment=(1, 0, 0), point=(0.1, -0.2, 0.3)),
+        Load(force=(0, 1, 2), moment=(1, 2, 3)),
+        Load(force=(0, 1e-6, 2)),
+    ):
+        force, moment = np.split(wrenches_of([load], R).ravel(), 2)
+        felt = np.abs(there.twists @ np.concatenate([moment, force])).max() > 1e-10
+        assert is_refused(load, name) == (name in SHARED and not felt), load
+    turns, moves = (bool((np.abs(there.twists[:, part]) > 1e-10).any()) for part in (slice(0, 3), slice(3, 6)))
+    assert is_refused(Load(any_moment=1.0), name) == (name in SHARED and not turns)
+    assert is_refused(Load(any_force=1.0), name) == (name in SHARED and not moves)
+    assert not is_refused(Load(any_force=1.0, any_moment=1.0), name)

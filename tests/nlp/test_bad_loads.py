@@ -252,6 +252,7 @@ REDUNDANT = (
     "is not for 'mixed': it has 5 actuators for 3 freedoms, so that they can load each other with forces that no load "
     "determines\n"
 )
+IDLE = "does no work in any motion of 'mixed': its actuators do not hold it; allowed is a load"
 #: Robot, tables and sentence.
 OF_ROBOTS = {
     "force of two kinds": (MIXED, f"{LOAD}[limits]\nactuator_force = {{ max = 3 }}", f"limits.actuator_force: {KINDS}"),
@@ -267,6 +268,21 @@ OF_ROBOTS = {
     ),
     "load on more actuators": (MORE, LOAD, f"load: {REDUNDANT}"),
     "motion of more actuators": (MORE, MOVED, "motion: is not for 'mixed': it has 5 actuators for 3 freedoms"),
+    "weight on a plane": (
+        MIXED,
+        '[[load]]\nname = "tool"\nmass = 2\ncentre = [1, 0, 0]',
+        f"load[0].mass = 2.0: load 'tool' {IDLE} with a force along x or y, or a moment about z\n",
+    ),
+    "force out of a plane": (
+        MIXED,
+        f"{LOAD}[[load]]\nforce = [0, 0, 5]",
+        f"load[1].force = [0.0, 0.0, 5.0]: load 'load 2' {IDLE} with a force along x or y, or a moment about z\n",
+    ),
+    "force and moment out of a plane": (
+        MIXED,
+        '[[load]]\nforce = [0, 0, 5]\nmoment = [1, 2, 0]\nframe = "platform"',
+        f"load[0]: load 'load 1' {IDLE} with a force along x or y, or a moment about z\n",
+    ),
     "limit on more actuators": (
         MORE,
         "[limits]\nactuator_force = { max = 3 }",

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from builders import case_from
 
-from screwsynth.nlp import load_case, solve
+from screwsynth.nlp import Case, Rotation, Task, build_model, load_case, solve
+from screwsynth.nlp.case.loads import Load, Loading
+from screwsynth.nlp.output.pictures.figures import figure_of
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.sections import sections
@@ -30,6 +32,18 @@ pitch = inf
 name = "side"
 force = [200, 20, -100]
 point = [0, 1, 2]
+"""
+
+DELTA = """\
+[robot]
+model = "delta"
+parameters = { rb = 0.164, rp = 0.044, arm = 0.524, rod = 1.244, w = 0.131, tilt = 20 }
+[pose]
+position = [0.1, 0, -1.2]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
 """
 
 
@@ -58,23 +72,52 @@ def test_arrows_push_and_pull_the_platform_along_the_legs_to_one_scale() -> None
 
 
 def test_torques_are_told_in_words_and_a_case_without_loads_has_no_arrows() -> None:
-    text = """\
-[robot]
-model = "delta"
-parameters = { rb = 0.164, rp = 0.044, arm = 0.524, rod = 1.244, w = 0.131, tilt = 20 }
-[pose]
-position = [0.1, 0, -1.2]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-"""
-    (without,) = drawings_of(solve(case_from(text)))
+    (without,) = drawings_of(solve(case_from(DELTA)))
     assert without.forces is None
-    (drawing,) = drawings_of(solve(case_from(text + "[[load]]\nforce = [0, 0, -30]\n")))
+    (drawing,) = drawings_of(solve(case_from(DELTA + "[[load]]\nforce = [0, 0, -30]\n")))
     assert drawing.forces is not None
     assert [arrow.kind for arrow in drawing.forces.arrows] == ["load"]
     assert drawing.forces.torques.count("N m") == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "twist"),
+    [
+        ("3-prs", (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
+        ("6-pus", (0.3, -0.5, 0.2, 0.7, 0.4, -0.6)),
+        ("planar-3-prr", (0.0, 0.0, 0.8, 0.5, -0.3, 0.0)),
+    ],
+)
+def test_arrows_of_slides_do_the_opposite_work_of_those_of_the_load(name: str, twist: tuple[float, ...]) -> None:
+    """In a motion of the platform, with the places of the slides as the drawing has them after it and before it."""
+    model = build_model(name)
+    values = {item.name: item.typical for item in model.parameters}
+    load = Load("cut", (3.0, -2.0, 5.0), (1.0, 2.0, -2.0), (0.1, 0.2, 0.3), in_platform=True)
+    case = Case(model, values, model.home, [Task(twist)], Rotation((0, 0, 1), 0.0), loading=Loading((load,)))
+    (drawing,) = drawings_of(solve(case))
+    assert drawing.forces is not None
+    assert drawing.forces.torques == ""
+    arrows = {(arrow.kind, arrow.name): arrow.ends for arrow in drawing.forces.arrows}
+    held, force, moment = drawing.posture, np.array(load.force), np.array(load.moment)
+    point = held.position + held.rotation @ load.point
+    lengths = [np.linalg.norm(np.diff(arrows[kind, "cut"], axis=0)) for kind in ("load", "moment")]
+    scale, turn = lengths[0] / np.linalg.norm(force), lengths[1] / np.linalg.norm(moment)
+    np.testing.assert_allclose(arrows["load", "cut"], [point - scale * force, point], atol=1e-12)
+    np.testing.assert_allclose(arrows["moment", "cut"], [point, point + turn * moment], atol=1e-12)
+    t = 1e-5
+    axes = figure_of([drawing]).axes[0]
+    assert {"moment cut", "moment cut second head"} <= {text.get_gid() for text in axes.texts}
+    before, after = (drawing.linkage.posture_after(held, np.array(twist), time) for time in (-t, t))
+    assert before is not None
+    assert after is not None
+    work = 0.0
+    for k, joint in enumerate(model.scene.joints):
+        if joint.is_actuated:
+            start, head = arrows["drive", str(joint.limb)]
+            np.testing.assert_allclose(start, held.joints[k][0], atol=1e-12)
+            work += float((head - start) / scale @ (after.joints[k][0] - before.joints[k][0]) / (2 * t))
+    omega, v = np.array(twist[:3]), np.array(twist[3:])
+    assert work == pytest.approx(-float(force @ (v + np.cross(omega, point)) + moment @ omega), rel=1e-8)
 
 
 def test_a_picture_of_an_objective_of_actuators_has_no_rates_of_a_motion() -> None:
@@ -85,20 +128,7 @@ def test_a_picture_of_an_objective_of_actuators_has_no_rates_of_a_motion() -> No
 
 
 def test_a_load_without_forces_has_no_scale_of_arrows() -> None:
-    text = """\
-[robot]
-model = "delta"
-parameters = { rb = 0.164, rp = 0.044, arm = 0.524, rod = 1.244, w = 0.131, tilt = 20 }
-[pose]
-position = [0.1, 0, -1.2]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[[load]]
-any = { force = 5 }
-"""
-    (drawing,) = drawings_of(solve(case_from(text)))
+    (drawing,) = drawings_of(solve(case_from(DELTA + "[[load]]\nany = { force = 5 }\n")))
     assert drawing.forces is not None
     assert drawing.forces.arrows == ()
     assert "longest arrow" not in drawing.forces.words

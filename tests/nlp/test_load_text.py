@@ -16,7 +16,7 @@ from screwsynth.nlp.case.loads import Load, Loading, Motion
 
 #: Of an angle that is written in degrees.
 ULP = 3e-16
-SIX, TURNING = starter("stewart-gough"), starter("planar-3-rrr")
+SIX, TURNING = starter("stewart-gough"), starter("delta")
 
 NUMBER = st.floats(-1e30, 1e30) | st.integers(-1000, 1000).map(float) | st.sampled_from([0.0, -0.0, 5e-324, 1e-7, 0.1])
 SIZE = st.floats(0, 1e30) | st.sampled_from([0.0, 1.0, 12.5])

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from screwsynth.models import three_upu
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case
-from screwsynth.nlp.case.limits.forces import ActuatorForce
+from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from screwsynth.nlp.case.limits.limits import Limits
 from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.motors import Motor
@@ -27,7 +27,7 @@ from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.closing import closed_start
-from screwsynth.nlp.evidence.loads import loads_at
+from screwsynth.nlp.evidence.loads import LoadState, loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.statement.machine import Legs
@@ -35,6 +35,8 @@ from screwsynth.nlp.proof.statement.motors import motor_claims
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
+from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
+from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.workspace import workspace_of
 from screwsynth.nlp.results.workspacemotors import motor_tables
@@ -102,14 +104,18 @@ _TURNS = (
 )
 
 
+def six_legs(rng: np.random.Generator) -> Legs:
+    """A hexapod that is not quite regular."""
+    angles = np.radians([-5, 5, 115, 125, 235, 245])
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+    turned = 0.5 * np.roll(ring, 1, axis=0) @ turn_about([0, 0, 1], math.radians(-60)).T
+    return Legs(ring + rng.normal(0, 0.05, (6, 3)), turned + rng.normal(0, 0.05, (6, 3)))
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_no_pose_of_six_legs_has_a_larger_number_than_its_bound(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    angles = np.radians([-5, 5, 115, 125, 235, 245])
-    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
-    turned = np.roll(np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1), 1, axis=0)
-    turned = 0.5 * turned @ turn_about([0, 0, 1], math.radians(-60)).T
-    robot = Legs(ring + rng.normal(0, 0.05, (6, 3)), turned + rng.normal(0, 0.05, (6, 3)))
+    robot = six_legs(rng)
     place = [Free(-0.15, 0.15), Free(-0.15, 0.1), Free(0.9, 1.1)]
     turns = _TURNS[seed]
     case = replace(case_of_legs(robot), loading=LOADING, workspace=Workspace(place, turns))
@@ -161,6 +167,14 @@ def test_no_pose_of_six_legs_has_a_larger_number_than_its_bound(seed: int) -> No
         assert sign * (value - each.reached) <= 0.0101 * size
 
 
+def held_at(case: Case, position: list[float], rotation: Rotation) -> tuple[LoadState, Array]:
+    """Forces under the only load at a pose, and speeds."""
+    nlp = formulate(replace(case, position=position, rotation=rotation, workspace=None))
+    x = closed_start(nlp)
+    (one,), speeds, _ = loads_at(nlp, x, evaluate(nlp, x))
+    return one, speeds
+
+
 @pytest.mark.parametrize("name", ["6-pus", "delta", "tricept"])
 def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name: str) -> None:
     """With six freedoms or fewer, with loops in closed form and others: forces and torques from J at single poses."""
@@ -170,9 +184,7 @@ def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name:
     assert all(each.outcome is Outcome.PROVED for each in found.values())
 
     def at(position: list[float], rotation: Rotation) -> dict[tuple[str, int, str, Sense], float]:
-        nlp = formulate(replace(case, position=position, rotation=rotation, workspace=None))
-        x = closed_start(nlp)
-        (one,), speeds, _ = loads_at(nlp, x, evaluate(nlp, x))
+        one, speeds = held_at(case, position, rotation)
         numbers = dict[tuple[str, int, str, Sense], float]()
         for k, (low, high, speed) in enumerate(zip(one.smallest, one.largest, speeds, strict=True)):
             numbers["force", k, "push", Sense.MIN], numbers["force", k, "push", Sense.MAX] = low, high
@@ -415,13 +427,84 @@ def test_machines_that_are_not_judged_leave_their_motors_open_with_the_reason() 
         assert each.reason == "errors take freedoms from the robot"
 
 
-def test_a_limit_for_all_actuators_and_one_of_its_own_are_both_claims() -> None:
-    case = at_home("delta")
-    every = Limits(ActuatorForce(max=3.0), ActuatorForce("2", max=2.0))
-    claims = list(motor_claims(replace(case, loading=Loading((Load("w", (0.0, 0.0, -1.0)),)), limits=every)))
-    assert Counter((each.key, each.limit) for each in claims) == {
-        ("actuator_force.max", 3.0): 3,
-        ("actuator_force.max", -3.0): 3,
-        ("actuator_force.2.max", 2.0): 1,
-        ("actuator_force.2.max", -2.0): 1,
+def test_slices_show_where_limits_on_actuators_hold() -> None:
+    """A random pose of each box against numbers in NumPy alone."""
+    rng = np.random.default_rng(3)
+    robot = six_legs(rng)
+    limits = Limits(ActuatorForce(max=13.0, min=-6.0), ActuatorSpeed(max=0.7585), ActuatorPower("1", max=5.0))
+    turns = Turns(TurnKind.ROLL_PITCH_YAW, (0.0, 0.0, 0.0))
+    workspace = Workspace((Free(-0.2, 0.2), 0.1, Free(0.9, 1.2)), turns)
+    case = replace(case_of_legs(robot), loading=LOADING, limits=limits, workspace=workspace)
+    (found,) = slices_of(case)
+    assert found.left_out == ()
+    assert {each.key: each.limit for each in found.limits} == {
+        "actuator_force.max": 13.0,
+        "actuator_force.min": -6.0,
+        "actuator_speed.max": 0.7585,
+        "actuator_power.1.max": 5.0,
     }
+    low, high = found.boxes[:, :2], found.boxes[:, 2:]
+    points = low + rng.uniform(size=low.shape) * (high - low)
+    over = np.zeros((len(points), len(found.limits)))
+    for row, (x, z) in zip(over, points.tolist(), strict=True):
+        values = numbers_at(robot, LOADING, np.array([x, 0.1, z]), np.eye(3))
+        for k, each in enumerate(found.limits):
+            _, what, *own, end = re.split("[_.]", each.key)
+            sense = Sense(end)
+            row[k] = max(
+                sense.sign * (value - each.limit)
+                for (word, leg, _, side), value in values.items()
+                if side is sense
+                and word in (("power", "braking") if what == "power" else (what,))
+                and (not own or leg == int(own[0]) - 1)
+            )
+    is_large = (high - low).min(axis=1) > 2 * (high - low).min()
+    assert (over[found.binding == KEPT] <= 0).all()
+    for k in range(len(found.limits)):
+        own = over[(found.binding == k) & is_large, k]
+        assert len(own) > 10
+        assert (own > 0).all()
+    size = np.prod(high - low, axis=1)
+    assert size[found.binding == KEPT].sum() > 0.1 * size.sum()
+    assert size[found.binding == UNDECIDED].sum() < 0.05 * size.sum()
+
+
+def test_slices_show_limits_on_actuators_where_loops_are_followed() -> None:
+    """A random pose of some boxes of a Delta, whose rotation follows from its position, against single poses."""
+    case, rng = at_home("delta", part=0.05), np.random.default_rng(4)
+    assert case.workspace is not None
+    place = [case.workspace.position[0], 0.0, case.workspace.position[2]]
+    load = Loading((Load("w", (3.0, 2.0, -1.0), any_force=2.0),))
+    case = replace(case, workspace=replace(case.workspace, position=place), loading=load)
+    limit = 1.01 * float(np.abs(held_at(case, case.position, Rotation())[0].forces).max())  # type: ignore[arg-type]
+    (found,) = slices_of(replace(case, limits=Limits(ActuatorForce(max=limit))))
+    assert found.left_out == ()
+    size = np.prod(found.boxes[:, 2:] - found.boxes[:, :2], axis=1)
+    for state in (KEPT, 0):
+        own = np.flatnonzero(found.binding == state)
+        assert size[own].sum() > 0.1 * size.sum()
+        for low, high in found.boxes[own[np.argsort(size[own])[-16:]]].reshape(-1, 2, 2):
+            x, z = low + rng.uniform(size=2) * (high - low)
+            largest = float(np.abs(held_at(case, [x, 0.0, z], Rotation())[0].forces).max())
+            assert (largest <= limit) == (state == KEPT)
+
+
+def test_the_tighter_of_a_limit_for_all_actuators_and_one_of_its_own_is_a_claim() -> None:
+    """No two claims have one name and sense: a checker would hold the number to one of their limits alone."""
+    every, loading = (
+        [ActuatorForce(max=3.0), ActuatorSpeed(max=5.0)],
+        Loading((Load("w", (0.0, 0.0, -1.0)),), Motion(1)),
+    )
+    own = [ActuatorForce("1", min=-9.0, max=2.0), ActuatorForce("2", max=4.0), ActuatorForce("3", min=-1.0)]
+    for limits in ([*every, *own], [*reversed(own), *reversed(every)]):
+        claims = list(motor_claims(replace(at_home("delta"), loading=loading, limits=Limits(*limits))))
+        assert len({each.label for each in claims}) == len(claims)
+        assert {(each.name, each.key): each.limit for each in claims if each.limit is not None} == {
+            **{(f"actuator_speed actuator {k}", "actuator_speed.max"): 5.0 for k in (1, 2, 3)},
+            **{(f"actuator_force actuator {k} backwards load w", "actuator_force.max"): -3.0 for k in (1, 2, 3)},
+            ("actuator_force actuator 1 load w", "actuator_force.1.max"): 2.0,
+            ("actuator_force actuator 2 load w", "actuator_force.max"): 3.0,
+            ("actuator_force actuator 3 load w", "actuator_force.max"): 3.0,
+            ("actuator_force actuator 1 smallest load w", "actuator_force.1.min"): -9.0,
+            ("actuator_force actuator 3 smallest load w", "actuator_force.3.min"): -1.0,
+        }

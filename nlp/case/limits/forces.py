@@ -15,15 +15,16 @@ from casadi import SX
 from pydantic import BeforeValidator, Discriminator, Tag
 
 from ....models import Dimension, Model
-from ....models.statics import DrivenJoint, driven_joints, statics_hindrance
+from ....models.statics import DrivenJoint, driven_joints
 from ...errors import CaseError, nearest
 from ...units import Units
+from ..checks import check_statics
 from ..forces import PosedForces, dimension_of_force, dimension_of_speed
 from ..table import Table, fault_of
 from ..toml import TomlValue
 from .constraint import LENGTH, BoundedConstraint, Reading, between
 from .interval import AtMost, IntervalTable
-from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, Written
+from .limit import Limit, LimitedCase, NumberRange, PosedRobot, Ranges, TableT, Written
 
 
 def _kind(value: object) -> str:
@@ -46,18 +47,48 @@ _Intervals = Annotated[
 _Largest = Annotated[Annotated[AtMost, Tag("<range>")] | Annotated[dict[str, AtMost], Tag("<list>")], *_Each]
 
 
-class ActuatorLimit(Limit[Table], abc.ABC):
+class LoadedLimit(Limit[TableT], abc.ABC):
+    """A limit on what loads on the platform or its fastest motions demand of actuators.
+
+    Attributes:
+        needs_loads, needs_motion: whether the numbers depend on loads, and on the platform's motions.
+    """
+
+    needs_loads: ClassVar[bool] = True
+    needs_motion: ClassVar[bool] = False
+
+    @classmethod
+    def is_for(cls, model: Model) -> bool:
+        """Return whether a robot's actuators are known."""
+        return bool(driven_joints(model))
+
+    def check(self, case: LimitedCase) -> None:
+        """Refuse a number out of its range, and a case without the loads or motions that the limit needs.
+
+        Raises:
+            CaseError: in the words of a case file.
+        """
+        super().check(case)
+        if self.needs_loads and not case.loading.loads:
+            raise CaseError(f"limits.{self.name}", "means nothing without [[load]]")
+        if self.needs_motion and case.loading.motion is None:
+            raise CaseError(f"limits.{self.name}", "means nothing without [motion]")
+
+
+@dataclass(frozen=True)
+class ActuatorLimit(LoadedLimit[Table], abc.ABC):
     """A limit on a number of all actuators, or of one.
 
     Attributes:
         actuator: name of the one; empty for all.
-        needs_loads, needs_motion: whether the number depends on loads, and on the platform's motions.
+        max: largest number, in radians of an actuator that turns; None where there is none.
     """
 
-    actuator: str
+    actuator: str = ""
+    _: KW_ONLY
+    max: float | None = None
 
-    needs_loads: ClassVar[bool] = True
-    needs_motion: ClassVar[bool] = False
+    table: ClassVar[Any] = _Largest
 
     @classmethod
     def read(cls, limits: Table, model: Model, units: Units) -> Iterator[Self]:
@@ -78,12 +109,7 @@ class ActuatorLimit(Limit[Table], abc.ABC):
     def from_table(cls, written: Written[Table]) -> Self:
         """Return the limit that a case file writes."""
         name = written.key.removeprefix(cls.key).removeprefix(".")
-        return cls._of(name, written.numbers(cls._of(name, {}).ranges(written.model)))
-
-    @classmethod
-    @abc.abstractmethod
-    def _of(cls, actuator: str, numbers: Mapping[str, float | None]) -> Self:
-        """Return the limit of an actuator, or of all, with these numbers."""
+        return cls(name, **written.numbers(cls(name).ranges(written.model)))
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:
         """Return the keys of ``[limits]`` that state this limit."""
@@ -104,10 +130,10 @@ class ActuatorLimit(Limit[Table], abc.ABC):
     def dimension(cls, joint: DrivenJoint) -> Dimension:
         """Return the dimension of the number of an actuator."""
 
-    @classmethod
-    def is_for(cls, model: Model) -> bool:
-        """Return whether a robot's actuators are known."""
-        return bool(driven_joints(model))
+    def ranges(self, model: Model) -> Ranges:
+        """Return the range of the largest number."""
+        joint = next((joint for _, joint in self.limited(model)), None)
+        return {"max": NumberRange(Dimension.NUMBER if joint is None else self.dimension(joint))}
 
     def check(self, case: LimitedCase) -> None:
         """Refuse an unknown actuator, actuators of two kinds, numbers out of their range, and what is not known.
@@ -115,9 +141,7 @@ class ActuatorLimit(Limit[Table], abc.ABC):
         Raises:
             CaseError: in the words of a case file.
         """
-        hindrance = statics_hindrance(case.model)
-        if hindrance:
-            raise CaseError(f"limits.{self.name}", f"is not for {case.model.name!r}: {hindrance}")
+        check_statics(case.model, f"limits.{self.name}")
         every = [joint.name for joint in driven_joints(case.model)]
         if self.actuator and self.actuator not in every:
             fault = f"is no actuator of {case.model.name!r}; {nearest(self.actuator, every)}"
@@ -126,18 +150,13 @@ class ActuatorLimit(Limit[Table], abc.ABC):
             fault = "means actuators that turn and actuators that slide; give one table for each, by its name"
             raise CaseError(f"limits.{self.name}", f"{fault}: {', '.join(every)}")
         super().check(case)
-        if self.needs_loads and not case.loading.loads:
-            raise CaseError(f"limits.{self.name}", "means nothing without [[load]]")
-        if self.needs_motion and case.loading.motion is None:
-            raise CaseError(f"limits.{self.name}", "means nothing without [motion]")
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the number of each actuator, and under each load case where it depends on loads."""
         for k, joint in self.limited(pose.model):
             name = f"{self.key} actuator {joint.name}"
-            # A largest number alone bounds a size.
-            above = 0.0 if getattr(self, "min", None) is None else -math.inf
-            yield from self.of_actuator(pose.forces, k, name, pose.where, Reading(self.dimension(joint), above=above))
+            reading = Reading(self.dimension(joint), above=self.ranges(pose.model)["max"].above)
+            yield from self.of_actuator(pose.forces, k, name, pose.where, reading)
 
     @abc.abstractmethod
     def of_actuator(
@@ -171,10 +190,8 @@ class ActuatorForce(ActuatorLimit):
         min: smallest force, signed; None where there is none.
     """
 
-    actuator: str = ""
     _: KW_ONLY
     min: float | None = None
-    max: float | None = None
 
     key: ClassVar[str] = "actuator_force"
     table: ClassVar[Any] = _Intervals
@@ -185,16 +202,12 @@ class ActuatorForce(ActuatorLimit):
         """Return the dimension of an actuator's force."""
         return dimension_of_force(joint)
 
-    @classmethod
-    def _of(cls, actuator: str, numbers: Mapping[str, float | None]) -> Self:
-        return cls(actuator, **numbers)
-
     def ranges(self, model: Model) -> Ranges:
         """Return the ranges of both numbers."""
-        joint = next((joint for _, joint in self.limited(model)), None)
-        dimension = Dimension.FORCE if joint is None else self.dimension(joint)
-        above = 0.0 if self.min is None else -math.inf
-        return {"min": NumberRange(dimension, above=-math.inf), "max": NumberRange(dimension, above=above)}
+        size = super().ranges(model)["max"]
+        signed = size._replace(above=-math.inf)
+        # A largest number alone bounds a size.
+        return {"min": signed, "max": size if self.min is None else signed}
 
     def of_actuator(
         self, forces: PosedForces, k: int, name: str, where: str, reading: Reading
@@ -212,32 +225,7 @@ class ActuatorForce(ActuatorLimit):
 
 
 @dataclass(frozen=True)
-class _LargestOfActuator(ActuatorLimit, abc.ABC):
-    """A largest number of actuators.
-
-    Attributes:
-        actuator: name of the actuator; empty for all.
-        max: largest number; in radians of an actuator that turns.
-    """
-
-    actuator: str = ""
-    _: KW_ONLY
-    max: float | None = None
-
-    table: ClassVar[Any] = _Largest
-
-    @classmethod
-    def _of(cls, actuator: str, numbers: Mapping[str, float | None]) -> Self:
-        return cls(actuator, **numbers)
-
-    def ranges(self, model: Model) -> Ranges:
-        """Return the range of the number."""
-        joint = next((joint for _, joint in self.limited(model)), None)
-        return {"max": NumberRange(Dimension.NUMBER if joint is None else self.dimension(joint))}
-
-
-@dataclass(frozen=True)
-class ActuatorSpeed(_LargestOfActuator):
+class ActuatorSpeed(ActuatorLimit):
     """Largest speed of actuators in the platform's fastest motions, at every pose."""
 
     key: ClassVar[str] = "actuator_speed"
@@ -259,7 +247,7 @@ class ActuatorSpeed(_LargestOfActuator):
 
 
 @dataclass(frozen=True)
-class ActuatorPower(_LargestOfActuator):
+class ActuatorPower(ActuatorLimit):
     """Largest power of actuators: their largest force times their largest speed, at every pose."""
 
     key: ClassVar[str] = "actuator_power"
@@ -283,7 +271,7 @@ class ActuatorPower(_LargestOfActuator):
 
 
 @dataclass(frozen=True)
-class Deflection(Limit[AtMost]):
+class Deflection(LoadedLimit[AtMost]):
     """Largest displacement of the platform's origin under every load, at every pose, as the actuators give way.
 
     Attributes:
@@ -298,11 +286,6 @@ class Deflection(Limit[AtMost]):
     numbers: ClassVar[Ranges] = {"max": NumberRange(Dimension.LENGTH)}
     order: ClassVar[int] = 1
 
-    @classmethod
-    def is_for(cls, model: Model) -> bool:
-        """Return whether a robot's actuators are known."""
-        return bool(driven_joints(model))
-
     def check(self, case: LimitedCase) -> None:
         """Refuse a number out of its range, and a case without loads or without stiffness.
 
@@ -310,8 +293,6 @@ class Deflection(Limit[AtMost]):
             CaseError: in the words of a case file.
         """
         super().check(case)
-        if not case.loading.loads:
-            raise CaseError(f"limits.{self.key}", "means nothing without [[load]]")
         if case.loading.stiffness is None:
             raise CaseError(f"limits.{self.key}", "needs robot.actuator_stiffness")
 

@@ -71,8 +71,20 @@ class Canvas:
         x, y = self.view.project(point)
         self._axes.plot([x], [y], marker=symbol, linestyle="none", gid=name, **style)
 
-    def arrow(self, start: FloatArray, end: FloatArray, name: str, colour: Colour, width: float, zorder: float) -> None:
-        """Draw an arrow between two points (3,); towards the eye it is only its head."""
+    def arrow(
+        self,
+        start: FloatArray,
+        end: FloatArray,
+        name: str,
+        colour: Colour,
+        width: float,
+        zorder: float,
+        *,
+        has_two_heads: bool = False,
+    ) -> None:
+        """Draw an arrow between two points (3,), with two heads for a moment; towards the eye it is only its head."""
+        if has_two_heads:
+            self.arrow(start, start + 0.86 * (end - start), f"{name} second head", colour, width, zorder)
         a, b = self.view.project(start), self.view.project(end)
         style: dict[str, Any] = {
             "arrowstyle": f"-|>,head_width={0.12 + 0.09 * width:.3f},head_length={0.3 + 0.14 * width:.3f}"

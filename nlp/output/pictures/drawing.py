@@ -230,7 +230,7 @@ def drawing_of(
         motion=_motion_of_twist(twist, drawing, chosen.name) if chosen.is_stated else None,
         free=tuple(_motion_of_twist(each, drawing, "free motion") for each in state.free_twists),
         reference=_reference(nlp, posture, drawing.size, pose),
-        forces=drawn_forces(nlp, x, state, pose, drawing.size),
+        forces=drawn_forces(nlp, x, state, posture, pose, drawing.size),
         headline=headline,
         is_answer=is_answer,
     )

@@ -2,47 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ....models import Dimension, FloatArray, frozen_array
+from ....models import Dimension, FloatArray, JointKind, Model, frozen_array
 from ....models.statics import driven_joints
 from ...case.forces import dimension_of_force
+from ...case.loads import LoadCase
 from ...evidence.loads import LoadState, loads_at
 from ...evidence.state import RobotState
 from ...program.nlp import Nlp
+from .posture import Posture
 
-#: Length of the longest arrow of a force, in parts of the robot's size.
-_LONGEST = 0.45
+#: Length of the longest arrow of a force, and of a moment, in parts of the robot's size.
+_LONGEST, _LONGEST_MOMENT = 0.45, 0.3
 #: Forces below this part of the largest have no arrow.
 _NOISE = 1e-6
 
 
 class ForceArrow(NamedTuple):
-    """An arrow of a force.
+    """An arrow of a force, or of a moment along its axis.
 
     Attributes:
-        kind: the load, or a leg that pushes or pulls the platform.
-        name: of the load or of the limb.
+        kind: force or moment of the load, a leg that pushes or pulls the platform, or an actuator that drives a slide.
+        name: of the load or of the actuator.
         ends: (2, 3) its start and its head, in the world frame.
         words: whose force it is, and how large.
     """
 
-    kind: Literal["load", "push", "pull"]
+    kind: Literal["load", "moment", "push", "pull", "drive"]
     name: str
     ends: FloatArray
     words: str
+
+    @property
+    def is_beside(self) -> bool:
+        """Whether it lies beside a leg or a slide, and not at the load's point."""
+        return self.kind not in ("load", "moment")
 
 
 class DrawnForces(NamedTuple):
     """Arrows of one load case, and what they mean.
 
     Attributes:
-        arrows: those of forces.
-        words: the load case with its largest force, by which arrows have their scale.
-        torques: torques of actuators that turn, in words; empty without any.
+        arrows: those of forces and moments.
+        words: the load case with its largest force and moment, by which arrows have their scale.
+        torques: torques of actuators that turn, and forces without a place, in words; empty without any.
     """
 
     arrows: tuple[ForceArrow, ...]
@@ -50,78 +58,126 @@ class DrawnForces(NamedTuple):
     torques: str
 
 
-def drawn_forces(nlp: Nlp, x: FloatArray, state: RobotState, pose: int, size: float) -> DrawnForces | None:
+def drawn_forces(
+    nlp: Nlp, x: FloatArray, state: RobotState, posture: Posture, pose: int, size: float
+) -> DrawnForces | None:
     """Return the arrows of a case's first load at a point; None without a load, and at a singular pose.
 
     Args:
         nlp: the program.
         x: (n,) the point.
         state: the robot there.
+        posture: its drawing there.
         pose: index of the pose.
         size: of the robot, length.
     """
-    cases = nlp.case.loading.cases
+    cases, units, model = nlp.case.loading.cases, nlp.case.units, nlp.program.model
     if not cases or state.is_singular:
         return None
-    held, units = loads_at(nlp, x, state, pose).loads[0], nlp.case.units
-    joints = driven_joints(nlp.case.model)
-    values = np.where(np.abs(held.largest) >= np.abs(held.smallest), held.largest, held.smallest)
-    legs = _legs(nlp, x, pose)
-    forces = {joint.name: float(value) for joint, value in zip(joints, values, strict=True) if joint.limb in legs}
-    given = _points_and_forces(nlp, state)
-    largest = max([*map(abs, forces.values()), *(float(np.linalg.norm(force)) for _, force in given)], default=0.0)
-    scale = _LONGEST * size / largest if largest > 0 else 0.0
-    arrows = [
-        ForceArrow(
-            "load",
-            cases[0].name,
-            frozen_array(np.stack([at - scale * force, at]), (2, 3)),
-            f"load {cases[0].name}: {float(np.linalg.norm(force)):.4g} {units.label(Dimension.FORCE)}",
-        )
-        for at, force in given
-    ]
-    for joint in joints:
-        if abs(forces.get(joint.name, 0.0)) > _NOISE * largest:
-            foot, head = legs[joint.limb]
-            along = scale * forces[joint.name] * (head - foot) / np.linalg.norm(head - foot)
-            # The arrow of a push ends at the joint on the platform, that of a pull begins there.
-            ends = np.stack([head - along, head]) if forces[joint.name] > 0 else np.stack([head, head + along])
-            kind: Literal["push", "pull"] = "push" if forces[joint.name] > 0 else "pull"
-            words = f"leg {joint.name}: {forces[joint.name]:+.4g} {units.label(Dimension.FORCE)}"
-            arrows.append(ForceArrow(kind, joint.name, frozen_array(ends, (2, 3)), words))
-    turning = [(joint, value) for joint, value in zip(joints, values, strict=True) if joint.name not in forces]
+    held, given = loads_at(nlp, x, state, pose).loads[0], list(_parts(cases[0], state))
+    lines = _slides(model, posture) | _legs(nlp, x, pose)
+    joints = driven_joints(model)
+    forces = [each for each in zip(joints, held.forces.tolist(), strict=True) if each[0].name in lines]
+    largest = max([*(_norm(part.force) for part in given), *(abs(force) for _, force in forces)], default=0.0)
+    turning = max((_norm(part.moment) for part in given), default=0.0)
+    scale, turn = (part * size / (most or 1.0) for part, most in ((_LONGEST, largest), (_LONGEST_MOMENT, turning)))
+    arrows = []
+    for part in given:
+        words = f"load {held.name}: {_norm(part.force):.4g} {units.label(Dimension.FORCE)}"
+        arrows.append(_arrow("load", held.name, part.point - scale * part.force, part.point, words))
+        words = f"moment of load {held.name}: {_norm(part.moment):.4g} {units.label(Dimension.TORQUE)}"
+        arrows.append(_arrow("moment", held.name, part.point, part.point + turn * part.moment, words))
+    for joint, force in forces:
+        line, words = lines[joint.name], f"{joint.name}: {force:+.4g} {units.label(Dimension.FORCE)}"
+        along = scale * force * line.direction if abs(force) > _NOISE * largest else np.zeros(3)
+        if not line.is_leg:
+            arrows.append(_arrow("drive", joint.name, line.place, line.place + along, f"actuator {words}"))
+        elif force > 0:  # the arrow of a push ends at the joint on the platform, that of a pull begins there
+            arrows.append(_arrow("push", joint.name, line.place - along, line.place, f"leg {words}"))
+        else:
+            arrows.append(_arrow("pull", joint.name, line.place, line.place + along, f"leg {words}"))
     torques = ", ".join(
-        f"{joint.name} {value:+.4g} {units.label(dimension_of_force(joint))}" for joint, value in turning
+        f"{joint.name} {force:+.4g} {units.label(dimension_of_force(joint))}"
+        for joint, force in zip(joints, held.forces.tolist(), strict=True)
+        if joint.name not in lines
     )
-    more = "" if len(nlp.case.loading.cases) == 1 else f", the first of {len(nlp.case.loading.cases)}"
-    longest = f": longest arrow {largest:.4g} {units.label(Dimension.FORCE)}" if arrows else ""
-    words = f"load {held.name}{more}{longest}{_any_words(held)}"
-    return DrawnForces(tuple(arrows), words, torques)
+    more = "" if len(cases) == 1 else f", the first of {len(cases)}"
+    scales = [f"longest arrow {largest:.4g} {units.label(Dimension.FORCE)}"] if largest > 0 else []
+    scales += [f"with two heads {turning:.4g} {units.label(Dimension.TORQUE)}"] if turning > 0 else []
+    of_scales = f": {', '.join(scales)}" if scales else ""
+    words = f"load {held.name}{more}{of_scales}{_any_words(held)}"
+    return DrawnForces(tuple(each for each in arrows if np.ptp(each.ends, axis=0).any()), words, torques)
+
+
+def _arrow(
+    kind: Literal["load", "moment", "push", "pull", "drive"],
+    name: str,
+    start: FloatArray,
+    end: FloatArray,
+    words: str,
+) -> ForceArrow:
+    return ForceArrow(kind, name, frozen_array(np.stack([start, end]), (2, 3)), words)
+
+
+def _norm(vector: FloatArray) -> float:
+    return float(np.linalg.norm(vector))
 
 
 def _any_words(held: LoadState) -> str:
-    """Return what forces of legs are where a load has any direction."""
-    return "" if np.array_equal(held.smallest, held.largest) else ", legs at their largest"
+    """Return what forces of actuators are where a load has any direction."""
+    return "" if np.array_equal(held.smallest, held.largest) else ", actuators at their largest"
 
 
-def _points_and_forces(nlp: Nlp, state: RobotState) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the points (3,) and the forces (3,) of the parts of the first load case, in the world frame."""
-    case, R, p = nlp.case.loading.cases[0], state.rotation, state.position
-    found = []
+class _Part(NamedTuple):
+    """A part of a load case in the world frame: its point (3,), force (3,) and moment (3,) about the point."""
+
+    point: FloatArray
+    force: FloatArray
+    moment: FloatArray
+
+
+def _parts(case: LoadCase, state: RobotState) -> Iterator[_Part]:
+    """Yield the parts of a load case."""
     for load, sign in case.parts:
-        turn = R if load.in_platform else np.eye(3)
+        turn = state.rotation if load.in_platform else np.eye(3)
         force = sign * (turn @ np.array(load.force) + load.mass * np.array(case.gravity))
-        if force.any():
-            found.append((p + R @ np.array(load.point), force))
-    return found
+        point = state.position + state.rotation @ np.array(load.point)
+        yield _Part(point, force, sign * (turn @ np.array(load.moment)))
 
 
-def _legs(nlp: Nlp, x: FloatArray, pose: int) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return the centres (3,) of both joints of each straight leg, in the world frame, by its limb."""
+class _Line(NamedTuple):
+    """The line of an actuator's force: a point (3,) of it, where the arrow is, and its unit direction (3,)."""
+
+    place: FloatArray
+    direction: FloatArray
+    is_leg: bool
+
+
+def _legs(nlp: Nlp, x: FloatArray, pose: int) -> dict[str, _Line]:
+    """Return the lines of straight legs, with their joints on the platform, by their actuators."""
     robot = nlp.program.robots[pose]
     if not robot.legs:
         return {}
     parts = [ca.horzcat(*[getattr(leg, part) for leg in robot.legs]) for part in ("base", "span")]
     function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in parts])
-    base, span = (each.full() for each in function(x, nlp.arguments))
-    return {leg.name: (base[:, k], base[:, k] + span[:, k]) for k, leg in enumerate(robot.legs)}
+    base, span = (each.full().T for each in function(x, nlp.arguments))
+    limbs = [leg.name for leg in robot.legs]
+    return {
+        joint.name: _Line(base[k] + span[k], span[k] / _norm(span[k]), is_leg=True)
+        for joint in driven_joints(nlp.program.model)
+        for k, limb in enumerate(limbs)
+        if limb == joint.limb
+    }
+
+
+def _slides(model: Model, posture: Posture) -> dict[str, _Line]:
+    """Return the lines of actuated slides by their actuators, of limbs whose actuators are all such slides."""
+    found = {}
+    for limb in model.limbs:
+        joints = [joint for joint in driven_joints(model) if joint.limb == limb]
+        driven = [k for k, each in enumerate(model.scene.joints) if each.limb == limb and each.is_actuated]
+        if len(joints) == len(driven) and all(model.scene.joints[k].kind is JointKind.PRISMATIC for k in driven):
+            for joint, k in zip(joints, driven, strict=True):
+                place, direction = posture.joints[k]
+                found[joint.name] = _Line(place, direction, is_leg=False)
+    return found

@@ -25,7 +25,10 @@ from .view import View, painting_order
 BASE_FACE, PLATFORM_FACE, JOINT_FACE = "#e6eaee", "#dbe6ef", "#ffffff"
 VELOCITY, FREE = "#6d2a8c", "#0b6b57"
 RAIL, PLAIN = "#8a949d", "#7d8a96"
-_FORCE_WIDTHS = {"load": 3.0, "push": 2.4, "pull": 2.4}
+_FORCE_WIDTHS = {"load": 3.0, "moment": 3.0, "push": 2.4, "pull": 2.4, "drive": 2.4}
+_FORCE_WORDS = {
+    "push": "leg in compression", "pull": "leg in tension", "drive": "force of an actuator on its slide",
+}  # fmt: skip
 #: Width of a link with its edges, in points.
 _WIDTHS = {LinkKind.BAR: 7.0, LinkKind.ROD: 4.4}
 #: Length of the longest velocity arrow, of the frames' axes and of a couple's arrow, in parts of the robot's size.
@@ -256,8 +259,7 @@ class Panel:
             at = self.drawing.posture.points[index]
             direction = values[3:] / np.linalg.norm(values[3:])
             end, colour = at + _COUPLE * self.drawing.size * direction, self._colour(row.rate)
-            self._canvas.arrow(at, end, f"couple {row.limb}", colour, 2.6, 50)
-            self._canvas.arrow(at, at + 0.86 * (end - at), f"couple head {row.limb}", colour, 2.6, 50)
+            self._canvas.arrow(at, end, f"couple {row.limb}", colour, 2.6, 50, has_two_heads=True)
             text = f"couple of limb {row.limb}\n{self._rate_text(row.rate)}"
             self._canvas.label(text, end, self._canvas.outwards(end), bold=True, size=8.5, is_led=True)
             if not any(text.startswith("couple") for _, text in self.legend):
@@ -280,14 +282,15 @@ class Panel:
         self.legend.append((handle, words))
 
     def _paint_forces(self, forces: DrawnForces) -> None:
-        """Paint a load and the forces of legs that hold it: pushes and pulls differ in colour, and pulls are open."""
+        """Paint a load and the forces that hold it: pushes and pulls of legs differ in colour, and pulls are open."""
         for arrow in forces.arrows:
             start, end = arrow.ends + self._beside(arrow)
             name = f"{arrow.kind} {arrow.name}"
-            self._canvas.arrow(start, end, name, FORCE_COLOURS[arrow.kind], _FORCE_WIDTHS[arrow.kind], 52)
+            colour, width, is_moment = FORCE_COLOURS[arrow.kind], _FORCE_WIDTHS[arrow.kind], arrow.kind == "moment"
+            self._canvas.arrow(start, end, name, colour, width, 52, has_two_heads=is_moment)
             if arrow.kind == "pull":
                 self._canvas.marker(start, name, "o", color=FORCE_COLOURS["pull"], markersize=5, zorder=52)
-        for kind, words in (("load", forces.words), ("push", "leg in compression"), ("pull", "leg in tension")):
+        for kind, words in {"load": forces.words, **_FORCE_WORDS}.items():
             if any(arrow.kind == kind for arrow in forces.arrows) or kind == "load":
                 mark = "o" if kind == "pull" else ">"
                 line = Line2D([], [], color=FORCE_COLOURS[kind], linewidth=_FORCE_WIDTHS[kind], marker=mark)
@@ -296,8 +299,8 @@ class Panel:
             self.legend.append((Line2D([], [], linestyle="none"), f"held by {forces.torques}"))
 
     def _beside(self, arrow: ForceArrow) -> FloatArray:
-        """Return by how much (3,) the arrow of a leg lies beside it on paper, away from the middle; 0 for a load."""
-        if arrow.kind == "load":
+        """Return by how much (3,) an arrow lies beside its leg or slide on paper, away from the middle."""
+        if not arrow.is_beside:
             return np.zeros(3)
         right, up, _ = self._canvas.view.axes
         flat = self._canvas.view.project(arrow.ends[1] - arrow.ends[0])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 #: Blue shortens, grey stays, orange lengthens: distinct with any colour blindness, and never as light as paper.
 RATE_COLOURS = ("#08519c", "#3f86c4", "#9aa3ab", "#e08a3c", "#b34700")
-#: Loads, and forces of legs that push and that pull the platform.
-FORCE_COLOURS = {"load": "#007a87", "push": "#b5005b", "pull": "#00703c"}
-#: Distance of the arrow of a force from its leg, in parts of the robot's size.
+#: Forces and moments of loads, forces of legs that push and that pull the platform, and of actuators on their slides.
+FORCE_COLOURS = {"load": "#007a87", "moment": "#007a87", "push": "#b5005b", "pull": "#00703c", "drive": "#b5005b"}
+#: Distance of the arrow of a force from its leg or slide, in parts of the robot's size.
 BESIDE = 0.045
 
 

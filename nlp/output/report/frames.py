@@ -154,7 +154,7 @@ class MotionData(TypedDict):
 
 
 class ForceData(TypedDict):
-    """An arrow of a force: of the load, or of a leg that pushes or pulls the platform, beside which it lies."""
+    """An arrow of a force or of a moment; see :class:`~screwsynth.nlp.output.pictures.loads.ForceArrow`."""
 
     kind: str
     name: str
@@ -311,11 +311,11 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
 
 
 def _force_data(drawing: Drawing, forces: DrawnForces | None) -> list[ForceData]:
-    """Return the arrows of forces; those of legs lie beside these, away from the robot's middle."""
+    """Return the arrows of forces; those of legs and slides lie beside these, away from the robot's middle."""
     found: list[ForceData] = []
     for arrow in () if forces is None else forces.arrows:
         ends = arrow.ends
-        if arrow.kind != "load":
+        if arrow.is_beside:
             way = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
             out = ends[0] - np.mean(drawing.posture.points, axis=0)
             out -= (out @ way) * way
@@ -335,6 +335,7 @@ def _forces_words(forces: DrawnForces | None) -> str:
     words = [f"Arrows at the pose found: {forces.words} (teal)"]
     words += ["legs in compression (magenta)"] if "push" in kinds else []
     words += ["legs in tension (green, from a dot)"] if "pull" in kinds else []
+    words += ["forces of actuators on their slides (magenta)"] if "drive" in kinds else []
     words += [f"held by {forces.torques}"] if forces.torques else []
     return "; ".join(words) + "."
 

@@ -19,8 +19,19 @@ from .claims import Claim, ClaimKind
 def motor_claims(case: Case) -> Iterator[Claim]:
     """Yield the claims about a case's actuators, with its limits: those of an actuator and a load after each other.
 
-    Names are those of the limits' constraints at a pose.
+    Names are those of the limits' constraints at a pose. Of a limit on all actuators and one on a single actuator the
+    tighter counts.
     """
+    found: dict[tuple[str, str], Claim] = {}
+    for each in _claims(case):
+        known = found.setdefault(each.label, each)
+        if each.limit is not None and (known.limit is None or each.sense.sign * (known.limit - each.limit) > 0):
+            found[each.label] = each
+    yield from found.values()
+
+
+def _claims(case: Case) -> Iterator[Claim]:
+    """Yield the claims for each limit on an actuator, and those of numbers without any."""
     loading = case.loading
     for k, joint in enumerate(driven_joints(case.model) if loading.loads or loading.motion else ()):
         kinds = ActuatorForce, ActuatorSpeed, ActuatorPower

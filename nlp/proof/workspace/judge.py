@@ -208,7 +208,7 @@ class _Numbers:
         self.found, strokes = whole[:count], whole[count:]
         yield from strokes
         yield from searched_extremes(subject, self.quantities, gap=self.gap, paper=self.paper)
-        yield from motor_extremes(subject, with_all=self.with_objective)
+        yield from motor_extremes(subject, with_all=self.with_objective, paper=self.paper)
         if has_straight_legs(self.case.model) and self.with_objective:
             yield from pose_errors(subject, self.leg_error, paper=self.paper)
 

@@ -20,6 +20,8 @@ from .verdict import Outcome, RankVerdict
 
 #: Part by which the bound of an error of first order is moved outwards, so that boxes at the worst pose have room.
 _OUTWARDS = 1e-6
+#: The same of a number of an actuator, in parts of the gap: forms of first order need smaller boxes for the same bound.
+_ROOM = 0.25
 #: Reason of claims about machines within a tolerance that are not known.
 _AS_BUILT = "the robot cannot be assembled with errors of its joint centres"
 #: Reason of numbers of machines whose coordinates follow from others, or that have kinks.
@@ -103,8 +105,6 @@ class _Writer:
             raise ProofError(_AS_BUILT)
         if each.kind is ClaimKind.RANK:
             return self._rank(each.name)
-        if each.kind is ClaimKind.MOTOR:
-            raise ProofError(_NO_RULES)
         if each.label not in self.extremes:
             raise ProofError(_NOT_JUDGED)
         found = self.extremes[each.label]
@@ -173,19 +173,25 @@ class _Writer:
         """Return a claim with a tree of a search of its own."""
         if each.name not in self._record.boxes:
             raise ProofError(_ONE_ASSEMBLY)
-        if each.kind is ClaimKind.ERROR or (self._case.joint_centre_tolerance and each.kind is not ClaimKind.CLEARANCE):
+        record, is_motor = self._record.own(each.name), each.kind is ClaimKind.MOTOR
+        if record.lacks_boxes:
+            raise ProofError(_BEYOND)
+        of_legs = self._case.joint_centre_tolerance and each.kind is ClaimKind.SPECTRUM
+        if each.kind is ClaimKind.ERROR or of_legs:
             self._need_lengths([leg.name for leg in self._case.model.legs], ("min",))
         if each.kind is ClaimKind.ERROR:
             bound = self._record.firsts[each.name] * (1 + _OUTWARDS)
         else:
             sign = found.sense.sign
-            # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check.
-            limit = found.bound + sign * _OUTWARDS * abs(found.bound) if each.limit is None else each.limit
-            bound = sign * max(sign * limit, sign * found.bound)
-            if not math.isfinite(bound) or (each.limit is None and not bound > 0):
+            # A proof of the limit is enough: the bound reached is often just beyond it, and takes longer to check. Of a
+            # number of an actuator the bound says which motor is needed.
+            room = _ROOM * abs(found.bound - found.reached) if is_motor else 0.0
+            beyond = sign * found.bound + _OUTWARDS * abs(found.bound) + room
+            limit = math.inf if each.limit is None else sign * each.limit
+            bound = sign * max(min(beyond, limit) if is_motor or each.limit is None else limit, sign * found.bound)
+            if not math.isfinite(bound) or not (is_motor or each.limit is not None or bound > 0):
                 raise ProofError(_NO_BOUND)
-        tree = self._record.own(each.name).tree(with_open=True)
-        return ProofClaim(*each.label, "boxes", bound, tree=tree)
+        return ProofClaim(*each.label, "boxes", bound, tree=record.tree(with_open=True))
 
     def _need_lengths(self, legs: Sequence[str], senses: Sequence[str]) -> None:
         """Refuse a claim where the shortest, or longest, lengths of legs that it rests on have no proof.

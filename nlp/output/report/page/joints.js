@@ -42,17 +42,18 @@ const jointTraces = (view, frame, ink) => {
 };
 
 
-// Arrows of the load and of the legs' forces, as in picture files: a pull begins with a dot.
+// Arrows of the load and of the actuators' forces, as in picture files: a pull begins with a dot, a moment has two heads.
 const forceTraces = (view, ink) => view.forces.flatMap(({ kind, name, words, colour, ends: [start, end] }) => {
   const way = plus(end, start, -1), long = norm(way);
   if (!(long > 0)) return [];
+  const reach = Math.min(0.08 * view.size, long), tips = kind === "moment" ? [end, plus(end, way, -0.75 * reach / long)] : [end];
   const steps = Array.from({ length: 9 }, (_, n) => plus(start, way, n / 8)), unit = way.map((each) => each / long);
   return [
     {
       type: "scatter3d", mode: kind === "pull" ? "lines+markers" : "lines", name: `${kind} ${name}`, x: steps.map((p) => p[0]), y: steps.map((p) => p[1]), z: steps.map((p) => p[2]),
-      line: { color: colour, width: kind === "load" ? 8 : 6 }, marker: { size: steps.map((_, n) => (n ? 0.1 : 6)), color: colour }, showlegend: false,
+      line: { color: colour, width: kind === "load" || kind === "moment" ? 8 : 6 }, marker: { size: steps.map((_, n) => (n ? 0.1 : 6)), color: colour }, showlegend: false,
       hoverinfo: "text", hovertext: steps.map(() => plain(words)), hoverlabel: { bgcolor: "#fff", bordercolor: ink, font: { color: ink, size: 13 } },
     },
-    heads(`${kind} head ${name}`, [end], [unit], Math.min(0.08 * view.size, long), colour),
+    heads(`${kind} head ${name}`, tips, tips.map(() => unit), reach, colour),
   ];
 });

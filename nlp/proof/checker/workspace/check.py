@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from casadi import SX
 
-from .....models import Dimension
+from .....models import Dimension, rate_relations
 from ....case.case import Case
 from ....case.limits.constraint import LENGTH
 from ....case.task import Sense
@@ -28,7 +28,9 @@ from ...statement.tolerance import Directions, length_of_one_machine, second_ord
 from ..check import check_proof
 from ..proof_file import Premises, Proof, ProofClaim, ProofError
 from ..tree import Node
+from .loop_claims import PosedLoops, posed_loops
 from .motion_matrix import PosedRobot
+from .motor_claims import MotorClaims
 from .number_claims import ClearanceClaim, ErrorClaim, SecondOrderClaim, SingularClaim, change_of_jacobian, whole_errors
 from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
 from .ranks import rank_claim
@@ -127,12 +129,14 @@ class _Checker:
         self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
         hold_premises(case, workspace, robot.legs, leg_error, premises)
         self._case, self._root, self._tolerance = case, pose_root(workspace), case.joint_centre_tolerance or 0.0
+        self._given = {(each.name, each.sense): each for each in proof.claims}
         self._firsts = {
             each.name: each.bound for each in proof.claims if each.name in _FIRSTS and each.bound is not None
         }
         self._lemmas = {(each.name, each.sense): each for each in proof.lemmas}
         self._eps = leg_error_of(case, leg_error)
         self._bounds: dict[tuple[str, str], float] = {}
+        self._shown: set[tuple[str, str]] = set()
         self.leaves = self.pieces = 0
         try:
             self.expected = expected_claims(case, robot, premises.quantities, leg_error)
@@ -148,6 +152,7 @@ class _Checker:
             (ClaimKind.ERROR, "boxes"): self._error,
             (ClaimKind.CLEARANCE, "boxes"): self._clearance,
             (ClaimKind.SPECTRUM, "boxes"): self._singular,
+            (ClaimKind.MOTOR, "boxes"): self._motor,
         }
         if self._tolerance and self.robot.machines is None:
             raise ProofError("errors of joint centres take freedoms from this robot")
@@ -296,6 +301,32 @@ class _Checker:
         if not math.isfinite(whole):
             raise ProofError("the errors are too large for a bound of their part of second order")
         return whole
+
+    def _motor(self, each: Claim, given: ProofClaim) -> float:
+        """Return the bound of a number of an actuator; those with one tree are shown together."""
+        if rate_relations(self.robot.model.actuators).shape[0]:
+            raise ProofError("loops demand relations of the actuators' rates")
+        if each.label not in self._shown:
+            # Numbers of an actuator under one load have the tree of one search.
+            motors = ((one, one.motor) for one in self.expected if one.label in self._given)
+            same = {
+                one.label: (motor, one.sense, _stated(self._given[one.label]))
+                for one, motor in motors
+                if motor and each.motor and motor.whose == each.motor.whose
+                if self._given[one.label].tree == given.tree
+            }
+            claims = MotorClaims(self._case, self._loops, self._root, list(same.values()))
+            self._show(claims, given.tree)
+            claims.finish()
+            self._shown |= same.keys()
+        return _stated(given)
+
+    @cached_property
+    def _loops(self) -> PosedLoops:
+        """The machines that are meant as expressions of the pose, of the closed loops, and of errors."""
+        machines = self.robot.machines
+        built = None if machines is None else machines.symbols.built
+        return posed_loops(self._case, self.robot.model, self._root, self._tolerance, built)
 
     @cached_property
     def _posed(self) -> PosedRobot:

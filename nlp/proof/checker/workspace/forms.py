@@ -5,6 +5,8 @@ Over a box of coordinates ``z_i = c_i + r_i e_i``, ``|e_i| <= 1``, an expression
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -20,6 +22,8 @@ from ..polynomials import UNIT, Polynomial, places
 UP = 1 + 1024 * UNIT
 #: Rounding of a product of matrices with fewer than 400 terms, in parts of the product of sizes.
 PRODUCT = 512 * UNIT
+#: Part by which the solution of a system is enlarged, so that it is a bound: its rounding is far below.
+ENLARGED = 1e-6
 #: Steps of the power method, and part of the largest singular value below which others are zero.
 _STEPS, _FLAT = 12, 1e-14
 
@@ -34,7 +38,31 @@ class AffineMatrix(NamedTuple):
     @property
     def rest(self) -> FloatArray:
         """The rest (B, m, c), with the rounding of a product with M and A."""
-        return np.asarray(self.E + PRODUCT * (np.abs(self.M) + np.abs(self.A).sum(axis=1)))
+        return np.asarray(self.E + PRODUCT * (np.abs(self.M) + self.spread))
+
+    @property
+    def spread(self) -> FloatArray:
+        """Largest sizes (B, m, c) of the linear parts."""
+        return np.asarray(np.abs(self.A).sum(axis=1))
+
+    def part(self, rows: slice, columns: slice = slice(None)) -> AffineMatrix:
+        """Return some rows and columns."""
+        return AffineMatrix(self.M[:, rows, columns], self.A[:, :, rows, columns], self.E[:, rows, columns])
+
+    def corners(self, count: int | None = None) -> FloatArray:
+        """Return the middles with the linear parts in the first coordinates, at corners of boxes (B, corners, m, c)."""
+        A = self.A[:, :count]
+        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=A.shape[1])))
+        moved = A.transpose(0, 2, 3, 1) @ signs.T
+        return np.asarray(self.M[:, None] + moved.transpose(0, 3, 1, 2))
+
+    def matmul(self, other: AffineMatrix) -> AffineMatrix:
+        """Return the products of the matrices."""
+        size, others = np.abs(self.M), np.abs(other.M)
+        one, two = self.spread + self.E, other.spread + other.E
+        rest = one @ two + size @ other.E + self.E @ others + PRODUCT * ((size + one) @ (others + two))
+        A = self.A @ other.M[:, None] + self.M[:, None] @ other.A
+        return AffineMatrix(self.M @ other.M, A, rest * UP)
 
     def contracted(
         self, C: FloatArray, moved: FloatArray | None = None
@@ -90,6 +118,32 @@ class Values(NamedTuple):
         return np.array(ends, dtype=float).reshape(2, -1, self.shape[0])
 
 
+class SparseMatrices(NamedTuple):
+    """Rows and columns (2, R) of the nonzero entries of matrices, one after the other, and shapes (m, c).
+
+    Attributes:
+        at, shapes: of each matrix.
+        entries: (R, 1) their expressions, all together.
+    """
+
+    at: list[NDArray[np.intp]]
+    shapes: list[tuple[int, int]]
+    entries: SX
+
+    @classmethod
+    def of(cls, matrices: Sequence[SX]) -> SparseMatrices:
+        """Return the entries of matrices."""
+        at = [np.array(each.sparsity().get_triplet(), dtype=np.intp) for each in matrices]
+        entries = ca.vertcat(SX(0, 1), *[ca.vec(each.nz[:]) for each in matrices])
+        return cls(at, [each.shape for each in matrices], entries)
+
+    def forms(self, entries: Forms) -> list[AffineMatrix]:
+        """Return the matrices from forms of all entries."""
+        ends = np.cumsum([0, *(each.shape[1] for each in self.at)])
+        parts = [Forms(*(each[:, begin:end] for each in entries)) for begin, end in itertools.pairwise(ends)]
+        return [part.matrix(at, shape) for part, at, shape in zip(parts, self.at, self.shapes, strict=True)]
+
+
 class FormArithmetic:
     """Affine forms of a vector of expressions (R, 1) of symbols (n, 1).
 
@@ -139,3 +193,30 @@ def inverses(matrices: FloatArray, zero: float | None = None) -> FloatArray:
 def off_identity(C: FloatArray, M: FloatArray) -> FloatArray:
     """Return sizes of ``I - C M``, but for the rounding of the product."""
     return np.asarray(np.abs(np.eye(C.shape[-2]) - C @ M) * (1 + 2 * UNIT) + 2 * UNIT)
+
+
+@np.errstate(all="ignore")
+def solved(A: AffineMatrix, D: AffineMatrix) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray]:
+    """Return the solutions (B, c, k) of ``A Y = D``, where they are known (B,), and shares (B, n) in the rest.
+
+    A (B, m, c) may have more rows than columns. With C near a left inverse of A in the middle of a box, ``Y_0 = C D_0``
+    and ``B >= |I - C A|``,
+
+        Y - Y_0 = C (D - A Y_0) + (C A)^-1 (I - C A) C (D - A Y_0).
+
+    The first part is affine in the coordinates but for a rest, the second at most ``(I - B)^-1 B |C (D - A Y_0)|``.
+    """
+    C = inverses(A.M)
+    holds, bound, shares = A.contracted(C)
+    Y = C @ D.M
+    gap = AffineMatrix(D.M - A.M @ Y, D.A - A.A @ Y[:, None], D.rest + A.rest @ np.abs(Y))
+    T = C[:, None] @ gap.A
+    rest = (np.abs(C @ gap.M) + np.abs(C) @ gap.rest) * UP
+    Q = (rest + np.abs(T).sum(axis=1)) * UP
+    known = holds & np.isfinite(Q).all(axis=(1, 2))
+    bound, Q = (np.where(known[:, None, None], each, 0.0) for each in (bound, Q))
+    right = bound @ Q * UP
+    X = np.linalg.solve(np.eye(bound.shape[1]) - bound, right) * (1 + ENLARGED) + ENLARGED * right
+    # (I - B) X >= B Q with a spectral radius below 1: X is a bound.
+    known = known & (X >= 0).all(axis=(1, 2)) & ((bound @ X) * UP + right <= X).all(axis=(1, 2))
+    return AffineMatrix(Y, T, (rest + X) * UP), np.asarray(known), shares

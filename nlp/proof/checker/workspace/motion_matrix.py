@@ -61,6 +61,7 @@ class PosedRobot:
         size: (n,) by which coordinates are comparable: half ranges, sizes of the unknowns, and the tolerance.
         length: by which rotations are multiplied, length: any positive number.
         position: (3, 1) the platform's origin, length.
+        rotation: (3, 3) platform to world coordinates.
         scale: (1, 1) by which rows are multiplied that are linear in the rotation; at least 1.
         rows: rows of limbs, one wrench each, with moments about the platform's origin.
         members, actuators: of the robot.
@@ -80,9 +81,10 @@ class PosedRobot:
         errors = SX.sym("errors", symbols[0].numel() - len(values))
         turned, self.scale = turned_rotation(root, y[3:])
         self.model, self.length, self.position = model, case.characteristic_length, ca.vertcat(*y[:3])
+        self.rotation = turned / self.scale
         self.z, self.errors = ca.vertcat(SX(0, 1), *[y[k] for k in self.free], unknowns, errors), errors.numel()
 
-        def put(expressions: Iterable[SX], rotation: SX = turned / self.scale) -> list[SX]:
+        def put(expressions: Iterable[SX], rotation: SX = self.rotation) -> list[SX]:
             """Return expressions of the model with those of the coordinates in the place of its symbols."""
             numbers = [ca.vertcat(SX(0, 1), *values, errors), unknowns, rotation, self.position]
             return list(ca.Function("robot", symbols, list(expressions)).call(numbers))
@@ -177,8 +179,34 @@ def motion_matrix(robot: PosedRobot, start: FloatArray, *, is_locked: bool) -> t
     return matrix, freedoms + idle
 
 
+def driven_matrices(robot: PosedRobot, start: FloatArray) -> tuple[SX, SX]:
+    """Return A (m, c) and D (m, a) with ``A (x, w) = D u`` for motions x, rates w of passive joints and u of actuators.
+
+    The actuators of a robot without given ones are its legs, whose rates are those of their rows.
+    """
+    if robot.actuators:
+        whole, count = _motion_rows(robot, start, robot.actuators), len(robot.actuators)
+        return whole[:, :-count], -whole[:, -count:]
+    sizes = [ca.norm_2(row.force) if row.kind is WrenchKind.FORCE else SX(0) for row in robot.rows]
+    legs = [k for k, row in enumerate(robot.rows) if row.kind is WrenchKind.FORCE]
+    rows = ca.vertcat(SX(0, 6), *[_work(robot, row) for row in robot.rows])
+    return rows, ca.sparsify(ca.diag(ca.vertcat(*sizes))[:, legs])
+
+
 def _whole_matrix(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
-    """Return the matrix (m, c), with columns of the platform, of passive joints, of actuators and of nested loops.
+    """Return the matrix (m, c), with columns of the platform, of passive joints, of actuators and of nested loops."""
+    relations, loops = rate_relations(actuators), []
+    motions = _motion_rows(robot, start, actuators)
+    passive = motions.shape[1] - relations.shape[1]
+    motions = ca.vertcat(motions, ca.horzcat(SX(relations.shape[0], passive), relations))
+    for path, conditions in zip(robot.model.nested, robot.nested, strict=True):
+        kept = _independent(robot.at(conditions, start), path.loop_rank, f"the nested loops of limb {path.member}")
+        loops += [conditions[kept, :].T] if kept else []
+    return ca.sparsify(ca.diagcat(motions, *loops))
+
+
+def _motion_rows(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actuator]) -> SX:
+    """Return the conditions (m, c) of limbs, with columns of the platform, of passive joints and of actuators.
 
     Of each member as many screws are taken as have its rank: where these are independent, they span all.
     """
@@ -200,12 +228,7 @@ def _whole_matrix(robot: PosedRobot, start: FloatArray, actuators: Sequence[Actu
         after = SX(6, passive - at - own.shape[1])
         blocks.append(seen @ ca.horzcat(SX.eye(6), SX(6, at), -own, after, *(-each for each in driven)))
         at += own.shape[1]
-    relations, loops = rate_relations(actuators), []
-    blocks.append(ca.horzcat(SX(relations.shape[0], 6 + passive), relations))
-    for path, conditions in zip(robot.model.nested, robot.nested, strict=True):
-        kept = _independent(robot.at(conditions, start), path.loop_rank, f"the nested loops of limb {path.member}")
-        loops += [conditions[kept, :].T] if kept else []
-    return ca.sparsify(ca.diagcat(ca.vertcat(*blocks), *loops))
+    return ca.sparsify(ca.vertcat(SX(0, 6 + passive + len(actuators)), *blocks))
 
 
 def _independent(rows: FloatArray, rank: int, whose: str) -> list[int]:

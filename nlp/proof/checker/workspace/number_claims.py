@@ -1,13 +1,8 @@
 """Claims about numbers that are no single expression: terms of second order, and those of six straight legs.
 
 Of six straight legs, with A their rows, F the diagonal matrix of the sizes of their forces, and J = F^-1 A with unit
-rows, the columns of ``P = A^-1 F`` are the platform's motions for unit changes of the legs' lengths. With C near the
-inverse of A at the centre of a box, ``P_0 = C F_0`` and ``B >= |I - C A|``,
-
-    P - P_0 = C (F - A P_0) + (C A)^-1 (I - C A) C (F - A P_0).
-
-The first part is affine in the coordinates but for a rest, the second at most ``(I - B)^-1 B |C (F - A P_0)|``. Sizes
-of affine matrices and vectors are convex: the corners of the box decide.
+rows, the columns of ``P = A^-1 F`` are the platform's motions for unit changes of the legs' lengths, affine but for a
+rest (:func:`.forms.solved`). Sizes of affine matrices and vectors are convex: the corners of the box decide.
 
 * The smallest singular value of J is at least t where ``|P| <= 1 / t``, and the largest at most t where ``|J| <= t``.
   The condition number is at most k where they are t and k t for any t.
@@ -37,15 +32,15 @@ from ....errors import UncoveredError
 from ...statement.machine import Legs
 from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
-from .forms import PRODUCT, UP, AffineMatrix, FormArithmetic, inverses
+from .forms import ENLARGED, PRODUCT, UP, AffineMatrix, FormArithmetic, solved
 from .motion_matrix import PosedRobot
 from .pose_boxes import Attempt
 from .statement import Machines
 
 #: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
 _WRONG = 1e-6
-#: Part by which the solution of a system is enlarged, so that it is a bound: its rounding is far below.
-_ENLARGED = 1e-6
+#: Rows and columns of the entries of a diagonal matrix (6, 6).
+_DIAGONAL = np.stack([np.arange(6)] * 2)
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
 _ERRORS = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32].T
 #: Rows and columns of the entries of matrices (6, 6) and (3, 4).
@@ -104,13 +99,6 @@ def are_positive(matrices: FloatArray) -> NDArray[np.bool_]:
     return good
 
 
-def _at_corners(matrices: AffineMatrix, part: slice = slice(None)) -> FloatArray:
-    """Return the affine parts of some rows at the corners of the boxes, (B, rows, corners, 6)."""
-    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=matrices.A.shape[1])))
-    moved = matrices.A[:, :, part].transpose(0, 2, 3, 1) @ corners.T
-    return np.asarray((matrices.M[:, part, :, None] + moved).transpose(0, 1, 3, 2))
-
-
 def _size_at_centre(matrices: AffineMatrix) -> FloatArray:
     """Return the spectral norms (B,) at the centres: computed numbers, 0 where they are not known."""
     return np.asarray(np.linalg.norm(np.where(np.isfinite(matrices.M), matrices.M, 0.0), 2, axis=(1, 2)))
@@ -119,7 +107,7 @@ def _size_at_centre(matrices: AffineMatrix) -> FloatArray:
 def _size_is_at_most(matrices: AffineMatrix, most: FloatArray) -> NDArray[np.bool_]:
     """Return whether the spectral norm is shown to be at most numbers (B,)."""
     room = most * (1 - 8 * UNIT) - np.sqrt((matrices.rest**2).sum(axis=(1, 2))) * UP
-    corners = _at_corners(matrices).transpose(0, 2, 1, 3)
+    corners = matrices.corners()
     square = corners @ corners.transpose(0, 1, 3, 2)
     # The product rounds by a part of the square of the Frobenius norm.
     free = (room * room * (1 - 8 * UNIT))[:, None] - PRODUCT * np.trace(square, axis1=2, axis2=3)
@@ -143,27 +131,11 @@ class LegInverse:
         self, lower: FloatArray, upper: FloatArray
     ) -> tuple[AffineMatrix, NDArray[np.bool_], FloatArray, AffineMatrix]:
         """Return P over boxes (B, 6), where it is known, shares (B, n) of coordinates in its rest, and J or A."""
-        values, leg = self._forms(lower[:, self.free], upper[:, self.free]), np.arange(6)
+        values = self._forms(lower[:, self.free], upper[:, self.free])
         sizes, matrix = values.forms(slice(0, 6)), values.forms(slice(6, 42)).matrix(_DENSE, (6, 6))
-        C = inverses(matrix.M)
-        holds, bound, shares = matrix.contracted(C)
-        P = C * sizes.c[:, None, :]
-        # F - A P_0.
-        gap = AffineMatrix(-(matrix.M @ P), -(matrix.A @ P[:, None]), matrix.rest @ np.abs(P))
-        gap.M[:, leg, leg] += sizes.c
-        gap.A[:, :, leg, leg] += sizes.a.transpose(0, 2, 1)
-        gap.E[:, leg, leg] += sizes.r
-        T = C[:, None] @ gap.A
-        rest = (np.abs(C @ gap.M) + np.abs(C) @ gap.rest) * UP
-        Q = (rest + np.abs(T).sum(axis=1)) * UP
-        known = holds & np.isfinite(Q).all(axis=(1, 2))
-        bound, Q = (np.where(known[:, None, None], each, 0.0) for each in (bound, Q))
-        right = bound @ Q * UP
-        X = np.linalg.solve(np.eye(6) - bound, right) * (1 + _ENLARGED) + _ENLARGED * right
-        # (I - B) X >= B Q with a spectral radius below 1: X is a bound.
-        known = known & (X >= 0).all(axis=(1, 2)) & ((bound @ X) * UP + right <= X).all(axis=(1, 2))
+        inverse, known, shares = solved(matrix, sizes.matrix(_DIAGONAL, (6, 6)))
         J = values.forms(slice(42, None)).matrix(_DENSE, (6, 6)) if self._is_unit else matrix
-        return AffineMatrix(P, T, (rest + X) * UP), np.asarray(known), shares, J
+        return inverse, known, shares, J
 
 
 class SingularClaim(LegInverse):
@@ -213,9 +185,8 @@ class ErrorClaim(LegInverse):
     def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
         """Try to show the claim on boxes (B, 6), at all corners of the boxes and of the errors."""
         inverse, known, shares, _ = self.inverse(lower, upper)
-        corners = np.ascontiguousarray(_at_corners(inverse, self._part))
-        moves = (corners.reshape(-1, 6) @ _ERRORS).reshape(len(corners), 3, -1)
-        worst = np.sqrt((moves * moves).sum(axis=1).max(axis=1))
+        moves = np.ascontiguousarray(inverse.part(self._part).corners()) @ _ERRORS
+        worst = np.sqrt((moves * moves).sum(axis=2).max(axis=(1, 2)))
         sums, sizes = inverse.E[:, self._part].sum(axis=2), np.abs(inverse.A[:, :, self._part]).sum(axis=(2, 3))
         terms = np.abs(inverse.M[:, self._part]).sum(axis=(1, 2)) + sizes.sum(axis=1)
         worst = (worst + np.sqrt((sums * sums).sum(axis=1)) + 64 * UNIT * terms) * UP
@@ -249,7 +220,7 @@ def whole_errors(position: float, rotation: float, eps: float, shortest: float, 
             return float(p) * (1 + 8 * UNIT), float(w) * (1 + 8 * UNIT)
         if needed > leg:
             break
-        r = float(needed) * (1 + _ENLARGED)
+        r = float(needed) * (1 + ENLARGED)
     return math.inf, math.inf
 
 

@@ -11,7 +11,7 @@ column rank then says that there are no more freedoms anywhere in the box.
 Of six straight legs, with e and f the errors of both joints of a leg in the world frame, the row
 ``(s (p - b) + u, u x (p - b))`` changes by ``(s (f - e), s f x (p - b) - u x e - s f x e)``. A component of a vector
 product with f is at most the tolerance times the size of the two other components of the other vector. The errors of
-other robots are coordinates of the forms, which are never cut.
+other robots are coordinates of the forms.
 """
 
 from __future__ import annotations
@@ -22,26 +22,19 @@ from fractions import Fraction
 import casadi as ca
 import numpy as np
 from casadi import SX
-from numpy.typing import NDArray
 
 from .....models import FloatArray, Model
-from .....models.member import scaled_twists
 from ....case.case import Case
-from ....errors import UncoveredError
 from ...statement.claims import CONSTRAINTS
 from ...statement.tolerance import BuiltModel
 from ..fractions import sign_of_determinant
 from ..proof_file import ProofError
-from .closed_loops import Assembly, Enclosed, needed_equations, start_of
-from .forms import UP, AffineMatrix, FormArithmetic, inverses
-from .motion_matrix import PosedRobot, motion_matrix
+from .closed_loops import Enclosed
+from .forms import UP, AffineMatrix, inverses
+from .loop_claims import LoopClaim, PosedLoops, posed_loops
+from .motion_matrix import motion_matrix
 from .pose_boxes import COORDINATES, Attempt, PoseRoot
 
-#: Errors at which equations and screws that were left out are tested, in parts of the robot's length, part of the
-#: workspace about its middle in which the poses lie, number of tests, and largest residual of a closed loop.
-_OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
-#: Singular values below this part of the largest are zero.
-_ZERO = 1e-9
 #: Part of the size of a row by which its entries may be off: numbers of a robot that should be 0 are rounding error.
 _CONSTANTS = 1e-13
 #: Numbers of parts of the way between two poses that are tried.
@@ -55,9 +48,6 @@ def rank_claim(
 ) -> RankClaim:
     """Return the claim that a robot's J, or its constraint wrenches alone, keep their rank.
 
-    Loop equations that hold at all closed points by themselves are left out. That is found by their ranks at a few
-    points: where it is wrong, the claim is about more than the closed loops, and says more.
-
     Args:
         case: with fixed dimensions.
         model: its robot without unknowns that follow in closed form.
@@ -70,84 +60,30 @@ def rank_claim(
         ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
             free, an expression has an operation without a rule, or errors take freedoms from the robot.
     """
-    robot = PosedRobot(case, model, root)
-    start = start_of(robot)
-    needed = needed_equations(robot, start)
-    if built is not None:
-        robot = PosedRobot(case, built.model, root)
-        start = np.concatenate([start, np.zeros(robot.errors)])
-    try:
-        assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
-        matrix, freedoms = motion_matrix(robot, start, is_locked=name != CONSTRAINTS)
-        if built is not None:
-            _refuse_other_freedoms(robot, assembly)
-        return RankClaim(robot, matrix, freedoms, assembly, tolerance)
-    except UncoveredError as error:
-        raise ProofError(f"the check has no rule for {error}") from None
+    loops = posed_loops(case, model, root, tolerance, built)
+    return RankClaim(loops, *motion_matrix(loops.robot, loops.start, is_locked=name != CONSTRAINTS))
 
 
-def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
-    """Refuse machines in which, at random errors, equations or screws that were left out do not follow from others."""
-    rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
-    poses = [j for j in assembly.independent if j < n]
-    for _ in range(_TESTS):
-        to = assembly.start[None].copy()
-        to[:, poses] += _SPREAD * robot.size[poses] * rng.uniform(-1, 1, len(poses))
-        to[:, n:] = _OFF * robot.length * rng.uniform(-1, 1, robot.errors)
-        (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
-        every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
-        if not (np.isfinite(z).all() and np.abs(every).max(initial=0.0) <= _CLOSED):
-            raise ProofError("with errors of joint centres the robot does not have the poses of the workspace")
-        for each in (one for one in robot.members if one.rank < one.screws.shape[1]):
-            columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
-            sizes = np.linalg.svd(robot.at(columns, z), compute_uv=False)
-            if int(np.count_nonzero(sizes > _ZERO * sizes.max(initial=0.0))) != each.rank:
-                raise ProofError("errors of joint centres take freedoms from the robot")
-
-
-class RankClaim:
+class RankClaim(LoopClaim):
     """The claim that a sparse matrix of motions (m, c) has no more freedoms than it is claimed to have.
 
     Errors of joint centres within a tolerance are those of six straight legs, or coordinates of the robot.
-
-    Raises:
-        UncoveredError: an entry holds an operation without a rule.
     """
 
-    def __init__(
-        self, robot: PosedRobot, matrix: SX, freedoms: int, assembly: Assembly, tolerance: float = 0.0
-    ) -> None:
-        self._freedoms, self._assembly, self._tolerance, self._length = freedoms, assembly, tolerance, robot.length
-        # Independent coordinates as those of poses.
-        self.free = [robot.free[j] for j in assembly.independent if j < len(robot.free)]
-        self._errors, self._shape = robot.errors, matrix.shape
+    def __init__(self, loops: PosedLoops, matrix: SX, freedoms: int) -> None:
+        robot = loops.robot
+        self._freedoms, self._length, self._shape = freedoms, robot.length, matrix.shape
         self._at = np.array(matrix.sparsity().get_triplet(), dtype=np.intp)
         self._off = np.zeros(matrix.shape)
         self._off[tuple(self._at)] = [0.0 if each.is_zero() else _CONSTANTS for each in ca.vertsplit(matrix.nz[:])]
         # The errors of joint centres change rows of legs by a part of these.
-        of_rows = bool(tolerance) and not robot.errors
+        of_rows = bool(loops.tolerance) and not robot.errors
         parts = [ca.vec(each) for foot, arm in robot.legs * of_rows for each in (robot.position - foot, arm)]
-        self._entries = FormArithmetic(robot.z, ca.vertcat(matrix.nz[:], *([robot.scale, *parts] if parts else [])))
-        self._shown: list[Enclosed] = []
+        super().__init__(loops, ca.vertcat(matrix.nz[:], *([robot.scale, *parts] if parts else [])))
 
-    @np.errstate(all="ignore")
-    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
-        """Try to show the claim on boxes (B, 6)."""
-        closed = self._closed(lower, upper)
-        holds, shares = closed.is_known.copy(), closed.shares[:, : len(self.free)].copy()
-        if holds.any():
-            known = closed.only(holds)
-            good, shares[holds] = self._examined(self._matrices(known))
-            holds[holds] = good
-            if self._assembly.dependent:
-                self._shown.append(known.only(good))
-        return Attempt(holds, shares)
-
-    def finish(self) -> None:
-        """Refuse boxes with closed loops that are not shown to be those of one assembly, after all were shown."""
-        if self._shown:
-            every = zip(*(vars(each).values() for each in self._shown), strict=True)
-            self._assembly.refuse_apart(Enclosed(*map(np.concatenate, every)))
+    def examined(self, closed: Enclosed) -> Attempt:
+        """Try to show the claim over closed loops."""
+        return self._examined(self._matrices(closed))
 
     def show_sign_change(self, root: PoseRoot, sides: Sequence[Sequence[float]]) -> None:
         """Show that the determinant has opposite signs at two points (6 + e,): a pose, and errors of joint centres.
@@ -156,15 +92,15 @@ class RankClaim:
         the determinant changes continuously, and is 0 at a point.
         """
         # The matrix is J itself, with rows that are neither normalised nor zero, over poses without loops.
-        if self._shape != (6, 6) or self._freedoms or self._assembly.dependent:
+        if self._shape != (6, 6) or self._freedoms or self.assembly.dependent:
             raise ProofError("only robots with six rows and without loops have proofs of singular poses")
         points = [np.array(each, dtype=float) for each in sides]
-        if len(points) != 2 or any(y.shape != (COORDINATES + self._errors,) for y in points):
+        if len(points) != 2 or any(y.shape != (COORDINATES + self.errors,) for y in points):
             raise ProofError("the claim has no two poses")
         if not all(np.isfinite(y).all() and root.holds(y[:COORDINATES]) for y in points):
             raise ProofError("a pose is not one of the workspace")
         for error in np.concatenate([y[COORDINATES:] for y in points]).reshape(-1, 3).tolist():
-            if sum(Fraction(each) ** 2 for each in error) > Fraction(self._tolerance) ** 2:
+            if sum(Fraction(each) ** 2 for each in error) > Fraction(self.tolerance) ** 2:
                 raise ProofError("a joint centre of the machine is off by more than the tolerance")
         signs = self._signs_at(np.stack(points))
         if signs[0] * signs[1] >= 0:
@@ -172,7 +108,7 @@ class RankClaim:
         for count in _PARTS:
             way = points[0] + np.linspace(0, 1, count + 1)[:, None] * (points[1] - points[0])
             way[[0, -1]] = points
-            matrices = self._matrices(self._closed(np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])))
+            matrices = self._matrices(self.closed(np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])))
             if all(np.isfinite(each).all() for each in matrices) and all(root.holds(y[:COORDINATES]) for y in way):
                 return
         raise ProofError("the determinant is not shown to change continuously between the two poses")
@@ -183,33 +119,25 @@ class RankClaim:
 
         Where ``C M`` is near I its determinant is positive: that of M has the sign of that of C, in fractions.
         """
-        matrices = self._matrices(self._closed(y, y))
+        matrices = self._matrices(self.closed(y, y))
         C = inverses(matrices.M)
         known = matrices.contracted(C)[0]
         return [sign_of_determinant(each.tolist()) if good else 0 for each, good in zip(C, known, strict=True)]
 
-    def _closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
-        """Return the closed loops over boxes (B, 6) for all errors, or over boxes (B, 6 + e) of poses and errors."""
-        if lower.shape[1] == COORDINATES:
-            errors = np.full((len(lower), self._errors), self._tolerance)
-            lower, upper = np.hstack([lower, -errors]), np.hstack([upper, errors])
-        own = [*self.free, *range(COORDINATES, COORDINATES + self._errors)]
-        return self._assembly.enclosed(lower[:, own], upper[:, own])
-
     @np.errstate(all="ignore")
     def _matrices(self, closed: Enclosed) -> AffineMatrix:
         """Return the forms of the matrix, whose coordinates are the independent ones."""
-        values, count = self._entries(closed.lower, closed.upper), self._at.shape[1]
-        matrices = self._assembly.followed(values.forms(slice(0, count)), closed).matrix(self._at, self._shape)
-        if self._tolerance and not self._errors:
+        values, count = self.values(closed), self._at.shape[1]
+        matrices = self.assembly.followed(values.forms(slice(0, count)), closed).matrix(self._at, self._shape)
+        if self.tolerance and not self.errors:
             most = np.abs(values.ends(slice(count, None))).max(axis=0).T
             legs = most[:, 1:].reshape(len(most), -1, 2, 3)
-            change = change_of_rows(most[:, 0], legs[:, :, 0], legs[:, :, 1], self._tolerance, self._length)
+            change = change_of_rows(most[:, 0], legs[:, :, 0], legs[:, :, 1], self.tolerance, self._length)
             matrices = matrices._replace(E=matrices.E + change)
         return matrices
 
-    def _examined(self, matrices: AffineMatrix) -> tuple[NDArray[np.bool_], FloatArray]:
-        """Return where the rank is shown (B,), and shares (B, f), from the forms of the matrix."""
+    def _examined(self, matrices: AffineMatrix) -> Attempt:
+        """Return where the rank is shown, from the forms of the matrix."""
         M, A, E = matrices
         # Rows are made comparable by a power of two, which rounds nothing.
         sizes = np.sqrt((M * M).sum(axis=2, keepdims=True))
@@ -226,7 +154,7 @@ class RankClaim:
         # The error of a centre is no larger than the tolerance in any direction.
         centres = np.sqrt((moved[:, p:].reshape(len(M), -1, 3, *moved.shape[2:]) ** 2).sum(axis=2))
         holds, _, shares = AffineMatrix(M, A, E).contracted(C, np.concatenate([moved[:, :p], centres], axis=1))
-        return holds, shares[:, :p]
+        return Attempt(holds, shares[:, :p])
 
 
 def change_of_rows(

@@ -15,6 +15,7 @@ from .....models import FloatArray, Model
 from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
+from ...boxes.tree import TreeRecord
 from ...statement.claims import Claim, ClaimKind, searched_claims
 from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
 from ...statement.motors import motor_claims
@@ -134,14 +135,14 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
     return extreme_of(claim, found, problem.box.pose(y), errors=errors)
 
 
-def motor_extremes(subject: Subject, *, with_all: bool = True) -> Iterator[Extreme]:
+def motor_extremes(subject: Subject, *, with_all: bool = True, paper: PaperRecord | None = None) -> Iterator[Extreme]:
     """Yield the extremes of :func:`~.motors.motor_claims`, all or those with limits, for each actuator and load."""
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
-    for _, group in itertools.groupby(claims, lambda claim: claim.motor and (claim.motor.place, claim.motor.load)):
-        yield from _motor_answers(subject, list(group))
+    for _, group in itertools.groupby(claims, lambda claim: claim.motor and claim.motor.whose):
+        yield from _motor_answers(subject, list(group), paper)
 
 
-def _motor_answers(subject: Subject, claims: Sequence[Claim]) -> Iterator[Extreme]:
+def _motor_answers(subject: Subject, claims: Sequence[Claim], paper: PaperRecord | None) -> Iterator[Extreme]:
     """Yield the extremes of numbers of an actuator, each to a part of the largest size of its kind at some poses."""
     try:
         if subject.machines is None:
@@ -157,7 +158,11 @@ def _motor_answers(subject: Subject, claims: Sequence[Claim]) -> Iterator[Extrem
             z = z[:, : len(problem.start)]
             allowed = allowed + np.nan_to_num(values - number.bounds(z, z), posinf=0.0).max(axis=0)
         goals = [goal_of(claim, gap, is_enough=False) for claim, gap in zip(claims, allowed.tolist(), strict=True)]
-        every = smallest_values(number, goals)
+        recorder = None if paper is None else TreeRecord()
+        every = smallest_values(number, goals, recorder)
+        if paper is not None and recorder is not None:
+            # One search is that of all.
+            paper.boxes |= dict.fromkeys((claim.name for claim in claims), recorder)
     except (UncoveredError, NotJudgedError) as error:
         every = [Minimum(reason=str(error))] * len(claims)
     for claim, found in zip(claims, every, strict=True):

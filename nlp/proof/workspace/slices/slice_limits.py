@@ -1,14 +1,15 @@
 """Reach and limits over the boxes of a slice: each kept, or violated, at every pose of a box, or open.
 
 Reach and limits on expressions are decided by their ranges, those on the clearance of legs by its bounds from below and
-from above. A limit on singular values is proved to be kept by its bound; it counts as violated where it is so at the
-corners and at the middle of the box, which is no proof.
+from above. A limit on singular values, or on a number of an actuator, is proved to be kept by its bound; it counts as
+violated where it is so at the corners and at the middle of the box, which is no proof.
 """
 
 from __future__ import annotations
 
 import enum
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,18 +24,20 @@ from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
 from ....errors import UncoveredError
+from ...boxes.search import some
 from ...enclosure.forms import Encloser
 from ...statement.claims import Claim, searched_claims
 from ...statement.motors import motor_claims
+from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
 from ..numbers.expressions import ranges
-from ..numbers.jacobian_numbers import SingularValues
 from ..numbers.machines import Machines
+from ..numbers.motors import Motors
 from ..numbers.searched import Subject
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
 from ..robot.pose_box import PoseBox
-from ..robot.posed_robot import build_problem
+from ..robot.posed_robot import NotJudgedError, build_problem
 from ..verdict import slack_of
 
 #: Limits of a box: all are proved to be kept, or nothing is proved; else the index of a limit that is violated.
@@ -102,20 +105,21 @@ class SliceLimits:
             limits.setdefault(claim.key, SliceLimit(claim.key, limit, claim.reading.dimension, is_enclosed=True))
         subject = Subject(case, closed.model, problem)
         self._others: list[_Other] = []
-        uncovered.update((each.key, None) for each in motor_claims(case) if each.key)
-        for claim in searched_claims(case):
-            key, number = claim.key, subject.number(claim)
+        motors = [each for each in motor_claims(case) if each.limit is not None]
+        groups = [[each] for each in searched_claims(case)]
+        groups += [list(group) for _, group in itertools.groupby(motors, lambda each: each.motor and each.motor.place)]
+        for group in groups:
             try:
-                examiner = None if problem.dependent else number.examiner
-            except UncoveredError:
-                examiner = None
-            if examiner is None:
-                uncovered[key] = None
+                number = Motors(problem, case, group) if group[0].motor else subject.number(group[0])
+                other = _Other([each.key for each in group], number, np.array(list(map(_least, group))))
+            except (NotJudgedError, UncoveredError):
+                uncovered |= dict.fromkeys(each.key for each in group)
                 continue
-            is_enclosed = isinstance(number, Clearance)
-            limits[key] = SliceLimit(key, claim.limit or 0.0, claim.reading.dimension, is_enclosed=is_enclosed)
-            self._others.append(_Other(key, number, _least(claim)))
-        keys = [*(each.key for each in known), *(each.key for each in self._others)]
+            for claim in group:
+                limit, dimension = claim.limit or 0.0, claim.reading.dimension
+                limits[claim.key] = SliceLimit(claim.key, limit, dimension, is_enclosed=other.is_enclosed)
+            self._others.append(other)
+        keys = [*(each.key for each in known), *(key for each in self._others for key in each.keys)]
         self._places, self._reaches = [list(limits).index(key) for key in keys], len(reaches)
         self.uncovered, self.limits = tuple(uncovered), tuple(limits.values())
         self._of = Coordinates(list(problem.independent), list(problem.dependent), [])
@@ -149,10 +153,13 @@ class SliceLimits:
             lower, upper = ranges(with_relation(forms.part(slice(k, -1)), own, self._of))
             found = _states_of(lower >= self._leasts, upper < self._leasts)
             states[rows, :enclosed] = np.where(is_open[rows, :enclosed], found, states[rows, :enclosed])
-        for j, claim in enumerate(self._others, enclosed):
-            rows = np.flatnonzero(is_open[:, j])
+        last = enclosed
+        for each in self._others:
+            first, last = last, last + len(each.keys)
+            rows = np.flatnonzero(is_open[:, first:last].any(axis=1))
             if rows.size:
-                states[rows, j] = claim.states(boxes.lower[rows], boxes.upper[rows])
+                found = each.states(some(boxes, rows))
+                states[rows, first:last] = np.where(is_open[rows, first:last], found, states[rows, first:last])
         return states
 
     def reached(self, states: NDArray[np.int8]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -171,7 +178,8 @@ class SliceLimits:
         found = np.zeros((len(self.limits), len(z)), dtype=np.bool_)
         with np.errstate(all="ignore"):
             numbers = values_at(self._function, z)[0][:, :, 0].T
-            claims = [*(numbers < self._leasts[:, None])[self._reaches :], *(each.violated(z) for each in self._others)]
+            claims = [*(numbers < self._leasts[:, None])[self._reaches :]]
+            claims += [row for each in self._others for row in each.violated(z).T]
         for place, claim in zip(self._places, claims, strict=True):
             found[place] |= claim
         return found
@@ -189,31 +197,46 @@ def _states_of(kept: NDArray[np.bool_], violated: NDArray[np.bool_]) -> NDArray[
 
 
 class _Other:
-    """A limit on a number with bounds of its own, and no dependent coordinates."""
+    """Limits on numbers with bounds of their own.
 
-    def __init__(self, key: str, number: SingularValues | Clearance, least: float) -> None:
-        self.key, self._number, self._least = key, number, least
+    Args:
+        keys: of the limits, K.
+        number: the numbers.
+        leasts: (K,) their smallest values allowed.
 
-    def states(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.int8]:
-        """Return the states (B,) over boxes (B, n).
+    Attributes:
+        keys: as given.
+        is_enclosed: whether boxes where they are violated are proved so, and not by samples.
+
+    Raises:
+        UncoveredError: an expression holds an operation without a rule.
+    """
+
+    def __init__(self, keys: Sequence[str], number: Number, leasts: FloatArray) -> None:
+        self.keys, self._number, self._leasts, self._examiner = keys, number, leasts, number.examiner
+        self.is_enclosed = isinstance(number, Clearance) and not number.problem.dependent
+
+    def states(self, boxes: LoopBoxes) -> NDArray[np.int8]:
+        """Return the states (B, K) over boxes whose dependent coordinates are known.
 
         A number that is bounded from below only is violated where it is so at the corners and the middle of a box.
         """
-        kept = self._number.bounds(lower, upper)[:, 0] >= self._least
-        if isinstance(self._number, Clearance):
-            return _states_of(kept, self._number.most(lower, upper) < self._least)
-        free = np.flatnonzero((upper > lower).any(axis=0))
-        violated = self.violated(0.5 * lower + 0.5 * upper)
-        for sides in itertools.product((False, True), repeat=len(free)):
-            corner = lower.copy()
-            for k, is_upper in zip(free, sides, strict=True):
-                corner[:, k] = upper[:, k] if is_upper else lower[:, k]
-            violated &= self.violated(corner)
+        kept = self._examiner.examine(boxes).smallest >= self._leasts
+        if isinstance(self._number, Clearance) and self.is_enclosed:
+            return _states_of(kept, self._number.most(boxes.lower, boxes.upper)[:, None] < self._leasts)
+        middle = self._number.closed(0.5 * boxes.lower + 0.5 * boxes.upper)
+        violated = self.violated(middle)
+        free = [k for k in self._number.problem.independent if (boxes.upper > boxes.lower)[:, k].any()]
+        for sides in itertools.product((boxes.lower, boxes.upper), repeat=len(free)):
+            corner = middle.copy()
+            for k, ends in zip(free, sides, strict=True):
+                corner[:, k] = ends[:, k]
+            violated &= self.violated(self._number.closed(corner))
         return _states_of(kept, violated)
 
     def violated(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return whether it is violated at points (P, n): (P,)."""
-        return np.asarray(self._number.values(points)[:, 0] < self._least)
+        """Return whether each is violated at points (P, n) with closed loops: (P, K)."""
+        return np.asarray(self._number.values(points) < self._leasts)
 
 
 class FirstViolated:

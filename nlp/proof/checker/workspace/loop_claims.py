@@ -1,0 +1,155 @@
+"""Claims about a robot's expressions over boxes, with closed loops, of a design or of all machines within a tolerance.
+
+Errors of joint centres are coordinates of the forms, which are never cut.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .....models import FloatArray, Model
+from .....models.member import scaled_twists
+from ....case.case import Case
+from ....errors import UncoveredError
+from ...statement.tolerance import BuiltModel
+from ..proof_file import ProofError
+from .closed_loops import Assembly, Enclosed, needed_equations, start_of
+from .forms import FormArithmetic, Values
+from .motion_matrix import PosedRobot
+from .pose_boxes import COORDINATES, Attempt, PoseRoot
+
+#: Errors at which equations and screws that were left out are tested, in parts of the robot's length, part of the
+#: workspace about its middle in which the poses lie, number of tests, and largest residual of a closed loop.
+_OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
+#: Singular values below this part of the largest are zero.
+_ZERO = 1e-9
+
+
+class PosedLoops(NamedTuple):
+    """A robot over a workspace with its closed loops, and the numbers by which it differs from its machines.
+
+    Attributes:
+        robot: the robot.
+        start: (n,) closed loops near the middle of the workspace.
+        assembly: the loops that change continuously from there.
+        tolerance: largest error of each joint centre in the machines that are meant.
+    """
+
+    robot: PosedRobot
+    start: FloatArray
+    assembly: Assembly
+    tolerance: float
+
+
+def posed_loops(
+    case: Case, model: Model, root: PoseRoot, tolerance: float = 0.0, built: BuiltModel | None = None
+) -> PosedLoops:
+    """Return a robot with closed loops.
+
+    Loop equations that hold at all closed points by themselves are left out. That is found by their ranks at a few
+    points: where it is wrong, claims are about more than the closed loops, and say more.
+
+    Args:
+        case: with fixed dimensions.
+        model: its robot without unknowns that follow in closed form.
+        root: the box of coordinates.
+        tolerance: largest error of each joint centre in the machines that are meant.
+        built: the robot with errors of its joint centres as coordinates; None for the design.
+
+    Raises:
+        ProofError: no closed loops are found in the middle of the workspace, they are singular there or leave a joint
+            free, an expression has an operation without a rule, or errors take freedoms from the robot.
+    """
+    robot = PosedRobot(case, model, root)
+    start = start_of(robot)
+    needed = needed_equations(robot, start)
+    if built is not None:
+        robot = PosedRobot(case, built.model, root)
+        start = np.concatenate([start, np.zeros(robot.errors)])
+    try:
+        assembly = Assembly(robot, robot.equations[needed] if needed else SX(0, 1), start)
+    except UncoveredError as error:
+        raise ProofError(f"the check has no rule for {error}") from None
+    if built is not None:
+        _refuse_other_freedoms(robot, assembly)
+    return PosedLoops(robot, start, assembly, tolerance)
+
+
+def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:
+    """Refuse machines in which, at random errors, equations or screws that were left out do not follow from others."""
+    rng, n = np.random.default_rng(_SEED), len(assembly.start) - robot.errors
+    poses = [j for j in assembly.independent if j < n]
+    for _ in range(_TESTS):
+        to = assembly.start[None].copy()
+        to[:, poses] += _SPREAD * robot.size[poses] * rng.uniform(-1, 1, len(poses))
+        to[:, n:] = _OFF * robot.length * rng.uniform(-1, 1, robot.errors)
+        (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
+        every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
+        if not (np.isfinite(z).all() and np.abs(every).max(initial=0.0) <= _CLOSED):
+            raise ProofError("with errors of joint centres the robot does not have the poses of the workspace")
+        for each in (one for one in robot.members if one.rank < one.screws.shape[1]):
+            columns = scaled_twists(each.screws, each.centre, SX(robot.length), each.size)
+            sizes = np.linalg.svd(robot.at(columns, z), compute_uv=False)
+            if int(np.count_nonzero(sizes > _ZERO * sizes.max(initial=0.0))) != each.rank:
+                raise ProofError("errors of joint centres take freedoms from the robot")
+
+
+class LoopClaim(ABC):
+    """A claim about expressions (R, 1) of a robot's coordinates.
+
+    Raises:
+        ProofError: an expression holds an operation without a rule.
+    """
+
+    def __init__(self, loops: PosedLoops, expressions: SX) -> None:
+        robot, _, self.assembly, self.tolerance = loops
+        # Independent coordinates as those of poses.
+        self.free = [robot.free[j] for j in self.assembly.independent if j < len(robot.free)]
+        self.errors, self._shown = robot.errors, list[Enclosed]()
+        try:
+            self._entries = FormArithmetic(robot.z, expressions)
+        except UncoveredError as error:
+            raise ProofError(f"the check has no rule for {error}") from None
+
+    @np.errstate(all="ignore")
+    def attempt(self, lower: FloatArray, upper: FloatArray) -> Attempt:
+        """Try to show the claim on boxes (B, 6)."""
+        closed = self.closed(lower, upper)
+        holds, shares = closed.is_known.copy(), closed.shares[:, : len(self.free)].copy()
+        is_wrong = np.zeros(len(holds), dtype=bool)
+        if holds.any():
+            known = closed.only(holds)
+            found = self.examined(known)
+            if found.is_wrong is not None:
+                is_wrong[holds] = found.is_wrong
+            shares[holds], holds[holds] = found.shares, found.holds
+            if self.assembly.dependent:
+                self._shown.append(known.only(found.holds))
+        return Attempt(holds, shares, is_wrong)
+
+    @abstractmethod
+    def examined(self, closed: Enclosed) -> Attempt:
+        """Try to show the claim over closed loops that are known."""
+
+    def finish(self) -> None:
+        """Refuse boxes with closed loops that are not shown to be those of one assembly, after all were shown."""
+        if self._shown:
+            every = zip(*(vars(each).values() for each in self._shown), strict=True)
+            self.assembly.refuse_apart(Enclosed(*map(np.concatenate, every)))
+
+    def closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
+        """Return the closed loops over boxes (B, 6) for all errors, or over boxes (B, 6 + e) of poses and errors."""
+        if lower.shape[1] == COORDINATES:
+            errors = np.full((len(lower), self.errors), self.tolerance)
+            lower, upper = np.hstack([lower, -errors]), np.hstack([upper, errors])
+        own = [*self.free, *range(COORDINATES, COORDINATES + self.errors)]
+        return self.assembly.enclosed(lower[:, own], upper[:, own])
+
+    def values(self, closed: Enclosed) -> Values:
+        """Return the expressions over closed loops, of all coordinates."""
+        return self._entries(closed.lower, closed.upper)

@@ -1,0 +1,200 @@
+"""Claims about forces, speeds and powers of an actuator.
+
+``A (x, w) = D u`` holds for the motion x of the platform, the rates w of passive joints and u of the actuators
+(:func:`.motion_matrix.driven_matrices`). With ``x_k`` the motion by a unit rate of actuator k, it holds a load W with
+the force ``-(W . x_k)``, by virtual work. Loads of any direction add multiples of the sizes of velocities. A leg's rate
+in a motion x of the platform is ``row . x / |force|`` with its own row. Else the motions of the platform are ``X u``,
+and any left inverse of X returns the rates: with L near one of the middle of a box, ``(L X)^-1 L``.
+
+All are an affine function of the coordinates, multiples of sizes of affine vectors, and a rest: but for the rest they
+are convex, so that the corners of a box decide. Rotations about any axis lie in a ball, where ``n . r <= sqrt(b)`` for
+unit vectors n. A multiple of the difference is added: it is at least 0 at every pose, and less at corners outside.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+from numpy.typing import NDArray
+
+from .....models import FloatArray, WrenchKind
+from ....case.case import Case
+from ....case.loads import Motion
+from ....case.motors import Motor, MotorNumber
+from ....case.task import Sense
+from .closed_loops import Enclosed
+from .forms import PRODUCT, UP, AffineMatrix, SparseMatrices, inverses, solved
+from .loop_claims import LoopClaim, PosedLoops
+from .motion_matrix import driven_matrices
+from .pose_boxes import COORDINATES, Attempt, PoseRoot
+
+#: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
+_WRONG = 1e-6
+#: Part by which a unit vector may be too long, and singular values below this part of the largest are zero.
+_UNIT, _ZERO = 1e-12, 1e-9
+
+
+class _Sum(NamedTuple):
+    """A number over boxes: an affine one (B, 1, 1), and sizes of affine vectors (B, 3, 1), each with a factor."""
+
+    affine: AffineMatrix
+    sizes: Sequence[tuple[float, AffineMatrix]] = ()
+
+
+class _Number(NamedTuple):
+    """The product of its parts, a force times a sign and, None, the speed; and the largest one allowed."""
+
+    parts: tuple[float | None, ...]
+    most: float
+
+
+def _number_of(motor: Motor, sense: Sense, bound: float) -> _Number:
+    """Return the number of a claim that a bound is the largest, or the smallest, value."""
+    if motor.number is MotorNumber.SPEED:
+        return _Number((None,), bound)
+    if motor.number is MotorNumber.POWER:
+        return _Number((-1.0 if motor.is_backwards else 1.0, None), bound)
+    return _Number((float(sense.sign),), sense.sign * bound)
+
+
+class MotorClaims(LoopClaim):
+    """The claims that numbers of one actuator, under one load, are at most bounds, or forces at least bounds.
+
+    Args:
+        case: with its loads and motions.
+        loops: the robot, whose loops demand no relation of the actuators' rates.
+        root: the box of poses.
+        claims: the numbers, with their bounds.
+    """
+
+    def __init__(
+        self, case: Case, loops: PosedLoops, root: PoseRoot, claims: Sequence[tuple[Motor, Sense, float]]
+    ) -> None:
+        robot, motor, motion = loops.robot, claims[0][0], case.loading.motion or Motion()
+        self._numbers = [_number_of(*each) for each in claims]
+        self._place, self._fastest = motor.place, (motion.linear, motion.angular * robot.length)
+        load = next((each for each in case.loading.cases if each.name == motor.load), None)
+        parts = [] if load is None else [each.load for each in load.parts]
+        self._any = [(each.any_force, each.any_moment / robot.length) for each in parts]
+        arms = [-ca.skew(robot.rotation @ SX(list(map(float, each.point)))) / robot.length for each in parts]
+        wrench = SX(6, 1) if load is None else load.wrench(robot.rotation)
+        A, D = driven_matrices(robot, loops.start)
+        forces = [row.moment / ca.norm_2(row.force) for row in robot.rows if row.kind is WrenchKind.FORCE]
+        self._is_six_legs = not robot.actuators and len(forces) == COORDINATES
+        self._has_speeds = any(None in each.parts for each in self._numbers)
+        if self._is_six_legs or not self._has_speeds:
+            D = D[:, motor.place]
+        moment = forces[motor.place].T / robot.length if self._is_six_legs else SX(1, 3)
+        self._ball = math.sqrt(root.ball) * (1 + _UNIT) if math.isfinite(root.ball) else math.inf
+        turn = [z for z, k in zip(ca.vertsplit(robot.z), robot.free, strict=False) if k >= 3]
+        scaled = ca.vertcat(wrench[:3], wrench[3:] / robot.length)
+        every = [A, D, scaled.T, moment, ca.horzcat(SX(1, 0), *turn), *arms]
+        self._matrices = SparseMatrices.of([ca.sparsify(each) for each in every])
+        super().__init__(loops, self._matrices.entries)
+
+    def examined(self, closed: Enclosed) -> Attempt:
+        """Try to show the claims over closed loops."""
+        forms = self.assembly.followed(self.values(closed).forms(), closed)
+        A, D, wrench, moment, turn, *arms = self._matrices.forms(forms)
+        y, known, shares = solved(A, D)
+        x, k = y.part(slice(0, 6)), self._place if D.M.shape[2] > 1 else 0
+        ends: dict[float | None, tuple[FloatArray, FloatArray]] = {}
+        for part in dict.fromkeys(part for number in self._numbers for part in number.parts):
+            if part is None:
+                speed, is_known = self._speed(x, moment)
+                known = known & is_known
+                ends[part] = self._largest(speed, turn)
+            else:
+                force = self._force(part, x.part(slice(None), slice(k, k + 1)), wrench, arms)
+                ends[part] = self._largest(force, turn)
+        holds, is_wrong = known, np.zeros(len(known), dtype=bool)
+        for number in self._numbers:
+            (upper, middle), *others = (ends[part] for part in number.parts)
+            for most, at_centre in others:
+                # The power of a force below 0 counts as 0.
+                upper, middle = np.maximum(upper, 0.0) * most * UP, np.maximum(middle, 0.0) * at_centre
+            holds = holds & (upper <= number.most)
+            is_wrong |= known & (middle > number.most + _WRONG * abs(number.most))
+        rest = y.E.sum(axis=(1, 2))[:, None]
+        return Attempt(np.asarray(holds), (shares * rest)[:, : len(self.free)], is_wrong)
+
+    def _force(self, sign: float, x: AffineMatrix, wrench: AffineMatrix, arms: Sequence[AffineMatrix]) -> _Sum:
+        """Return the force times a sign, from the motion (B, 6, 1) by a unit rate of the actuator."""
+        M, A, E = wrench.matmul(x)
+        moved, turned, sizes = x.part(slice(0, 3)), x.part(slice(3, 6)), []
+        for (force, moment), arm in zip(self._any, arms, strict=True):
+            if force:
+                along = arm.matmul(turned)
+                sizes.append((force, AffineMatrix(*(one + other for one, other in zip(moved, along, strict=True)))))
+            if moment:
+                sizes.append((moment, turned))
+        return _Sum(AffineMatrix(-sign * M, -sign * A, E), sizes)
+
+    def _speed(self, x: AffineMatrix, moment: AffineMatrix) -> tuple[_Sum, NDArray[np.bool_]]:
+        """Return the largest speed, and where it is known, from motions (B, 6, a) by unit rates of all actuators."""
+        (linear, angular), B = self._fastest, len(x.M)
+        fixed = AffineMatrix(*(np.zeros((*each.shape[:-2], 1, 1)) for each in x))
+        if self._is_six_legs:
+            # The force of a leg has unit size.
+            fixed.M[:] = linear
+            return _Sum(fixed, [(angular, _transposed(moment))]), np.ones(B, dtype=bool)
+        # Of left inverses of X that with the least speeds in the middle.
+        weights = np.repeat([1.0, linear / angular if linear and angular else 1.0], 3)
+        L = inverses(x.M * weights[:, None], _ZERO) * weights
+        constant = AffineMatrix(L, np.zeros((B, x.A.shape[1], *L.shape[1:])), np.zeros(L.shape))
+        rates, known, _ = solved(constant.matmul(x), constant)
+        own = _transposed(rates.part(slice(self._place, self._place + 1)))
+        sizes = [(linear, own.part(slice(0, 3))), (angular, own.part(slice(3, 6)))]
+        return _Sum(fixed, sizes), known
+
+    def _largest(self, number: _Sum, turn: AffineMatrix) -> tuple[FloatArray, FloatArray]:
+        """Return upper bounds (B,) of a number over boxes, and its values in their middles."""
+        p, affine = len(self.free), number.affine
+        corners, middle = affine.corners(p)[:, :, 0, 0], affine.M[:, 0, 0].copy()
+        slopes, rest = affine.A[:, :p, 0, 0].copy(), affine.E[:, 0, 0] + self._of_errors(affine)
+        terms = np.abs(affine.M).sum(axis=(1, 2)) + affine.spread.sum(axis=(1, 2))
+        for factor, vector in number.sizes:
+            size, at = np.sqrt((vector.M**2).sum(axis=(1, 2))), vector.corners(p)
+            corners = corners + factor * np.sqrt((at * at).sum(axis=(2, 3)))
+            rest += factor * (np.sqrt((vector.E**2).sum(axis=(1, 2))) + self._of_errors(vector))
+            terms += factor * (np.abs(vector.M) + vector.spread).sum(axis=(1, 2))
+            middle += factor * size
+            unit = vector.M[:, None] / np.where(size > 0, size, 1.0)[:, None, None, None]
+            slopes += factor * (vector.A[:, :p] * unit).sum(axis=(2, 3))
+        upper = corners.max(axis=1)
+        if math.isfinite(self._ball):
+            upper = np.fmin(upper, (corners + self._inside(slopes, turn)).max(axis=1))
+        return np.asarray(upper + (rest + PRODUCT * terms) * UP), middle
+
+    def _inside(self, slopes: FloatArray, turn: AffineMatrix) -> FloatArray:
+        """Return multiples (B, corners) of what is at least 0 wherever rotations lie in the ball."""
+        p = len(self.free)
+        r = turn.M[:, 0]
+        size = np.sqrt((r * r).sum(axis=1))
+        n = r / np.where(size > 0, size, 1.0)[:, None]
+        along = -(turn.A[:, :p, 0] @ n[:, :, None])[:, :, 0]
+        room = self._ball - (turn.corners(p)[:, :, 0] @ n[:, :, None])[:, :, 0]
+        rest = turn.rest[:, 0] + np.abs(turn.A[:, p:, 0]).sum(axis=1)
+        room += ((rest * np.abs(n)).sum(axis=1) * UP + PRODUCT * self._ball)[:, None]
+        # Of the multiples at which a slope vanishes, that with the least bound.
+        tried = np.nan_to_num(np.where(along != 0, -slopes / np.where(along != 0, along, 1.0), 0.0))
+        tried = np.maximum(tried, 0.0)
+        left = np.abs(slopes[:, None] + tried[:, :, None] * along[:, None]).sum(axis=2)
+        ends = tried * (self._ball - size)[:, None] + left
+        best = np.take_along_axis(tried, ends.argmin(axis=1)[:, None], axis=1)
+        return np.asarray(best * room)
+
+    def _of_errors(self, vector: AffineMatrix) -> FloatArray:
+        """Return the largest change (B,) of a column by errors of joint centres, each a vector of at most unit size."""
+        own = vector.A[:, len(self.free) :].reshape(len(vector.A), -1, 3, vector.A.shape[2])
+        return np.asarray(np.sqrt((own**2).sum(axis=(2, 3))).sum(axis=1) * UP)
+
+
+def _transposed(matrix: AffineMatrix) -> AffineMatrix:
+    """Return the transposed matrices."""
+    return AffineMatrix(*(each.swapaxes(-1, -2) for each in matrix))
