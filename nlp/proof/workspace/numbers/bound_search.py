@@ -193,7 +193,7 @@ class SmallestValues(LoopRule):
         self.block = _BLOCK if number.problem.dependent else 2 * _BLOCK
         self._best = _Best(np.full(len(goals), np.inf), np.tile(number.problem.start, (len(goals), 1)))
         self._closed = np.full(len(goals), np.inf)
-        if not self._problem.dependent:
+        if not self._problem.dependent and self._problem.cover is None:
             self._start_from_poses()
 
     def _levels(self) -> FloatArray:
@@ -223,12 +223,25 @@ class SmallestValues(LoopRule):
         rows = np.argsort(found.smallest[known], axis=0, kind="stable")[: max(1, _TRIED // count)].T
         which, boxes = np.repeat(np.arange(count), rows.shape[1]), some(found.boxes, known[rows.ravel()])
         with np.errstate(all="ignore"):
-            sets = self._number.near(boxes, which)
+            cover = self._problem.cover
+            if cover is None:
+                sets = self._number.near(boxes, which)
+            else:
+                sets = self._on_path(boxes, found.along[known[rows.ravel()]])
             every = some(boxes, np.tile(np.arange(len(which)), len(sets)))
             z, problem = sets.reshape(-1, sets.shape[2]), self._problem
             inside = np.isfinite(z).all(axis=1) & are_between(z, every, problem.dependent)
             inside[inside] = problem.box.holds(problem.pose_of(z[inside]))
         self._note(z[inside])
+
+    def _on_path(self, boxes: LoopBoxes, along: FloatArray) -> FloatArray:
+        """Return points (S, P, n) of the pieces of a path that boxes cover, closed or NaN."""
+        sets, free = [], list(self._problem.free)
+        for part in (0.0, 0.5, 1.0):
+            z = boxes.near.copy()
+            z[:, : len(free)] = self._problem.cover.points(along, part)[:, free]
+            sets.append(self._number.closed(z))
+        return np.stack(sets)
 
     def _start_from_poses(self) -> None:
         """Take note of values at random poses and at corners, and near the best of them; without dependent ones."""

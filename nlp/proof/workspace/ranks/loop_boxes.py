@@ -23,6 +23,7 @@ from ...boxes.search import Boxes, Order, Rule, Search, bisected, joined, some
 from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Encloser, Forms
 from ..robot.closed_loops import inverses
+from ..robot.path_cover import PathCover
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from .krawczyk import Coordinates, Relation, by_centres, no_relation, relation_of, with_relation
@@ -82,6 +83,7 @@ class Examined(NamedTuple):
         relation: of these; its rest is infinite where they are not known.
         is_regular, shares, smallest, signs: those of :class:`~.rank_rule.Tested`; nothing is known of ``smallest``
             where it is infinite. Of K numbers it is (B, K), their lower bounds.
+        along: of :class:`Followed`.
     """
 
     boxes: LoopBoxes
@@ -90,6 +92,7 @@ class Examined(NamedTuple):
     shares: FloatArray
     smallest: FloatArray
     signs: NDArray[np.int32]
+    along: FloatArray = np.zeros((0, 0))
 
 
 class Test(Protocol):
@@ -301,11 +304,25 @@ def are_between(z: FloatArray, boxes: LoopBoxes, dependent: Sequence[int]) -> ND
 def whole_workspace(problem: Problem) -> LoopBoxes:
     """Return the whole workspace as one box; its dependent coordinates are not known."""
     box, free = problem.box, list(problem.free)
+    if problem.cover is not None:
+        return _whole_path(problem, problem.cover)
     ends = np.full((2, len(problem.start)), np.nan)
     ends[:, : len(free)] = box.lower[free], box.upper[free]
     ends[:, problem.of_errors] = np.array([[-problem.tolerance], [problem.tolerance]])
     ends[:, list(problem.dependent)] = np.nan
     return LoopBoxes(ends[:1], ends[1:], problem.start[None].copy(), np.full(1, not problem.dependent))
+
+
+def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
+    """Return boxes that cover the pieces of a path."""
+    free, count = list(problem.free), len(cover.pieces)
+    ends = np.full((2, count, len(problem.start)), np.nan)
+    for end, found in zip(ends, cover.boxes(cover.pieces), strict=True):
+        end[:, : len(free)] = found[:, free]
+    ends[:, :, problem.of_errors] = np.array([[[-problem.tolerance]], [[problem.tolerance]]])
+    ends[:, :, list(problem.dependent)] = np.nan
+    near = np.repeat(problem.start[None], count, axis=0)
+    return LoopBoxes(ends[0], ends[1], near, np.full(count, not problem.dependent))
 
 
 def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_], NDArray[np.bool_]]:
@@ -350,12 +367,15 @@ class Followed(NamedTuple):
         near, is_known: those of :class:`LoopBoxes`.
         relation: of the dependent coordinates.
         more: further columns (B, ...) of a rule, as a tuple.
+        along: (B, 3) pieces of a path that the boxes cover: index of the segment, and the ends of its parameter; (B, 0)
+            for boxes of a workspace.
     """
 
     near: FloatArray
     is_known: NDArray[np.bool_]
     relation: Relation
     more: Any = ()
+    along: FloatArray = np.zeros((1, 0))
 
 
 class LoopRule(Rule[Followed]):
@@ -378,7 +398,9 @@ class LoopRule(Rule[Followed]):
         self._recorder = recorder
         self._start = whole_workspace(problem)
         self.whole: FloatArray = np.zeros(len(problem.start))
-        self.whole[self._independent] = (self._start.upper - self._start.lower)[0, self._independent]
+        self.whole[self._independent] = (self._start.upper.max(axis=0) - self._start.lower.min(axis=0))[
+            self._independent
+        ]
         # The boxes in which dependent coordinates became known.
         self._roots: list[LoopBoxes] = []
 
@@ -386,8 +408,11 @@ class LoopRule(Rule[Followed]):
     def root(self) -> Boxes[Followed]:
         """The whole workspace."""
         lower, upper, near, is_known = self._start
-        columns = Followed(near, is_known, no_relation(1, self._examiner.of), self._more)
-        return Boxes(lower, upper, np.array([np.inf]), np.array([-1]), columns)
+        count, cover = len(lower), self._problem.cover
+        along = np.zeros((count, 0)) if cover is None else cover.pieces
+        more = np.repeat(self._more, count, axis=0) if isinstance(self._more, np.ndarray) else self._more
+        columns = Followed(near, is_known, no_relation(count, self._examiner.of), more, along)
+        return Boxes(lower, upper, np.full(count, np.inf), np.full(count, -1), columns)
 
     def search(self, order: Order) -> Search[Rule[Followed]]:
         """Return the search of the whole workspace in an order."""
@@ -400,18 +425,36 @@ class LoopRule(Rule[Followed]):
             self._recorder.cuts(*self._poses(boxes.lower, boxes.upper), along)
         parts = self.parts(boxes)
         shape = (len(parts.split) // max(len(boxes.split), 1), 1)
+        if self._problem.cover is not None:
+            return parts
         sides = 1.0 * (parts.lower > np.tile(boxes.lower, shape)) - 1.0 * (parts.upper < np.tile(boxes.upper, shape))
         found = self._examiner.narrowed(loop_boxes_of(parts), parts.more.relation, sides[:, self._independent])
         return parts._replace(lower=found.lower, upper=found.upper)
 
     def parts(self, boxes: Boxes[Followed]) -> Boxes[Followed]:
-        """Return the halves of boxes, all lower ones first."""
-        return bisected(boxes)
+        """Return the halves of boxes, all lower ones first; along a path those of its pieces."""
+        cover = self._problem.cover
+        if cover is None:
+            return bisected(boxes)
+        every = np.arange(len(boxes.split))
+        parts, count = some(boxes, np.concatenate([every, every])), len(every)
+        middle = 0.5 * (boxes.more.along[:, 1] + boxes.more.along[:, 2])
+        parts.more.along[:count, 2] = parts.more.along[count:, 1] = middle
+        lower, upper = cover.boxes(parts.more.along)
+        free = self._problem.free
+        parts.lower[:, : len(free)], parts.upper[:, : len(free)] = lower[:, list(free)], upper[:, list(free)]
+        # Dependent coordinates are found anew, from a closed point nearby.
+        D = list(self._problem.dependent)
+        parts.lower[:, D] = parts.upper[:, D] = np.nan
+        return parts._replace(more=parts.more._replace(is_known=np.full(2 * count, not D)))
 
     def examined(self, boxes: Boxes[Followed]) -> Examined:
         """Return the results for the boxes that hold poses of the workspace."""
         inside = self._contracted(loop_boxes_of(boxes))
         found = self._examiner.examine(inside)
+        # Boxes are left out where the ball of rotations is left, which a path has not.
+        along = boxes.more.along if self._problem.cover is not None else np.zeros((len(found.shares), 0))
+        found = found._replace(along=along)
         new = np.flatnonzero(found.boxes.is_known & ~inside.is_known)
         if new.size:
             self._roots.append(some(found.boxes, new))
@@ -441,7 +484,7 @@ class LoopRule(Rule[Followed]):
         """Return examined boxes with bounds (B,), places (B,) of the coordinates to bisect, and columns of the rule."""
         lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
-        return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation, more))
+        return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation, more, found.along))
 
     def widths(self, boxes: LoopBoxes | Boxes[Followed]) -> FloatArray:
         """Return the widths (B, f) of boxes along independent coordinates, in parts of the whole workspace."""

@@ -24,6 +24,7 @@ from ....case.case import Case
 from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .closed_loops import DEPENDENT, Loops, closed_from_home
+from .path_cover import PathCover
 from .pose_box import PoseBox
 from .posed_model import Chosen, PosedModel, RankMatrix, posed_model
 
@@ -61,6 +62,7 @@ class Problem:
         names: of the m joint centres whose errors are coordinates.
         tolerance: largest size of each error, length.
         design: the design alone, of all machines.
+        cover: of the path that is meant; None for the whole box.
     """
 
     box: PoseBox
@@ -76,6 +78,7 @@ class Problem:
     names: tuple[str, ...] = ()
     tolerance: float = 0.0
     design: Problem | None = field(default=None, repr=False)
+    cover: PathCover | None = None
 
     @property
     def problem(self) -> Problem:

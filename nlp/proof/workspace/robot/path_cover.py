@@ -1,0 +1,86 @@
+"""Boxes of poses that cover pieces of a path: hulls in the coordinates of a :class:`~.pose_box.PoseBox`.
+
+Coordinates of a line are monotone between its ends: positions, angles, and tangents of half angles. Those of an arc are
+products of a radius between its ends and of cosines over a range. Ends move outwards by several roundings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .....models import FloatArray
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Part of the sizes of the numbers of a piece by which its ends move outwards: more than the rounding of its formulas.
+_OUTWARDS = 2.0**-48
+
+
+@dataclass(frozen=True, eq=False)
+class PathCover:
+    """A path as boxes of poses.
+
+    Attributes:
+        knots: (N + 1, 6) positions, then roll, pitch and yaw, between which they change linearly.
+        arcs: (N, 6) centre, radius, growth of the radius, angle and sweep of arcs; NaN of lines.
+        axes: (N, 3) axes of the plane of arcs, and the axis along it.
+    """
+
+    knots: FloatArray
+    arcs: FloatArray
+    axes: NDArray[np.intp]
+
+    @property
+    def pieces(self) -> FloatArray:
+        """The whole segments as pieces (N, 3): index, and ends of the parameter."""
+        count = len(self.knots) - 1
+        return np.stack([np.arange(count), np.zeros(count), np.ones(count)], axis=1).astype(float)
+
+    def boxes(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, 6) of boxes that cover pieces (B, 3)."""
+        k = pieces[:, 0].astype(int)
+        start, change = self.knots[k], self.knots[k + 1] - self.knots[k]
+        ends = [start + s[:, None] * change for s in (pieces[:, 1], pieces[:, 2])]
+        slack = _OUTWARDS * (np.abs(start) + np.abs(change))
+        low, high = np.minimum(*ends) - slack, np.maximum(*ends) + slack
+        # Fixed coordinates stay so.
+        low, high = (np.where(change == 0, start, each) for each in (low, high))
+        arcs = np.flatnonzero(np.isfinite(self.arcs[k, 0]))
+        if arcs.size:
+            first, second, radius, growth, angle, sweep = self.arcs[k[arcs]].T
+            s = pieces[arcs, 1:]
+            radii = radius[:, None] + s * growth[:, None]
+            angles = angle[:, None] + s * sweep[:, None]
+            for axis, centre, turn in ((0, first, 0.0), (1, second, -0.5 * np.pi)):
+                cosines = _cosines(angles + turn)
+                products = radii[:, :, None] * cosines[:, None, :]
+                size = np.abs(centre) + np.abs(radii).max(axis=1) * (4 + np.abs(angles).max(axis=1))
+                at = arcs, self.axes[k[arcs], axis]
+                low[at] = centre + products.min(axis=(1, 2)) - _OUTWARDS * size
+                high[at] = centre + products.max(axis=(1, 2)) + _OUTWARDS * size
+        for each, sign in ((low, -1.0), (high, 1.0)):
+            tangents = np.tan(0.5 * each[:, 3:])
+            each[:, 3:] = tangents + sign * _OUTWARDS * np.abs(tangents)
+        return low, high
+
+    def points(self, pieces: FloatArray, part: float) -> FloatArray:
+        """Return coordinates (B, 6) of computed points of pieces."""
+        s = pieces[:, 1] + part * (pieces[:, 2] - pieces[:, 1])
+        low, high = self.boxes(np.stack([pieces[:, 0], s, s], axis=1))
+        return 0.5 * low + 0.5 * high
+
+
+def _cosines(angles: FloatArray) -> FloatArray:
+    """Return the ends (B, 2) of the cosines over ranges (B, 2) of angles, whose ends may be exchanged."""
+    low, high = angles.min(axis=1), angles.max(axis=1)
+    ends = np.cos(angles)
+    # Multiples of pi in the range, with room for their rounding.
+    has_one = np.floor(high / (2 * np.pi) + 1e-12) >= np.ceil(low / (2 * np.pi) - 1e-12)
+    has_minus = np.floor(high / (2 * np.pi) - 0.5 + 1e-12) >= np.ceil(low / (2 * np.pi) - 0.5 - 1e-12)
+    least = np.where(has_minus, -1.0, ends.min(axis=1))
+    most = np.where(has_one, 1.0, ends.max(axis=1))
+    return np.stack([least, most], axis=1)
