@@ -32,6 +32,7 @@ from ..ranks.loop_boxes import (
     coordinates_to_split,
 )
 from ..ranks.rank_rule import Tested, not_regular
+from ..robot.path_cover import PathCover, Place
 from ..robot.posed_robot import Problem
 
 if TYPE_CHECKING:
@@ -130,6 +131,7 @@ class Minimum(NamedTuple):
         boxes, open: number of boxes examined, and of boxes left.
         seconds: wall time.
         reason: for stopping before the gap was met; else empty.
+        place: segment of a path, and its parameter, of the point that has the value; None for a workspace.
     """
 
     bound: float = -math.inf
@@ -139,6 +141,7 @@ class Minimum(NamedTuple):
     open: int = 0
     seconds: float = 0.0
     reason: str = ""
+    place: Place | None = None
 
 
 class Goal(NamedTuple):
@@ -169,10 +172,11 @@ class Goal(NamedTuple):
 
 
 class _Best(NamedTuple):
-    """The smallest values (K,) known, infinite without one, and the points (K, n) that have them."""
+    """The smallest values (K,) known, infinite without one, the points (K, n) that have them, and places (K, 2)."""
 
     value: FloatArray
     at: FloatArray
+    where: FloatArray
 
 
 class SmallestValues(LoopRule):
@@ -191,9 +195,13 @@ class SmallestValues(LoopRule):
         super().__init__(number.problem, number.examiner, recorder)
         self._number, self._goals, self._more = number, goals, number.unknown[None]
         self.block = _BLOCK if number.problem.dependent else 2 * _BLOCK
-        self._best = _Best(np.full(len(goals), np.inf), np.tile(number.problem.start, (len(goals), 1)))
+        K, start = len(goals), number.problem.start
+        self._best = _Best(np.full(K, np.inf), np.tile(start, (K, 1)), np.zeros((K, 2)))
         self._closed = np.full(len(goals), np.inf)
-        if not self._problem.dependent and self._problem.cover is None:
+        cover = self._problem.cover
+        if cover is not None:
+            self._start_from_path(cover)
+        elif not self._problem.dependent:
             self._start_from_poses()
 
     def _levels(self) -> FloatArray:
@@ -224,24 +232,29 @@ class SmallestValues(LoopRule):
         which, boxes = np.repeat(np.arange(count), rows.shape[1]), some(found.boxes, known[rows.ravel()])
         with np.errstate(all="ignore"):
             cover = self._problem.cover
-            if cover is None:
-                sets = self._number.near(boxes, which)
-            else:
-                sets = self._on_path(boxes, found.along[known[rows.ravel()]])
+            if cover is not None:
+                self._note_on_path(cover, boxes.near, found.along[known[rows.ravel()]])
+                return
+            sets = self._number.near(boxes, which)
             every = some(boxes, np.tile(np.arange(len(which)), len(sets)))
             z, problem = sets.reshape(-1, sets.shape[2]), self._problem
             inside = np.isfinite(z).all(axis=1) & are_between(z, every, problem.dependent)
             inside[inside] = problem.box.holds(problem.pose_of(z[inside]))
         self._note(z[inside])
 
-    def _on_path(self, boxes: LoopBoxes, along: FloatArray) -> FloatArray:
-        """Return points (S, P, n) of the pieces of a path that boxes cover, closed or NaN."""
-        sets, free = [], list(self._problem.free)
+    def _start_from_path(self, cover: PathCover) -> None:
+        """Take note of values at the ends of segments; of a robot with dependent coordinates at the first one."""
+        count = 1 if self._problem.dependent else len(cover.pieces)
+        self._note_on_path(cover, np.tile(self._problem.start, (count, 1)), cover.pieces[:count])
+
+    def _note_on_path(self, cover: PathCover, near: FloatArray, along: FloatArray) -> None:
+        """Take note of values at the ends and in the middle of pieces of a path, from closed points near them."""
         for part in (0.0, 0.5, 1.0):
-            z = boxes.near.copy()
-            z[:, : len(free)] = self._problem.cover.points(along, part)[:, free]
-            sets.append(self._number.closed(z))
-        return np.stack(sets)
+            z = near.copy()
+            z[:, : len(self._problem.free)] = cover.points(along, part)[:, list(self._problem.free)]
+            z, s = self._number.closed(z), along[:, 1] + part * (along[:, 2] - along[:, 1])
+            kept = np.isfinite(z).all(axis=1)
+            self._note(z[kept], np.stack([along[kept, 0], s[kept]], axis=1))
 
     def _start_from_poses(self) -> None:
         """Take note of values at random poses and at corners, and near the best of them; without dependent ones."""
@@ -257,11 +270,11 @@ class SmallestValues(LoopRule):
             y = self._problem.pose_of(self._best.at[0])
             points = box.clipped(y + step * (box.upper - box.lower) * rng.normal(size=(_AROUND, 6)))
 
-    def _note(self, z: FloatArray) -> None:
-        """Take note of the values at points (P, n)."""
+    def _note(self, z: FloatArray, where: FloatArray | None = None) -> None:
+        """Take note of the values at points (P, n), and of their places (P, 2) on a path."""
         if not len(z):
             return
-        known, at = self._best
+        known, at, places = self._best
         with np.errstate(all="ignore"):
             values = self._number.values(z)
             values = np.where(np.isfinite(values), values, np.inf)
@@ -269,7 +282,8 @@ class SmallestValues(LoopRule):
             better = np.isfinite(least) & ~(least >= known - _TIE * np.abs(known))
             first = np.argmax(values <= least + _TIE * np.abs(least), axis=0)
         if better.any():
-            self._best = _Best(np.where(better, least, known), np.where(better[:, None], z[first], at))
+            places = places if where is None else np.where(better[:, None], where[first], places)
+            self._best = _Best(np.where(better, least, known), np.where(better[:, None], z[first], at), places)
 
     def is_one_assembly(self) -> bool:
         """Return whether all boxes surely have the assembly of the middle."""
@@ -299,8 +313,9 @@ class SmallestValues(LoopRule):
             Minimum(
                 min(bound, value) if bound < math.inf else -math.inf,
                 *(value, at, search.boxes, search.left, effort.seconds, reason),
+                None if self._problem.cover is None else Place(int(where[0]), float(where[1])),
             )
-            for bound, value, at in zip(bounds.tolist(), self._best.value.tolist(), self._best.at, strict=True)
+            for bound, value, at, where in zip(bounds.tolist(), self._best.value.tolist(), *self._best[1:], strict=True)
         ]
 
 

@@ -25,6 +25,7 @@ from ...certificate.certificate import Certificate, CertificateStatus
 from ...statement.claims import Claim
 from ...statement.machine import JointErrors
 from ...statement.posed_layout import extreme_program, varies
+from ..robot.path_cover import Place
 from ..robot.pose_box import PoseNumbers
 from ..verdict import Outcome, slack_of
 from .bound_search import Goal, Minimum
@@ -65,6 +66,7 @@ class Extreme:
         reason: for an open outcome; else empty.
         errors: of the joint centres of the machine that reaches the value; None for the exact machine.
         motor: the actuator and its number, of claims about motors.
+        place: on a path, of the value reached; None for a workspace.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Extreme:
     reason: str
     errors: JointErrors | None = None
     motor: Motor | None = None
+    place: Place | None = None
 
     @property
     def fails(self) -> bool:
@@ -127,6 +130,7 @@ def extreme_of(
         reason=reason if outcome is Outcome.OPEN else "",
         errors=errors,
         motor=claim.motor,
+        place=found.place,
     )
 
 

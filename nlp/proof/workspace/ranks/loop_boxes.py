@@ -375,7 +375,7 @@ class Followed(NamedTuple):
     is_known: NDArray[np.bool_]
     relation: Relation
     more: Any = ()
-    along: FloatArray = np.zeros((1, 0))
+    along: FloatArray = np.zeros((0, 0))
 
 
 class LoopRule(Rule[Followed]):
@@ -403,6 +403,7 @@ class LoopRule(Rule[Followed]):
         ]
         # The boxes in which dependent coordinates became known.
         self._roots: list[LoopBoxes] = []
+        self._root_pieces: list[FloatArray] = []
 
     @property
     def root(self) -> Boxes[Followed]:
@@ -458,6 +459,7 @@ class LoopRule(Rule[Followed]):
         new = np.flatnonzero(found.boxes.is_known & ~inside.is_known)
         if new.size:
             self._roots.append(some(found.boxes, new))
+            self._root_pieces.append(some(found.along, new))
         return found
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
@@ -497,6 +499,11 @@ class LoopRule(Rule[Followed]):
             return True
         roots = joined(self._roots)
         count = len(roots.lower)
+        if self._problem.cover is not None:
+            # Pieces in the order of the path: each has a point in common with the next one.
+            order = np.lexsort(joined(self._root_pieces).T[[1, 0]])
+            pairs = np.stack([order[:-1], order[1:]], axis=1)
+            return bool(one_assembly(self._examiner, roots, pairs, np.arange(count) == order[0]).all())
         if count > _MANY:
             return False
         lower, upper = roots.lower[:, self._independent], roots.upper[:, self._independent]

@@ -109,7 +109,7 @@ def prove_rank(
     """
     effort = Effort(most_boxes)
     with one_search():
-        rule = _RankRule(problem, matrix, recorder, look or SingularSearch(problem, matrix).look)
+        rule = RankRule(problem, matrix, recorder, look or SingularSearch(problem, matrix).look)
         search = rule.search(Order.NEWEST)
 
         def ending() -> str | None:
@@ -139,7 +139,7 @@ def prove_rank(
     return _refuted(RankVerdict(outcome, problem.box, at, None, ENGINE, *numbers), rule.singular)
 
 
-class _RankRule(LoopRule):
+class RankRule(LoopRule):
     """Rule of the rank of a matrix.
 
     Args:

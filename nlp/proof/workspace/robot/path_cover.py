@@ -7,7 +7,7 @@ products of a radius between its ends and of cosines over a range. Ends move out
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 
 #: Part of the sizes of the numbers of a piece by which its ends move outwards: more than the rounding of its formulas.
 _OUTWARDS = 2.0**-48
+
+
+class Place(NamedTuple):
+    """A point of a path: the index of its segment, and the parameter from 0 to 1 along it."""
+
+    segment: int
+    parameter: float
 
 
 @dataclass(frozen=True, eq=False)

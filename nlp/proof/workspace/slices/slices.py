@@ -246,7 +246,9 @@ class _SliceRule(LoopRule):
         is_small = (high - low <= (self._upper - self._lower) / _SIDE).all(axis=1)
         done = (is_regular & is_same) | unreached | is_small | (is_empty & ~inside.is_known)
         self._done.append(some((inside, region.astype(np.int8), binding), done))
-        columns = Followed(inside.near, inside.is_known, relation, (states, has_ranks, signs))
+        columns = Followed(
+            inside.near, inside.is_known, relation, (states, has_ranks, signs), np.zeros((len(signs), 0))
+        )
         split = np.full(len(done), self._places[0])
         left = some(Boxes(inside.lower, inside.upper, boxes.bound, split, columns), ~done)
         return Verdicts(left, -math.inf, len(done))

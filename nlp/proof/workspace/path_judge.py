@@ -1,0 +1,279 @@
+"""Verdicts on a programmed path: regular, and within limits, at every point of every segment.
+
+The claims are those about a workspace. Their boxes are those that cover pieces of the path, halved along it, and values
+are those of its points. Every machine within the case's tolerance on joint centres is meant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ....models import FloatArray
+from ....models.joints.closedform import closed_form
+from ...case.case import Case
+from ...case.pose import Free, Value
+from ...case.workspace import TurnKind, Turns, Workspace
+from ...errors import InputError, UncoveredError
+from ...interruption import one_search, within
+from ...path.arcs import PLANES
+from ...path.options import Between
+from ...path.orientation import ORDERS
+from ...path.path import ProgrammedPath
+from ..boxes.search import Effort, Order, joined
+from ..enclosure.engine import kernel
+from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR
+from ..statement.machine import workspace_of_case
+from .numbers.bound_search import Minimum
+from .numbers.extremes import Extreme, extreme_of
+from .numbers.machines import Machines
+from .numbers.searched import Subject, motor_extremes, searched_extremes
+from .numbers.strokes import with_strokes
+from .ranks.loop_boxes import APART
+from .ranks.ranks import RankRule
+from .ranks.singular_pose import DeterminantSigns, SingularPose
+from .robot.path_cover import PathCover, Place
+from .robot.pose_box import PoseNumbers, pose_box
+from .robot.posed_model import RankMatrix
+from .robot.posed_robot import NotJudgedError, Problem, build_problem
+from .verdict import Outcome
+
+if TYPE_CHECKING:
+    pass
+
+#: Seconds after which a judgement stops where the caller does not say.
+TIME_LIMIT = 600.0
+#: Part of the time that is left that a search takes at most, and gap of a number without a limit, as a part of it.
+_PART, _GAP = 0.5, 1e-3
+#: Part of the sizes of positions, or angle, by which the box of all poses is larger than the path.
+_ROOM = 1e-9
+#: Angles from which on the tangent of the half is too large a coordinate.
+_LARGEST = math.radians(170)
+#: Singular value, in parts of the largest, that counts as 0 at a point of a path, and steps in the search of it.
+_SINGULAR, _STEPS = 1e-9, 80
+
+
+@dataclass(frozen=True, eq=False)
+class RankOnPath:
+    """Verdict on the claim that J, or the constraint wrenches, keep their rank along a path.
+
+    Attributes:
+        name: of the claim.
+        outcome: the verdict.
+        place: of a singular pose where the claim is refuted, and of an open piece where it is open; else None.
+        pose: there.
+        boxes: number of boxes examined.
+        seconds: wall time.
+        reason: for an open verdict, or how a singular pose was found; else empty.
+    """
+
+    name: str
+    outcome: Outcome
+    place: Place | None
+    pose: PoseNumbers | None
+    boxes: int
+    seconds: float
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class PathJudgement:
+    """Verdicts on a machine along a path; with a tolerance on joint centres, on every machine within it.
+
+    Attributes:
+        case: the case, its dimensions fixed.
+        path: the path.
+        ranks: of J, and of the constraint wrenches of a robot that has them.
+        extremes: of reach, limits, actuators and loads.
+    """
+
+    case: Case
+    path: ProgrammedPath
+    ranks: tuple[RankOnPath, ...]
+    extremes: tuple[Extreme, ...]
+
+    @property
+    def is_proved(self) -> bool:
+        """Whether all ranks and limits are proved."""
+        return all(each.outcome is Outcome.PROVED for each in self.ranks) and not any(
+            each.fails for each in self.extremes
+        )
+
+    @property
+    def first_fault(self) -> RankOnPath | Extreme | None:
+        """The claim with the first known point in the order of the path that refutes it; None without one."""
+        every: list[RankOnPath | Extreme] = [*self.ranks, *(each for each in self.extremes if each.limit is not None)]
+        wrong = [(each.place, k) for k, each in enumerate(every) if each.outcome is Outcome.REFUTED and each.place]
+        return every[min(wrong)[1]] if wrong else None
+
+
+def judge_path(
+    case: Case,
+    path: ProgrammedPath,
+    *,
+    gap: float = _GAP,
+    time_limit: float | None = TIME_LIMIT,
+    progress: Callable[[str], None] | None = None,
+) -> PathJudgement:
+    """Judge a machine at every point of a path.
+
+    Args:
+        case: the machine, whose own poses and workspace are not used.
+        path: in the case's unit of length.
+        gap: largest relative gap of a number without a limit.
+        time_limit: seconds of all searches.
+        progress: called with what is done next.
+
+    Raises:
+        CaseError: a dimension of the robot is free.
+        InputError: the path has a convention of angles, or angles, that are not covered, or there is no C kernel.
+    """
+    cover, workspace = _covered(path)
+    case = replace(case, workspace=workspace)
+    workspace_of_case(case)
+    kernel()
+    report = progress or (lambda _: None)
+    with within(time_limit, _PART):
+        closed, box = closed_form(case.model), pose_box(workspace)
+        try:
+            design = replace(build_problem(case, closed.model, box), cover=cover)
+            if design.has_following:
+                raise NotJudgedError(
+                    "its platform has fewer than six freedoms, and the path states more of its numbers"
+                )
+            machines = Machines(case, closed, design)
+        except NotJudgedError as error:
+            return PathJudgement(case, path, (RankOnPath(REGULAR, Outcome.OPEN, None, None, 0, 0.0, str(error)),), ())
+        family = machines.family
+        ranks = []
+        for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
+            if matrix is not None:
+                report(name)
+                ranks.append(_rank(family, matrix, name, cover))
+        report("limits")
+        names = [item.name for item in case.model.quantities if item.name in (*ACTUATED, "leg_length")]
+        reaches, claims = machines.symbols.claims(names, with_objective=False)
+        found: list[Extreme] = []
+        for group in (reaches, claims):
+            covered = [claim for claim in group if machines.is_covered(claim)]
+            found += machines.searched(covered, gap) if covered else []
+            rest = [claim for claim in group if claim not in covered]
+            found += [extreme_of(claim, Minimum(reason="the check has no rule for its expression")) for claim in rest]
+        lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
+        subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
+        found = with_strokes(subject, found, lambda *_: None)
+        found += searched_extremes(subject, (), gap=gap)
+        report("actuators")
+        found += motor_extremes(subject)
+    return PathJudgement(case, path, tuple(ranks), tuple(found))
+
+
+def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:
+    """Return the boxes of a path, and a workspace that holds all of it.
+
+    Raises:
+        InputError: its angles are not covered.
+    """
+    if path.between is not Between.ANGLES or path.order != ORDERS["rpy"]:
+        raise InputError(f"{path.source}: paths are judged between roll, pitch and yaw that change linearly alone")
+    if not len(path):
+        raise InputError(f"{path.source}: has no motion")
+    wide = np.abs(path.knots[:, 3:]).max(axis=1)
+    if wide.max() >= _LARGEST:
+        line = path.lines[max(int(np.argmax(wide >= _LARGEST)) - 1, 0)]
+        raise InputError(f"{path.source}: line {line}: angles must be below {math.degrees(_LARGEST):g} degrees")
+    arcs, axes = np.full((len(path), 6), np.nan), np.zeros((len(path), 3), dtype=np.intp)
+    k = path.arc_segments
+    arcs[k] = path.arcs
+    axes[k] = [PLANES[plane] for plane in path.planes.tolist()] if len(k) else np.zeros((0, 3), dtype=np.intp)
+    cover = PathCover(path.knots, arcs, axes)
+    lower, upper = cover.boxes(cover.pieces)
+    low, high = lower.min(axis=0), upper.max(axis=0)
+    low[3:], high[3:] = 2 * np.arctan(low[3:]), 2 * np.arctan(high[3:])
+    room = _ROOM * np.concatenate([np.full(3, np.abs(path.knots[:, :3]).max()), np.ones(3)])
+    ends: list[Value] = [
+        Free(a - by, b + by) if b > a else a
+        for a, b, by in zip(low.tolist(), high.tolist(), room.tolist(), strict=True)
+    ]
+    return cover, Workspace(ends[:3], Turns(TurnKind.ROLL_PITCH_YAW, tuple(ends[3:])))
+
+
+def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> RankOnPath:
+    """Return the verdict on the rank of a matrix along a path."""
+    place = _sign_change(problem, matrix, cover)
+    if place is not None:
+        return RankOnPath(name, Outcome.REFUTED, place, _pose(problem, cover, place), 0, 0.0, "")
+    effort = Effort()
+    try:
+        with one_search():
+            rule = RankRule(problem, matrix, None, lambda *_: None)
+            search = rule.search(Order.NEWEST)
+            reason = effort.run(search, lambda: None)
+    except UncoveredError as error:
+        return RankOnPath(name, Outcome.OPEN, None, None, 0, effort.seconds, str(error))
+    left = search.state.left
+    if not (left or reason):
+        is_one = rule.is_one_assembly()
+        outcome, reason = (Outcome.PROVED, "") if is_one else (Outcome.OPEN, APART)
+        return RankOnPath(name, outcome, None, None, search.boxes, effort.seconds, reason)
+    pieces = joined([each.more.along for each in left])
+    piece = pieces[np.lexsort(pieces.T[[1, 0]])[0]]
+    place, value = _most_singular(problem, matrix, cover, piece)
+    is_singular = value <= _SINGULAR
+    words = f"its smallest singular value is {value:.1e} of the largest there" if math.isfinite(value) else reason
+    outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
+    return RankOnPath(name, outcome, place, _pose(problem, cover, place), search.boxes, effort.seconds, words)
+
+
+def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Place | None:
+    """Return the first place between whose neighbours the determinant is proved to have opposite signs.
+
+    Where its rows have values along the piece, which the search of boxes shows or leaves open.
+    """
+    if matrix.matrix.shape != (6, 6) or matrix.nullity or problem.dependent or problem.names:
+        return None
+    signs, pieces = DeterminantSigns(problem, matrix), cover.pieces
+    parts = (0.0, 0.25, 0.5, 0.75, 1.0)
+    points = [cover.points(pieces, part)[:, list(problem.free)] for part in parts]
+    values = np.stack([np.sign(signs.computed(each)) for each in points], axis=1)
+    for k, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0).tolist():
+        low, high = parts[j], parts[j + 1]
+        if signs.proved(points[j][k]) * signs.proved(points[j + 1][k]) >= 0:
+            continue
+        first = values[k, j]
+        for _ in range(_STEPS):
+            middle = 0.5 * (low + high)
+            z = cover.points(pieces[k : k + 1], middle)[:, list(problem.free)]
+            low, high = (middle, high) if np.sign(signs.computed(z)[0]) == first else (low, middle)
+        return Place(k, high)
+    return None
+
+
+def _most_singular(problem: Problem, matrix: RankMatrix, cover: PathCover, piece: FloatArray) -> tuple[Place, float]:
+    """Return the place in a piece, and near it, with the smallest singular value, and the value."""
+    newton, free = SingularPose(problem, matrix), list(problem.free)
+
+    def at(s: float) -> float:
+        z = problem.start.copy()
+        z[: len(free)] = cover.points(np.array([[piece[0], s, s]]), 0.0)[0, free]
+        if problem.dependent:
+            z = problem.loops.all_closed(z[:, None], list(problem.dependent))[:, 0]
+        return newton.smallest(z) if np.isfinite(z).all() else math.inf
+
+    low, high = max(piece[1] - (piece[2] - piece[1]), 0.0), min(piece[2] + (piece[2] - piece[1]), 1.0)
+    for _ in range(_STEPS):
+        s = np.linspace(low, high, 5)
+        values = [at(each) for each in s.tolist()]
+        k = int(np.argmin(values))
+        low, high = float(s[max(k - 1, 0)]), float(s[min(k + 1, 4)])
+    middle = 0.5 * (low + high)
+    return Place(int(piece[0]), middle), at(middle)
+
+
+def _pose(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
+    """Return the pose at a place."""
+    return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
