@@ -23,6 +23,7 @@ SUMMARIES = {
     "certify": "Prove a bound of the global optimum over the whole box.",
     "verify-proof": "Check a proof with independent code.",
     "workspace": "Prove regular poses and limits over a whole workspace.",
+    "path": "Prove regular poses and limits at every point of a path.",
     "check": "Compare cases with their expected and published values.",
     "evaluate": "Show F, J, rank and rates at one point.",
     "codegen": "Write F and its derivatives as C for embedding.",

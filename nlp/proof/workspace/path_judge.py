@@ -7,16 +7,18 @@ are those of its points. Every machine within the case's tolerance on joint cent
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from ....models import FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.pose import Free, Value
+from ...case.task import Sense
 from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import InputError, UncoveredError
 from ...interruption import one_search, within
@@ -26,10 +28,11 @@ from ...path.orientation import ORDERS
 from ...path.path import ProgrammedPath
 from ..boxes.search import Effort, Order, joined
 from ..enclosure.engine import kernel
-from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR
+from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
 from ..statement.machine import workspace_of_case
 from .numbers.bound_search import Minimum
-from .numbers.extremes import Extreme, extreme_of
+from .numbers.expressions import Expressions
+from .numbers.extremes import Extreme, extreme_of, goal_of
 from .numbers.machines import Machines
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
@@ -42,9 +45,6 @@ from .robot.posed_model import RankMatrix
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
 from .verdict import Outcome
 
-if TYPE_CHECKING:
-    pass
-
 #: Seconds after which a judgement stops where the caller does not say.
 TIME_LIMIT = 600.0
 #: Part of the time that is left that a search takes at most, and gap of a number without a limit, as a part of it.
@@ -52,9 +52,11 @@ _PART, _GAP = 0.5, 1e-3
 #: Part of the sizes of positions, or angle, by which the box of all poses is larger than the path.
 _ROOM = 1e-9
 #: Angles from which on the tangent of the half is too large a coordinate.
-_LARGEST = math.radians(170)
+_LARGEST = math.radians(149)
 #: Singular value, in parts of the largest, that counts as 0 at a point of a path, and steps in the search of it.
 _SINGULAR, _STEPS = 1e-9, 80
+#: Points of each segment at which the first one beyond a limit is looked for.
+_SAMPLES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,14 @@ class RankOnPath:
     reason: str
 
 
+class Fault(NamedTuple):
+    """A point of a path that refutes a limit: its place, the value, and the pose."""
+
+    place: Place
+    value: float
+    pose: PoseNumbers
+
+
 @dataclass(frozen=True, eq=False)
 class PathJudgement:
     """Verdicts on a machine along a path; with a tolerance on joint centres, on every machine within it.
@@ -89,12 +99,15 @@ class PathJudgement:
         path: the path.
         ranks: of J, and of the constraint wrenches of a robot that has them.
         extremes: of reach, limits, actuators and loads.
+        faults: the first known point that refutes a limit, by name and sense of the claim, where it is before the worst
+            one.
     """
 
     case: Case
     path: ProgrammedPath
     ranks: tuple[RankOnPath, ...]
     extremes: tuple[Extreme, ...]
+    faults: Mapping[tuple[str, Sense], Fault] = field(default_factory=dict)
 
     @property
     def is_proved(self) -> bool:
@@ -102,13 +115,6 @@ class PathJudgement:
         return all(each.outcome is Outcome.PROVED for each in self.ranks) and not any(
             each.fails for each in self.extremes
         )
-
-    @property
-    def first_fault(self) -> RankOnPath | Extreme | None:
-        """The claim with the first known point in the order of the path that refutes it; None without one."""
-        every: list[RankOnPath | Extreme] = [*self.ranks, *(each for each in self.extremes if each.limit is not None)]
-        wrong = [(each.place, k) for k, each in enumerate(every) if each.outcome is Outcome.REFUTED and each.place]
-        return every[min(wrong)[1]] if wrong else None
 
 
 def judge_path(
@@ -158,9 +164,13 @@ def judge_path(
         names = [item.name for item in case.model.quantities if item.name in (*ACTUATED, "leg_length")]
         reaches, claims = machines.symbols.claims(names, with_objective=False)
         found: list[Extreme] = []
+        faults: dict[tuple[str, Sense], Fault] = {}
         for group in (reaches, claims):
             covered = [claim for claim in group if machines.is_covered(claim)]
-            found += machines.searched(covered, gap) if covered else []
+            searched = machines.searched(covered, gap) if covered else []
+            found += searched
+            wrong = [claim for claim, each in zip(covered, searched, strict=True) if each.outcome is Outcome.REFUTED]
+            faults |= _first_faults(machines, wrong, cover)
             rest = [claim for claim in group if claim not in covered]
             found += [extreme_of(claim, Minimum(reason="the check has no rule for its expression")) for claim in rest]
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
@@ -169,7 +179,7 @@ def judge_path(
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
         found += motor_extremes(subject)
-    return PathJudgement(case, path, tuple(ranks), tuple(found))
+    return PathJudgement(case, path, tuple(ranks), tuple(found), faults)
 
 
 def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:
@@ -277,3 +287,32 @@ def _most_singular(problem: Problem, matrix: RankMatrix, cover: PathCover, piece
 def _pose(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
     """Return the pose at a place."""
     return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
+
+
+def _first_faults(machines: Machines, claims: Sequence[Claim], cover: PathCover) -> dict[tuple[str, Sense], Fault]:
+    """Return the first known points of the design that are beyond limits; none where its loops have to be followed."""
+    problem, found = machines.family, dict[tuple[str, Sense], Fault]()
+    if problem.problem.dependent or not claims:
+        return found
+    numbers, free = Expressions(problem, ca.vertcat(*map(machines.number, claims))), list(problem.free)
+
+    def values(pieces: FloatArray, part: float) -> FloatArray:
+        return numbers.values(problem.exact(cover.points(pieces, part)[:, free]))
+
+    parts = np.linspace(0.0, 1.0, _SAMPLES)
+    every = np.stack([values(cover.pieces, part) for part in parts.tolist()], axis=1)
+    for k, claim in enumerate(claims):
+        goal = goal_of(claim)
+        least = (goal.limit or 0.0) - goal.slack
+        beyond = np.argwhere(every[:, :, k] < least)
+        if not len(beyond):
+            continue
+        segment, sample = beyond[0].tolist()
+        piece, low, high = cover.pieces[segment : segment + 1], parts[max(sample - 1, 0)], parts[sample]
+        for _ in range(_STEPS if sample else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)
+        place = Place(segment, float(high))
+        value = claim.reading.from_value(-claim.sense.sign * float(values(piece, float(high))[0, k]))
+        found[claim.name, claim.sense] = Fault(place, value, _pose(problem, cover, place))
+    return found

@@ -1,0 +1,92 @@
+"""Verdicts on a programmed path in words: the answer, the first fault with its line, and the table of claims."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+from ..case.task import Sense
+from ..proof.workspace.verdict import Outcome
+from .rounding import number
+from .text import Line, TextTable, Tone
+from .wording import title_line
+from .workspacemotors import TONES
+from .workspacewording import pose_words
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from .path import PathClaimData, PathFaultData, PathResult
+    from .workspace import WorkspacePose
+
+_ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
+
+
+def path_summary(
+    case: Case, result: PathResult, command: Callable[[WorkspacePose], str] | None = None
+) -> Iterator[Line | TextTable]:
+    """Yield the verdicts on a machine along a path.
+
+    Args:
+        case: the case.
+        result: the verdicts.
+        command: returns the command that shows a pose; left out, none is named.
+    """
+    yield title_line(case)
+    path = result.path
+    yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
+    checked = [each for each in path.claims if each.sense is None or each.limit is not None]
+    counts = ", ".join(f"{sum(each.outcome is one for each in checked)} {one.value}" for one in _ORDER)
+    words = "everything is proved at every point" if result.proved else f"not everything is proved: {counts}"
+    yield Line(words, label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+    wrong = first_refuted(result)
+    if wrong is not None and wrong.fault is not None:
+        yield Line(_fault_words(wrong, wrong.fault), label="first fault", tone=Tone.FAULT)
+        if command is not None:
+            yield Line(command(wrong.fault.pose), label="see it")
+    for each in path.claims:
+        if each.sense is None:
+            after = f": {each.reason}" if each.reason else ""
+            yield Line(each.outcome.value, label=each.name, tone=TONES[each.outcome], after=after + _place_words(each))
+    rows = [_row(case, each) for each in path.claims if each.sense is not None]
+    if rows:
+        headers = ("number", "unit", "value", "limit", "proven bound", "reached", "outcome", "line", "at")
+        yield TextTable(headers, tuple(rows), name="claims", title="numbers at every point of the path")
+
+
+def first_refuted(result: PathResult) -> PathClaimData | None:
+    """Return the claim that is refuted at the first known point in the order of the path; None without one."""
+    claims = [(each, each.fault) for each in result.path.claims if each.sense is None or each.limit is not None]
+    places = [(fault.segment, fault.parameter, k) for k, (_, fault) in enumerate(claims) if fault is not None]
+    return claims[min(places)[2]][0] if places else None
+
+
+def _fault_words(each: PathClaimData, fault: PathFaultData) -> str:
+    """Return a refuted claim at its first known point."""
+    where = f"line {fault.line}, {number(fault.parameter, 1.0)} of its segment"
+    if each.limit is None or fault.value is None:
+        return f"{where}: {'J is singular' if each.name == 'regular' else 'the constraint wrenches lose rank'}"
+    side = "below" if each.sense is Sense.MIN else "above"
+    limit = f"{number(each.limit)} {each.unit}".rstrip()
+    return f"{where}: {each.name} goes {side} {limit}"
+
+
+def _place_words(each: PathClaimData) -> str:
+    """Return the place of a claim, after a comma."""
+    if each.line is None or each.parameter is None:
+        return ""
+    return f", in line {each.line}, {number(each.parameter, 1.0)} of its segment"
+
+
+def _row(case: Case, each: PathClaimData) -> tuple[str | Line, ...]:
+    """Return the row of a number."""
+    return (
+        each.name,
+        each.unit or "",
+        "smallest" if each.sense is Sense.MIN else "largest",
+        "" if each.limit is None else number(each.limit),
+        "" if each.bound is None else number(each.bound),
+        "" if each.reached is None else number(each.reached),
+        Line(each.outcome.value, tone=TONES[each.outcome], after=f": {each.reason}" if each.reason else ""),
+        "" if each.line is None else str(each.line),
+        "" if each.pose is None else pose_words(case, each.pose),
+    )
