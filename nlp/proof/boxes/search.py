@@ -34,6 +34,8 @@ TOO_SMALL = "the boxes that are left are too small to be divided"
 _MANY = 2_000_000
 #: With more open boxes than this those with the largest bounds are no longer looked for among all.
 _FEW = 50_000
+#: Number of boxes with which a search begins that are kept together.
+_ROOTS = 4096
 #: Seconds between two reports of progress.
 _REPORT_EVERY = 0.1
 #: Coordinates to bisect of boxes that are examined again as they are, and of those that are too small to be bisected.
@@ -191,7 +193,7 @@ class Search(Generic[AnyRule]):
 
     Args:
         rule: examines boxes.
-        root: the whole box.
+        root: the whole box, or boxes that cover what is searched.
         whole: (n,) widths of the whole box; those of 0 do not count.
         least: width, in parts of the whole box, below which a box is not bisected, without and with a finite bound.
         order: the boxes that are taken first.
@@ -207,7 +209,11 @@ class Search(Generic[AnyRule]):
         self.rule, self._order = rule, order
         self._columns = np.flatnonzero(whole > 0)
         self._whole, self._least, self._newest = whole[self._columns], least, 0
-        self.state: State[Any] = State([(math.inf, 0, root)], [], -math.inf, 0)
+        # Of very many boxes, steps would copy all that are left.
+        count = len(root.split)
+        parts = [some(root, np.arange(k, min(k + _ROOTS, count))) for k in range(0, count, _ROOTS)]
+        waiting = [(math.inf, -k, part) for k, part in reversed(list(enumerate(parts)))]
+        self.state: State[Any] = State(waiting, [], -math.inf, 0)
 
     @property
     def is_open(self) -> bool:

@@ -55,8 +55,8 @@ _ROOM = 1e-9
 _LARGEST = math.radians(149)
 #: Singular value, in parts of the largest, that counts as 0 at a point of a path, and steps in the search of it.
 _SINGULAR, _STEPS = 1e-9, 80
-#: Points of each segment at which the first one beyond a limit is looked for.
-_SAMPLES = 5
+#: Parameters of points of each segment at which a change of sign, or the first one beyond a limit, is looked for.
+_SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,20 +246,19 @@ def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Plac
     """
     if matrix.matrix.shape != (6, 6) or matrix.nullity or problem.dependent or problem.names:
         return None
-    signs, pieces = DeterminantSigns(problem, matrix), cover.pieces
-    parts = (0.0, 0.25, 0.5, 0.75, 1.0)
-    points = [cover.points(pieces, part)[:, list(problem.free)] for part in parts]
-    values = np.stack([np.sign(signs.computed(each)) for each in points], axis=1)
-    for k, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0).tolist():
-        low, high = parts[j], parts[j + 1]
-        if signs.proved(points[j][k]) * signs.proved(points[j + 1][k]) >= 0:
-            continue
-        first = values[k, j]
-        for _ in range(_STEPS):
-            middle = 0.5 * (low + high)
-            z = cover.points(pieces[k : k + 1], middle)[:, list(problem.free)]
-            low, high = (middle, high) if np.sign(signs.computed(z)[0]) == first else (low, middle)
-        return Place(k, high)
+    signs, free = DeterminantSigns(problem, matrix), list(problem.free)
+    for pieces in cover.blocks():
+        points = [cover.points(pieces, part)[:, free] for part in _SAMPLES]
+        values = np.stack([np.sign(signs.computed(each)) for each in points], axis=1)
+        for k, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0).tolist():
+            low, high = _SAMPLES[j], _SAMPLES[j + 1]
+            if signs.proved(points[j][k]) * signs.proved(points[j + 1][k]) >= 0:
+                continue
+            for _ in range(_STEPS):
+                middle = 0.5 * (low + high)
+                sign = np.sign(signs.computed(cover.points(pieces[k : k + 1], middle)[:, free])[0])
+                low, high = (middle, high) if sign == values[k, j] else (low, middle)
+            return Place(int(pieces[k, 0]), high)
     return None
 
 
@@ -299,20 +298,22 @@ def _first_faults(machines: Machines, claims: Sequence[Claim], cover: PathCover)
     def values(pieces: FloatArray, part: float) -> FloatArray:
         return numbers.values(problem.exact(cover.points(pieces, part)[:, free]))
 
-    parts = np.linspace(0.0, 1.0, _SAMPLES)
-    every = np.stack([values(cover.pieces, part) for part in parts.tolist()], axis=1)
-    for k, claim in enumerate(claims):
-        goal = goal_of(claim)
-        least = (goal.limit or 0.0) - goal.slack
-        beyond = np.argwhere(every[:, :, k] < least)
-        if not len(beyond):
-            continue
-        segment, sample = beyond[0].tolist()
-        piece, low, high = cover.pieces[segment : segment + 1], parts[max(sample - 1, 0)], parts[sample]
-        for _ in range(_STEPS if sample else 0):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)
-        place = Place(segment, float(high))
-        value = claim.reading.from_value(-claim.sense.sign * float(values(piece, float(high))[0, k]))
-        found[claim.name, claim.sense] = Fault(place, value, _pose(problem, cover, place))
+    left = dict(enumerate(claims))
+    for block in cover.blocks():
+        every = np.stack([values(block, part) for part in _SAMPLES], axis=1) if left else np.zeros((0, 0, 0))
+        for k, claim in list(left.items()):
+            goal = goal_of(claim)
+            least = (goal.limit or 0.0) - goal.slack
+            beyond = np.argwhere(every[:, :, k] < least)
+            if not len(beyond):
+                continue
+            del left[k]
+            row, sample = beyond[0].tolist()
+            piece, low, high = block[row : row + 1], _SAMPLES[max(sample - 1, 0)], _SAMPLES[sample]
+            for _ in range(_STEPS if sample else 0):
+                middle = 0.5 * (low + high)
+                low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)
+            place = Place(int(block[row, 0]), high)
+            value = claim.reading.from_value(-claim.sense.sign * float(values(piece, high)[0, k]))
+            found[claim.name, claim.sense] = Fault(place, value, _pose(problem, cover, place))
     return found

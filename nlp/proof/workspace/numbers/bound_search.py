@@ -244,8 +244,11 @@ class SmallestValues(LoopRule):
 
     def _start_from_path(self, cover: PathCover) -> None:
         """Take note of values at the ends of segments; of a robot with dependent coordinates at the first one."""
-        count = 1 if self._problem.dependent else len(cover.pieces)
-        self._note_on_path(cover, np.tile(self._problem.start, (count, 1)), cover.pieces[:count])
+        for pieces in cover.blocks():
+            own = pieces[:1] if self._problem.dependent else pieces
+            self._note_on_path(cover, np.tile(self._problem.start, (len(own), 1)), own)
+            if self._problem.dependent:
+                return
 
     def _note_on_path(self, cover: PathCover, near: FloatArray, along: FloatArray) -> None:
         """Take note of values at the ends and in the middle of pieces of a path, from closed points near them."""

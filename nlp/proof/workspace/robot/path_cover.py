@@ -6,6 +6,7 @@ products of a radius between its ends and of cosines over a range. Ends move out
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Part of the sizes of the numbers of a piece by which its ends move outwards: more than the rounding of its formulas.
 _OUTWARDS = 2.0**-48
+#: Number of segments whose points are computed at once.
+_BLOCK = 2**15
 
 
 class Place(NamedTuple):
@@ -46,6 +49,12 @@ class PathCover:
         """The whole segments as pieces (N, 3): index, and ends of the parameter."""
         count = len(self.knots) - 1
         return np.stack([np.arange(count), np.zeros(count), np.ones(count)], axis=1).astype(float)
+
+    def blocks(self) -> Iterator[FloatArray]:
+        """Yield the whole segments as pieces in blocks, so that a long path needs little memory."""
+        pieces = self.pieces
+        for begin in range(0, len(pieces), _BLOCK):
+            yield pieces[begin : begin + _BLOCK]
 
     def boxes(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the ends (B, 6) of boxes that cover pieces (B, 3)."""
