@@ -23,6 +23,7 @@ from .options import (
 from .progress import spinner
 
 if TYPE_CHECKING:
+    from ..path.options import PathOptions
     from ..results.workspace import WorkspacePose
 
 
@@ -33,6 +34,17 @@ def path(
     ],
     settings: SettingTexts = None,
     of: ResultFile = None,
+    unit: Annotated[
+        str | None, typer.Option("--unit", metavar="mm|in", help="Unit of a program before G20 or G21.")
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option("--start", metavar="X,Y,Z,A,B,C", help="Where the machine stands before a program."),
+    ] = None,
+    offset: Annotated[
+        list[str] | None,
+        typer.Option("--offset", metavar="G54=X,Y,Z,A,B,C", help="Origin of a program's coordinate system."),
+    ] = None,
     gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a number without a limit.")] = 1e-3,
     time: Time = None,
     json_file: JsonFile = None,
@@ -58,7 +70,7 @@ def path(
     files = Outputs(json=json_file, csv=csv_file)
     files.check({**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
-        programmed = read_path(along, loaded.units)
+        programmed = read_path(along, loaded.units, _options(unit, start, offset or []))
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, progress=show)
     result = path_result(judged)
@@ -76,3 +88,27 @@ def path(
 
         show_on(console(), summary)
     raise typer.Exit(0 if result.proved else 1)
+
+
+def _options(unit: str | None, start: str | None, offsets: list[str]) -> PathOptions:
+    """Return the choices that a path's file leaves open.
+
+    Raises:
+        InputError: one is not a list of six numbers.
+    """
+    from ..errors import InputError
+    from ..path.options import PathOptions
+
+    def numbers(option: str, text: str) -> list[float]:
+        try:
+            return [float(part) for part in text.split(",")]
+        except ValueError:
+            raise InputError(f"{option} {text}: must be six numbers with commas: X,Y,Z,A,B,C") from None
+
+    found = {}
+    for each in offsets:
+        name, equals, text = each.partition("=")
+        if not equals:
+            raise InputError(f"--offset {each}: must be a coordinate system and its origin: G54=X,Y,Z,A,B,C")
+        found[name] = numbers("--offset", text)
+    return PathOptions(unit=unit, start=None if start is None else numbers("--start", start), offsets=found)

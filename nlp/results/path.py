@@ -80,18 +80,34 @@ class PathActuatorData(JsonObject):
     largest: float | None
 
 
+class IdleData(JsonObject):
+    """A word of a program that moves nothing, or a line that is no part of the path.
+
+    Attributes:
+        word: the word, or what is left out.
+        line: the first line that has it.
+        lines: number of lines that have it.
+    """
+
+    word: str
+    line: int
+    lines: int
+
+
 class PathData(JsonObject):
     """A path and the claims about it.
 
     Attributes:
         file: its name.
         segments: their number.
+        idle: what moves nothing, in the order of the lines.
         claims: ranks first.
         actuators: of the robot.
     """
 
     file: str
     segments: int
+    idle: tuple[IdleData, ...]
     claims: tuple[PathClaimData, ...]
     actuators: tuple[PathActuatorData, ...]
 
@@ -122,6 +138,7 @@ def path_result(judged: "PathJudgement") -> PathResult:
         path=PathData(
             file=judged.path.source,
             segments=len(judged.path),
+            idle=tuple(IdleData.of(each) for each in judged.path.idle),
             claims=(*ranks, *numbers),
             actuators=tuple(_actuators(judged)),
         ),

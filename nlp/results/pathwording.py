@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .path import PathClaimData, PathFaultData, PathResult
     from .workspace import WorkspacePose
 
+#: So many words that move nothing are shown.
+_SHOWN = 6
 _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 
 
@@ -34,6 +36,10 @@ def path_summary(
     yield title_line(case)
     path = result.path
     yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
+    if path.idle:
+        words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
+        rest = len(path.idle) - _SHOWN
+        yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="moves nothing")
     checked = [each for each in path.claims if each.sense is None or each.limit is not None]
     counts = ", ".join(f"{sum(each.outcome is one for each in checked)} {one.value}" for one in _ORDER)
     words = "everything is proved at every point" if result.proved else f"not everything is proved: {counts}"
