@@ -69,6 +69,10 @@ class PathCover:
                 at = arcs, self.axes[k[arcs], axis]
                 low[at] = centre + products.min(axis=(1, 2)) - _OUTWARDS * size
                 high[at] = centre + products.max(axis=(1, 2)) + _OUTWARDS * size
+            # The ends of an arc meet its knots up to rounding, or up to what a program may be off.
+            for end, knots in enumerate((start, self.knots[k + 1])):
+                at = arcs[s[:, end] == end]
+                low[at], high[at] = np.minimum(low[at], knots[at]), np.maximum(high[at], knots[at])
         for each, sign in ((low, -1.0), (high, 1.0)):
             tangents = np.tan(0.5 * each[:, 3:])
             each[:, 3:] = tangents + sign * _OUTWARDS * np.abs(tangents)
