@@ -70,6 +70,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "certify": ("small.toml", "--gap", "0.2", "--starts", "1", "--json", "out.json", "--proof", "out.proof"),
     "verify-proof": ("given.proof",),
     "workspace": ("fixed.toml", "--gap", "0.2", "--json", "out.json", "--proof", "out.proof"),
+    "path": ("fixed.toml", "--along", "path.csv", "--json", "out.json", "--csv", "out.csv"),
     "check": ("small.toml", "fixed.toml", "--json", "out.json", "--junit", "out.xml"),
     "evaluate": ("fixed.toml", "--json", "out.json"),
     "codegen": ("small.toml", "--no-measure", "--out", "folder"),
@@ -112,7 +113,9 @@ def key_at_call(n: int) -> Iterator[list[int]]:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    for name, text in (("small.toml", SMALL), ("fixed.toml", FIXED), ("model.xml", reachy.mjcf())):
+    along = "x,y,z\n0,0,29.5\n0.4,0,30\n0,0.1,30.5\n"
+    texts = {"small.toml": SMALL, "fixed.toml": FIXED, "model.xml": reachy.mjcf(), "path.csv": along}
+    for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path
 

@@ -14,19 +14,19 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....models import FloatArray
+from ....models import FloatArray, frozen_array
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.pose import Free, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import InputError, UncoveredError
-from ...interruption import one_search, within
+from ...interruption import one_call, one_search, within
 from ...path.arcs import PLANES
 from ...path.options import Between
 from ...path.orientation import ORDERS
 from ...path.path import ProgrammedPath
-from ..boxes.search import Effort, Order, joined
+from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
 from ..statement.machine import workspace_of_case
@@ -36,7 +36,7 @@ from .numbers.extremes import Extreme, extreme_of, goal_of
 from .numbers.machines import Machines
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
-from .ranks.loop_boxes import APART
+from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
 from .ranks.ranks import RankRule
 from .ranks.singular_pose import DeterminantSigns, SingularPose
 from .robot.path_cover import PathCover, Place
@@ -55,6 +55,8 @@ _ROOM = 1e-9
 _LARGEST = math.radians(149)
 #: Singular value, in parts of the largest, that counts as 0 at a point of a path, and steps in the search of it.
 _SINGULAR, _STEPS = 1e-9, 80
+#: Steps of the loops from home to the first point of a path, and parts of a way over which rows must have values.
+_WAY, _PARTS = 40, 64
 #: Parameters of points of each segment at which a change of sign, or the first one beyond a limit, is looked for.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -99,8 +101,8 @@ class PathJudgement:
         path: the path.
         ranks: of J, and of the constraint wrenches of a robot that has them.
         extremes: of reach, limits, actuators and loads.
-        faults: the first known point that refutes a limit, by name and sense of the claim, where it is before the worst
-            one.
+        faults: the first known point that refutes a limit, by name and sense of the claim, where it is before the one
+            of the worst value.
     """
 
     case: Case
@@ -117,6 +119,7 @@ class PathJudgement:
         )
 
 
+@one_call
 def judge_path(
     case: Case,
     path: ProgrammedPath,
@@ -146,7 +149,7 @@ def judge_path(
     with within(time_limit, _PART):
         closed, box = closed_form(case.model), pose_box(workspace)
         try:
-            design = replace(build_problem(case, closed.model, box), cover=cover)
+            design = _on_path(build_problem(case, closed.model, box), cover)
             if design.has_following:
                 raise NotJudgedError(
                     "its platform has fewer than six freedoms, and the path states more of its numbers"
@@ -166,13 +169,11 @@ def judge_path(
         found: list[Extreme] = []
         faults: dict[tuple[str, Sense], Fault] = {}
         for group in (reaches, claims):
-            covered = [claim for claim in group if machines.is_covered(claim)]
-            searched = machines.searched(covered, gap) if covered else []
+            searched = _searched(machines, group, gap)
             found += searched
-            wrong = [claim for claim, each in zip(covered, searched, strict=True) if each.outcome is Outcome.REFUTED]
+            pairs = zip(group, searched, strict=True)
+            wrong = {claim: each for claim, each in pairs if each.outcome is Outcome.REFUTED}
             faults |= _first_faults(machines, wrong, cover)
-            rest = [claim for claim in group if claim not in covered]
-            found += [extreme_of(claim, Minimum(reason="the check has no rule for its expression")) for claim in rest]
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
         subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
         found = with_strokes(subject, found, lambda *_: None)
@@ -180,6 +181,36 @@ def judge_path(
         report("actuators")
         found += motor_extremes(subject)
     return PathJudgement(case, path, tuple(ranks), tuple(found), faults)
+
+
+def _on_path(design: Problem, cover: PathCover) -> Problem:
+    """Return a design whose poses are those of a path, with closed loops at its first point.
+
+    Raises:
+        NotJudgedError: the loops do not close there.
+    """
+    start, free = np.zeros(len(design.start)), list(design.free)
+    start[: len(free)] = cover.points(cover.pieces[:1], 0.0)[0, free]
+    if design.dependent and not design.has_following:
+        start = design.loops.all_closed(start[:, None], design.dependent, steps=_WAY)[:, 0]
+    if not (np.isfinite(start).all() and (design.has_following or design.loops.is_closed(start))):
+        raise NotJudgedError("the loops could not be closed in the assembly of home at the start of the path")
+    return replace(design, start=frozen_array(start, start.shape), cover=cover)
+
+
+def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[Extreme]:
+    """Return the extremes of numbers; those without rules are open."""
+    covered, reason = [claim for claim in claims if machines.is_covered(claim)], "the check has no rule for it"
+    found = dict[Claim, Extreme]()
+    try:
+        found = dict(zip(covered, machines.searched(covered, gap) if covered else [], strict=True))
+        # A number that cannot be decided ends the search of all.
+        limited = [each for each in covered if each.limit is not None and len(covered) > 1]
+        for claim in (each for each in limited if found[each].reason == TOO_SMALL):
+            (found[claim],) = machines.searched([claim], gap)
+    except UncoveredError as error:  # of an equation of loops
+        reason = str(error)
+    return [found.get(claim) or extreme_of(claim, Minimum(reason=reason)) for claim in claims]
 
 
 def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:
@@ -204,7 +235,9 @@ def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:
     lower, upper = cover.boxes(cover.pieces)
     low, high = lower.min(axis=0), upper.max(axis=0)
     low[3:], high[3:] = 2 * np.arctan(low[3:]), 2 * np.arctan(high[3:])
-    room = _ROOM * np.concatenate([np.full(3, np.abs(path.knots[:, :3]).max()), np.ones(3)])
+    room = _ROOM * np.concatenate([np.full(3, np.abs(path.knots[:, :3]).max() or 1.0), np.ones(3)])
+    if not (high > low).any():  # a path that stays at one pose
+        low[0], high[0] = low[0] - room[0], high[0] + room[0]
     ends: list[Value] = [
         Free(a - by, b + by) if b > a else a
         for a, b, by in zip(low.tolist(), high.tolist(), room.tolist(), strict=True)
@@ -222,19 +255,22 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
         with one_search():
             rule = RankRule(problem, matrix, None, lambda *_: None)
             search = rule.search(Order.NEWEST)
-            reason = effort.run(search, lambda: None)
+            # One piece that is too small leaves the claim open or refutes it, however many others there are.
+            reason = effort.run(search, lambda: TOO_SMALL if search.state.small else None)
     except UncoveredError as error:
         return RankOnPath(name, Outcome.OPEN, None, None, 0, effort.seconds, str(error))
     left = search.state.left
-    if not (left or reason):
-        is_one = rule.is_one_assembly()
-        outcome, reason = (Outcome.PROVED, "") if is_one else (Outcome.OPEN, APART)
+    if not left:
+        reason = reason or ("" if rule.is_one_assembly() else APART)
+        outcome = Outcome.OPEN if reason else Outcome.PROVED
         return RankOnPath(name, outcome, None, None, search.boxes, effort.seconds, reason)
-    pieces = joined([each.more.along for each in left])
-    piece = pieces[np.lexsort(pieces.T[[1, 0]])[0]]
-    place, value = _most_singular(problem, matrix, cover, piece)
+    boxes = joined(search.state.small or left)
+    pieces = boxes.more.along
+    first = np.lexsort(pieces.T[[1, 0]])[:1]
+    place, value = _most_singular(problem, matrix, cover, pieces[first[0]], loop_boxes_of(some(boxes, first)))
     is_singular = value <= _SINGULAR
-    words = f"its smallest singular value is {value:.1e} of the largest there" if math.isfinite(value) else reason
+    words = f"its smallest singular value is {value:.1e} of the largest there"
+    words = words if math.isfinite(value) else reason
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
     return RankOnPath(name, outcome, place, _pose(problem, cover, place), search.boxes, effort.seconds, words)
 
@@ -242,32 +278,39 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
 def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Place | None:
     """Return the first place between whose neighbours the determinant is proved to have opposite signs.
 
-    Where its rows have values along the piece, which the search of boxes shows or leaves open.
+    The rows surely have values all the way between them.
     """
     if matrix.matrix.shape != (6, 6) or matrix.nullity or problem.dependent or problem.names:
         return None
-    signs, free = DeterminantSigns(problem, matrix), list(problem.free)
-    for pieces in cover.blocks():
+    signs, free, every = DeterminantSigns(problem, matrix), list(problem.free), cover.pieces
+    for rows in cover.blocks():
+        pieces = every[rows]
         points = [cover.points(pieces, part)[:, free] for part in _SAMPLES]
         values = np.stack([np.sign(signs.computed(each)) for each in points], axis=1)
         for k, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0).tolist():
-            low, high = _SAMPLES[j], _SAMPLES[j + 1]
+            segment, low, high = int(pieces[k, 0]), _SAMPLES[j], _SAMPLES[j + 1]
             if signs.proved(points[j][k]) * signs.proved(points[j + 1][k]) >= 0:
+                continue
+            ends = np.linspace(low, high, _PARTS + 1)
+            boxes = cover.boxes(np.stack([np.full(_PARTS, segment), ends[:-1], ends[1:]], axis=1))
+            if not signs.has_values(*(each[:, free] for each in boxes)):
                 continue
             for _ in range(_STEPS):
                 middle = 0.5 * (low + high)
                 sign = np.sign(signs.computed(cover.points(pieces[k : k + 1], middle)[:, free])[0])
                 low, high = (middle, high) if sign == values[k, j] else (low, middle)
-            return Place(int(pieces[k, 0]), high)
+            return Place(segment, high)
     return None
 
 
-def _most_singular(problem: Problem, matrix: RankMatrix, cover: PathCover, piece: FloatArray) -> tuple[Place, float]:
-    """Return the place in a piece, and near it, with the smallest singular value, and the value."""
+def _most_singular(
+    problem: Problem, matrix: RankMatrix, cover: PathCover, piece: FloatArray, box: LoopBoxes
+) -> tuple[Place, float]:
+    """Return the place in a piece with its box, and near it, with the smallest singular value, and the value."""
     newton, free = SingularPose(problem, matrix), list(problem.free)
 
     def at(s: float) -> float:
-        z = problem.start.copy()
+        z = box.near[0].copy()
         z[: len(free)] = cover.points(np.array([[piece[0], s, s]]), 0.0)[0, free]
         if problem.dependent:
             z = problem.loops.all_closed(z[:, None], list(problem.dependent))[:, 0]
@@ -288,8 +331,14 @@ def _pose(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
     return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
 
 
-def _first_faults(machines: Machines, claims: Sequence[Claim], cover: PathCover) -> dict[tuple[str, Sense], Fault]:
-    """Return the first known points of the design that are beyond limits; none where its loops have to be followed."""
+def _first_faults(
+    machines: Machines, wrong: Mapping[Claim, Extreme], cover: PathCover
+) -> dict[tuple[str, Sense], Fault]:
+    """Return the first known points of the design that are beyond limits, where they are before those of worst values.
+
+    There are none where loops have to be followed.
+    """
+    claims = list(wrong)
     problem, found = machines.family, dict[tuple[str, Sense], Fault]()
     if problem.problem.dependent or not claims:
         return found
@@ -299,8 +348,11 @@ def _first_faults(machines: Machines, claims: Sequence[Claim], cover: PathCover)
         return numbers.values(problem.exact(cover.points(pieces, part)[:, free]))
 
     left = dict(enumerate(claims))
-    for block in cover.blocks():
-        every = np.stack([values(block, part) for part in _SAMPLES], axis=1) if left else np.zeros((0, 0, 0))
+    for rows in cover.blocks():
+        if not left:
+            break
+        block = cover.pieces[rows]
+        every = np.stack([values(block, part) for part in _SAMPLES], axis=1)
         for k, claim in list(left.items()):
             goal = goal_of(claim)
             least = (goal.limit or 0.0) - goal.slack
@@ -314,6 +366,8 @@ def _first_faults(machines: Machines, claims: Sequence[Claim], cover: PathCover)
                 middle = 0.5 * (low + high)
                 low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)
             place = Place(int(block[row, 0]), high)
+            if place > (wrong[claim].place or place):
+                continue
             value = claim.reading.from_value(-claim.sense.sign * float(values(piece, high)[0, k]))
             found[claim.name, claim.sense] = Fault(place, value, _pose(problem, cover, place))
     return found

@@ -233,7 +233,7 @@ class SmallestValues(LoopRule):
         with np.errstate(all="ignore"):
             cover = self._problem.cover
             if cover is not None:
-                self._note_on_path(cover, boxes.near, found.along[known[rows.ravel()]])
+                self._note_on_path(cover, boxes, found.along[known[rows.ravel()]])
                 return
             sets = self._number.near(boxes, which)
             every = some(boxes, np.tile(np.arange(len(which)), len(sets)))
@@ -244,19 +244,19 @@ class SmallestValues(LoopRule):
 
     def _start_from_path(self, cover: PathCover) -> None:
         """Take note of values at the ends of segments; of a robot with dependent coordinates at the first one."""
-        for pieces in cover.blocks():
-            own = pieces[:1] if self._problem.dependent else pieces
-            self._note_on_path(cover, np.tile(self._problem.start, (len(own), 1)), own)
-            if self._problem.dependent:
-                return
+        if self._problem.dependent:
+            self._note(self._problem.start[None], np.zeros((1, 2)))
+            return
+        for rows in cover.blocks():
+            self._note_on_path(cover, LoopBoxes(*(each[rows] for each in self._start)), cover.pieces[rows])
 
-    def _note_on_path(self, cover: PathCover, near: FloatArray, along: FloatArray) -> None:
-        """Take note of values at the ends and in the middle of pieces of a path, from closed points near them."""
+    def _note_on_path(self, cover: PathCover, boxes: LoopBoxes, along: FloatArray) -> None:
+        """Take note of values at the ends and in the middle of pieces of a path, where their boxes are known."""
         for part in (0.0, 0.5, 1.0):
-            z = near.copy()
+            z = boxes.near.copy()
             z[:, : len(self._problem.free)] = cover.points(along, part)[:, list(self._problem.free)]
             z, s = self._number.closed(z), along[:, 1] + part * (along[:, 2] - along[:, 1])
-            kept = np.isfinite(z).all(axis=1)
+            kept = np.isfinite(z).all(axis=1) & are_between(z, boxes, self._problem.dependent)
             self._note(z[kept], np.stack([along[kept, 0], s[kept]], axis=1))
 
     def _start_from_poses(self) -> None:

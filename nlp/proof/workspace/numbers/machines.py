@@ -22,9 +22,11 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
+from .....models import Dimension
 from .....models.joints import RobotError
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
+from ....case.limits.constraint import LENGTH, Reading
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
@@ -52,6 +54,8 @@ if TYPE_CHECKING:
 
 #: Part of itself by which a bound of a change moves outwards: its own rounding.
 _OUTWARDS = 1 + 1e-12
+#: Length, in parts of the robot's, or angle, that counts as small.
+_SMALL = 0.01
 #: Poses from whose first-order changes the size is taken beside which terms of second order are small.
 _POSES, _SEED = 32, 0
 
@@ -129,7 +133,7 @@ class Machines:
             claims: the numbers, in the symbols of machines.
             gap: as a part of a number; bounds within limits are enough.
         """
-        return list(self._by_search(claims, gap, is_enough=True))
+        return list(self._by_search(claims, gap, is_enough=True, small=_SMALL))
 
     def is_covered(self, claim: Claim) -> bool:
         """Return whether a number has no operation without a rule."""
@@ -191,19 +195,23 @@ class Machines:
             self._rests[key] = second_order_change(family, number, first)
         return self._rests[key]
 
-    def _by_search(self, claims: Sequence[Claim], gap: float, *, is_enough: bool = False) -> Iterator[Extreme]:
+    def _by_search(
+        self, claims: Sequence[Claim], gap: float, *, is_enough: bool = False, small: float = 0.0
+    ) -> Iterator[Extreme]:
         """Yield the extremes of numbers by one search of boxes of poses for all machines.
 
         Args:
             claims: the numbers, in the symbols of machines.
             gap: as a part of a number.
             is_enough: whether bounds within limits are enough whatever the gap is.
+            small: length, in parts of the robot's, or angle, of which the gap is a part too: numbers may be 0 at home.
 
         Raises:
             UncoveredError: an expression holds an operation without a rule.
         """
         problem = self.family.problem
-        goals = [goal_of(claim, part=gap, is_enough=is_enough) for claim in claims]
+        sizes = {LENGTH: small * problem.length, Reading(Dimension.ANGLE): small}
+        goals = [goal_of(claim, gap * sizes.get(claim.reading, 0.0), gap, is_enough=is_enough) for claim in claims]
         every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals)
         for claim, found in zip(claims, every, strict=True):
             is_known = math.isfinite(found.value)

@@ -96,8 +96,9 @@ class _Combined:
         reached, errors = self.reached(ends)
         reason = next((each.reason for each in ends if each.reason), "")
         reason = reason if math.isfinite(bound) else "the leg's lengths are not bounded"
-        found = Minimum(-self._sign * bound, -self._sign * reached, reason=reason)
-        return extreme_of(self._claim, found, ends[self._claim.sense is Sense.MAX].pose, errors=errors)
+        end = ends[self._claim.sense is Sense.MAX]
+        found = Minimum(-self._sign * bound, -self._sign * reached, reason=reason, place=end.place)
+        return extreme_of(self._claim, found, end.pose, errors=errors)
 
     def reached(self, ends: Sequence[Extreme]) -> tuple[float, JointErrors | None]:
         """Return the value from the two lengths of one machine, and its errors; of the design without a tolerance."""

@@ -45,6 +45,8 @@ _LEAST = 1e-10
 _MOST = 1.0
 #: Part of itself by which an end of a dependent coordinate moves outwards: several roundings.
 _ROUNDING = 1e-14
+#: Width of a coordinate along a path, as a part of its size, up to which it is fixed.
+_FIXED = 1e-12
 #: Part of their widths by which computed dependent coordinates may be beyond their ends: rounding of Newton's method.
 _CLOSE = 1e-9
 #: Contractions of the closed point at the common face of two boxes: each one squares its width.
@@ -321,8 +323,22 @@ def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
         end[:, : len(free)] = found[:, free]
     ends[:, :, problem.of_errors] = np.array([[[-problem.tolerance]], [[problem.tolerance]]])
     ends[:, :, list(problem.dependent)] = np.nan
-    near = np.repeat(problem.start[None], count, axis=0)
-    return LoopBoxes(ends[0], ends[1], near, np.full(count, not problem.dependent))
+    return LoopBoxes(ends[0], ends[1], _closed_along(problem, cover), np.full(count, not problem.dependent))
+
+
+def _closed_along(problem: Problem, cover: PathCover) -> FloatArray:
+    """Return closed points (N, n) in the middle of segments, each from the one before; the start where one is lost."""
+    near, free, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.free), problem.dependent
+    z = problem.start.copy()
+    points = [cover.points(cover.pieces, part)[:, free] for part in (0.5, 1.0)] if D else []
+    for k, both in enumerate(zip(*points, strict=True)):
+        for point in both:
+            moved = z.copy()
+            moved[: len(free)] = point
+            moved = problem.loops.all_closed(moved[:, None], D)[:, 0]
+            z = moved if np.isfinite(moved).all() else z
+            near[k] = z if point is both[0] else near[k]
+    return near
 
 
 def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_], NDArray[np.bool_]]:
@@ -401,6 +417,10 @@ class LoopRule(Rule[Followed]):
         self.whole[self._independent] = (self._start.upper.max(axis=0) - self._start.lower.min(axis=0))[
             self._independent
         ]
+        if problem.cover is not None:
+            # What is fixed along the path is as wide as its rounding, however often a piece is halved.
+            size = np.maximum(np.abs(self._start.lower).max(axis=0), np.abs(self._start.upper).max(axis=0))
+            self.whole[~(self.whole > _FIXED * size)] = 0.0
         # The boxes in which dependent coordinates became known.
         self._roots: list[LoopBoxes] = []
         self._root_pieces: list[FloatArray] = []
@@ -500,10 +520,12 @@ class LoopRule(Rule[Followed]):
         roots = joined(self._roots)
         count = len(roots.lower)
         if self._problem.cover is not None:
-            # Pieces in the order of the path: each has a point in common with the next one.
-            order = np.lexsort(joined(self._root_pieces).T[[1, 0]])
-            pairs = np.stack([order[:-1], order[1:]], axis=1)
-            return bool(one_assembly(self._examiner, roots, pairs, np.arange(count) == order[0]).all())
+            # Pieces in the order of the path: each has a point in common with the next one, and the first the start.
+            ordered, start = some(roots, np.lexsort(joined(self._root_pieces).T[[1, 0]])), self._problem.start
+            if not ((ordered.lower[0] <= start) & (start <= ordered.upper[0])).all():
+                return False
+            blocks = [np.arange(k, min(k + _PAIRS, count - 1)) for k in range(0, count - 1, _PAIRS)]
+            return all(bool(self._are_tied(some(ordered, k), some(ordered, k + 1)).all()) for k in blocks)
         if count > _MANY:
             return False
         lower, upper = roots.lower[:, self._independent], roots.upper[:, self._independent]
@@ -513,6 +535,13 @@ class LoopRule(Rule[Followed]):
         ]
         pairs = np.stack([np.repeat(np.arange(count), [len(each) for each in touching]), np.concatenate(touching)])
         return bool(one_assembly(self._examiner, roots, pairs.T, np.arange(count) == 0).all())
+
+    def _are_tied(self, one: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
+        """Return whether boxes (B,) have a pose in common, and there the same closed point as others."""
+        own = self._independent
+        meet = ((one.lower <= other.upper) & (other.lower <= one.upper))[:, own].all(axis=1)
+        # The closed point of a small box is found to be between the ends of a large one, not the other way.
+        return np.asarray(meet & (self._examiner.tied(one, other) | self._examiner.tied(other, one)))
 
 
 def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:

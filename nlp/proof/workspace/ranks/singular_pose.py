@@ -226,6 +226,10 @@ class DeterminantSigns:
         sizes = np.linalg.norm(rows, axis=2).prod(axis=1)
         return np.asarray(np.linalg.det(rows) / np.where(sizes > 0, sizes, 1.0))
 
+    def has_values(self, lower: FloatArray, upper: FloatArray) -> bool:
+        """Return whether the rows surely have values everywhere in boxes (B, n)."""
+        return bool(np.isfinite(self._encloser(lower.T, upper.T).r).all())
+
     def proved(self, z: FloatArray) -> int:
         """Return the sign at a point (n,); 0 where it is not proved."""
         forms = self._encloser(z[:, None], z[:, None])

@@ -50,11 +50,10 @@ class PathCover:
         count = len(self.knots) - 1
         return np.stack([np.arange(count), np.zeros(count), np.ones(count)], axis=1).astype(float)
 
-    def blocks(self) -> Iterator[FloatArray]:
-        """Yield the whole segments as pieces in blocks, so that a long path needs little memory."""
-        pieces = self.pieces
-        for begin in range(0, len(pieces), _BLOCK):
-            yield pieces[begin : begin + _BLOCK]
+    def blocks(self) -> Iterator[slice]:
+        """Yield the places of the segments in blocks, so that a long path needs little memory."""
+        count = len(self.knots) - 1
+        return (slice(begin, begin + _BLOCK) for begin in range(0, count, _BLOCK))
 
     def boxes(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the ends (B, 6) of boxes that cover pieces (B, 3)."""
@@ -78,6 +77,10 @@ class PathCover:
                 at = arcs, self.axes[k[arcs], axis]
                 low[at] = centre + products.min(axis=(1, 2)) - _OUTWARDS * size
                 high[at] = centre + products.max(axis=(1, 2)) + _OUTWARDS * size
+            # The ends of an arc meet its knots up to rounding, or up to what a program may be off.
+            for end, knots in enumerate((start, self.knots[k + 1])):
+                at = arcs[s[:, end] == end]
+                low[at], high[at] = np.minimum(low[at], knots[at]), np.maximum(high[at], knots[at])
         for each, sign in ((low, -1.0), (high, 1.0)):
             tangents = np.tan(0.5 * each[:, 3:])
             each[:, 3:] = tangents + sign * _OUTWARDS * np.abs(tangents)

@@ -118,7 +118,8 @@ class Problem:
     @property
     def errors(self) -> SX:
         """Symbols (3 m, 1) of the errors."""
-        return self.z[self.of_errors]
+        # With both indices a column stays one where it is empty.
+        return self.z[len(self.start) - 3 * len(self.names) :, :]
 
     def pose_of(self, z: FloatArray) -> FloatArray:
         """Return the six coordinates of the pose (..., 6) at points (..., n)."""
