@@ -248,7 +248,9 @@ class SmallestValues(LoopRule):
             self._note(self._problem.start[None], np.zeros((1, 2)))
             return
         for rows in cover.blocks():
-            self._note_on_path(cover, LoopBoxes(*(each[rows] for each in self._start)), cover.pieces[rows])
+            self._note_on_path(
+                cover, some(self._start, np.arange(*rows.indices(len(cover.pieces)))), cover.pieces[rows]
+            )
 
     def _note_on_path(self, cover: PathCover, boxes: LoopBoxes, along: FloatArray) -> None:
         """Take note of values at the ends and in the middle of pieces of a path, where their boxes are known."""
