@@ -34,7 +34,7 @@ MOST = 250_000
 #: How far outside of the workspace, in parts of it and radians, a pose still counts as inside: closed by rounding.
 INSIDE = 1e-10
 #: How far outside a closed pose may be for a further one near it in the workspace.
-NEAR = 1e-3
+NEAR = 0.05
 #: Best points of each number from which ascents begin, children of each, and steps.
 PARENTS, CHILDREN, ASCENTS = 4, 6, 20
 #: Poses from which other ones are closed.
@@ -134,22 +134,18 @@ class GallerySubject:
         return Points(u, errors, self.anchors.q[near])
 
     def at(self, points: Points) -> tuple[Points, Array]:
-        """Return points that are closed twice: a pose that gave way to its loops is brought back into the workspace."""
-        robot = self.robot
+        """Return points that are closed; a pose that left the workspace as it gave way to its loops is brought back."""
+        robot, box = self.robot, self.box
         own = robot.points_array + points.errors
-        meant = self.box.poses(points.u)
-        poses, q, _ = close(robot, [meant], own, self.weight, points.q)
-        poses, q, good = close(robot, [self.box.poses(self.box.within(poses))], own, self.weight, q)
-        length, turn = self.box.outside(poses)
-        left = np.flatnonzero(good & ((length > INSIDE) | (turn > INSIDE)) & (length + turn < NEAR))
-        if left.size:
-            other = Poses(poses.p[left], poses.R[left])
-            other, q[left], good[left] = close(
-                robot, [self.box.poses(self.box.within(other))], own[left], self.weight, q[left]
-            )
-            poses.p[left], poses.R[left] = other
-            length, turn = self.box.outside(poses)
-        good &= (length < INSIDE) & (turn < INSIDE)
+        poses, q, good = close(robot, [box.poses(points.u)], own, self.weight, points.q)
+        for _ in range(2):
+            off = np.add(*box.outside(poses))
+            left = np.flatnonzero(good & (off > INSIDE) & (off < NEAR))
+            if left.size:
+                back = box.poses(box.within(Poses(poses.p[left], poses.R[left])))
+                there, q[left], good[left] = close(robot, [back], own[left], self.weight, q[left])
+                poses.p[left], poses.R[left] = there
+        good &= np.add(*box.outside(poses)) < INSIDE
         values = np.full((len(q), len(self.keys)), -np.inf)
         if good.any():
             found, residual = self._numbers(poses, q, own, good)
