@@ -86,6 +86,28 @@ class Loading:
                     columns[Key(k, power, name)] = np.maximum(each[:, k], 0) * speeds[:, k]
         return np.stack([columns[key] for key in self.keys(count)], axis=1)
 
+    def products(self, motions: Array, length: float) -> Array:
+        """Return the median sizes (K,) of loads and motions, whatever their directions: of most numbers, and of none 0.
+
+        Args:
+            motions: as in :meth:`numbers`.
+            length: of the robot, by which moments and turns are compared with forces and velocities.
+        """
+        x = np.linalg.norm(motions[:, :3], axis=1) + length * np.linalg.norm(motions[:, 3:], axis=1)
+        size = np.median(x, axis=0)
+        speeds, found = (self.linear + self.angular * length) / size, []
+        for key in self.keys(len(size)):
+            force = 0.0
+            for load, _ in self.cases.get(key.load, ()):
+                arm, most = np.linalg.norm(load.get("point", load.get("centre", 0.0))), load.get("any", {})
+                along = np.linalg.norm(load.get("force", 0.0)) + load.get("mass", 0.0) * np.linalg.norm(self.gravity)
+                about = np.linalg.norm(load.get("moment", 0.0)) + most.get("moment", 0.0)
+                force += (along + most.get("force", 0.0)) * (1 + arm / length) + about / length
+            force *= size[key.place]
+            speed = speeds[key.place]
+            found.append(speed if key.word == "speed" else force * (speed if key.word in POWERS else 1.0))
+        return np.array(found)
+
     def _speeds(self, motions: Array) -> Array:
         """Return the largest speeds (N, a), from the factors of least size of rates in motions of the platform."""
         length = self.linear / self.angular if self.linear and self.angular else 1.0
