@@ -233,6 +233,19 @@ def test_a_translating_tripod_has_the_published_largest_force() -> None:
             assert abs(each.bound - extreme) <= 0.02 * largest
 
 
+def test_numbers_that_are_zero_at_every_pose_are_bounded_in_few_boxes() -> None:
+    """A platform that cannot turn holds a moment without its actuators, whose rates do not depend on a turn."""
+    found = tripod(Load("couple", moment=(1.0, 2.0, 3.0)), 0.5, 0.12, 0.45)
+    assert all(each.outcome is Outcome.PROVED and each.boxes == 1 for each in found.values())
+    moment, size = Load("couple", moment=(1.0, 2.0, 3.0)), math.sqrt(14.0)
+    case = at_home("delta-parallelogram", part=0.005)
+    workspace = replace(case.workspace, turns=Turns()) if case.workspace else None
+    found = motors_of(replace(case, workspace=workspace, loading=Loading((moment,), Motion(angular=1.0))))
+    assert all(each.outcome is Outcome.PROVED for each in found.values())
+    assert all(abs(each.bound) <= 1e-3 * size for each in found.values())
+    assert all(abs(each.reached) <= 1e-9 * size for each in found.values())
+
+
 def test_nothing_is_proved_where_a_force_has_no_bound() -> None:
     """A robot whose base and platform have one radius is singular at every pose; another at some poses."""
     found = tripod(Load("load", (2.0, 2.0, -10.0)), 0.3, 0.3, 0.45, time_limit=2.0)

@@ -34,6 +34,9 @@ _NEAR_ZERO = 0.1
 _TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
 #: Gap of numbers of actuators as a part of the largest size of the same number.
 MOTOR_GAP = 0.01
+#: Part of a load times a motion that such a size is at least: some numbers are 0 at every pose, as those of a platform
+#: that cannot turn under a moment.
+_SMALL = 0.01
 #: Number of poses at which the width of a bound over machines is taken, and as many near corners.
 _POINTS, _SEED = 64, 0
 
@@ -149,9 +152,12 @@ def _motor_answers(subject: Subject, claims: Sequence[Claim]) -> Iterator[Extrem
         number, problem = Motors(subject.machines, subject.case, claims), subject.machines.problem
         z = np.tile(subject.machines.start, (2 * _POINTS, 1))
         z[:, : len(problem.free)] = _points(problem)[:, list(problem.free)]
-        values = np.nan_to_num(number.values(number.closed(z)), posinf=0.0, neginf=0.0)
+        closed = number.closed(z)
+        values = np.nan_to_num(number.values(closed), posinf=0.0, neginf=0.0)
         kinds = [claim.motor and claim.motor.number for claim in claims]
         sizes = np.array([np.abs(values[:, [other is kind for other in kinds]]).max() for kind in kinds])
+        products = np.nan_to_num(number.products(closed), posinf=0.0)
+        sizes = np.maximum(sizes, _SMALL * np.median(products, axis=0))
         allowed = MOTOR_GAP * sizes
         if subject.machines.names and not problem.dependent:
             z = z[:, : len(problem.start)]
