@@ -248,6 +248,22 @@ def test_numbers_that_are_zero_at_every_pose_are_bounded_in_few_boxes() -> None:
     assert all(abs(each.reached) <= 1e-9 * size for each in found.values())
 
 
+def test_actuators_share_the_time_and_a_power_is_at_most_force_times_speed() -> None:
+    """Where the time ends all searches, the last actuator has bounds as the first one has."""
+    case = at_home("3-upu", part=0.02)
+    workspace = replace(case.workspace, turns=Turns()) if case.workspace else None
+    load = Load("push", (1.0, 2.0, -10.0), any_force=1.0)
+    case = replace(case, workspace=workspace, loading=Loading((load,), Motion(1.0, 0.2)))
+    found = motors_of(case, gap=0.5, time_limit=1.0)
+    assert any(each.outcome is Outcome.OPEN for each in found.values())
+    assert all(each.boxes > 0 and math.isfinite(each.bound) for each in found.values())
+    for (number, k, load_name, _), each in found.items():
+        if number in ("power", "braking"):
+            sense, sign = (Sense.MAX, 1.0) if number == "power" else (Sense.MIN, -1.0)
+            force, speed = found["force", k, load_name, sense], found["speed", k, "", Sense.MAX]
+            assert each.bound <= max(sign * force.bound, 0.0) * speed.bound * (1 + 1e-12)
+
+
 def test_nothing_is_proved_where_a_force_has_no_bound() -> None:
     """A robot whose base and platform have one radius is singular at every pose; another at some poses."""
     found = motors_of(tripod(Load("load", (2.0, 2.0, -10.0)), 0.3, 0.3, 0.45), time_limit=2.0)
