@@ -50,8 +50,10 @@ def judged(text: str, *words: str) -> tuple[Any, Row]:
     return None, {"counts": {"failed": 1}, "faults": [err]}
 
 
-def campaign(examine: Callable[[int], Row]) -> None:
+def campaign(examine: Callable[[int], Row]) -> list[Row]:
     """Examine the seeds that the words of the command ask for, write the journal, and print faults and counts.
+
+    Returns the rows of these seeds.
 
     Args:
         examine: of a seed; its row has ``faults``, a list of sentences, and ``counts``, numbers by their names.
@@ -85,3 +87,4 @@ def campaign(examine: Callable[[int], Row]) -> None:
     print(f"{len(rows)} seeds in {seconds:.0f} s, faults: {faults}")
     for name, number in sorted(counts.items()):
         print(f"  {name}: {number}")
+    return rows

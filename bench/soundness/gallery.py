@@ -115,19 +115,8 @@ class Sampled:
 
     def inside(self, poses: Poses) -> Array:
         """Return which poses (N,) are in the workspace, up to rounding."""
-        angle = np.arccos(np.clip((np.trace(poses.R, axis1=1, axis2=2) - 1) / 2, -1, 1))
-        v = np.stack(
-            [
-                poses.R[:, 2, 1] - poses.R[:, 1, 2],
-                poses.R[:, 0, 2] - poses.R[:, 2, 0],
-                poses.R[:, 1, 0] - poses.R[:, 0, 1],
-            ],
-            1,
-        )
-        size = np.linalg.norm(v, axis=1, keepdims=True)
-        axis = np.where(size > 1e-14, v / np.maximum(size, 1e-300), [0.0, 0, 1])
-        rows = zip(poses.p, axis, angle / self.box.unit, strict=True)
-        return np.array([self.box.has({"position": p, "axis": a, "angle": t}) for p, a, t in rows])
+        length, turn = self.box.outside(poses)
+        return np.asarray((length < 1e-9) & (turn < 1e-7))
 
     def errors(self, count: int) -> Array:
         found = self.rng.normal(size=(count, *self.robot.points_array.shape))

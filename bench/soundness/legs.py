@@ -53,19 +53,51 @@ class Box:
             self.angles = np.array([ends(rotation["angle"])]) * self.unit
         self.size = 3 + (1 if self.kind == "axis" else 3)
 
+    @property
+    def ends(self) -> tuple[Array, Array]:
+        """Smallest and largest values (size,) of positions and angles; of components of a rotation vector in a ball."""
+        angles = np.repeat(self.angles, self.size - 2 - len(self.angles), 0)
+        return np.concatenate([self.position, angles]).T[0], np.concatenate([self.position, angles]).T[1]
+
     def poses(self, u: Array) -> Poses:
         """Return the poses of coordinates (N, size) between 0 and 1; a ball's corners are brought to its surface."""
-        p = self.position[:, 0] + u[:, :3] * (self.position[:, 1] - self.position[:, 0])
+        lower, upper = self.ends
+        p, a = np.split(lower + u * (upper - lower), [3], axis=1)
         if self.kind == "ball":
-            v = (2 * u[:, 3:] - 1) * self.angles[0, 1]
-            size = np.linalg.norm(v, axis=1)
-            v *= np.minimum(1.0, self.angles[0, 1] / np.maximum(size, 1e-300))[:, None]
-            return Poses(p, turned(v, np.linalg.norm(v, axis=1)))
-        a = self.angles[:, 0] + u[:, 3:] * (self.angles[:, 1] - self.angles[:, 0])
+            size = np.linalg.norm(a, axis=1)
+            a *= np.minimum(1.0, self.angles[0, 1] / np.maximum(size, 1e-300))[:, None]
+            return Poses(p, turned(a, np.linalg.norm(a, axis=1)))
         if self.kind == "axis":
             return Poses(p, turned(np.broadcast_to(self.axis, p.shape), a[:, 0]))
         x, y, z = (turned(np.broadcast_to(axis, p.shape), a[:, k]) for k, axis in enumerate(np.eye(3)))
         return Poses(p, z @ y @ x)
+
+    def turns(self, R: Array) -> Array:
+        """Return the angles (N, size - 3) of rotations: the nearest ones where they are about one axis."""
+        if self.kind == "rpy":
+            roll, yaw = np.arctan2(R[:, 2, 1], R[:, 2, 2]), np.arctan2(R[:, 1, 0], R[:, 0, 0])
+            return np.stack([roll, np.arcsin(np.clip(-R[:, 2, 0], -1, 1)), yaw], 1)
+        v = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1) / 2
+        c = (np.trace(R, axis1=1, axis2=2) - 1) / 2
+        if self.kind == "ball":
+            s = np.linalg.norm(v, axis=1)
+            return v * (np.arctan2(s, c) / np.maximum(s, 1e-300))[:, None]
+        n = self.axis / np.linalg.norm(self.axis)
+        along = np.einsum("i,nij,j->n", n, R, n)  # 1 about this axis
+        return np.arctan2(v @ n, c + (1 - along) / 2)[:, None]
+
+    def within(self, poses: Poses) -> Array:
+        """Return coordinates (N, size) between 0 and 1: those of poses, or of near ones in the workspace."""
+        lower, upper = self.ends
+        width = upper - lower
+        y = np.concatenate([poses.p, self.turns(poses.R)], 1)
+        return np.asarray(np.clip((y - lower) / np.where(width > 0, width, 1.0), 0, 1))
+
+    def outside(self, poses: Poses) -> tuple[Array, Array]:
+        """Return how far poses (N,) are outside of the workspace, lengths in parts of its size and radians."""
+        near, size = self.poses(self.within(poses)), np.abs(self.position).max() or 1.0
+        turn = np.linalg.norm(poses.R - near.R, axis=(1, 2)) / np.sqrt(2)
+        return np.abs(poses.p - near.p).max(1) / size, turn
 
     def sample(self, rng: np.random.Generator, count: int) -> Array:
         """Return coordinates: a half uniform, a quarter with most at ends, a quarter with some at ends."""
@@ -77,26 +109,8 @@ class Box:
 
     def has(self, pose: dict[str, Any]) -> bool:
         """Whether a pose of a result is in the workspace, up to rounding."""
-        p, R = np.array(pose["position"]), pose_of(pose, self.unit).R[0]
-        size = np.abs(self.position).max()
-        if ((p < self.position[:, 0] - 1e-9 * size) | (p > self.position[:, 1] + 1e-9 * size)).any():
-            return False
-        if self.kind == "rpy":
-            yaw, pitch, roll = (
-                np.arctan2(R[1, 0], R[0, 0]),
-                np.arcsin(-np.clip(R[2, 0], -1, 1)),
-                np.arctan2(R[2, 1], R[2, 2]),
-            )
-            found = np.array([roll, pitch, yaw])
-            return bool(((found > self.angles[:, 0] - 1e-7) & (found < self.angles[:, 1] + 1e-7)).all())
-        v = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / 2
-        angle = np.arctan2(np.linalg.norm(v), (np.trace(R) - 1) / 2)
-        if self.kind == "ball":
-            return bool(angle < self.angles[0, 1] + 1e-7)
-        n = self.axis / np.linalg.norm(self.axis)
-        signed = angle * np.sign(v @ n)
-        off = np.linalg.norm(R @ n - n)
-        return bool(off < 1e-7 and self.angles[0, 0] - 1e-7 < signed < self.angles[0, 1] + 1e-7)
+        length, turn = self.outside(pose_of(pose, self.unit))
+        return bool(length[0] < 1e-9 and turn[0] < 1e-7)
 
 
 def pose_of(pose: dict[str, Any], unit: float) -> Poses:

@@ -18,6 +18,8 @@ from legs import Array, Poses, turned
 import screwsynth.models
 
 FOLDER = Path(screwsynth.models.__file__).parent / "robots"
+#: Residual of loops, in parts of the robot and radians, that are closed.
+CLOSED = 1e-12
 
 
 class Turn(NamedTuple):
@@ -188,7 +190,9 @@ class Robot:
         return T, S, centres
 
 
-def close(robot: Robot, path: list[Poses], points: Array, weight: float = 1e-3) -> tuple[Poses, Array, Array]:
+def close(
+    robot: Robot, path: list[Poses], points: Array, weight: float = 1e-3, start: Array | None = None
+) -> tuple[Poses, Array, Array]:
     """Return closed poses, joint coordinates (N, count) and whether each is closed, along poses that begin at home.
 
     Args:
@@ -196,18 +200,19 @@ def close(robot: Robot, path: list[Poses], points: Array, weight: float = 1e-3) 
         path: poses (N,) each, one after another; the last ones are meant.
         points: (N, centres, 3) of machines.
         weight: how much a pose may move to close, beside joints.
+        start: joint coordinates at the beginning; those of home if left out.
     """
     n = len(points)
-    q = np.zeros((n, robot.count))
+    q = np.zeros((n, robot.count)) if start is None else start.copy()
     size = float(np.abs(robot.points_array).max())
     scale = np.concatenate([np.full(3, weight * size), np.full(3, weight), np.where(robot.slides, size, 1.0)])
     good = np.ones(n, bool)
     for target in path:
-        p, R = target.p.copy(), target.R.copy()
-        for k in range(12):
-            T, S, _ = robot.moved(q, points)
-            D = np.tile(np.eye(4), (n, 1, 1))  # displacement of the platform from home
-            D[:, :3, :3], D[:, :3, 3] = R, p - np.einsum("nij,j->ni", R, robot.home)
+        p, R, todo, off = target.p.copy(), target.R.copy(), np.arange(n), np.zeros(n)
+        for _ in range(12):
+            T, S, _ = robot.moved(q[todo], points[todo])
+            D = np.tile(np.eye(4), (len(todo), 1, 1))  # displacement of the platform from home
+            D[:, :3, :3], D[:, :3, 3] = R[todo], p[todo] - np.einsum("nij,j->ni", R[todo], robot.home)
             # The twist from each chain's end to the platform, about the world's origin, to first order.
             Q = D[:, None, :3, :3] @ np.swapaxes(T[:, :, :3, :3], 2, 3)
             omega = (
@@ -215,18 +220,21 @@ def close(robot: Robot, path: list[Poses], points: Array, weight: float = 1e-3) 
                 / 2
             )
             v = D[:, None, :3, 3] - np.einsum("ncij,ncj->nci", Q, T[:, :, :3, 3])
-            r = np.concatenate([v / size, omega], 2).reshape(n, -1)
-            if k > 1 and np.abs(r[good]).max(initial=0) < 1e-13:
+            r = np.concatenate([v / size, omega], 2).reshape(len(todo), -1)
+            off[todo] = np.abs(r).max(1)
+            left = off[todo] > CLOSED
+            if not left.any():
                 break
+            todo, S, r = todo[left], S[left], r[left]
             A = S / np.array([size] * 3 + [1] * 3)[:, None]
-            motion = np.zeros((n, 1, 6, 6))
+            motion = np.zeros((len(todo), 1, 6, 6))
             motion[:, 0, :3, :3] = np.eye(3) / size
             motion[:, 0, 3:, 3:] = np.eye(3)
             # a rotation of the platform about its own origin moves the point at the world's origin
-            motion[:, 0, :3, 3:] = cross_matrix(p) / size
+            motion[:, 0, :3, 3:] = cross_matrix(p[todo]) / size
             M = (
-                np.concatenate([-np.broadcast_to(motion, (n, len(robot.chains), 6, 6)), A], 3).reshape(
-                    n, -1, 6 + robot.count
+                np.concatenate([-np.broadcast_to(motion, (len(todo), len(robot.chains), 6, 6)), A], 3).reshape(
+                    len(todo), -1, 6 + robot.count
                 )
                 * scale
             )
@@ -235,10 +243,10 @@ def close(robot: Robot, path: list[Poses], points: Array, weight: float = 1e-3) 
             step = np.einsum("nij,ni->nj", M, np.linalg.solve(G, r[:, :, None])[:, :, 0]) * scale
             large = np.abs(step[:, 6:] / scale[6:]).max(1, initial=0)
             step *= np.minimum(1, 0.5 / np.maximum(large, 1e-300))[:, None]
-            p = p + step[:, :3]
-            R = turned(step[:, 3:6], np.linalg.norm(step[:, 3:6], axis=1)) @ R
-            q = q + step[:, 6:]
-        good &= np.abs(r).max(1) < 1e-9
+            p[todo] += step[:, :3]
+            R[todo] = turned(step[:, 3:6], np.linalg.norm(step[:, 3:6], axis=1)) @ R[todo]
+            q[todo] += step[:, 6:]
+        good &= off < 1e-9
     return Poses(p, R), q, good
 
 
@@ -247,6 +255,38 @@ def cross_matrix(p: Array) -> Array:
     K = np.zeros((len(p), 3, 3))
     K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -p[:, 2], p[:, 1], -p[:, 0]
     return K - np.swapaxes(K, 1, 2)
+
+
+def motions(robot: Robot, poses: Poses, q: Array, points: Array) -> tuple[Array, Array]:
+    """Return motions (N, 6, a) of the platform by a unit rate of each actuator alone, and residuals (N,) of the loops.
+
+    Velocity of the platform's origin, then angular velocity. From each chain its own passive joints are taken out: the
+    wrenches that these do not feel.
+    """
+    n, size = len(q), float(np.abs(robot.points_array).max())
+    _, S, _ = robot.moved(q, points)
+    A = np.concatenate([S[:, :, :3] + np.cross(S[:, :, 3:], poses.p[:, None, :, None], axis=2), size * S[:, :, 3:]], 2)
+    of = [sorted({each.coordinate for each in chain.turns}) for chain in robot.chains]
+    passive = [k for k in range(robot.count) if k not in robot.actuated]
+    common = [k for k in passive if sum(k in each for each in of) > 1]
+    rows, sides = [], []
+    for c, coordinates in enumerate(of):
+        own: list[int] = []  # without those that are idle in the first pose, such as the spin of a rod
+        for k in coordinates:
+            if k in passive and k not in common:
+                s = np.linalg.svd(
+                    A[0, c][:, [*own, k]] / np.linalg.norm(A[0, c][:, [*own, k]], axis=0), compute_uv=False
+                )
+                own += [k] if s[-1] > 1e-6 else []
+        Q = np.linalg.qr(A[:, c][:, :, own])[0]
+        P = np.eye(6) - Q @ np.swapaxes(Q, 1, 2)
+        rows.append(np.concatenate([P, -P @ A[:, c][:, :, common]], 2))
+        sides.append(P @ A[:, c][:, :, robot.actuated])
+    M, B = np.concatenate(rows, 1), np.concatenate(sides, 1)
+    Q, T = np.linalg.qr(M)
+    y = np.linalg.solve(T, np.swapaxes(Q, 1, 2) @ B)
+    residual = np.abs(M @ y - B).reshape(n, -1).max(1) / np.abs(B).reshape(n, -1).max(1)
+    return y[:, :6] * np.repeat([1.0, 1 / size], 3)[:, None], residual
 
 
 def numbers(robot: Robot, poses: Poses, q: Array, points: Array, chi: Array) -> dict[str, Array]:

@@ -23,6 +23,8 @@ TONES = {Outcome.PROVED: Tone.HOLDS, Outcome.REFUTED: Tone.FAULT, Outcome.OPEN: 
 #: Outcomes, the worst one first.
 _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 _NOTHING = "no bound"
+#: Size that every number is compared with: bounds of numbers that are 0 are above underflow, by roots of it.
+_UNDERFLOW = 1e-90
 
 
 def ends_of_motor(motor: MotorData) -> tuple[MotorEndData, ...]:
@@ -54,7 +56,8 @@ def motor_tables(case: Case, motors: Sequence[MotorData]) -> Iterator[TextTable]
 def _row(joint: DrivenJoint, motors: Sequence[MotorData]) -> tuple[str | Line, ...]:
     """Return the row of an actuator: coordinate from and to, force in both senses, speed, power, outcome."""
     by = {each: [motor for motor in motors if motor.number is each] for each in MotorNumber}
-    size = max((abs(end.bound or 0.0) for motor in by[MotorNumber.FORCE] for end in ends_of_motor(motor)), default=0.0)
+    forces = [abs(end.bound or 0.0) for motor in by[MotorNumber.FORCE] for end in ends_of_motor(motor)]
+    size = max(forces, default=0.0) + _UNDERFLOW
 
     def extreme(what: MotorNumber, sense: Sense, *, flipped: bool = False) -> str:
         ends = [motor.smallest if sense is Sense.MIN else motor.largest for motor in by[what]]
@@ -67,7 +70,7 @@ def _row(joint: DrivenJoint, motors: Sequence[MotorData]) -> tuple[str | Line, .
         value = min(values) if sense is Sense.MIN else max(values)
         if what is MotorNumber.FORCE:
             value = max(-value if flipped else value, 0.0)
-        return number(value, size if what is MotorNumber.FORCE else 0.0)
+        return number(value, size if what is MotorNumber.FORCE else _UNDERFLOW)
 
     outcomes = [end.outcome for motor in motors for end in ends_of_motor(motor)]
     worst = next((each for each in _ORDER if each in outcomes), Outcome.OPEN)

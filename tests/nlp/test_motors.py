@@ -216,18 +216,18 @@ def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name:
         assert each.sense.sign * (each.bound - each.reached) <= 0.011 * size
 
 
-def tripod(load: Load, radius: float, platform: float, height: float, **options: float) -> Numbers:
+def tripod(load: Load, radius: float, platform: float, height: float) -> Case:
     """A 3-UPU robot that translates, over a box of 0.2 m by 0.2 m by 0.1 m."""
     place = [Free(-0.1, 0.1), Free(-0.1, 0.1), Free(height - 0.05, height + 0.05)]
     workspace = Workspace(place, Turns(TurnKind.AXIS, (0.0,), (0, 0, 1)))
     numbers = {"base_radius": radius, "platform_radius": platform}
     case = Case(three_upu(axes="tsai"), numbers, [0, 0, height], [Task([0, 0, 0, 0, 0, 1])], workspace=workspace)
-    return motors_of(replace(case, loading=Loading((load,))), **options)
+    return replace(case, loading=Loading((load,)))
 
 
 def test_a_translating_tripod_has_the_published_largest_force() -> None:
     """Prause and others: 8.08803 N is the largest of this robot, at a corner of the box."""
-    found = tripod(Load("load", (2.0, 2.0, -10.0)), 0.5, 0.12, 0.45)
+    found = motors_of(tripod(Load("load", (2.0, 2.0, -10.0)), 0.5, 0.12, 0.45))
     largest = max(abs(each.reached) for each in found.values())
     bound = max(abs(each.bound) for each in found.values())
     assert largest == pytest.approx(8.08803, abs=1e-5)
@@ -245,9 +245,40 @@ def test_a_translating_tripod_has_the_published_largest_force() -> None:
             assert abs(each.bound - extreme) <= 0.02 * largest
 
 
+def test_numbers_that_are_zero_at_every_pose_are_bounded_in_few_boxes() -> None:
+    """A platform that cannot turn holds a moment without its actuators, whose rates do not depend on a turn."""
+    moment, size = Load("couple", moment=(1.0, 2.0, 3.0)), math.sqrt(14.0)
+    judged = judge_workspace(tripod(moment, 0.5, 0.12, 0.45), jobs=1)
+    assert all(each.outcome is Outcome.PROVED and each.boxes == 1 for each in judged.extremes if each.motor)
+    (table,) = motor_tables(judged.case, workspace_of(judged).motors or ())
+    assert [str(cell) for cell in table.rows[0][3:5]] == ["0", "0"]
+    case = at_home("delta-parallelogram", part=0.005)
+    workspace = replace(case.workspace, turns=Turns()) if case.workspace else None
+    found = motors_of(replace(case, workspace=workspace, loading=Loading((moment,), Motion(angular=1.0))))
+    assert all(each.outcome is Outcome.PROVED for each in found.values())
+    assert all(abs(each.bound) <= 1e-3 * size for each in found.values())
+    assert all(abs(each.reached) <= 1e-9 * size for each in found.values())
+
+
+def test_actuators_share_the_time_and_a_power_is_at_most_force_times_speed() -> None:
+    """Where the time ends all searches, the last actuator has bounds as the first one has."""
+    case = at_home("3-upu", part=0.02)
+    workspace = replace(case.workspace, turns=Turns()) if case.workspace else None
+    load = Load("push", (1.0, 2.0, -10.0), any_force=1.0)
+    case = replace(case, workspace=workspace, loading=Loading((load,), Motion(1.0, 0.2)))
+    found = motors_of(case, gap=0.5, time_limit=1.0)
+    assert any(each.outcome is Outcome.OPEN for each in found.values())
+    assert all(each.boxes > 0 and math.isfinite(each.bound) for each in found.values())
+    for (number, k, load_name, _), each in found.items():
+        if number in ("power", "braking"):
+            sense, sign = (Sense.MAX, 1.0) if number == "power" else (Sense.MIN, -1.0)
+            force, speed = found["force", k, load_name, sense], found["speed", k, "", Sense.MAX]
+            assert each.bound <= max(sign * force.bound, 0.0) * speed.bound * (1 + 1e-12)
+
+
 def test_nothing_is_proved_where_a_force_has_no_bound() -> None:
     """A robot whose base and platform have one radius is singular at every pose; another at some poses."""
-    found = tripod(Load("load", (2.0, 2.0, -10.0)), 0.3, 0.3, 0.45, time_limit=2.0)
+    found = motors_of(tripod(Load("load", (2.0, 2.0, -10.0)), 0.3, 0.3, 0.45), time_limit=2.0)
     assert all(each.outcome is Outcome.OPEN and math.isinf(each.bound) for each in found.values())
     angles = np.radians([-5, 5, 115, 125, 235, 245])
     ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)

@@ -111,7 +111,7 @@ def judge_workspace(
         quantities: names of measures of the robot whose smallest and largest values are asked for.
         gap: allowed distance of a bound from the best value known, as a part of it.
         time_limit: seconds for all searches together, which then stop with the bounds reached; None for no limit. A
-            search takes at most half of what is left.
+            search takes at most half of what is left, and those of actuators even shares of it.
         jobs: threads.
         with_limits: whether numbers are bounded at all, and not regularity alone.
         with_objective: whether F of each task is bounded, and numbers of actuators without a limit are.

@@ -89,10 +89,31 @@ class Motors(Number):
 
     def values(self, z: FloatArray) -> FloatArray:
         """Return the values (P, K) at closed points (P, n)."""
-        c = values_at(self._entries, z)[0][:, :, 0]
         with np.errstate(all="ignore"):
-            found = self._bounded(self._matrices(Forms(c, np.zeros((*c.shape, 0)), np.zeros_like(c)), 0))[0]
+            found = self._bounded(self._at(z))[0]
         return -self._of_claims([np.where(np.isfinite(each.r), each.c, np.nan)[0, 0] for each in found])
+
+    def products(self, z: FloatArray) -> FloatArray:
+        """Return sizes (P, K) of loads and motions, whatever their directions, at closed points (P, n).
+
+        A number is of this size for most directions of a load, or of a motion, and may be 0 for others.
+        """
+        motion = self._loading.motion or Motion()
+        with np.errstate(all="ignore"):
+            A, D, _, _, wrenches, _ = self._at(z)
+            x = np.linalg.norm(solved(A, D).c[:6, self._column], axis=0)
+            ends = [(motion.linear + motion.angular * self._length) / x for _ in self._parts]
+            for j, (sense, load) in enumerate(self._parts):
+                if sense is not None:
+                    parts = [each for each, _ in self._loading.cases[load].parts]
+                    spread = sum(each.any_force + each.any_moment / self._length for each in parts)
+                    ends[j] = x * (np.linalg.norm(wrenches.c[:, load], axis=0) + spread)
+            return self._of_claims(ends)
+
+    def _at(self, z: FloatArray) -> list[Quadratics]:
+        """Return the matrices of :meth:`_matrices` at points (P, n)."""
+        c = values_at(self._entries, z)[0][:, :, 0]
+        return self._matrices(Forms(c, np.zeros((*c.shape, 0)), np.zeros_like(c)), 0)
 
     def over(self, forms: Forms, count: int) -> Bounds:
         """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""

@@ -13,8 +13,10 @@ import numpy as np
 
 from .....models import FloatArray, Model
 from ....case.case import Case
+from ....case.motors import Motor, MotorNumber
 from ....case.task import Sense
 from ....errors import UncoveredError
+from ....interruption import seconds_left, within
 from ...boxes.tree import TreeRecord
 from ...statement.claims import Claim, ClaimKind, searched_claims
 from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
@@ -35,6 +37,11 @@ _NEAR_ZERO = 0.1
 _TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
 #: Gap of numbers of actuators as a part of the largest size of the same number.
 MOTOR_GAP = 0.01
+#: Part of a load times a motion that such a size is at least: some numbers are 0 at every pose, as those of a platform
+#: that cannot turn under a moment.
+_SMALL = 0.01
+#: Part of a product of two bounds that is more than its rounding.
+_ROUNDING = 1e-15
 #: Number of poses at which the width of a bound over machines is taken, and as many near corners.
 _POINTS, _SEED = 64, 0
 
@@ -136,30 +143,53 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
 
 
 def motor_extremes(subject: Subject, *, with_all: bool = True, paper: PaperRecord | None = None) -> Iterator[Extreme]:
-    """Yield the extremes of :func:`~.motors.motor_claims`, all or those with limits, for each actuator and load."""
+    """Yield the extremes of :func:`~.motors.motor_claims`, all or those with limits, for each actuator and load.
+
+    Actuators are much alike: each takes its share of the time left, and the work after them has one too.
+    """
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
-    for _, group in itertools.groupby(claims, lambda claim: claim.motor and claim.motor.whose):
-        yield from _motor_answers(subject, list(group), paper)
+    alike = itertools.groupby(claims, lambda claim: claim.motor and claim.motor.whose)
+    groups = [list(group) for _, group in alike]
+    speeds: dict[str, float] = {}
+    for left, group in zip(range(len(groups), 0, -1), groups, strict=True):
+        actuator = group[0].motor.actuator if group[0].motor else ""
+        with within(seconds_left() / (left + 1)):
+            found = list(_motor_answers(subject, group, speeds.get(actuator, math.inf), paper))
+        if group[0].motor and group[0].motor.number is MotorNumber.SPEED:
+            speeds[actuator] = found[0].bound
+        yield from found
 
 
-def _motor_answers(subject: Subject, claims: Sequence[Claim], paper: PaperRecord | None) -> Iterator[Extreme]:
-    """Yield the extremes of numbers of an actuator, each to a part of the largest size of its kind at some poses."""
+def _motor_answers(
+    subject: Subject, claims: Sequence[Claim], speed: float, paper: PaperRecord | None
+) -> Iterator[Extreme]:
+    """Yield the extremes of numbers of an actuator, each to a part of the largest size of its kind at some poses.
+
+    Args:
+        subject: the robot.
+        claims: the numbers; those of one load, or the speed.
+        speed: proven bound of the actuator's speed; infinite where there is none.
+        paper: records the search for a proof.
+    """
     try:
         if subject.machines is None:
             raise NotJudgedError(subject.reason)
         number, problem = Motors(subject.machines, subject.case, claims), subject.machines.problem
         z = np.tile(subject.machines.start, (2 * _POINTS, 1))
         z[:, : len(problem.free)] = _points(problem)[:, list(problem.free)]
-        values = np.nan_to_num(number.values(number.closed(z)), posinf=0.0, neginf=0.0)
+        closed = number.closed(z)
+        values = np.nan_to_num(number.values(closed), posinf=0.0, neginf=0.0)
         kinds = [claim.motor and claim.motor.number for claim in claims]
         sizes = np.array([np.abs(values[:, [other is kind for other in kinds]]).max() for kind in kinds])
+        products = np.nan_to_num(number.products(closed), posinf=0.0)
+        sizes = np.maximum(sizes, _SMALL * np.median(products, axis=0))
         allowed = MOTOR_GAP * sizes
         if subject.machines.names and not problem.dependent:
             z = z[:, : len(problem.start)]
             allowed = allowed + np.nan_to_num(values - number.bounds(z, z), posinf=0.0).max(axis=0)
         goals = [goal_of(claim, gap, is_enough=False) for claim, gap in zip(claims, allowed.tolist(), strict=True)]
         recorder = None if paper is None else TreeRecord()
-        every = smallest_values(number, goals, recorder)
+        every = _at_most_products(claims, smallest_values(number, goals, recorder), speed)
         if paper is not None and recorder is not None:
             # One search is that of all.
             paper.boxes |= dict.fromkeys((claim.name for claim in claims), recorder)
@@ -169,6 +199,21 @@ def _motor_answers(subject: Subject, claims: Sequence[Claim], paper: PaperRecord
         is_known = math.isfinite(found.value)
         pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
         yield extreme_of(claim, found, pose)
+
+
+def _at_most_products(claims: Sequence[Claim], every: Sequence[Minimum], speed: float) -> list[Minimum]:
+    """Return the results of claims, with powers of at most the bound of the force times that of the speed."""
+    motors, forces, found = [claim.motor or Motor() for claim in claims], dict[Sense, float](), []
+    for claim, motor, own in zip(claims, motors, every, strict=True):
+        bound = own.bound
+        if motor.number is MotorNumber.FORCE:
+            forces[claim.sense] = max(-bound, 0.0)
+        elif motor.number is MotorNumber.POWER:
+            force = forces.get(Sense.MIN if motor.is_backwards else Sense.MAX, math.inf)
+            most = force * speed * (1 + _ROUNDING) if math.isfinite(force) and math.isfinite(speed) else math.inf
+            bound = max(bound, -most)
+        found.append(own._replace(bound=bound))
+    return found
 
 
 def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float) -> float:
