@@ -21,7 +21,7 @@ def text_of(tables: Tables) -> str:
             return f"[{', '.join(map(value, given))}]"
         return (
             json.dumps(given)
-            if isinstance(given, str)
+            if isinstance(given, str | bool)
             else str(given)
             if isinstance(given, int)
             else repr(float(given))
