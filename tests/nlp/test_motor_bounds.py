@@ -164,7 +164,7 @@ def worst_errors(case: Case, y: FloatArray, key: tuple[str, int]) -> FloatArray:
 @pytest.mark.parametrize("name", ["legs", "legs with a tolerance"])
 def test_no_claim_about_legs_holds_that_a_pose_of_the_box_refutes(name: str) -> None:
     """Forces, speeds and powers under two loads together, over boxes inside of the ball and at its surface."""
-    case = replace(robot_of(name), loading=LOADING)
+    case = replace(robot_of(name), loading=LOADING, characteristic_length=0.6)
     subject, rng, load = Subject.of(case), np.random.default_rng(5), case.loading.cases[0].name
     shown, count = 0, 5 if case.joint_centre_tolerance else 12
     for k, box in enumerate(boxes(subject.root, rng, 0.3, count) + boxes(subject.root, rng, 0.02, count)):
@@ -193,7 +193,7 @@ def test_no_claim_about_legs_holds_that_a_pose_of_the_box_refutes(name: str) -> 
 @pytest.mark.parametrize("angular", [0.0, 5.0])
 def test_speeds_of_three_freedoms_are_those_of_results(angular: float) -> None:
     """Rates of least size: of other rates in the same motions a bound may be below the speed that results have."""
-    case = replace(robot_of("3-rps"), loading=Loading((), Motion(1.0, angular)))
+    case = replace(robot_of("3-rps"), loading=Loading((), Motion(1.0, angular)), characteristic_length=0.6)
     subject, rng = Subject.of(case), np.random.default_rng(2)
     meant = build_problem(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
     free = MotorClaims(case, subject.loops, subject.root, [(Motor(MotorNumber.SPEED), Sense.MAX, 1.0)]).free
