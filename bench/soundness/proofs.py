@@ -31,7 +31,7 @@ from randomcases import limited_legs, random_legs, text_of
 Place = tuple[str | int, ...]
 ALTERED = 4
 #: Seconds of a search with and without loads, and parts of values by which altered bounds of actuators are beyond them.
-SECONDS, BEYOND = (15, 3), (-1e-2, -1e-4, -1e-6, 1e-4)
+SECONDS, BEYOND = (60, 3), (-1e-2, -1e-4, -1e-6, 1e-4)
 BOUND = re.compile(r"at (most|least) (-?[\d.]+(?:e[-+]?\d+)?)")
 #: What may differ: counts of boxes, reasons that are not checked.
 FREE = re.compile(r"[\d,]+ leaves, shown on .*\n|(?<=not on paper: ).*")

@@ -58,6 +58,18 @@ def test_products_and_solutions_of_numbers_have_the_least_rests(*, is_product: b
         assert form.E.item() <= most * (1 + 1e-9 if is_product else 1.7)
 
 
+def test_no_solution_is_known_where_a_system_may_be_singular() -> None:
+    """The coordinate, or the rest, reaches a number without an inverse; in one of two rows that are apart as well."""
+    one, zero = np.ones((1, 1, 1)), np.zeros((1, 1, 1))
+    right = AffineMatrix(one, zero[:, None], zero)
+    for A, E in ((1.2, 0.0), (0.0, 1.2), (0.6, 0.6), (1.0, 0.0)):
+        assert not solved(AffineMatrix(one, A * one[:, None], E * one), right)[1].any()
+    wide = AffineMatrix(np.eye(2)[None], np.diag([1.2, 0.0])[None, None], np.zeros((1, 2, 2)))
+    for column in np.eye(2):
+        right = AffineMatrix(column[None, :, None], np.zeros((1, 1, 2, 1)), np.zeros((1, 2, 1)))
+        assert not solved(wide, right)[1].any()
+
+
 def test_solutions_of_more_rows_than_columns_are_in_their_forms() -> None:
     """Systems with a solution at every value of three coordinates."""
     rng = np.random.default_rng(3)
