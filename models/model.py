@@ -250,6 +250,11 @@ def _check_references(model: Model) -> None:
     for leg in model.legs:
         if leg.name not in model.limbs:
             raise _model_error(model, f"leg {leg.name!r} is no limb: it has no wrench")
+    # Where the legs are the actuators, the rows of forces are theirs, one by one.
+    names = [leg.name for leg in model.legs]
+    forces = [row.limb for row in model.wrenches if row.kind is WrenchKind.FORCE and row.limb in names]
+    if not model.actuators and forces != names:
+        raise _model_error(model, f"legs {', '.join(names)} are not in the order of their forces, {', '.join(forces)}")
     if model.built and [(row.limb, row.kind) for row in model.built] != [
         (row.limb, row.kind) for row in model.wrenches
     ]:

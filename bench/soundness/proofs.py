@@ -3,7 +3,8 @@
     python bench/soundness/proofs.py COUNT FIRST [JOURNAL]
 
 An altered proof that is accepted must say what the proof said, but for bounds, which must be beyond the values that the
-search reached.
+search reached. Half of the workspaces have loads and motions: then bounds of numbers of actuators are moved to these
+values too, a little less or more.
 """
 
 from __future__ import annotations
@@ -24,10 +25,13 @@ import numpy as np
 from campaign import Row, campaign, command
 from certificates import random_certificate
 from gallery import NAMES, limited, random_gallery
+from loads import random_loading
 from randomcases import limited_legs, random_legs, text_of
 
 Place = tuple[str | int, ...]
 ALTERED = 4
+#: Seconds of a search with and without loads, and parts of values by which altered bounds of actuators are beyond them.
+SECONDS, BEYOND = (60, 3), (-1e-2, -1e-4, -1e-6, 1e-4)
 BOUND = re.compile(r"at (most|least) (-?[\d.]+(?:e[-+]?\d+)?)")
 #: What may differ: counts of boxes, reasons that are not checked.
 FREE = re.compile(r"[\d,]+ leaves, shown on .*\n|(?<=not on paper: ).*")
@@ -84,6 +88,24 @@ def altered(content: Any, rng: np.random.Generator) -> tuple[str, Any]:  # noqa:
     return f"{place}: {str(value)[:30]!r} -> {str(new)[:30]!r}", found
 
 
+def moved(content: Any, lines: str, reached: dict[tuple[str, str], float], rng: np.random.Generator) -> tuple[str, Any]:  # noqa: ANN401 - JSON
+    """Return a copy of a file with a bound of an actuator near the value reached; as it is where there is none."""
+    found, sides = copy.deepcopy(content), {"max": "most", "min": "least"}
+    stated = {
+        (name.strip(), side): float(value)
+        for name, side, value in re.findall(r"(actuator_(?:force|speed|power) .*): at (most|least) (\S+)", lines)
+    }
+    claims = [(each, (each["name"], sides.get(each["sense"], ""))) for each in found["claims"]]
+    claims = [(each, key) for each, key in claims if stated.get(key) and reached.get(key)]
+    if not claims:
+        return "no actuators", found
+    claim, key = claims[rng.integers(len(claims))]
+    part, sign = BEYOND[rng.integers(len(BEYOND))], 1.0 if key[1] == "most" else -1.0
+    # Bounds of the file are in radians.
+    claim["bound"] *= (reached[key] + sign * part * abs(reached[key])) / stated[key]
+    return f"{key}: beyond the value by {part:g} of it", found
+
+
 def untrue(before: str, after: str, reached: dict[tuple[str, str], float]) -> str:
     """Return what an accepted altered proof says that is not known to be true; empty if nothing."""
     lines = [FREE.sub("", each).splitlines() for each in (before, after)]
@@ -124,13 +146,18 @@ def examine(seed: int) -> Row:
         tables = limited(rng, random_gallery(rng, NAMES[(seed // 3) % len(NAMES)]))
     else:
         tables = random_certificate(rng) if kind == "certify" else limited_legs(rng, random_legs(rng))
-    name = tables["robot"]["model"]
+    name, is_loaded = tables["robot"]["model"], kind != "certify" and rng.random() < 0.5
+    if is_loaded:
+        unit = 1.0 if tables.get("units", {}).get("angle") == "rad" else np.pi / 180
+        size = float(np.linalg.norm(tables["pose"]["position"])) or 1.0
+        tables |= random_loading(rng, size, unit)
+        kind += " with loads"
     with tempfile.TemporaryDirectory() as folder:
         case, proof, out, other = (
             str(Path(folder) / each) for each in ("case.toml", "proof.json", "result.json", "other.json")
         )
         Path(case).write_text(text_of(tables), encoding="utf-8")
-        words = ["--time", "3", "--jobs", "1", "--json", out, "--proof", proof]
+        words = ["--time", str(SECONDS[not is_loaded]), "--jobs", "1", "--json", out, "--proof", proof]
         if kind == "certify":
             code, _, err = command("certify", case, "--gap", "1e-2", "--starts", "2", *words)
         else:
@@ -146,8 +173,10 @@ def examine(seed: int) -> Row:
             return {"counts": counts, "faults": [f"a proof is rejected: {err.strip()}"]}
         content = json.loads(Path(proof).read_text(encoding="utf-8"))
         reached = reached_values(json.loads(Path(out).read_text(encoding="utf-8")))
-        for _ in range(ALTERED):
-            what, changed = altered(content, rng)
+        for k in range((1 + is_loaded) * ALTERED):
+            what, changed = altered(content, rng) if k < ALTERED else moved(content, before, reached, rng)
+            if k >= ALTERED:
+                counts[f"{kind}: {what.rpartition(': ')[2]}"] += 1
             Path(other).write_text(json.dumps(changed), encoding="utf-8")
             code, after, err = command("verify-proof", other, case)
             counts[f"{kind}: altered, exit status {code}"] += 1

@@ -156,7 +156,10 @@ def _premises(case: Case, numbers_at: str) -> Iterator[str]:
     for task in case.tasks:
         yield f"{'F' if len(case.tasks) == 1 else f'F of {task.name}'}: of the task {task.name!r}"
     if numbers_at:
-        yield f"assemblies: ranks in the one of home in the middle of the workspace, numbers in {numbers_at}"
+        # The boxes of actuators' loads follow the loops from the middle, as those of ranks do.
+        followed = "ranks, forces, speeds and powers" if case.loading.cases or case.loading.motion else "ranks"
+        others = "numbers" if followed == "ranks" else "other numbers"
+        yield f"assemblies: {followed} in the one of home in the middle of the workspace, {others} in {numbers_at}"
 
 
 def _words(claim: CheckedClaim, case: Case) -> str:

@@ -349,6 +349,8 @@ def test_legs_and_built_rows_that_fit_no_limb_are_refused() -> None:
     sound = stewart_gough()
     with pytest.raises(ModelError, match="leg 'x' is no limb"):
         replace(sound, legs=(*sound.legs, Leg("x", SX.zeros(3), SX.zeros(3))))
+    with pytest.raises(ModelError, match=r"legs .* are not in the order of their forces"):
+        replace(sound, legs=sound.legs[::-1])
     with pytest.raises(ModelError, match="rows of the built machine"):
         replace(sound, built=sound.built[1:])
     with pytest.raises(ModelError, match="leg 1- base should have shape"):

@@ -74,7 +74,8 @@ class VerifiedWorkspace:
 
     Attributes:
         claims: what it proves.
-        numbers_at: assemblies that the claims about numbers cover; empty for a robot without loops.
+        numbers_at: assemblies that the claims about numbers cover, but for those of actuators under loads, which are
+            about home's as ranks are; empty for a robot without loops.
         leaves: number of claims about boxes in it.
         pieces: number of boxes that were evaluated to show them.
     """

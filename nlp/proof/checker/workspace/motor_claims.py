@@ -4,7 +4,7 @@
 (:func:`.motion_matrix.driven_matrices`). With ``x_k`` the motion by a unit rate of actuator k, it holds a load W with
 the force ``-(W . x_k)``, by virtual work. Loads of any direction add multiples of the sizes of velocities. A leg's rate
 in a motion x of the platform is ``row . x / |force|`` with its own row. Else the motions of the platform are ``X u``,
-and any left inverse of X returns the rates: with L near one of the middle of a box, ``(L X)^-1 L``.
+and of the left inverses of X, which all return the rates, a speed is by definition that of least size.
 
 All are an affine function of the coordinates, multiples of sizes of affine vectors, and a rest: but for the rest they
 are convex, so that the corners of a box decide. Rotations about any axis lie in a ball, where ``n . r <= sqrt(b)`` for
@@ -28,15 +28,15 @@ from ....case.loads import Motion
 from ....case.motors import Motor, MotorNumber
 from ....case.task import Sense
 from .closed_loops import Enclosed
-from .forms import PRODUCT, UP, AffineMatrix, SparseMatrices, inverses, solved
+from .forms import PRODUCT, UP, AffineMatrix, SparseMatrices, solved
 from .loop_claims import LoopClaim, PosedLoops
 from .motion_matrix import driven_matrices
 from .pose_boxes import COORDINATES, Attempt, PoseRoot
 
 #: Part of a bound by which a number at a pose must be beyond it to show that a claim is wrong: far more than rounding.
 _WRONG = 1e-6
-#: Part by which a unit vector may be too long, and singular values below this part of the largest are zero.
-_UNIT, _ZERO = 1e-12, 1e-9
+#: Part by which a unit vector may be too long.
+_UNIT = 1e-12
 
 
 class _Sum(NamedTuple):
@@ -78,6 +78,7 @@ class MotorClaims(LoopClaim):
         robot, motor, motion = loops.robot, claims[0][0], case.loading.motion or Motion()
         self._numbers = [_number_of(*each) for each in claims]
         self._place, self._fastest = motor.place, (motion.linear, motion.angular * robot.length)
+        self._length = robot.length
         load = next((each for each in case.loading.cases if each.name == motor.load), None)
         parts = [] if load is None else [each.load for each in load.parts]
         self._any = [(each.any_force, each.any_moment / robot.length) for each in parts]
@@ -143,11 +144,15 @@ class MotorClaims(LoopClaim):
             # The force of a leg has unit size.
             fixed.M[:] = linear
             return _Sum(fixed, [(angular, _transposed(moment))]), np.ones(B, dtype=bool)
-        # Of left inverses of X that with the least speeds in the middle.
-        weights = np.repeat([1.0, linear / angular if linear and angular else 1.0], 3)
-        L = inverses(x.M * weights[:, None], _ZERO) * weights
-        constant = AffineMatrix(L, np.zeros((B, x.A.shape[1], *L.shape[1:])), np.zeros(L.shape))
-        rates, known, _ = solved(constant.matmul(x), constant)
+        if x.M.shape[2] == COORDINATES:
+            right = AffineMatrix(np.broadcast_to(np.eye(COORDINATES), x.M.shape), 0 * x.A, 0 * x.E)
+            rates, known, _ = solved(x, right)
+        else:
+            # Rows g of rates of least size, as numbers at a pose have them: (X' S X)^-1 X' S.
+            length = linear / angular if linear and angular else 1 / self._length
+            weights = np.repeat([1.0, length**2], 3)
+            right = _transposed(AffineMatrix(*(each * weights[:, None] for each in x)))
+            rates, known, _ = solved(right.matmul(x), right)
         own = _transposed(rates.part(slice(self._place, self._place + 1)))
         sizes = [(linear, own.part(slice(0, 3))), (angular, own.part(slice(3, 6)))]
         return _Sum(fixed, sizes), known

@@ -107,7 +107,8 @@ class RobotClaims:
         place: the same for claims about reach.
         model: the robot without these unknowns, over whose poses its ranks are claimed.
         reaches: claims that limbs reach every pose.
-        numbers_at: assemblies that its numbers are about, in words; empty for a robot without unknowns.
+        numbers_at: assemblies that its numbers are about, but for those of actuators under loads, in words; empty for a
+            robot without unknowns.
         machines: every machine within the tolerance, in whose symbols the numbers and ``reaches`` are then; None where
             the design is meant, or machines cannot be assembled.
     """
