@@ -53,12 +53,15 @@ _PART, _GAP = 0.5, 1e-3
 _ROOM = 1e-9
 #: Angles from which on the tangent of the half is too large a coordinate.
 _LARGEST = math.radians(149)
-#: Singular value, in parts of the largest, that counts as 0 at a point of a path, and steps in the search of it.
-_SINGULAR, _STEPS = 1e-9, 80
+#: Singular value, in parts of the largest, that counts as 0 at a point of a path, steps in the search of it, and powers
+#: of two of a piece's width at which it begins.
+_SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
 #: Steps of the loops from home to the first point of a path, and parts of a way over which rows must have values.
 _WAY, _PARTS = 40, 64
-#: Parameters of points of each segment at which a change of sign, or the first one beyond a limit, is looked for.
+#: Parameters of points of each segment at which a change of sign is looked for.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
+#: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
+_ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +319,13 @@ def _most_singular(
             z = problem.loops.all_closed(z[:, None], list(problem.dependent))[:, 0]
         return newton.smallest(z) if np.isfinite(z).all() else math.inf
 
-    low, high = max(piece[1] - (piece[2] - piece[1]), 0.0), min(piece[2] + (piece[2] - piece[1]), 1.0)
+    # Where the value falls with the square of the distance, pieces are left far from the least one too.
+    wide, middle = piece[2] - piece[1], 0.5 * (piece[1] + piece[2])
+    away = wide * 2.0 ** np.arange(_FAR)
+    near = np.clip(np.concatenate([[middle], middle - away, middle + away]), 0.0, 1.0)
+    best = float(near[int(np.argmin([at(each) for each in near.tolist()]))])
+    wide += abs(best - middle)
+    low, high = max(best - wide, 0.0), min(best + wide, 1.0)
     for _ in range(_STEPS):
         s = np.linspace(low, high, 5)
         values = [at(each) for each in s.tolist()]
@@ -347,12 +356,13 @@ def _first_faults(
     def values(pieces: FloatArray, part: float) -> FloatArray:
         return numbers.values(problem.exact(cover.points(pieces, part)[:, free]))
 
-    left = dict(enumerate(claims))
+    count = min(max(_ALL_SAMPLES // len(cover.pieces), _LEAST_SAMPLES), _MOST_SAMPLES)
+    left, parts = dict(enumerate(claims)), np.linspace(0.0, 1.0, count).tolist()
     for rows in cover.blocks():
         if not left:
             break
         block = cover.pieces[rows]
-        every = np.stack([values(block, part) for part in _SAMPLES], axis=1)
+        every = np.stack([values(block, part) for part in parts], axis=1)
         for k, claim in list(left.items()):
             goal = goal_of(claim)
             least = (goal.limit or 0.0) - goal.slack
@@ -361,7 +371,7 @@ def _first_faults(
                 continue
             del left[k]
             row, sample = beyond[0].tolist()
-            piece, low, high = block[row : row + 1], _SAMPLES[max(sample - 1, 0)], _SAMPLES[sample]
+            piece, low, high = block[row : row + 1], parts[max(sample - 1, 0)], parts[sample]
             for _ in range(_STEPS if sample else 0):
                 middle = 0.5 * (low + high)
                 low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)

@@ -1,0 +1,282 @@
+"""Random programmed paths: proved claims attacked by dense samples of every segment, refuting points evaluated.
+
+    python bench/soundness/paths.py COUNT FIRST [JOURNAL]
+
+Two of three paths are those of straight legs, with arithmetic of ``legs.py``; the others those of robots of the gallery
+with that of ``robots.py``. Not judged are clearances of links, and what needs loads.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from campaign import Row, campaign, command
+from gallery import Sampled, limited, random_gallery
+from legs import Array, Legs, Poses, turned
+from randomcases import limited_legs, random_legs, text_of
+from workspaces import value_name
+
+Tables = dict[str, Any]
+Values = dict[str, Array]
+#: Points of each segment, of straight legs and of loops that are closed; steps of a descent; and the condition number
+#: from which on a pose counts as singular.
+POINTS, CLOSED, STEPS = 10_000, 300, 12
+SINGULAR = 1e9
+GALLERY = ("6-pus", "6-rss", "6-rus", "6-ups", "delta", "orthoglide", "planar-3-rrr", "planar-3-prr", "planar-3-rpr")
+PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
+
+
+class Segment(NamedTuple):
+    """A line, or an arc about a centre (2,) in a plane; angles are radians."""
+
+    start: Array
+    end: Array
+    plane: int = 0
+    centre: Array = np.zeros(2)
+    sweep: float = 0.0
+
+    def at(self, s: Array) -> Array:
+        """Return positions and angles (N, 6)."""
+        found = self.start + s[:, None] * (self.end - self.start)
+        if self.plane:
+            first, second, _ = PLANES[self.plane]
+            arm = self.start[[first, second]] - self.centre
+            angle = np.arctan2(arm[1], arm[0]) + s * self.sweep
+            found[:, first] = self.centre[0] + np.hypot(*arm) * np.cos(angle)
+            found[:, second] = self.centre[1] + np.hypot(*arm) * np.sin(angle)
+        return found
+
+    def line(self, scale: float) -> str:
+        """Return the words of a program."""
+        words = [f"{name}{value * scale!r}" for name, value in zip("XYZ", self.end[:3].tolist(), strict=True)]
+        words += [f"{name}{value!r}" for name, value in zip("ABC", np.degrees(self.end[3:]).tolist(), strict=True)]
+        if not self.plane:
+            return " ".join(["G1", *words])
+        first, second, _ = PLANES[self.plane]
+        arm = (self.centre - self.start[[first, second]]) * scale
+        offsets = [f"{'IJK'[axis]}{value!r}" for axis, value in zip((first, second), arm.tolist(), strict=True)]
+        turns = int(np.ceil(abs(self.sweep) / (2 * np.pi) - 1e-9))
+        return " ".join([f"G{self.plane}", "G3" if self.sweep > 0 else "G2", *words, *offsets, f"P{turns}"])
+
+
+def random_path(rng: np.random.Generator, start: Array, half: Array) -> list[Segment]:
+    """Return lines and arcs about a pose (6,), within some half ranges (6,) or a little more."""
+    found, here = list[Segment](), start.copy()
+    for _ in range(rng.integers(1, 6)):
+        end = start + half * rng.uniform(-1, 1, 6) * (rng.random(6) < 0.8)
+        plane, kind = int(rng.choice([17, 18, 19])), rng.random()
+        first, second, _ = PLANES[plane]
+        if kind < 0.5 or not (half[first] and half[second]):
+            found.append(Segment(here, end))
+        else:
+            radius, angle = min(half[first], half[second]) * rng.uniform(0.1, 0.8), rng.uniform(-np.pi, np.pi)
+            centre = here[[first, second]] - radius * np.array([np.cos(angle), np.sin(angle)])
+            is_full, turns = kind > 0.9, int(rng.integers(0, 3)) * (rng.random() < 0.3)
+            part = 2 * np.pi if is_full else rng.uniform(0.05, 2 * np.pi - 0.05)
+            sweep = float((part + 2 * np.pi * turns) * rng.choice([-1, 1]))
+            at = angle + sweep
+            end[[first, second]] = (
+                here[[first, second]] if is_full else centre + radius * np.array([np.cos(at), np.sin(at)])
+            )
+            found.append(Segment(here, end, plane, centre, sweep))
+        here = end
+    return found
+
+
+def poses_of(points: Array) -> Poses:
+    """Return the poses of positions and angles (N, 6)."""
+    about = [turned(np.broadcast_to(axis, (len(points), 3)), points[:, 3 + k]) for k, axis in enumerate(np.eye(3))]
+    return Poses(points[:, :3], about[2] @ about[1] @ about[0])
+
+
+def boxed(tables: Tables, path: list[Segment], unit: float) -> Tables:
+    """Return a case with the box of a path as its workspace, about which limits are chosen."""
+    points = np.concatenate([each.at(np.linspace(0, 1, 65)) for each in path])
+    low, high = points.min(axis=0), points.max(axis=0)
+    low[3:], high[3:] = low[3:] / unit, high[3:] / unit
+    ends = [{"min": a, "max": b} if b > a else a for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+    if not any(isinstance(each, dict) for each in ends):
+        ends[0] = {"min": ends[0], "max": ends[0] + 1e-9}
+    rotation = dict(zip(("roll", "pitch", "yaw"), ends[3:], strict=True))
+    return tables | {"workspace": {"position": ends[:3], "rotation": rotation}}
+
+
+def judged_path(tables: Tables, path: list[Segment], rng: np.random.Generator) -> tuple[Any, Row]:
+    """Return the result of ``path``, or None and the row of a seed without one."""
+    label = tables.get("units", {}).get("length", "m")
+    scale = {"m": 1000.0, "mm": 1.0, "in": 1.0}[label]
+    tables = tables | {"units": tables.get("units", {}) | {"length": label}}
+    begin = Segment(path[0].start, path[0].start)
+    lines = [f"{'G20' if label == 'in' else 'G21'} G90 G94 F100", begin.line(scale)]
+    lines += [each.line(scale) for each in path]
+    with tempfile.TemporaryDirectory() as folder:
+        case, program, out = (Path(folder) / name for name in ("case.toml", "part.ngc", "result.json"))
+        case.write_text(text_of(tables), encoding="utf-8")
+        program.write_text("\n".join([*lines, "M2", ""]), encoding="utf-8")
+        words = ["--time", str(rng.choice([8, 15])), "--gap", str(rng.choice([0.1, 0.01, 1e-3]))]
+        code, _, err = command("path", str(case), "--along", str(program), *words, "--json", str(out))
+        if out.exists():
+            return json.loads(out.read_text(encoding="utf-8")) | {"status": code}, {}
+    if code == 2:
+        return None, {"counts": {f"refused: {err.strip()[-60:]}": 1}, "faults": []}
+    return None, {"counts": {"failed": 1}, "faults": [err]}
+
+
+class Attack:
+    """Numbers at points of a path.
+
+    Args:
+        path: its segments.
+        values: returns numbers (N,) at poses, NaN where the robot has none, with the same random machine for a seed.
+        count: of points of each segment.
+        unit: radians of the case's unit of angles.
+    """
+
+    def __init__(self, path: list[Segment], values: Callable[[Poses, int], Values], count: int, unit: float) -> None:
+        self.path, self.numbers, self.unit = path, values, unit
+        self.s = np.linspace(0, 1, count)
+        self.sampled = [self.at(k, self.s, 1) for k in range(len(path))]
+
+    def at(self, k: int, s: Array, machine: int) -> Values:
+        return self.numbers(poses_of(self.path[k].at(s)), machine)
+
+    def largest(self, name: str, sign: float) -> float:
+        """Return the largest value times a sign, by a descent from the best samples; -inf without one."""
+        every = np.array([np.nan_to_num(sign * each[name], nan=-np.inf).max() for each in self.sampled])
+        k, best = int(np.argmax(every)), float(every.max())
+        middle = self.s[int(np.argmax(np.nan_to_num(sign * self.sampled[k][name], nan=-np.inf)))]
+        width = 2 * self.s[1]
+        for _ in range(STEPS):
+            s = np.clip(middle + width * np.linspace(-1, 1, 17), 0, 1)
+            found = np.nan_to_num(sign * self.at(k, s, 1)[name], nan=-np.inf)
+            middle, width = s[int(np.argmax(found))], width / 4
+            best = max(best, float(found.max()))
+        return best
+
+    def value(self, name: str, place: Tables) -> float:
+        """Return the number of the design at a place of a result."""
+        return float(self.at(place["segment"], np.array([place["parameter"]]), 0)[name][0])
+
+
+def judge(attack: Attack, result: Tables, label: str) -> tuple[Counter[str], list[str]]:
+    """Attack the claims of a result."""
+    counts, faults = Counter[str](), list[str]()
+    proved = True
+    for each in result["path"]["claims"]:
+        name, sense, outcome = each["name"], each.get("sense"), each["outcome"]
+        kind = re.split(r" limb|joint|actuator |:", name)[0] or "joint"
+        counts[f"{label}: {kind} {outcome}"] += 1
+        proved &= outcome == "proved" or (sense is not None and "limit" not in each)
+        if sense is None:
+            own = "regular" if name == "regular" else "constraints"
+            if own not in attack.sampled[0]:
+                continue
+            if outcome == "proved":
+                least = -attack.largest(own, -1.0)
+                dets = np.concatenate([values["det"] for values in attack.sampled]) if own == "regular" else np.ones(1)
+                signs = set(np.sign(dets[np.isfinite(dets)]).tolist())
+                if least < 1e-10 or len(signs) > 1:
+                    faults.append(f"{name} is proved, and the least singular value is {least:.2e}, signs {signs}")
+            elif outcome == "refuted" and not attack.value(own, each) < 1e-6:
+                faults.append(f"{name} is refuted, and the singular value there is {attack.value(own, each):.2e}")
+            continue
+        own = value_name(each | ({"key": 1} if "limit" in each else {}))
+        own = re.sub(r"(joint\.\S+?)(\.first|\.second)? joint .*", lambda m: m[1] + (m[2] or "").replace(".", " "), own)
+        sign, scale = 1.0 if sense == "max" else -1.0, attack.unit if each["unit"] in ("deg", "rad") else 1.0
+        if own.startswith(("actuator.stroke_max", "actuator.dead_length")) and "limb" in own:
+            lengths = [attack.largest(f"leg_length limb {name.split()[-1]}", way) for way in (1.0, -1.0)]
+            long, short = lengths[0], -lengths[1]
+            found = sign * (long - short if "stroke" in own else 2 * short - long)
+        elif own not in attack.sampled[0]:
+            counts[f"not judged: {re.sub('[0-9:+-]+', '', own)}"] += 1
+            continue
+        else:
+            found = attack.largest(own, sign)
+            # A condition number of a singular pose is rounding alone.
+            if each["segment"] is not None and abs(each["reached"]) < SINGULAR:
+                there = attack.value(own, each)
+                if not abs(there - each["reached"] * scale) <= 1e-6 * (abs(found) + 1e-2):
+                    faults.append(f"{name} {sense}: reached {each['reached']}, and {there / scale} there")
+            fault = each.get("fault")
+            if fault and not sign * (attack.value(own, fault) - each["limit"] * scale) > -1e-9 * abs(found):
+                faults.append(f"{name} {sense}: a fault of {fault['value']}, {attack.value(own, fault) / scale} there")
+        if outcome == "refuted" and not (each.get("fault") and sign * (each["reached"] - each["limit"]) > 0):
+            faults.append(f"{name} {sense}: refuted by {each['reached']} with the limit {each['limit']}")
+        slack = 1e-8 * (abs(found) + 1e-2) if np.isfinite(found) else 0.0
+        if each["bound"] is not None and found - sign * each["bound"] * scale > slack:
+            faults.append(f"{name} {sense}: bound {each['bound'] * scale:.12g}, sampled {sign * found:.12g}")
+        if outcome == "proved" and "limit" in each and found - sign * each["limit"] * scale > slack:
+            faults.append(f"{name} {sense}: proved within {each['limit'] * scale:.12g}, sampled {sign * found:.12g}")
+    if result["proved"] != proved or result["status"] != (0 if proved else 1):
+        faults.append(f"proved is {result['proved']}, exit status {result['status']}")
+    return counts, faults
+
+
+def of_legs(tables: Tables) -> Callable[[Poses, int], Values]:
+    """Return the numbers of straight legs; those of machine 1 are at the edge of the tolerance."""
+    legs, t = Legs(tables), tables.get("tolerance", {}).get("joint_centre", 0.0)
+    errors = np.random.default_rng(0).normal(size=(2, len(legs.names), 3))
+    errors *= t / np.linalg.norm(errors, axis=2, keepdims=True)
+    pairs = [f"leg_clearance limbs {a} and {b}" for k, a in enumerate(legs.names) for b in legs.names[k + 1 :]]
+
+    def values(poses: Poses, machine: int) -> Values:
+        found = legs.values(poses, *(machine * errors))
+        if "leg_clearance" in legs.limits:
+            found |= {name: legs.clearance(name, poses, *(machine * errors)) for name in pairs}
+        return found
+
+    return values
+
+
+def of_loops(sampled: Sampled) -> Callable[[Poses, int], Values]:
+    """Return the numbers of a robot of the gallery, of the design alone."""
+
+    def values(poses: Poses, _: int) -> Values:
+        found, inside = sampled.at_poses(poses, np.zeros((len(poses.p), *sampled.robot.points_array.shape)))
+        off = np.linalg.norm(sampled.poses.p - poses.p, axis=1) > 1e-7 * np.abs(sampled.robot.points_array).max()
+        found["det"] = found.get("locked sign", np.ones(len(off)))
+        found["regular"] = found["locked"][:, 5] / found["locked"][:, 0]
+        return {name: np.where(inside & ~off, each, np.nan) for name, each in found.items() if np.ndim(each) == 1}
+
+    return values
+
+
+def examine(seed: int) -> Row:
+    """Judge a random path, and attack what is claimed."""
+    rng = np.random.default_rng(seed)
+    if seed % 3:
+        tables = random_legs(rng)
+        unit, home = Legs(tables).unit, np.array([*tables["pose"]["position"], 0, 0, 0])
+        size, turn = rng.choice([0.02, 0.1, 0.4]) * home[2], np.radians(rng.choice([0, 4, 20, 80]))
+        path = random_path(rng, home, np.repeat([size, turn], 3))
+        tables = limited_legs(rng, boxed(tables, path, unit))
+        label, count = tables["robot"]["model"] + " with tolerance" * ("tolerance" in tables), POINTS
+        numbers = of_legs(tables)
+    else:
+        name = str(rng.choice(GALLERY))
+        tables, unit = random_gallery(rng, name), np.pi / 180
+        tables.pop("tolerance", None)
+        home = np.array([*tables["pose"]["position"], 0, 0, 0])
+        size = float(np.abs(Sampled(tables, rng).robot.points_array).max()) * rng.choice([0.01, 0.05, 0.15])
+        turns = 1.0 if name.startswith("6") else np.array([0, 0, 1.0]) if name.startswith("planar") else 0.0
+        flat = np.array([1, 1, 0.0]) if name.startswith("planar") else np.ones(3)
+        half = np.concatenate([size * flat, np.radians(rng.choice([3, 15])) * turns * np.ones(3)])
+        path = random_path(rng, home, half)
+        tables = limited(rng, boxed(tables, path, unit))
+        label, count, numbers = name, CLOSED, of_loops(Sampled(tables, rng))
+    result, row = judged_path(tables, path, rng)
+    if result is None:
+        return row
+    counts, faults = judge(Attack(path, numbers, count, unit), result, label)
+    return {"counts": counts, "faults": faults}
+
+
+if __name__ == "__main__":
+    campaign(examine)

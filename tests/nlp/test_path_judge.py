@@ -1,0 +1,304 @@
+"""Verdicts on programmed paths: hulls of pieces, and machines against kinematics of ours at dense samples."""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import Array, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
+from hypothesis import given
+from hypothesis import strategies as st
+from measures import circle_joints
+
+from screwsynth.nlp import Case, Outcome, judge_workspace
+from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.path.gcode import read_program
+from screwsynth.nlp.path.options import PathOptions
+from screwsynth.nlp.path.path import ProgrammedPath
+from screwsynth.nlp.path.poses_csv import read_poses
+from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
+from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, _covered, judge_path
+from screwsynth.nlp.units import Units
+
+Run = Callable[..., tuple[int, str, str]]
+#: Points of each segment at which machines are measured.
+SAMPLES = np.linspace(0, 1, 4001)
+#: A line with turns, a helix of two turns, an arc in each other plane and a dwell; about (0, 0, 20) in.
+TOUR = (
+    "G94 F60\nG1 X3 Y0 Z21 A2 C-3\nG3 X3 Y0 Z22 I-3 J0 P2 A0\nG18 G2 X0 Z25 K3 I0\nG4 P1\nG19 G3 Y3 Z22 J0 K-3 B4\nM2"
+)
+
+
+def program(text: str, units: Units, start: tuple[float, ...]) -> ProgrammedPath:
+    return read_program(text.split("\n"), "part.ngc", units, PathOptions(start=start))
+
+
+def table(case: Case, *rows: tuple[float, ...]) -> ProgrammedPath:
+    """A path through rows of x, y, z, roll, pitch, yaw."""
+    text = "\n".join(["x,y,z,roll,pitch,yaw", *(",".join(repr(float(each)) for each in row) for row in rows)])
+    return read_poses(text, "poses.csv", case.units, PathOptions())
+
+
+def points_of(path: ProgrammedPath, k: int, s: Array) -> Array:
+    """Positions and angles (N, 6) on a segment, from its arc's numbers alone."""
+    found = path.knots[k] + s[:, None] * (path.knots[k + 1] - path.knots[k])
+    if k in path.arc_segments:
+        arc, plane = path.arc_of(k)
+        first, second = {17: (0, 1), 18: (2, 0), 19: (1, 2)}[plane]
+        angle, radius = arc.angle + s * arc.sweep, arc.radius + s * arc.growth
+        found[:, first], found[:, second] = arc[0] + radius * np.cos(angle), arc[1] + radius * np.sin(angle)
+    return found
+
+
+def turn(points: Array) -> Array:
+    """Rotations Rz(C) Ry(B) Rx(A) (N, 3, 3)."""
+    (a, b, c), (d, e, f) = np.cos(points[:, 3:]).T, np.sin(points[:, 3:]).T
+    rows = [
+        [c * b, c * e * d - f * a, c * e * a + f * d],
+        [f * b, f * e * d + c * a, f * e * a - c * d],
+        [-e, b * d, b * a],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def lengths(points: Array) -> Array:
+    """Lengths (N, 6) of the hexapod's legs in closed form."""
+    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
+    spans = points[:, None, :3] + np.einsum("nij,kj->nki", turn(points), platform) - base
+    return np.asarray(np.linalg.norm(spans, axis=2))
+
+
+def extreme(judged: PathJudgement, name: str, sense: Sense) -> Extreme:
+    (found,) = (each for each in judged.extremes if (each.name, each.sense) == (name, sense))
+    return found
+
+
+def hexapod(limits: str = "") -> Case:
+    """LinuxCNC's hexapod, whose legs have these limits."""
+    return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": {"leg_length": limits} if limits else {}})
+
+
+@given(
+    st.tuples(*[st.floats(-9, 9)] * 6, *[st.floats(-140, 140)] * 6),
+    st.sampled_from([(17, "IJ"), (18, "KI"), (19, "JK")]),
+    st.tuples(st.floats(0.1, 9), st.floats(-math.pi, math.pi), st.floats(0.01, 6), st.integers(1, 4)),
+    st.lists(st.booleans(), max_size=60),
+    st.floats(0, 1),
+)
+def test_boxes_of_pieces_hold_their_points(
+    ends: tuple[float, ...],
+    plane: tuple[int, str],
+    arc: tuple[float, float, float, int],
+    halves: list[bool],
+    part: float,
+) -> None:
+    (code, letters), (radius, angle, sweep, turns) = plane, arc
+    first, second = {17: "XY", 18: "ZX", 19: "YZ"}[code]
+    place = dict(zip("XYZ", ends[:3], strict=True))
+    centre = [place[first] - radius * math.cos(angle), place[second] - radius * math.sin(angle)]
+    end = {first: centre[0] + radius * math.cos(angle + sweep), second: centre[1] + radius * math.sin(angle + sweep)}
+    words = [f"{x}{end[x]:.12f}" for x in end]
+    words += [f"{x}{c - place[y]:.12f}" for x, c, y in zip(letters, centre, (first, second), strict=True)]
+    words += [f"{x}{value:.12f}" for x, value in zip("ABC", ends[9:], strict=True)]
+    text = f"G21 G94 F60\nG{code} G3 {' '.join(words)} P{turns}\nG1 X{ends[3]:.9f} A{ends[6]:.9f}\nM2"
+    start = (*ends[:3], *ends[6:9])
+    path = program(text, Units("mm"), start)
+    cover = _covered(path)[0]
+    low, high = 0.0, 1.0
+    for is_upper in halves:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_upper else (low, middle)
+    for k in range(2):
+        lower, upper = cover.boxes(np.array([[k, low, high]]))
+        s = np.array([low, high, min(max(low + part * (high - low), low), high)])
+        y = points_of(path, k, s)
+        y[:, 3:] = np.tan(0.5 * y[:, 3:])
+        assert (np.minimum(y - lower, upper - y) >= 0).all()
+        assert (upper - lower <= 200 * turns * (high - low) * (1 + upper[:, 3:].max() ** 2) + 1e-9).any()
+    # Segments meet in a pose, so that loops can be followed from one to the next.
+    one, other = cover.boxes(np.array([[0, low, 1.0], [1, 0, high]]))
+    assert (one.max(axis=0) <= other.min(axis=0)).all()
+
+
+def test_legs_of_a_hexapod_on_lines_arcs_and_helices_are_those_of_dense_samples() -> None:
+    case = case_from({**shipped_tables("hexapod-linuxcnc"), "limits": {}})
+    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    judged = judge_path(case, path, gap=1e-3)
+    assert judged.is_proved
+    sampled = np.concatenate([lengths(points_of(path, k, SAMPLES)) for k in range(len(path))])
+    names = [each.name for each in judged.extremes if each.sense is Sense.MIN]
+    assert len(names) == 6
+    for k, name in enumerate(names):
+        shortest, longest = (extreme(judged, name, sense) for sense in (Sense.MIN, Sense.MAX))
+        for found, end, sign in ((shortest, sampled[:, k].min(), -1), (longest, sampled[:, k].max(), 1)):
+            assert sign * (found.bound - end) > -1e-9
+            assert sign * (found.bound - end) < 2e-3 * end
+            at = points_of(path, found.place.segment, np.array([found.place.parameter]))
+            assert lengths(at)[0, k] == pytest.approx(found.reached, rel=1e-12)
+
+
+def test_a_limit_is_refuted_in_the_first_line_that_leaves_it() -> None:
+    case = hexapod({"min": 17, "max": 33.5})
+    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    judged = judge_path(case, path)
+    beyond = [lengths(points_of(path, k, SAMPLES)).max(axis=1) > 33.5 for k in range(len(path))]
+    segment = next(k for k, each in enumerate(beyond) if each.any())
+    first = min(each.place for each in judged.faults.values())
+    assert first.segment == segment
+    assert first.parameter == pytest.approx(SAMPLES[np.argmax(beyond[segment])], abs=SAMPLES[1])
+    of_longest = [each for each in judged.extremes if each.sense is Sense.MAX]
+    sampled = np.concatenate([lengths(points_of(path, k, SAMPLES)) for k in range(len(path))])
+    assert [each.outcome is Outcome.REFUTED for each in of_longest] == (sampled.max(axis=0) > 33.5).tolist()
+    # Without time nothing is proved.
+    stopped = judge_path(hexapod({"max": 50}), path, time_limit=0)
+    assert {each.outcome for each in (*stopped.ranks, *stopped.extremes)} == {Outcome.OPEN}
+    assert not stopped.is_proved
+
+
+@pytest.mark.parametrize("text", ["G1 Z22", "G4 P1", "G1 X1"])
+@pytest.mark.parametrize("yaw", [0.0, 30.0])
+def test_a_path_along_one_coordinate_or_none(text: str, yaw: float) -> None:
+    case = hexapod({"min": 17, "max": 43})
+    path = program(f"G94 F60\n{text}\nM2", case.units, (0, 0, 20, 0, 0, yaw))
+    judged = judge_path(case, path)
+    assert judged.is_proved
+    sampled = lengths(points_of(path, 0, SAMPLES))
+    for k, found in enumerate(each for each in judged.extremes if each.sense is Sense.MIN):
+        assert 17 <= found.bound <= sampled[:, k].min() + 1e-9
+
+
+def test_a_singular_pose_is_crossed_and_all_of_a_line_is_singular() -> None:
+    # The octahedral platform is singular where it is turned by a right angle.
+    case = hexapod()
+    crossed = judge_path(case, table(case, (0, 0, 20, 0, 0, 50), (0, 0, 20, 0, 0, 60), (1, 0, 21, 0, 0, 110))).ranks[0]
+    assert crossed.outcome is Outcome.REFUTED
+    assert crossed.place.segment == 1
+    assert crossed.place.parameter == pytest.approx(0.6, abs=1e-9)
+    whole = judge_path(case, table(case, (0, 0, 20, 0, 0, 90), (1, 0, 21, 0, 0, 90))).ranks[0]
+    assert whole.outcome is Outcome.REFUTED
+
+
+def triangle(radius: float, azimuth: float) -> Array:
+    angles = np.radians(azimuth) + 2 * np.pi / 3 * np.arange(3)
+    return radius * np.stack([np.cos(angles), np.sin(angles)], 1)
+
+
+def rpr_determinant(x: float, y: Array) -> Array:
+    """Determinants (N,) of the legs of a planar 3-RPR robot that is not turned, as vectors of any length."""
+    base, d = triangle(1.0, 0), np.stack(np.broadcast_arrays(x, y), 1)[:, None] + triangle(0.35, 60) - triangle(1.0, 0)
+    moments = base[:, 0] * d[:, :, 1] - base[:, 1] * d[:, :, 0]
+    return np.asarray(np.linalg.det(np.concatenate([d, moments[:, :, None]], 2)))
+
+
+def test_a_singular_pose_is_touched_between_samples_without_a_change_of_sign() -> None:
+    tables = starter_tables("planar-3-rpr")
+    tables["robot"]["parameters"]["rb"] = 1.0
+    case = case_from(tables | {"limits": {}})
+
+    def extreme_at(x: float) -> tuple[float, float]:
+        """The y at which the determinant, a quadratic along a line, is extreme, and its value there."""
+        a, b, c = np.polyfit([-1.0, 0.0, 1.0], rpr_determinant(x, np.array([-1.0, 0.0, 1.0])), 2)
+        return -b / (2 * a), c - b * b / (4 * a)
+
+    # Singular poses without a turn lie on a circle, and this line is a tangent far from legs without length.
+    low, high = 0.0, -3.0
+    assert extreme_at(low)[1] * extreme_at(high)[1] < 0
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if extreme_at(middle)[1] * extreme_at(low)[1] > 0 else (low, middle)
+    y, _ = extreme_at(low)
+    values = rpr_determinant(low, np.linspace(y - 0.1234, y + 0.2, 324))
+    assert (values > 0).all() or (values < 0).all()
+    judged = [
+        judge_path(case, table(case, (x, y - 0.1234, 0, 0, 0, 0), (x, y + 0.2, 0, 0, 0, 0)))
+        for x in (low, low + 1e-4, low - 1e-4)
+    ]
+    touched, *beside = (each.ranks[0] for each in judged)
+    assert touched.outcome is Outcome.REFUTED
+    assert touched.pose.position[1] == pytest.approx(y, abs=1e-6)
+    # On one side the determinant changes its sign twice, on the other nowhere.
+    assert {each.outcome for each in beside} == {Outcome.PROVED, Outcome.REFUTED}
+
+
+def test_cranks_of_a_delta_are_those_of_its_closed_form() -> None:
+    tables = starter_tables("delta")
+    tables["robot"]["parameters"]["rb"] = rb = 0.164
+    case = case_from(tables | {"limits": {"actuator_angle": {"max": 60}}})
+    rows = [(0, 0, -1.2), (0.1, 0.05, -1.1), (-0.2, 0.1, -1.0), (-0.2, 0.1, -1.0005)]
+    path = table(case, *((*row, 0, 0, 0) for row in rows))
+    judged = judge_path(case, path)
+    assert judged.is_proved
+    p = np.concatenate([points_of(path, k, SAMPLES) for k in range(3)])[:, :3]
+    for k in range(3):
+        c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
+        # From the motor to the joints on the platform, in the limb's frame: |v - 0.524 (cos t, 0, -sin t)| = 1.244.
+        v = np.stack([c * p[:, 0] + s * p[:, 1] + 0.044 - rb, c * p[:, 1] - s * p[:, 0], p[:, 2]], 1)
+        reach, size = ((v**2).sum(1) + 0.524**2 - 1.244**2) / (2 * 0.524), np.hypot(v[:, 0], v[:, 2])
+        angles = np.arctan2(-v[:, 2], v[:, 0]) - np.arccos(reach / size) - math.radians(20)
+        for sense, end in ((Sense.MIN, angles.min()), (Sense.MAX, angles.max())):
+            found = extreme(judged, f"actuator_angle limb {k + 1}", sense)
+            assert sense.sign * (found.bound - end) > -1e-9
+            assert found.reached == pytest.approx(end, abs=2e-3)
+
+
+def test_slides_of_a_robot_with_loops_are_followed_along_its_path() -> None:
+    tables = starter_tables("planar-3-prr")
+    tables["robot"]["parameters"]["rb"] = 1.0
+    case = case_from(tables | {"limits": {"actuator_length": {"min": -0.3, "max": 0.3}}})
+    path = table(case, (0, 0, 0, 0, 0, 0), (0.1, 0.05, 0, 0, 0, 5), (0.1, 0.1, 0, 0, 0, -5))
+    judged = judge_path(case, path)
+    assert judged.is_proved
+    points = np.concatenate([points_of(path, k, SAMPLES) for k in range(2)])
+    hinges = points[:, None, :2] + np.einsum("nij,kj->nki", turn(points)[:, :2, :2], triangle(0.35, 60))
+    for k in range(3):
+        c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
+        a, b = c * hinges[:, k, 0] + s * hinges[:, k, 1], c * hinges[:, k, 1] - s * hinges[:, k, 0]
+        # The first point is home, where the slide is at -0.3 of its rail.
+        slides = b - np.sqrt((a[0] - 1) ** 2 + (b[0] + 0.3) ** 2 - (a - 1) ** 2) + 0.3
+        assert slides[0] == pytest.approx(0, abs=1e-12)
+        for sense, end in ((Sense.MIN, slides.min()), (Sense.MAX, slides.max())):
+            found = extreme(judged, f"actuator_length limb {k + 1}", sense)
+            assert sense.sign * (found.bound - end) > -1e-9
+            assert sense.sign * (end - found.reached) > -1e-9
+
+
+@pytest.mark.parametrize("tolerance", [None, 1e-3])
+def test_every_limit_of_a_case_is_a_claim(tolerance: float | None) -> None:
+    tables = shipped_tables("hexapod-linuxcnc")
+    tables["limits"] = {
+        "leg_length": {"min": 17, "max": 43}, "actuator": {"stroke_max": 12, "dead_length": 10},
+        "base_joint_angle": {"max": 60}, "platform_joint_angle": {"max": 80}, "rate_share": {"max": 0.9},
+        "actuator_rate": {"max": 3}, "leg_clearance": {"min": 0.1}, "condition_number": {"max": 50, "length": 10},
+        "smallest_singular_value": {"min": 0.01, "length": 10}, "footprint": {"base": 27, "platform": 12},
+        "joint_spacing": {"min": 0.5}, "radius_ratio": {"min": 0.1, "max": 0.9}, "custom": ["p_x^2 + p_y*p_z <= 90"],
+    }  # fmt: skip
+    tables["tolerance"] = {"joint_centre": tolerance} if tolerance else {"joint_centre": 0.0}
+    if not tolerance:
+        del tables["tolerance"]
+    judged = judge_path(case_from(tables), table(hexapod(), (0, 0, 20, 0, 0, 0), (0.5, 0, 20.5, 0, 2, 0)))
+    expected = judge_workspace(judged.case, workspace=judged.case.workspace, time_limit=0, with_objective=False)
+    limited = {(each.name, each.sense, each.limit) for each in expected.extremes if each.limit is not None}
+    assert limited == {(each.name, each.sense, each.limit) for each in judged.extremes if each.limit is not None}
+    assert {each[0].split()[0].partition(".")[0] for each in limited} >= {"leg_clearance", "actuator", "footprint"}
+
+
+def test_the_command_writes_a_result_and_says_how_it_ended(cli: Run, tmp_path: Path) -> None:
+    part, out = tmp_path / "part.ngc", tmp_path / "path.json"
+    saved(part, f"G90 G0 X0 Y0 Z20 A0 B0 C0\n{TOUR}\n")
+    shown = output_of(cli("path", "hexapod-linuxcnc", "--along", str(part), "--json", str(out)))
+    assert "everything is proved at every point" in shown
+    result = json.loads(out.read_text())
+    assert result["proved"]
+    assert len(result["path"]["claims"]) == 13
+    code, shown, _ = cli(
+        "path", "hexapod-linuxcnc", "--along", str(part), "--set", "limits.leg_length.max=31.5", "--json", str(out)
+    )
+    assert code == 1
+    assert "first fault line 3" in " ".join(shown.split())
+    refuted = [each for each in json.loads(out.read_text())["path"]["claims"] if each["outcome"] == "refuted"]
+    assert min(each["fault"]["line"] for each in refuted) == 3
+    refusal_of(cli("path", "hexapod-linuxcnc", "--along", str(tmp_path / "none.ngc")), "none.ngc")
+    saved(part, "G1 X0 C150\nM2\n")
+    refusal_of(cli("path", "hexapod-linuxcnc", "--along", str(part)), "part.ngc")
