@@ -72,6 +72,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "workspace": ("fixed.toml", "--gap", "0.2", "--json", "out.json", "--proof", "out.proof"),
     "check": ("small.toml", "fixed.toml", "--json", "out.json", "--junit", "out.xml"),
     "evaluate": ("fixed.toml", "--json", "out.json"),
+    "inverse": ("fixed.toml", "--poses", "given.csv", "--csv", "out.csv"),
     "codegen": ("small.toml", "--no-measure", "--out", "folder"),
     "export": ("small.toml", "--format", "csv", "--out", "folder"),
     "models": (),
@@ -112,7 +113,9 @@ def key_at_call(n: int) -> Iterator[list[int]]:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    for name, text in (("small.toml", SMALL), ("fixed.toml", FIXED), ("model.xml", reachy.mjcf())):
+    poses = "x,y,z\n0,0,30\n"
+    texts = (("small.toml", SMALL), ("fixed.toml", FIXED), ("model.xml", reachy.mjcf()), ("given.csv", poses))
+    for name, text in texts:
         (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path
 
