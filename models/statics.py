@@ -22,6 +22,7 @@ from typing import NamedTuple
 import casadi as ca
 from casadi import SX
 
+from .actuation import rates_expression
 from .instance import RobotInstance
 from .model import Model
 from .parts import Dimension
@@ -137,14 +138,43 @@ def statics_of(model: Model, jacobian: SX, driven: SX, position: SX) -> Statics:
         driven: (m, a) that of the instance, or numbers.
         position: (3, 1) origin of the platform frame in the world frame, length.
     """
-    force, moment = jacobian[:, :3], jacobian[:, 3:]
-    about_origin = moment - ca.horzcat(*[ca.cross(position, each.T) for each in ca.vertsplit(force)]).T
-    rows = ca.horzcat(about_origin, force)
+    rows = rows_about(jacobian, position)
     driven = driven if model.actuators else _of_legs(model)
     factors = _factors(rows.T @ rows)
     motions = _solved(factors, rows.T @ driven)
     motions += _solved(factors, rows.T @ (driven - rows @ motions))
     return Statics(motions, SX(1), rows, driven, factors)
+
+
+def rows_about(jacobian: SX, position: SX) -> SX:
+    """Return rows (m, 6) for motions of the platform: moment about its origin (3, 1), then force."""
+    force, moment = jacobian[:, :3], jacobian[:, 3:]
+    return ca.horzcat(moment - ca.horzcat(*[ca.cross(position, each.T) for each in ca.vertsplit(force)]).T, force)
+
+
+def inverse_rates(model: Model, robot: RobotInstance) -> SX:
+    """Return the rates (a, 6) of all actuators by the platform's angular velocity and its origin's velocity.
+
+    They are the least squares solution of ``D qdot = J chi`` for each limb, which is exact in every motion that the
+    platform can make. Unlike :meth:`Statics.rates` it also exists where J is singular, and for any number of actuators.
+
+    Args:
+        model: the robot.
+        robot: the robot at a pose.
+    """
+    rows, joints = rows_about(robot.jacobian, robot.position), driven_joints(model)
+    driven, relations = (robot.driven, robot.relations) if model.actuators else (_of_legs(model), SX(0, len(joints)))
+    found = SX(len(joints), 6)
+    for limb in dict.fromkeys(each.limb for each in joints):
+        own = [k for k, each in enumerate(joints) if each.limb == limb]
+        at = [k for k, row in enumerate(model.frame_rows) if row.limb == limb]
+        found[own, :] = rates_expression(driven[at, own], _without_zeros(relations[:, own]), rows[at, :])
+    return found
+
+
+def _without_zeros(relations: SX) -> SX:
+    """Return the relations (r, a) that a limb's actuators have a part in."""
+    return relations[[k for k in range(relations.shape[0]) if not relations[k, :].is_zero()], :]
 
 
 def posed_statics(model: Model, robot: RobotInstance) -> Statics:

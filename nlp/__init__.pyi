@@ -35,8 +35,10 @@ from .case.pose import Pose as Pose
 from .case.pose import Rotation as Rotation
 from .case.pose import along_screw as along_screw
 from .case.pose import over_grid as over_grid
+from .case.reader import PoseRows as PoseRows
 from .case.reader import case_from_tables as case_from_tables
 from .case.reader import load_case as load_case
+from .case.reader import read_poses as read_poses
 from .case.robots import build_model as build_model
 from .case.settings import Expectation as Expectation
 from .case.settings import Published as Published
@@ -64,6 +66,8 @@ from .errors import EvaluationError as EvaluationError
 from .errors import InputError as InputError
 from .errors import ScrewsynthError as ScrewsynthError
 from .errors import UncoveredError as UncoveredError
+from .evidence.inverse import InversePoses as InversePoses
+from .evidence.inverse import inverse as inverse
 from .evidence.margins import Margin as Margin
 from .evidence.margins import margins_of as margins_of
 from .evidence.optimality import ActiveSide as ActiveSide

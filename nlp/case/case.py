@@ -128,6 +128,24 @@ class Case(Whole, Shown):
         values = self.parameters[name]
         return tuple(values) if isinstance(values, Sequence) else (values,)
 
+    def fixed_parameters(self, reason: str) -> FloatArray:
+        """Return the values (d,) of all components of the robot's parameters, in its order.
+
+        Args:
+            reason: why they must be fixed, as a clause.
+
+        Raises:
+            CaseError: one is free.
+        """
+        found: list[float] = []
+        for item in self.model.parameters:
+            values = [value for value in self.components(item.name) if not isinstance(value, Free)]
+            if len(values) < len(item.typical):
+                fault = f"is free, and {reason}: give it with --set, or a result with --of"
+                raise CaseError(f"robot.parameters.{item.name}", fault, source=self.source)
+            found += values
+        return np.array(found, dtype=np.float64)
+
     def parameter_name(self, name: str) -> str:
         """Return the name of a parameter, or of one of its components, in this case; see :mod:`.names`.
 

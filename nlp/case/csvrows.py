@@ -18,6 +18,8 @@ from ..errors import CaseError, InputError, listing, nearest
 
 #: Largest size of a file, bytes, and the largest number of its rows: what is larger is no trajectory of a case.
 _MOST_BYTES, _MOST_ROWS = 4_000_000, 1_000
+#: The same where poses are no part of a case, and nothing is optimised.
+_MOST_BYTES_APART, _MOST_ROWS_APART = 256_000_000, 1_000_000
 
 #: Columns of one number of a table, or of several that stand or lack together, by key within the table.
 _Columns = Mapping[str, tuple[str, ...]]
@@ -167,18 +169,36 @@ def insert_rows(tables: dict[str, Any], folder: Path) -> TableOrigins:
     return TableOrigins(sources)
 
 
-def _read_rows(file: str, folder: Path, kind: RowKind, name: str) -> tuple[list[dict[str, Any]], _Source]:
+def pose_tables(file: str, option: str) -> tuple[list[dict[str, Any]], TableOrigins, tuple[int, ...]]:
+    """Return the tables of the poses of a file that no case names, where they come from, and the number of each row.
+
+    Args:
+        file: its name.
+        option: that names it, for messages.
+
+    Raises:
+        CaseError: the file cannot be read, or has a fault.
+        InputError: the file is no table at all.
+    """
+    most = _MOST_BYTES_APART, _MOST_ROWS_APART
+    tables, source = _read_rows(file, Path(), POSE_ROWS, option, *most)
+    return tables, TableOrigins({"pose": source}), source.rows
+
+
+def _read_rows(
+    file: str, folder: Path, kind: RowKind, name: str, most_bytes: int = _MOST_BYTES, most_rows: int = _MOST_ROWS
+) -> tuple[list[dict[str, Any]], _Source]:
     """Return the tables of a file's rows, and where they come from.
 
     Raises:
         CaseError: the file cannot be read, or has a fault.
         InputError: the file is no table at all.
     """
-    records = list(csv_rows(_text_of(folder / file, file, name), file))
+    records = list(csv_rows(_text_of(folder / file, file, name, most_bytes), file))
     if len(records) < 2:
         raise InputError(f"{file}: has no rows below a row that names the columns")
-    if len(records) - 1 > _MOST_ROWS:
-        raise InputError(f"{file}: has {len(records) - 1} rows, of which at most {_MOST_ROWS} are allowed")
+    if len(records) - 1 > most_rows:
+        raise InputError(f"{file}: has {len(records) - 1} rows, of which at most {most_rows} are allowed")
     (top, header), *body = records
     columns = check_header(header, kind, lambda fault: CaseError(f"row {top}", fault, source=file))
     tables = [_table_of(number, record, header, columns, kind, file) for number, record in body]
@@ -223,7 +243,7 @@ def number_in(text: str, row: int, column: str, file: str) -> float:
         raise CaseError(f"row {row}, column {column}", fault, text or None, file) from None
 
 
-def _text_of(path: Path, file: str, name: str) -> str:
+def _text_of(path: Path, file: str, name: str, most: int) -> str:
     """Return the text of a file.
 
     Raises:
@@ -231,9 +251,9 @@ def _text_of(path: Path, file: str, name: str) -> str:
     """
     try:
         with path.open("rb") as stream:
-            content = stream.read(_MOST_BYTES + 1)
-        if len(content) > _MOST_BYTES:
-            raise CaseError(name, f"is larger than {_MOST_BYTES // 1_000_000} MB", file)
+            content = stream.read(most + 1)
+        if len(content) > most:
+            raise CaseError(name, f"is larger than {most // 1_000_000} MB", file)
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise CaseError(name, "cannot be read: it is not UTF-8 text", file) from None

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 #: Largest distance of a matrix from an orthogonal one, in a component of ``R' R``, and of a quaternion's size from 1:
 #: more than numbers with seven decimals leave, and far less than a slip of the pen.
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 #: Largest angle of a rotation about a free axis. Its variables are a quaternion's vector part, which is a smooth
 #: function of the rotation below half a turn only.
 MAX_FREE_ROTATION = math.radians(179)
@@ -200,7 +200,7 @@ def rotation_from_matrix(matrix: ArrayLike, key: str) -> AxisAngle:
     rows = _numbers(matrix, (3, 3), key, "three rows of three finite numbers")
     with np.errstate(over="ignore", invalid="ignore"):
         error = float(np.max(np.abs(rows.T @ rows - np.eye(3))))
-    if not error <= _ROUNDING:
+    if not error <= ROUNDING:
         fault = "must be orthogonal: its columns must be unit vectors at right angles"
         raise CaseError(key, f"{fault}, and R' R differs from the unit matrix by {error:.3g}")
     if np.linalg.det(rows) < 0:
@@ -222,7 +222,7 @@ def rotation_from_quaternion(quaternion: ArrayLike, key: str) -> AxisAngle:
     """
     parts = _numbers(quaternion, (4,), key, "four finite numbers: w, x, y, z")
     size = math.hypot(*parts.tolist())
-    if not abs(size - 1) <= _ROUNDING:
+    if not abs(size - 1) <= ROUNDING:
         raise CaseError(key, f"must be a unit quaternion (w, x, y, z): its size is {size:.7g}", parts.tolist())
     sign = -1.0 if parts[0] < 0 else 1.0
     sine = math.hypot(*parts[1:].tolist())

@@ -7,13 +7,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from pydantic import ValidationError
 
-from ...models import Dimension
+from ...models import Dimension, FloatArray, unit_vector
 from ..errors import CaseError
 from ..units import Units
 from .case import Case
-from .csvrows import TableOrigins, insert_rows
+from .checks import check_direction
+from .csvrows import TableOrigins, insert_rows, pose_tables
 from .displacements import read_displacements
 from .limits.limits import Limits
 from .overrides import Settings, override_number
@@ -22,13 +24,14 @@ from .pose import (
     Pose,
     Rotation,
     Value,
+    ends_of,
     internal_value,
     rotation_from_matrix,
     rotation_from_quaternion,
     rotation_from_rpy,
 )
 from .robots import insert_robot_file, model_of_table
-from .schema import Document, ExpectTable, PublishedTable, Range, RotationTable, TaskTable
+from .schema import Document, ExpectTable, PoseTable, PublishedTable, Range, RotationTable, TaskTable
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, read_text, tables_of
 from .table import case_error
@@ -75,6 +78,63 @@ def read_case(name: str, settings: Settings | None = None) -> CaseFile:
     inputs = inputs_of(path, tables)  # the names of files leave the tables when a case is made of these
     case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
     return CaseFile(case, text if len(inputs) == 1 and not settings else toml_document(tables), inputs)
+
+
+class PoseRows(NamedTuple):
+    """Poses of a CSV file.
+
+    Attributes:
+        positions: (N, 3) origins of the platform frame in the world frame, length.
+        rotations: (N, 3, 3) platform to world coordinates.
+        rows: (N,) number of each row in the file, as a spreadsheet counts.
+    """
+
+    positions: FloatArray
+    rotations: FloatArray
+    rows: tuple[int, ...]
+
+
+def read_poses(file: str, units: Units, option: str = "poses") -> PoseRows:
+    """Return the poses of a CSV file that stands apart from a case; its columns are those of a case's ``poses``.
+
+    Args:
+        file: name of the file.
+        units: of its numbers.
+        option: that names it, for messages.
+
+    Raises:
+        InputError: the file cannot be read, or holds a fault.
+    """
+    tables, origins, rows = pose_tables(file, option)
+    positions, rotations = np.zeros((len(tables), 3)), np.zeros((len(tables), 3, 3))
+    try:
+        for k, table in enumerate(tables):
+            written = _pose_table(table, k)
+            positions[k] = [ends_of(internal_value(part, units, Dimension.LENGTH))[0] for part in written.position]
+            rotation = _rotation(written.rotation, units, f"pose[{k}]")
+            axis, angle = rotation.axis, rotation.angle
+            if axis is None:
+                raise CaseError(f"pose[{k}].rotation.axis", "is missing: the axis of a given pose is fixed")
+            rotations[k] = _matrix(unit_vector(check_direction(axis, f"pose[{k}].rotation.axis")), ends_of(angle)[0])
+    except CaseError as error:
+        raise (error if error.source else origins.error_in(error, file)) from None
+    return PoseRows(positions, rotations, rows)
+
+
+def _pose_table(table: dict[str, Any], index: int) -> PoseTable:
+    """Return a pose as a table of the schema; errors are those of :func:`_parse`."""
+    try:
+        return PoseTable.model_validate(table)
+    except ValidationError as error:
+        fault = case_error(error.errors(include_url=False)[0])
+        raise CaseError(f"pose[{index}].{fault.key}", fault.fault, fault.value) from None
+
+
+def _matrix(axis: FloatArray, angle: float) -> FloatArray:
+    """Return the rotation (3, 3) about a unit axis (3,), radians."""
+    x, y, z = axis.tolist()
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
 
 
 def case_from_tables(

@@ -26,6 +26,7 @@ SUMMARIES = {
     "path": "Prove regular poses and limits at every point of a path.",
     "check": "Compare cases with their expected and published values.",
     "evaluate": "Show F, J, rank and rates at one point.",
+    "inverse": "Compute positions of actuators and joints at many poses.",
     "codegen": "Write F and its derivatives as C for embedding.",
     "export": "Write the solved robot as MJCF, URDF, CSV or DXF.",
     "models": "List the robots, or show one in full.",

@@ -170,6 +170,11 @@ def unknowns_from_home(model: Model, parameters: FloatArray, pose: FloatArray) -
     return _follow(model, parameters, pose)[0]
 
 
+def home_position(model: Model, parameters: FloatArray) -> FloatArray:
+    """Return the position (3,) of the platform at the home of a robot with parameters (k,), at this robot's size."""
+    return np.array(model.home) * _path_of(model).factor(parameters)
+
+
 def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[FloatArray | None, float]:
     """Return the unknowns (u,) at the end of the path from home, None where it ends early, and the nearness on it."""
     path = _path_of(model)

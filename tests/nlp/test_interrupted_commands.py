@@ -73,6 +73,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "path": ("fixed.toml", "--along", "path.csv", "--json", "out.json", "--csv", "out.csv"),
     "check": ("small.toml", "fixed.toml", "--json", "out.json", "--junit", "out.xml"),
     "evaluate": ("fixed.toml", "--json", "out.json"),
+    "inverse": ("fixed.toml", "--poses", "given.csv", "--csv", "out.csv"),
     "codegen": ("small.toml", "--no-measure", "--out", "folder"),
     "export": ("small.toml", "--format", "csv", "--out", "folder"),
     "models": (),
@@ -117,7 +118,13 @@ def key_at_call(n: int) -> Iterator[list[int]]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     along = "x,y,z\n0,0,29.5\n0.4,0,30\n0,0.1,30.5\n"
-    texts = {"small.toml": SMALL, "fixed.toml": FIXED, "model.xml": reachy.mjcf(), "path.csv": along}
+    texts = {
+        "small.toml": SMALL,
+        "fixed.toml": FIXED,
+        "model.xml": reachy.mjcf(),
+        "path.csv": along,
+        "given.csv": "x,y,z\n0,0,30\n",
+    }
     for name, text in texts.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path

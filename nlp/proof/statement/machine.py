@@ -57,12 +57,7 @@ def workspace_of_case(case: Case) -> Workspace:
     """
     if case.workspace is None:
         raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
-    for name in case.parameters:
-        if any(isinstance(value, Free) for value in case.components(name)):
-            fault = (
-                "is free, and a workspace is judged with fixed dimensions: give it with --set, or a result with --of"
-            )
-            raise CaseError(f"robot.parameters.{name}", fault, source=case.source)
+    case.fixed_parameters("a workspace is judged with fixed dimensions")
     return case.workspace
 
 

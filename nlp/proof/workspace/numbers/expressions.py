@@ -18,10 +18,10 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from .....models.arrays import FloatArray, values_at
+from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
 from ..ranks.krawczyk import ROUNDING, by_centres
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.closed_loops import inverses
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 

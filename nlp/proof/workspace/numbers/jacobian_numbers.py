@@ -33,10 +33,10 @@ import numpy as np
 from casadi import SX
 
 from .....models.arrays import FloatArray, values_at
+from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
 from ...statement.machine import LEGS, Legs
 from ..ranks.krawczyk import by_centres
-from ..robot.closed_loops import inverses
 from ..robot.posed_robot import Problem
 from .bound_search import Bounds, Number
 

@@ -24,9 +24,9 @@ import numpy as np
 from casadi import SX
 
 from .....models import Dimension, FloatArray
+from ....evidence.closed_loops import Loops
 from ...statement.claims import ERRORS
 from ...statement.machine import Legs
-from ..robot.closed_loops import Loops
 from ..robot.pose_box import PoseNumbers, cayley_rotation
 from .bound_search import Goal, Minimum, smallest_values
 from .extremes import Extreme, extreme_of

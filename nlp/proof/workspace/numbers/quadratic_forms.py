@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .....models import FloatArray
+from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms, QuadraticModel
 from ..ranks.krawczyk import ROUNDING, by_centres
-from ..robot.closed_loops import inverses
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

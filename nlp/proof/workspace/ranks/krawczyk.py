@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from .....models import FloatArray
+from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Forms
-from ..robot.closed_loops import inverses
 
 #: Part of the sum of the sizes of all terms by which a computed product may be off: products here have fewer than 400
 #: terms, each with a rounding of 2^-53.

@@ -18,11 +18,11 @@ from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import first_largest
+from ....evidence.closed_loops import inverses
 from ...boxes.engine import MOST_VARIABLES
 from ...boxes.search import Boxes, Order, Rule, Search, bisected, joined, some
 from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Encloser, Forms
-from ..robot.closed_loops import inverses
 from ..robot.path_cover import PathCover
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem

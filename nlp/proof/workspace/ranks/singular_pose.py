@@ -29,9 +29,9 @@ import numpy as np
 
 from .....models import FloatArray, frozen_array
 from .....models.arrays import first_largest, values_at
+from ....evidence.closed_loops import inverses
 from ...enclosure.forms import Encloser
 from ...statement.machine import JointErrors
-from ..robot.closed_loops import inverses
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
 from .krawczyk import ROUNDING

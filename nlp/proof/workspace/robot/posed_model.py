@@ -36,7 +36,7 @@ from .....models.instance import homogenised, sizes_at
 from .....models.member import scaled_twists
 from ....case.case import Case
 from ....case.pose import Free
-from .closed_loops import Loops
+from ....evidence.closed_loops import Loops
 from .pose_box import PoseBox, polynomial_rotation, rotation_of
 
 

@@ -21,9 +21,9 @@ from .....models import FloatArray, Model, frozen_array
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
+from ....evidence.closed_loops import DEPENDENT, Loops, closed_from_home
 from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
-from .closed_loops import DEPENDENT, Loops, closed_from_home
 from .path_cover import PathCover
 from .pose_box import PoseBox
 from .posed_model import Chosen, PosedModel, RankMatrix, posed_model

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from .....models.arrays import FloatArray, values_at
+from ...models.arrays import FloatArray, values_at
 
 #: Largest residual of a closed loop; equations are of order 1, and Newton's method ends at rounding.
 _CLOSED = 1e-10

@@ -1,0 +1,340 @@
+"""Inverse kinematics of a machine at many poses: positions of all joints, J and rates of the actuators, as arrays.
+
+Unknowns that limbs have in closed form are expressions of the pose. The others are followed, for many poses at once,
+along paths of the pose: from home's assembly, or from the pose before. Newton's method closes the loops at each step of
+a path, from joints that are extrapolated. Where it corrects these by more than a little, it may have found another
+assembly, and the steps are made shorter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import Dimension, FloatArray, Substitution, axis_angle_from_matrix
+from ...models.arrays import values_at
+from ...models.instance import instantiate
+from ...models.joints.closedform import closed_form
+from ...models.parts import Quantity
+from ...models.rows import independent_rows
+from ...models.statics import driven_joints, inverse_rates, rows_about
+from ..case.case import Case
+from ..case.pose import ROUNDING
+from ..errors import InputError
+from .assembly import home_position, unknowns_from_home
+from .closed_loops import DEPENDENT, Loops
+from .state import CLOSED, ZERO_SINGULAR_VALUE
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+#: Poses that are worked on at once: what they need stays in a processor's cache.
+_BLOCK = 256
+#: Numbers of a pose: the rotation column after column, then the position.
+_POSE = 12
+#: Ways along a path: number of its steps, and the largest correction of an unknown of order 1 in a step, beyond the
+#: extrapolation of the steps before. The last one is that of :mod:`.assembly`, beyond which a step is a jump.
+_WAYS = ((4, 0.2), (16, 0.1), (64, 0.05))
+#: Between poses that follow each other, one step is tried first.
+_NEXT = ((1, 0.05), *_WAYS)
+#: Number of the given poses from which home's assembly is sought, where the machine has not home's own pose.
+_REFERENCES = 8
+#: Part of the largest determinant of J'J by which its rank is 6 for sure: the smallest singular value is then at least
+#: 1e-6 of the largest. Below, singular values are computed.
+_REGULAR = 1e-10
+#: Quantities that are the positions of actuators.
+_MEASURES = ("actuator_angle", "actuator_length")
+
+
+@dataclass(frozen=True, eq=False)
+class InversePoses:
+    """Joints, J and rates of a machine at N poses; NaN at poses that are not closed. Angles are radians.
+
+    Attributes:
+        actuators: (a,) names of the actuators.
+        measures: (a,) the quantity that each coordinate is: ``leg_length``, the distance between a leg's joints, of
+            robots given by their rows; ``actuator_angle`` or ``actuator_length``, away from home, of others.
+        joints: (u,) names of the passive joints' positions that are unknowns of the robot.
+        coordinates: (N, a) of the actuators, radians or length.
+        unknowns: (N, u) positions of these passive joints, from home, radians or length.
+        jacobian: (N, m, 6) ``J``: unit wrenches, force, then moment about the world origin, couples times the
+            characteristic length. For a limb whose wrenches follow from its joints, all rows of the projector on them,
+            of which results show a basis: ``J'J`` is the same.
+        rates: (N, a, 6) of the actuators for a unit of each component of the platform's motion: angular velocity, then
+            velocity of its origin, in the world frame. They hold for motions that the platform can make.
+        closed: (N,) whether all loops close at the pose, in the assembly that is followed. Limits do not count.
+        singular: (N,) whether J has not the rank 6 at a closed pose, or rates are not finite.
+    """
+
+    actuators: tuple[str, ...]
+    measures: tuple[str, ...]
+    joints: tuple[str, ...]
+    coordinates: FloatArray
+    unknowns: FloatArray
+    jacobian: FloatArray
+    rates: FloatArray
+    closed: NDArray[np.bool_]
+    singular: NDArray[np.bool_]
+
+
+def inverse(
+    case: Case,
+    positions: ArrayLike,
+    rotations: ArrayLike | None = None,
+    *,
+    follow: Literal["home", "previous"] = "home",
+) -> InversePoses:
+    """Return positions of all joints, J and rates of the actuators at many poses.
+
+    No pose raises an error: where the loops do not close, or the numbers are no pose, ``closed`` is False.
+
+    Args:
+        case: whose robot has fixed dimensions; its poses, limits and tasks do not count.
+        positions: (N, 3) origins of the platform frame in the world frame, length.
+        rotations: (N, 3, 3) platform to world coordinates, orthogonal to 1e-6; none for no rotation.
+        follow: the assembly of the joints where loops are not closed by formulas: that of ``"home"``, or that to which
+            the way from the closed pose ``"previous"`` to each one leads, which takes one pose after the other. Angles
+            of actuators then have no jumps by a turn either.
+
+    Raises:
+        CaseError: a dimension of the case's robot is free.
+        InputError: the arrays have other shapes, the positions of the robot's actuators are not known, or ``follow`` is
+            another word.
+    """
+    p = np.array(positions, dtype=np.float64)
+    R = np.broadcast_to(np.eye(3), (len(p), 3, 3)) if rotations is None else np.array(rotations, dtype=np.float64)
+    if p.ndim != 2 or p.shape[1] != 3 or R.shape != (len(p), 3, 3):
+        raise InputError(f"poses must be arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}")
+    if follow not in ("home", "previous"):
+        raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
+    machine = _machine_of(case)
+    poses = np.concatenate([R.transpose(0, 2, 1).reshape(-1, 9), p], axis=1)
+    is_pose = _are_poses(R, p)
+    moving = np.full((len(p), len(machine.size)), np.nan)
+    if len(machine.size) and is_pose.any():
+        moving[is_pose] = machine.followed(poses[is_pose], one_by_one=follow == "previous")
+    blocks = [machine.at(poses[k : k + _BLOCK], moving[k : k + _BLOCK]) for k in range(0, max(len(p), 1), _BLOCK)]
+    q, unknowns, J, rates, margin, residual, signs, modes = (np.concatenate(each) for each in zip(*blocks, strict=True))
+    with np.errstate(invalid="ignore"):
+        closed = is_pose & np.isfinite(q).all(axis=1) & np.isfinite(unknowns).all(axis=1)
+        closed &= (np.abs(residual) <= CLOSED).all(axis=1) & (signs > 0).all(axis=1)
+        closed &= (modes > 0).all(axis=1) | (follow == "previous")
+        singular = closed & ~((margin[:, 0] > _REGULAR) & np.isfinite(rates).all(axis=(1, 2)))
+    unsure = np.flatnonzero(singular & np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(J).all(axis=(1, 2)))
+    singular[unsure] = _ranks(J[unsure], p[unsure]) < 6
+    for each in (q, unknowns, J, rates):
+        each[~closed] = np.nan
+    turning = machine.turning
+    if follow == "previous" and turning:
+        q[np.ix_(closed, turning)] = np.unwrap(q[np.ix_(closed, turning)], axis=0)
+    for each in (q, unknowns, J, rates, closed, singular):
+        each.flags.writeable = False
+    return InversePoses(machine.actuators, machine.measures, machine.joints, q, unknowns, J, rates, closed, singular)
+
+
+class _Values(NamedTuple):
+    """Numbers at B poses: those of :class:`InversePoses`, and those by which poses are judged."""
+
+    coordinates: FloatArray
+    unknowns: FloatArray
+    jacobian: FloatArray
+    rates: FloatArray
+    margin: FloatArray
+    residual: FloatArray
+    signs: FloatArray
+    modes: FloatArray
+
+
+@lru_cache(maxsize=4)
+def _machine_of(case: Case) -> _Machine:
+    """Return the functions of a case's robot; those of the last cases are kept, as a controller asks again."""
+    return _Machine(case)
+
+
+class _Machine:
+    """A robot with fixed dimensions, as functions of the pose and of the unknowns that have no closed form.
+
+    Args:
+        case: its case.
+
+    Attributes:
+        actuators, measures, joints: those of :class:`InversePoses`.
+        turning: indices of the actuators that turn.
+        size: (f,) sizes of the unknowns without a closed form.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self._parameters = case.fixed_parameters("joint positions are computed with fixed dimensions")
+        model, drives = case.model, driven_joints(case.model)
+        self.joints = tuple(each.name for each in model.unknowns)
+        if self.joints:
+            # Among the quantities, the unknowns that are replaced by expressions have these as values.
+            all_of_them = ca.vertcat(*[each.symbol for each in model.unknowns])
+            listed = Quantity("every unknown", self.joints, all_of_them, Dimension.NUMBER, "of joints")
+            model = replace(model, quantities=(*model.quantities, listed))
+        self._model = closed_form(model).model
+        own, pose = self._model.unknowns, SX.sym("pose", _POSE)
+        z = ca.vertcat(pose, SX.sym("z", len(own)))
+        position = pose[9:]
+        given = Substitution(SX(ca.DM(self._parameters)), z[_POSE:], ca.reshape(pose[:9], 3, 3), position)
+        robot = instantiate(self._model, given, SX(case.characteristic_length), [SX([0, 0, 1, 0, 0, 0])])
+        values = {each.name: robot.quantities[k] for k, each in enumerate(self._model.quantities)}
+        known = {
+            owner: (each.name, values[each.name][k])
+            for each in self._model.quantities
+            if each.name in (_MEASURES if model.actuators else ("leg_length",))
+            for k, owner in enumerate(each.owners)
+        }
+        self.actuators = tuple(each.name for each in drives)
+        if not set(self.actuators) <= set(known) or not drives:
+            raise InputError(f"the positions of the actuators of {model.name!r} are not known")
+        self.measures = tuple(known[name][0] for name in self.actuators)
+        self.turning = [k for k, each in enumerate(drives) if each.dimension is Dimension.ANGLE]
+        sizes = ca.Function("sizes", [model.symbols], [ca.vertcat(SX(0, 1), *[each.size for each in own])])
+        self.size = np.asarray(sizes(self._parameters).full().ravel(), dtype=np.float64)
+        every = ca.vertcat(robot.loops, robot.closure)
+        size = np.concatenate([np.ones(_POSE), self.size])
+        self._loops = Loops(z, robot.closure, every, robot.signs, size)
+        is_mode = [each.is_mode for each in self._model.signs]
+        outputs = [
+            ca.vertcat(*[known[name][1] for name in self.actuators]),
+            values.get("every unknown", SX(0, 1)),
+            robot.jacobian.T,
+            inverse_rates(self._model, robot).T,
+            _margin(rows_about(robot.jacobian, position)),
+            every,
+            robot.signs[[k for k, mode in enumerate(is_mode) if not mode]],
+            robot.signs[[k for k, mode in enumerate(is_mode) if mode]],
+        ]
+        self._function = ca.Function("inverse", [z], [ca.densify(each) for each in outputs])
+
+    def at(self, poses: FloatArray, moving: FloatArray) -> _Values:
+        """Return the numbers at poses (B, 12) with unknowns (B, f)."""
+        # CasADi's columns are NumPy's rows: the transposes are contiguous.
+        found = [each.transpose(0, 2, 1) for each in values_at(self._function, np.hstack([poses, moving]))]
+        return _Values(*(each if k in (2, 3) else each[:, 0] for k, each in enumerate(found)))
+
+    def followed(self, poses: FloatArray, *, one_by_one: bool) -> FloatArray:
+        """Return the unknowns (N, f) without closed form at poses (N, 12); NaN where they are not found.
+
+        Args:
+            poses: the poses.
+            one_by_one: whether each pose is reached from the one before.
+        """
+        found = np.full((len(poses), len(self.size)), np.nan)
+        start = self._start(poses)
+        if start is None:
+            return found
+        loops = self._loops.some(self._independent(start))
+        if not one_by_one:
+            for k in range(0, len(poses), _BLOCK):
+                found[k : k + _BLOCK] = self._reached(loops, start, poses[k : k + _BLOCK], _WAYS)
+            return found
+        for k in range(len(poses)):
+            found[k] = self._reached(loops, start, poses[k : k + 1], _NEXT)[0]
+            start = np.concatenate([poses[k], found[k]]) if np.isfinite(found[k]).all() else start
+        return found
+
+    def _start(self, poses: FloatArray) -> FloatArray | None:
+        """Return a pose with its unknowns (12 + f,) in home's assembly: home itself, or one of the given poses."""
+        at_home = np.concatenate([np.eye(3).ravel(), home_position(self._model, self._parameters)])
+        chosen = poses[np.unique(np.linspace(0, len(poses) - 1, _REFERENCES).astype(int))]
+        for pose in (at_home, *chosen):
+            axis, angle = axis_angle_from_matrix(pose[:9].reshape(3, 3).T)
+            unknowns = unknowns_from_home(self._model, self._parameters, np.concatenate([angle * axis, pose[9:]]))
+            if unknowns is not None:
+                return np.concatenate([pose, unknowns])
+        return None
+
+    def _independent(self, start: FloatArray) -> Sequence[int]:
+        """Return as many loop equations as there are unknowns, which determine these about a point (12 + f,)."""
+        rng = np.random.default_rng(0)
+        spread = 0.1 * self._loops.size
+        spread[:_POSE] = 0.0
+        near = start + np.vstack([np.zeros(len(start)), spread * rng.uniform(-1, 1, (4, len(start)))])
+        slopes = (self._loops.slopes(near.T) * self._loops.size)[:, :, _POSE:]
+        return independent_rows(list(slopes))
+
+    def _reached(
+        self, loops: Loops, start: FloatArray, poses: FloatArray, ways: Sequence[tuple[int, float]]
+    ) -> FloatArray:
+        """Return the unknowns (B, f) at poses (B, 12), to which ways from a closed point (12 + f,) lead, or NaN."""
+        found = np.full((len(poses), len(self.size)), np.nan)
+        left = np.arange(len(poses))
+        for steps, largest in ways:
+            at = start[_POSE:] + np.zeros((len(left), 1))
+            before = at
+            for pose in _path(start[:_POSE], poses[left], steps):
+                kept = np.isfinite(at).all(axis=1)
+                guess = 2 * at[kept] - before[kept]
+                square = loops.count == len(self.size)
+                z = loops.all_closed(
+                    np.hstack([pose[kept], guess]).T,
+                    range(_POSE, _POSE + len(self.size)),
+                    zero=None if square else DEPENDENT,
+                )[_POSE:].T
+                with np.errstate(invalid="ignore"):
+                    z[~(np.abs(z - guess) <= largest * self.size).all(axis=1)] = np.nan
+                before, at = at, np.full(at.shape, np.nan)
+                at[kept] = z
+            found[left] = at
+            left = left[~np.isfinite(at).all(axis=1)]
+            if not len(left):
+                break
+        return found
+
+
+def _path(start: FloatArray, poses: FloatArray, steps: int) -> Iterator[FloatArray]:
+    """Yield poses (B, 12) on straight ways from a pose (12,), with the turn to each about one axis."""
+    begin = start[:9].reshape(3, 3).T
+    turns = [axis_angle_from_matrix(each.reshape(3, 3).T @ begin.T) for each in poses[:, :9]]
+    angles = np.array([each.angle for each in turns])[:, None, None]
+    cross = np.cross(np.eye(3), np.array([each.axis for each in turns]).reshape(-1, 1, 3))
+    for k in range(1, steps):
+        part = k / steps
+        turn = np.eye(3) + np.sin(part * angles) * cross + (1 - np.cos(part * angles)) * (cross @ cross)
+        rotations = (turn @ begin).transpose(0, 2, 1).reshape(-1, 9)
+        yield np.hstack([rotations, start[9:] + part * (poses[:, 9:] - start[9:])])
+    yield poses
+
+
+def _are_poses(R: FloatArray, p: FloatArray) -> NDArray[np.bool_]:
+    """Return whether positions (N, 3) are finite and matrices (N, 3, 3) rotations."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        x, y, z = R.transpose(1, 0, 2)
+        off = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        volume = sum(x[:, k] * (y[:, k - 2] * z[:, k - 1] - y[:, k - 1] * z[:, k - 2]) for k in range(3))
+        return np.asarray(np.isfinite(p).all(axis=1) & (off <= ROUNDING) & (np.asarray(volume) > 0))
+
+
+def _margin(rows: SX) -> SX:
+    """Return a number (1, 1) that is small where rows (m, 6), moments in front, are nearly dependent.
+
+    It is the determinant of ``J'J``, with moments in parts of the longest, over the largest one with these squares.
+    """
+    arm = SX(0)
+    for row in ca.vertsplit(rows):
+        arm = ca.fmax(arm, ca.sumsqr(row[:3]))
+    scaled = ca.horzcat(rows[:, :3] / ca.sqrt(arm), rows[:, 3:])
+    products = scaled.T @ scaled
+    pivots = ca.ldl(products)[0]
+    volume = SX(1)
+    for k in range(6):
+        volume *= pivots[k] * 6 / ca.trace(products)
+    return volume
+
+
+def _ranks(J: FloatArray, p: FloatArray) -> NDArray[np.intp]:
+    """Return the ranks (N,) of matrices (N, m, 6), moments about points (N, 3), by the rule of :mod:`.state`."""
+    moments = J[:, :, 3:] - np.cross(p[:, None], J[:, :, :3])
+    arms = np.linalg.norm(moments, axis=2).max(axis=1, initial=0.0)[:, None, None]
+    values = np.linalg.svd(
+        np.concatenate([J[:, :, :3], moments / np.where(arms > 0, arms, 1.0)], axis=2), compute_uv=False
+    )
+    return np.asarray(np.count_nonzero(values > ZERO_SINGULAR_VALUE * values[:, :1], axis=1))
