@@ -157,6 +157,21 @@ def test_a_limit_is_refuted_in_the_first_line_that_leaves_it() -> None:
     assert not stopped.is_proved
 
 
+@pytest.mark.parametrize(("part", "outcome"), [(1.0001, Outcome.PROVED), (0.9999, Outcome.REFUTED)])
+def test_a_stroke_is_the_longest_length_less_the_shortest_at_any_two_points(part: float, outcome: Outcome) -> None:
+    tables = shipped_tables("hexapod-linuxcnc")
+    case = case_from(tables | {"limits": {}})
+    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    sampled = np.concatenate([lengths(points_of(path, k, SAMPLES)) for k in range(len(path))])
+    most = float(np.ptp(sampled, axis=0).max())
+    limits = {"leg_length": {"min": 17, "max": 43}, "actuator": {"stroke_max": part * most}}
+    judged = judge_path(case_from(tables | {"limits": limits}), path)
+    strokes = [each for each in judged.extremes if each.name.startswith("actuator.stroke_max")]
+    assert strokes[int(np.argmax(np.ptp(sampled, axis=0)))].outcome is outcome
+    assert judged.is_proved == (part > 1)
+    assert all(each.place is not None for each in strokes)
+
+
 @pytest.mark.parametrize("text", ["G1 Z22", "G4 P1", "G1 X1"])
 @pytest.mark.parametrize("yaw", [0.0, 30.0])
 def test_a_path_along_one_coordinate_or_none(text: str, yaw: float) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import casadi as ca
@@ -21,7 +22,7 @@ from ...case.pose import Free, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import InputError, UncoveredError
-from ...interruption import one_call, one_search, within
+from ...interruption import is_requested, one_call, one_search, within
 from ...path.arcs import PLANES
 from ...path.options import Between
 from ...path.orientation import ORDERS
@@ -30,6 +31,7 @@ from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
 from ..statement.machine import workspace_of_case
+from ..statement.tolerance import Directions
 from .numbers.bound_search import Minimum
 from .numbers.expressions import Expressions
 from .numbers.extremes import Extreme, extreme_of, goal_of
@@ -177,7 +179,7 @@ def judge_path(
             faults |= _first_faults(machines, wrong, cover)
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
         subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
-        found = with_strokes(subject, found, lambda *_: None)
+        found = with_strokes(subject, found, partial(_finer, machines, claims))
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
         found += motor_extremes(subject)
@@ -212,6 +214,16 @@ def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[E
     except UncoveredError as error:  # of an equation of loops
         reason = str(error)
     return [found.get(claim) or extreme_of(claim, Minimum(reason=reason)) for claim in claims]
+
+
+def _finer(
+    machines: Machines, claims: Sequence[Claim], leg: int, sense: Sense, gap: float, about: Directions | None
+) -> Extreme | None:
+    """Return a length of a leg, proved more finely; None where the work is to stop, and for errors along directions."""
+    if is_requested() or about is not None:
+        return None
+    claim = next(each for each in claims if each.legs == (leg,) and each.sense is sense)
+    return machines.searched([claim], gap, is_enough=False)[0]
 
 
 def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:
