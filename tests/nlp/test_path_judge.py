@@ -289,9 +289,8 @@ def test_every_limit_of_a_case_is_a_claim(tolerance: float | None) -> None:
         "smallest_singular_value": {"min": 0.01, "length": 10}, "footprint": {"base": 27, "platform": 12},
         "joint_spacing": {"min": 0.5}, "radius_ratio": {"min": 0.1, "max": 0.9}, "custom": ["p_x^2 + p_y*p_z <= 90"],
     }  # fmt: skip
-    tables["tolerance"] = {"joint_centre": tolerance} if tolerance else {"joint_centre": 0.0}
-    if not tolerance:
-        del tables["tolerance"]
+    if tolerance:
+        tables["tolerance"] = {"joint_centre": tolerance}
     judged = judge_path(case_from(tables), table(hexapod(), (0, 0, 20, 0, 0, 0), (0.5, 0, 20.5, 0, 2, 0)))
     expected = judge_workspace(judged.case, workspace=judged.case.workspace, time_limit=0, with_objective=False)
     limited = {(each.name, each.sense, each.limit) for each in expected.extremes if each.limit is not None}
