@@ -258,6 +258,18 @@ def test_cranks_of_a_delta_are_those_of_its_closed_form() -> None:
             assert found.reached == pytest.approx(end, abs=2e-3)
 
 
+def test_a_path_out_of_reach_is_refuted_and_no_rank_is() -> None:
+    tables = starter_tables("delta")
+    tables["robot"]["parameters"]["rb"] = 0.164
+    case = case_from(tables | {"limits": {}})
+    # Arms and rods are 1.768 long together.
+    judged = judge_path(case, table(case, (0, 0, -1.1, 0, 0, 0), (0, 0, -1.2, 0, 0, 0), (0, 0, -3, 0, 0, 0)))
+    reaches = [each for each in judged.extremes if each.name.startswith("reach")]
+    assert {each.outcome for each in reaches} == {Outcome.REFUTED}
+    assert {each.place.segment for each in reaches} == {1}
+    assert Outcome.PROVED not in {each.outcome for each in judged.ranks[:1]}
+
+
 def test_slides_of_a_robot_with_loops_are_followed_along_its_path() -> None:
     tables = starter_tables("planar-3-prr")
     tables["robot"]["parameters"]["rb"] = 1.0

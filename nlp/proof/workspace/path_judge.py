@@ -15,7 +15,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....models import FloatArray, frozen_array
+from ....models import FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.pose import Free, Value
@@ -58,8 +58,8 @@ _LARGEST = math.radians(149)
 #: Singular value, in parts of the largest, that counts as 0 at a point of a path, steps in the search of it, and powers
 #: of two of a piece's width at which it begins.
 _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
-#: Steps of the loops from home to the first point of a path, and parts of a way over which rows must have values.
-_WAY, _PARTS = 40, 64
+#: Parts of a way over which rows must have values.
+_PARTS = 64
 #: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
 _ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
 
@@ -152,7 +152,8 @@ def judge_path(
     with within(time_limit, _PART):
         closed, box = closed_form(case.model), pose_box(workspace)
         try:
-            design = _on_path(build_problem(case, closed.model, box), cover)
+            first = cover.points(cover.pieces[:1], 0.0)[0]
+            design = replace(build_problem(case, closed.model, box, first), cover=cover)
             if design.has_following:
                 raise NotJudgedError(
                     "its platform has fewer than six freedoms, and the path states more of its numbers"
@@ -184,21 +185,6 @@ def judge_path(
         report("actuators")
         found += motor_extremes(subject)
     return PathJudgement(case, path, tuple(ranks), tuple(found), faults)
-
-
-def _on_path(design: Problem, cover: PathCover) -> Problem:
-    """Return a design whose poses are those of a path, with closed loops at its first point.
-
-    Raises:
-        NotJudgedError: the loops do not close there.
-    """
-    start, free = np.zeros(len(design.start)), list(design.free)
-    start[: len(free)] = cover.points(cover.pieces[:1], 0.0)[0, free]
-    if design.dependent and not design.has_following:
-        start = design.loops.all_closed(start[:, None], design.dependent, steps=_WAY)[:, 0]
-    if not (np.isfinite(start).all() and (design.has_following or design.loops.is_closed(start))):
-        raise NotJudgedError("the loops could not be closed in the assembly of home at the start of the path")
-    return replace(design, start=frozen_array(start, start.shape), cover=cover)
 
 
 def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[Extreme]:
