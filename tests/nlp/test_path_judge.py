@@ -157,6 +157,21 @@ def test_a_limit_is_refuted_in_the_first_line_that_leaves_it() -> None:
     assert not stopped.is_proved
 
 
+@pytest.mark.parametrize(("part", "outcome"), [(1.0001, Outcome.PROVED), (0.9999, Outcome.REFUTED)])
+def test_a_stroke_is_the_longest_length_less_the_shortest_at_any_two_points(part: float, outcome: Outcome) -> None:
+    tables = shipped_tables("hexapod-linuxcnc")
+    case = case_from(tables | {"limits": {}})
+    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    sampled = np.concatenate([lengths(points_of(path, k, SAMPLES)) for k in range(len(path))])
+    most = float(np.ptp(sampled, axis=0).max())
+    limits = {"leg_length": {"min": 17, "max": 43}, "actuator": {"stroke_max": part * most}}
+    judged = judge_path(case_from(tables | {"limits": limits}), path)
+    strokes = [each for each in judged.extremes if each.name.startswith("actuator.stroke_max")]
+    assert strokes[int(np.argmax(np.ptp(sampled, axis=0)))].outcome is outcome
+    assert judged.is_proved == (part > 1)
+    assert all(each.place is not None for each in strokes)
+
+
 @pytest.mark.parametrize("text", ["G1 Z22", "G4 P1", "G1 X1"])
 @pytest.mark.parametrize("yaw", [0.0, 30.0])
 def test_a_path_along_one_coordinate_or_none(text: str, yaw: float) -> None:
@@ -243,6 +258,18 @@ def test_cranks_of_a_delta_are_those_of_its_closed_form() -> None:
             assert found.reached == pytest.approx(end, abs=2e-3)
 
 
+def test_a_path_out_of_reach_is_refuted_and_no_rank_is() -> None:
+    tables = starter_tables("delta")
+    tables["robot"]["parameters"]["rb"] = 0.164
+    case = case_from(tables | {"limits": {}})
+    # Arms and rods are 1.768 long together.
+    judged = judge_path(case, table(case, (0, 0, -1.1, 0, 0, 0), (0, 0, -1.2, 0, 0, 0), (0, 0, -3, 0, 0, 0)))
+    reaches = [each for each in judged.extremes if each.name.startswith("reach")]
+    assert {each.outcome for each in reaches} == {Outcome.REFUTED}
+    assert {each.place.segment for each in reaches} == {1}
+    assert Outcome.PROVED not in {each.outcome for each in judged.ranks[:1]}
+
+
 def test_slides_of_a_robot_with_loops_are_followed_along_its_path() -> None:
     tables = starter_tables("planar-3-prr")
     tables["robot"]["parameters"]["rb"] = 1.0
@@ -274,9 +301,8 @@ def test_every_limit_of_a_case_is_a_claim(tolerance: float | None) -> None:
         "smallest_singular_value": {"min": 0.01, "length": 10}, "footprint": {"base": 27, "platform": 12},
         "joint_spacing": {"min": 0.5}, "radius_ratio": {"min": 0.1, "max": 0.9}, "custom": ["p_x^2 + p_y*p_z <= 90"],
     }  # fmt: skip
-    tables["tolerance"] = {"joint_centre": tolerance} if tolerance else {"joint_centre": 0.0}
-    if not tolerance:
-        del tables["tolerance"]
+    if tolerance:
+        tables["tolerance"] = {"joint_centre": tolerance}
     judged = judge_path(case_from(tables), table(hexapod(), (0, 0, 20, 0, 0, 0), (0.5, 0, 20.5, 0, 2, 0)))
     expected = judge_workspace(judged.case, workspace=judged.case.workspace, time_limit=0, with_objective=False)
     limited = {(each.name, each.sense, each.limit) for each in expected.extremes if each.limit is not None}

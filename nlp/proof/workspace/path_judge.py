@@ -9,19 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ....models import FloatArray, frozen_array
+from ....models import FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.pose import Free, Value
 from ...case.task import Sense
 from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import InputError, UncoveredError
-from ...interruption import one_call, one_search, within
+from ...interruption import is_requested, one_call, one_search, within
 from ...path.arcs import PLANES
 from ...path.options import Between
 from ...path.orientation import ORDERS
@@ -30,6 +31,7 @@ from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
 from ..statement.machine import workspace_of_case
+from ..statement.tolerance import Directions
 from .numbers.bound_search import Minimum
 from .numbers.expressions import Expressions
 from .numbers.extremes import Extreme, extreme_of, goal_of
@@ -56,8 +58,8 @@ _LARGEST = math.radians(149)
 #: Singular value, in parts of the largest, that counts as 0 at a point of a path, steps in the search of it, and powers
 #: of two of a piece's width at which it begins.
 _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
-#: Steps of the loops from home to the first point of a path, and parts of a way over which rows must have values.
-_WAY, _PARTS = 40, 64
+#: Parts of a way over which rows must have values.
+_PARTS = 64
 #: Parameters of points of each segment at which a change of sign is looked for.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 #: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
@@ -152,7 +154,8 @@ def judge_path(
     with within(time_limit, _PART):
         closed, box = closed_form(case.model), pose_box(workspace)
         try:
-            design = _on_path(build_problem(case, closed.model, box), cover)
+            first = cover.points(cover.pieces[:1], 0.0)[0]
+            design = replace(build_problem(case, closed.model, box, first), cover=cover)
             if design.has_following:
                 raise NotJudgedError(
                     "its platform has fewer than six freedoms, and the path states more of its numbers"
@@ -179,26 +182,11 @@ def judge_path(
             faults |= _first_faults(machines, wrong, cover)
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
         subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
-        found = with_strokes(subject, found, lambda *_: None)
+        found = with_strokes(subject, found, partial(_finer, machines, claims))
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
         found += motor_extremes(subject)
     return PathJudgement(case, path, tuple(ranks), tuple(found), faults)
-
-
-def _on_path(design: Problem, cover: PathCover) -> Problem:
-    """Return a design whose poses are those of a path, with closed loops at its first point.
-
-    Raises:
-        NotJudgedError: the loops do not close there.
-    """
-    start, free = np.zeros(len(design.start)), list(design.free)
-    start[: len(free)] = cover.points(cover.pieces[:1], 0.0)[0, free]
-    if design.dependent and not design.has_following:
-        start = design.loops.all_closed(start[:, None], design.dependent, steps=_WAY)[:, 0]
-    if not (np.isfinite(start).all() and (design.has_following or design.loops.is_closed(start))):
-        raise NotJudgedError("the loops could not be closed in the assembly of home at the start of the path")
-    return replace(design, start=frozen_array(start, start.shape), cover=cover)
 
 
 def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[Extreme]:
@@ -214,6 +202,16 @@ def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[E
     except UncoveredError as error:  # of an equation of loops
         reason = str(error)
     return [found.get(claim) or extreme_of(claim, Minimum(reason=reason)) for claim in claims]
+
+
+def _finer(
+    machines: Machines, claims: Sequence[Claim], leg: int, sense: Sense, gap: float, about: Directions | None
+) -> Extreme | None:
+    """Return a length of a leg, proved more finely; None where the work is to stop, and for errors along directions."""
+    if is_requested() or about is not None:
+        return None
+    claim = next(each for each in claims if each.legs == (leg,) and each.sense is sense)
+    return machines.searched([claim], gap, is_enough=False)[0]
 
 
 def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:

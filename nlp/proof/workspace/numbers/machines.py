@@ -126,14 +126,15 @@ class Machines:
             with suppress(UncoveredError):  # an equation of loops
                 yield from self._by_search(covered, gap, is_enough=True)
 
-    def searched(self, claims: Sequence[Claim], gap: float) -> list[Extreme]:
+    def searched(self, claims: Sequence[Claim], gap: float, *, is_enough: bool = True) -> list[Extreme]:
         """Return the extremes of numbers that have rules, all by one search.
 
         Args:
             claims: the numbers, in the symbols of machines.
-            gap: as a part of a number; bounds within limits are enough.
+            gap: as a part of a number.
+            is_enough: whether bounds within limits are enough whatever the gap is.
         """
-        return list(self._by_search(claims, gap, is_enough=True, small=_SMALL))
+        return list(self._by_search(claims, gap, is_enough=is_enough, small=_SMALL if is_enough else 0.0))
 
     def is_covered(self, claim: Claim) -> bool:
         """Return whether a number has no operation without a rule."""

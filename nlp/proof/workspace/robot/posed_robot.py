@@ -154,20 +154,22 @@ class Problem:
         return z
 
 
-def build_problem(case: Case, model: Model, box: PoseBox) -> Problem:
+def build_problem(case: Case, model: Model, box: PoseBox, at: FloatArray | None = None) -> Problem:
     """Return a robot over a workspace.
 
     Args:
         case: with fixed dimensions.
         model: its robot, some of whose unknowns may have been replaced by expressions.
         box: the poses.
+        at: (6,) coordinates of the pose at which closed loops are looked for; the middle of the workspace if left out.
 
     Raises:
-        NotJudgedError: no closed loops are found in the middle of the workspace, or they leave a joint free.
+        NotJudgedError: no closed loops are found there, or they leave a joint free.
     """
     posed = posed_model(case, model, box)
     loops, count = posed.loops, len(posed.free)
-    middle = np.concatenate([(0.5 * (box.lower + box.upper))[list(posed.free)], np.zeros(len(loops.size) - count)])
+    at = 0.5 * (box.lower + box.upper) if at is None else at
+    middle = np.concatenate([at[list(posed.free)], np.zeros(len(loops.size) - count)])
     start = closed_from_home(loops, middle, count)
     if start is None:
         raise NotJudgedError("the loops could not be closed in the assembly of home in the middle of the workspace")
