@@ -154,6 +154,8 @@ def test_input_that_is_none_is_refused() -> None:
     case = case_of("delta")
     with pytest.raises(InputError, match=r"must be arrays \(N, 3\) and \(N, 3, 3\), got \(3, 2\)"):
         inverse(case, np.zeros((3, 2)))
+    with pytest.raises(InputError, match=r"got \(\) and"):
+        inverse(case, 1.0)
     with pytest.raises(InputError, match="must be 'home' or 'previous'"):
         inverse(case, np.zeros((1, 3)), follow="next")  # type: ignore[arg-type]
     free = Case(case.model, {**case.parameters, "arm": Free(0.3, 0.5)}, case.position, case.tasks)
