@@ -19,7 +19,7 @@ from ..errors import CaseError, InputError, listing, nearest
 #: Largest size of a file, bytes, and the largest number of its rows: what is larger is no trajectory of a case.
 _MOST_BYTES, _MOST_ROWS = 4_000_000, 1_000
 #: The same where poses are no part of a case, and nothing is optimised.
-_MOST_BYTES_APART, _MOST_ROWS_APART = 256_000_000, 1_000_000
+_MOST_BYTES_APART, _MOST_ROWS_APART = 64_000_000, 200_000
 
 #: Columns of one number of a table, or of several that stand or lack together, by key within the table.
 _Columns = Mapping[str, tuple[str, ...]]

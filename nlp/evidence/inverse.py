@@ -108,8 +108,9 @@ def inverse(
             another word.
     """
     p = np.array(positions, dtype=np.float64)
-    R = np.broadcast_to(np.eye(3), (len(p), 3, 3)) if rotations is None else np.array(rotations, dtype=np.float64)
-    if p.ndim != 2 or p.shape[1] != 3 or R.shape != (len(p), 3, 3):
+    shape = (*p.shape[:1], 3, 3)
+    R = np.broadcast_to(np.eye(3), shape) if rotations is None else np.array(rotations, dtype=np.float64)
+    if p.ndim != 2 or p.shape[1] != 3 or R.shape != shape:
         raise InputError(f"poses must be arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}")
     if follow not in ("home", "previous"):
         raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
@@ -213,6 +214,8 @@ class _Machine:
             robot.signs[[k for k, mode in enumerate(is_mode) if mode]],
         ]
         self._function = ca.Function("inverse", [z], [ca.densify(each) for each in outputs])
+        # CasADi finds a mapped function again as long as it is held: making it takes as long as evaluating it.
+        self._mapped = self._function.map(_BLOCK)
 
     def at(self, poses: FloatArray, moving: FloatArray) -> _Values:
         """Return the numbers at poses (B, 12) with unknowns (B, f)."""

@@ -35,13 +35,15 @@ def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[i
     yield title_line(case)
     total, closed = len(rows), int(found.closed.sum())
     if closed == total:
-        yield Line(f"all {total} poses are closed", tone=Tone.HOLDS)
+        yield Line("the pose is closed" if total == 1 else f"all {total} poses are closed", tone=Tone.HOLDS)
     else:
-        fault = f"{total - closed} of {total} poses are not closed"
-        yield Line(fault, tone=Tone.FAULT, after=_first(~found.closed, file, rows))
+        yield Line(f"{_of(total - closed, total)} not closed", tone=Tone.FAULT, after=_first(~found.closed, file, rows))
     if found.singular.any():
-        fault = f"{int(found.singular.sum())} of {total} poses are singular"
-        yield Line(fault, tone=Tone.CAUTION, after=_first(found.singular, file, rows))
+        yield Line(
+            f"{_of(int(found.singular.sum()), total)} singular",
+            tone=Tone.CAUTION,
+            after=_first(found.singular, file, rows),
+        )
     if closed:
         smallest, largest = (each(found.coordinates, axis=0) for each in (np.nanmin, np.nanmax))
         ends = []
@@ -50,6 +52,10 @@ def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[i
             cells = [number(each, max(map(abs, shown))) for each in shown]
             ends.append((joint.name, found.measures[k], *cells, case.units.label(joint.dimension)))
         yield TextTable(("actuator", "quantity", "smallest", "largest", "unit"), tuple(ends), "actuators")
+
+
+def _of(count: int, total: int) -> str:
+    return f"{count} of {total} pose{'s' if total > 1 else ''} {'is' if count == 1 else 'are'}"
 
 
 def _first(chosen: NDArray[np.bool_], file: str, rows: Sequence[int]) -> str:

@@ -150,10 +150,23 @@ def test_joints_are_followed_from_pose_to_pose_beyond_a_turn() -> None:
     np.testing.assert_allclose(turned, [1, *[0] * (len(turned) - 1)], atol=1e-9)
 
 
+def test_a_robot_of_another_size_has_the_same_joints() -> None:
+    case = case_of("3-prs")
+    p = np.add(case.model.home, [[0.0, 0.0, 0.03], [0.0, 0.0, -0.05]])
+    large = {each.name: 50 * each.typical[0] for each in case.model.parameters if each.dimension.value == "length"}
+    other = Case(case.model, {**case.parameters, **large}, case.position, case.tasks)
+    found, same = inverse(other, 50 * p), inverse(case, p)
+    assert found.closed.all()
+    assert np.abs(same.coordinates).min() > 0.01
+    np.testing.assert_allclose(found.coordinates, 50 * same.coordinates, rtol=1e-8)
+
+
 def test_input_that_is_none_is_refused() -> None:
     case = case_of("delta")
     with pytest.raises(InputError, match=r"must be arrays \(N, 3\) and \(N, 3, 3\), got \(3, 2\)"):
         inverse(case, np.zeros((3, 2)))
+    with pytest.raises(InputError, match=r"got \(\) and"):
+        inverse(case, 1.0)
     with pytest.raises(InputError, match="must be 'home' or 'previous'"):
         inverse(case, np.zeros((1, 3)), follow="next")  # type: ignore[arg-type]
     free = Case(case.model, {**case.parameters, "arm": Free(0.3, 0.5)}, case.position, case.tasks)
