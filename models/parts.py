@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import casadi as ca
 from casadi import SX
+
+from .values import dataclass
 
 _AXES = ("x", "y", "z")
 
