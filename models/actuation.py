@@ -11,7 +11,6 @@ the actuators that take part in it are undetermined.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import casadi as ca
@@ -23,6 +22,7 @@ from .arrays import FloatArray
 from .member import pseudo_inverse
 from .parts import Dimension, JointScrews
 from .rows import RANK_TOLERANCE, rank_of
+from .values import dataclass
 
 if TYPE_CHECKING:
     from .model import Model

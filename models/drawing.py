@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from casadi import SX
 
 from .arrays import FloatArray
+from .values import dataclass
 
 #: Points nearer to each other, or to an edge, than this part of the plate's size are one, or on the edge.
 _NEAR = 1e-9

@@ -12,7 +12,6 @@ basis of its wrenches; its rows here are all rows of ``P``, which are not indepe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeVar
 
 import casadi as ca
@@ -24,6 +23,7 @@ from .limbjoints import LimbJoint, LimbLink
 from .member import Member, resistance
 from .model import Model
 from .parts import Actuator, Closure, Unknown, rate_relations
+from .values import dataclass
 from .whole import expressions_of, with_expressions
 from .wrench import Wrench, WrenchKind
 

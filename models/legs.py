@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 from casadi import SX
 
 from .drawing import Body, Link, Point, Scene
 from .parts import Dimension, Leg, PoseSymbols, Quantity
+from .values import dataclass
 from .wrench import Wrench, force_along
 
 

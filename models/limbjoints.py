@@ -7,13 +7,12 @@ is then given by its sine and cosine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 from casadi import SX
 
 from .arrays import FloatArray
 from .parts import Dimension
+from .values import dataclass
 
 
 @dataclass(frozen=True, eq=False)

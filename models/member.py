@@ -11,13 +11,13 @@ member's wrenches, and no basis is needed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
 from .rows import ColumnGroup
+from .values import dataclass
 from .wrench import WrenchKind
 
 

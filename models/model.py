@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from types import MappingProxyType
 
 import casadi as ca
@@ -34,6 +34,7 @@ from .parts import (
     Unknown,
 )
 from .shown import Shown
+from .values import dataclass
 from .whole import Whole, expressions_of
 from .wrench import RowLabel, Wrench, WrenchKind
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
 
 from .arrays import FloatArray
+from .values import dataclass
 
 _AXES = ("x", "y", "z")
 

@@ -17,12 +17,12 @@ paper that :mod:`screwsynth.nlp.program.formulation` cites.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .arrays import FloatArray, frozen_array
+from .values import dataclass
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
 from casadi import SX
+
+from .values import dataclass
 
 
 class WrenchKind(enum.Enum):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
 
 from ..models import Dimension
+from ..models.values import dataclass
 
 #: Largest distance from 1 of the size of a unit screw, whose motion is measured by its angle, or by its translation.
 _UNIT = 1e-9

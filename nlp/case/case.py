@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
 from ...models.shown import Shown
 from ...models.statics import driven_joints
+from ...models.values import dataclass
 from ...models.whole import Whole
 from ..errors import CaseError, listing, nearest
 from ..units import Units

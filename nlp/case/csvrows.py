@@ -10,10 +10,11 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ...models.values import dataclass
 from ..errors import CaseError, InputError, listing, nearest
 
 #: Largest size of a file, bytes, and the largest number of its rows: what is larger is no trajectory of a case.

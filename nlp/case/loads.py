@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
@@ -18,6 +17,7 @@ from casadi import SX
 
 from ...models import Model
 from ...models.parts import PlatformMotions
+from ...models.values import dataclass
 from ..errors import CaseError, nearest
 from ..units import Units
 from .checks import check_real, check_size, check_vector

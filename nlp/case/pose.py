@@ -11,13 +11,14 @@ import enum
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 import numpy as np
 
 from ...models import Dimension, Displacement, FloatArray, axis_from_screw, screw_displacement
 from ...models.rotation import AxisAngle, axis_angle_from_matrix
+from ...models.values import dataclass
 from ..errors import CaseError
 from ..units import Units
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from ...models.values import dataclass
 from ..errors import CaseError
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...models import FloatArray, screw_from_axis
+from ...models.values import dataclass
 from ..errors import CaseError
 from .checks import check_direction, check_real, check_size, check_vector
 

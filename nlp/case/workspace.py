@@ -5,10 +5,11 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
+from ...models.values import dataclass
 from ..errors import CaseError
 from ..units import Units
 from .checks import check_value

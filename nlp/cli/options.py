@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import TYPE_CHECKING, Annotated, Any, ParamSpec
 
@@ -297,9 +298,15 @@ def write_csv(target: str | None, tables: Iterable[TextTable], name: str | None)
         write_text(target, tables_as_csv(tables, name))
 
 
-def console() -> Console:
-    """Return a console on standard output for lines and tables."""
+def console() -> Console | None:
+    """Return a console on standard output for lines and tables; None where that shows no styles."""
+    # With one of these variables, the console itself decides whether it shows styles.
+    if not sys.stdout.isatty() and not os.environ.keys() & {"FORCE_COLOR", "TTY_COMPATIBLE"}:
+        return None
     from rich.console import Console
 
+    from ..output.terminal import PLAIN_WIDTH
+
     # In a file or a pipe, a table is as wide as its content.
-    return Console(highlight=False, markup=False, emoji=False, width=None if sys.stdout.isatty() else 120)
+    width = None if sys.stdout.isatty() else PLAIN_WIDTH
+    return Console(highlight=False, markup=False, emoji=False, width=width)

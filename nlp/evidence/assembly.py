@@ -15,7 +15,6 @@ of the robot's own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
@@ -30,6 +29,7 @@ from ...models import (
     axis_angle_from_matrix,
     matrix_from_axis_angle,
 )
+from ...models.values import dataclass
 from ..program.nlp import Nlp
 from ..program.program import Kernel, tuple_of
 from .state import RobotState

@@ -8,13 +8,14 @@ its last passive joint, whose place on the joint's axis is free.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, Model, Substitution, objective
+from ...models.values import dataclass
 from ..program.nlp import Nlp
 
 #: Dependence below this part of F is rounding: F is a sum of squares whose rates are known to 1e-9.

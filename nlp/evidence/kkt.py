@@ -13,12 +13,12 @@ The module uses no solver: every number comes from the program and the point.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...models import FloatArray
+from ...models.values import dataclass
 from ..program.nlp import Nlp, Side
 from .equations import gradient_sizes, linearise_equations
 from .linalg import nonnegative_least_squares

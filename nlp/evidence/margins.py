@@ -9,13 +9,13 @@ active limits have independent normals and positive multipliers, which :mod:`scr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray
+from ...models.values import dataclass
 from ..case.limits.constraint import BoundedConstraint, Constraint
 from ..program.nlp import Nlp
 from ..program.pairs import pair_constraints, tightest_pairs, with_pairs_at

@@ -8,13 +8,13 @@ minimise the motion that the limb resists (:mod:`screwsynth.models.actuation`).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from ...models import FloatArray, GenericRanks, LimbDrive, constraint_rows, limb_drive, rank_of_rows
+from ...models.values import dataclass
 from ..program.nlp import Nlp
 from .paths import velocities_at
 from .singularities import Singularity, SingularityKind, limb_singularities, platform_singularities

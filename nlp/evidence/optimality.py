@@ -15,13 +15,13 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
 from ...models import Dimension, FloatArray, frozen_array
+from ...models.values import dataclass
 from ..case.task import Sense
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at

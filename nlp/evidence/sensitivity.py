@@ -11,7 +11,6 @@ all active sides stay active. And there is none where the loops of the robot clo
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -19,6 +18,7 @@ import numpy as np
 from casadi import SX
 
 from ...models import Dimension, FloatArray
+from ...models.values import dataclass
 from ..program.nlp import Nlp
 from .kkt import constraint_weights, linearise, multipliers
 

@@ -20,12 +20,12 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...models import FloatArray, JointScrews, frozen_array
+from ...models.values import dataclass
 from ..program.nlp import Nlp
 from ..program.program import RobotNumbers
 from .linalg import echelon_basis

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -18,6 +17,7 @@ from ...models import (
     reporting_matrix,
 )
 from ...models.basis import settled_basis
+from ...models.values import dataclass
 from ..case.case import Case
 from ..errors import EvaluationError
 from ..program.nlp import Nlp

@@ -9,7 +9,6 @@ machine reaches that pose with other leg lengths.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi as ca
@@ -17,6 +16,7 @@ import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, frozen_array, objective
+from ...models.values import dataclass
 from ..case.pose import OverPoses
 from ..program.epigraph import total_over_poses, worst_value
 from ..program.nlp import Nlp

@@ -1,15 +1,24 @@
-"""Lines and tables of text on a terminal."""
+"""Lines and tables of text on a terminal, and in a file or a pipe."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 from rich.cells import cell_len
-from rich.console import Console
-from rich.text import Text
 
 from ..errors import one_line
 from ..results.text import Line, TextTable, Tone
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+#: A line as its parts, each with its style.
+_Styled: TypeAlias = "list[tuple[str, str]]"
+
+#: Columns of a file or a pipe, where a table is as wide as its content.
+PLAIN_WIDTH = 120
 
 _LABEL = "dim"
 _STYLES = {
@@ -29,12 +38,35 @@ _WRAPPED = 14
 _COMFORTABLE = 28
 
 
-def show(console: Console, items: Iterable[Line | TextTable]) -> None:
-    """Print lines and tables; no word or number of them is split unless it is wider than the terminal by itself."""
+def show(console: Console | None, items: Iterable[Line | TextTable]) -> None:
+    """Print lines and tables; no word or number of them is split unless it is wider than the terminal by itself.
+
+    Args:
+        console: terminal; None for a standard output without styles.
+        items: lines and tables.
+    """
+    width = PLAIN_WIDTH if console is None else console.width
     for item in items:
         is_command = isinstance(item, Line) and item.is_command
-        for line in [_text(item)] if isinstance(item, Line) else _table_lines(item, console.width):
-            console.print(line, soft_wrap=is_command)
+        for line in [_text(item)] if isinstance(item, Line) else _table_lines(item, width):
+            _print(console, line, is_command=is_command)
+
+
+def _print(console: Console | None, line: _Styled, *, is_command: bool) -> None:
+    """Print a line; a command is not broken into several."""
+    if console is None:
+        text = "".join(part for part, _ in line)
+        if "\t" not in text and (is_command or cell_len(text) <= PLAIN_WIDTH):
+            sys.stdout.write(f"{text}\n")
+            return
+    # Loading the console takes as long as a tenth of a short command: a text that needs none goes without it.
+    from rich.console import Console  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    if console is None:
+        console = Console(highlight=False, markup=False, emoji=False, width=PLAIN_WIDTH)
+    styled = Text(line[0][0], style=line[0][1]) if len(line) == 1 else Text.assemble(*line)
+    console.print(styled, soft_wrap=is_command)
 
 
 def _header(text: str) -> str:
@@ -43,16 +75,16 @@ def _header(text: str) -> str:
     return f"{one_line(name)}{line_break}{one_line(unit)}"
 
 
-def _text(line: Line) -> Text:
+def _text(line: Line) -> _Styled:
     """Return a line; the words of a case are escaped, so that they cannot control the terminal."""
     style = _STYLES[line.tone]
     if not (line.label or line.before or line.after):
-        return Text(one_line(line.text), style=style)
+        return [(one_line(line.text), style)]
     label = [(f"{one_line(line.label)}  ", _LABEL)] if line.label else []
-    return Text.assemble(*label, one_line(line.before), (one_line(line.text), style), one_line(line.after))
+    return [*label, (one_line(line.before), ""), (one_line(line.text), style), (one_line(line.after), "")]
 
 
-def _table_lines(table: TextTable, width: int) -> Iterator[Text]:
+def _table_lines(table: TextTable, width: int) -> Iterator[_Styled]:
     """Yield the lines of a table in a width: in several tables below each other where one would be too wide.
 
     Each of these begins with the first column, which names the rows.
@@ -63,11 +95,11 @@ def _table_lines(table: TextTable, width: int) -> Iterator[Text]:
         for k, header in enumerate(table.headers)
     ]
     if table.title:
-        yield Text(one_line(table.title), style=_LABEL)
+        yield [(one_line(table.title), _LABEL)]
     for part in _parts(columns, width):
         yield from _part_lines(part, len(shown), width)
     if table.folded:
-        yield Text(f"and {table.folded} {table.folded_words}; --csv FILE lists them", style=_LABEL)
+        yield [(f"and {table.folded} {table.folded_words}; --csv FILE lists them", _LABEL)]
 
 
 class _Column:
@@ -106,7 +138,7 @@ def _fits(widths: Sequence[int], width: int) -> bool:
     return sum(widths) + _NARROW_GAP * (len(widths) - 1) <= width
 
 
-def _part_lines(columns: Sequence[_Column], rows: int, width: int) -> Iterator[Text]:
+def _part_lines(columns: Sequence[_Column], rows: int, width: int) -> Iterator[_Styled]:
     """Yield the lines of a table whose columns fit a width."""
     naturals = [column.natural for column in columns]
     between = _GAP if sum(naturals) + _GAP * (len(columns) - 1) <= width else _NARROW_GAP
@@ -137,16 +169,16 @@ def _widths(columns: Sequence[_Column], width: int) -> list[int]:
 
 def _row_lines(
     cells: Sequence[Sequence[str]], styles: Sequence[str], widths: Sequence[int], between: int
-) -> Iterator[Text]:
+) -> Iterator[_Styled]:
     """Yield the lines of one row, each cell as its lines."""
     for k in range(max(map(len, cells))):
-        line = Text()
+        line: _Styled = []
         for lines, style, size in zip(cells, styles, widths, strict=True):
             text = lines[k] if k < len(lines) else ""
-            line.append(text, style=style)
-            line.append(" " * (size - cell_len(text) + between))
-        line.rstrip()
-        yield line
+            line += [(text, style), (" " * (size - cell_len(text) + between), "")]
+        while line and not line[-1][0].strip():
+            line.pop()
+        yield [*line[:-1], *((text.rstrip(), style) for text, style in line[-1:])]
 
 
 def _wrapped(text: str, width: int) -> list[str]:

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 import casadi as ca
@@ -40,6 +40,7 @@ from ...models import (
     reason_for_zero_row,
 )
 from ...models.instance import sizes_at
+from ...models.values import dataclass
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.pose import Free, Pose, Value, sizes_of_turn

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple, Self
 
@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import FloatArray, frozen_vector
+from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, PairFamily

@@ -7,13 +7,13 @@ may give its parameters any names.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, TypeAlias
 
 import casadi as ca
 from casadi import SX
 
 from ...models import Dimension, component_names
+from ...models.values import dataclass
 from ..case.limits.constraint import Constraint
 from ..case.pose import Free, Value
 
@@ -123,7 +123,6 @@ class PlacedSymbols(NamedTuple):
     places: tuple[Place, ...]
 
 
-@dataclass
 class SymbolTable:
     """The symbols of a program under construction: free variables and fixed arguments, in the order of addition.
 
@@ -136,13 +135,14 @@ class SymbolTable:
         values: value of each fixed argument.
     """
 
-    variables: list[Scalar] = field(default_factory=list)
-    x: list[SX] = field(default_factory=list)
-    bounds: list[Free] = field(default_factory=list)
-    arguments: list[Scalar] = field(default_factory=list)
-    p: list[SX] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-    _names: set[str] = field(default_factory=set)
+    def __init__(self) -> None:
+        self.variables: list[Scalar] = []
+        self.x: list[SX] = []
+        self.bounds: list[Free] = []
+        self.arguments: list[Scalar] = []
+        self.p: list[SX] = []
+        self.values: list[float] = []
+        self._names: set[str] = set()
 
     def add(self, name: str, dimension: Dimension, value: Value) -> PlacedSymbols:
         """Add a number, as a variable where it is free and as an argument where it is fixed.

@@ -12,7 +12,6 @@ the memory that the function reads and writes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from threading import Lock
 from typing import Generic, NamedTuple, TypeVar
@@ -23,6 +22,7 @@ from casadi import SX
 
 from ...models import FloatArray, Model, RobotInstance, Substitution
 from ...models.arrays import buffer_on
+from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.limits.constraint import Call, Constraint
 from .places import Places, Scalar

@@ -9,13 +9,14 @@ contradict each other.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ...models import Dimension, FloatArray, frozen_vector
+from ...models.values import dataclass
 from ..case.limits.constraint import Constraint, Reading
 from ..case.task import Sense
 from .nlp import Nlp, PairPlace

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+
+from ...models.values import dataclass
 
 #: Fewer rows than these are not worth folding.
 FEWEST_FOLDED = 3

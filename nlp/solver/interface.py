@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 from ...models import FloatArray
+from ...models.values import dataclass
 from ..case.settings import Search
 from ..program.nlp import Nlp
 

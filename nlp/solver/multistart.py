@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ...models import FloatArray, frozen_array
+from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.settings import Search
 from ..errors import EvaluationError

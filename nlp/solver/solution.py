@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...models import FloatArray
 from ...models.shown import Shown
+from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
 from ..case.task import Method, Task

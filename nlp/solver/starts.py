@@ -10,13 +10,14 @@ import enum
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from queue import SimpleQueue
 
 import numpy as np
 
 from ...models import FloatArray
+from ...models.values import dataclass
 from ..case.settings import Search
 from ..evidence.assembly import Assembly, assembly_over_poses
 from ..evidence.kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, linearise, multipliers

@@ -10,7 +10,6 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
 from functools import cached_property, partial
 from operator import mul
 from typing import TypeAlias, TypeVar
@@ -18,6 +17,7 @@ from typing import TypeAlias, TypeVar
 from casadi import SX
 
 from ....models import Dimension, FloatArray
+from ....models.values import dataclass
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
 
 from ....models import FloatArray
 from ....models.shown import Shown
+from ....models.values import dataclass
 from ....models.whole import Whole
 from ...case.task import Sense
 from ...evidence.state import ZERO_F
