@@ -15,6 +15,7 @@ from screwsynth.nlp.proof.checker.optimum import Claims, rule_of
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly, LoopPoints
+from screwsynth.nlp.proof.checker.workspace.loop_claims import PosedLoops
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim
@@ -118,12 +119,12 @@ def test_the_sign_of_a_nearly_singular_matrix_is_right_or_unknown(size: float) -
     """Two rows are parallel but for rounding, and the sign of the computed inverse is wrong."""
     rng, case = np.random.default_rng(1), load_case("hexapod-linuxcnc")
     robot = PosedRobot(case, case.model, pose_root(workspace_of_case(case)))
-    assembly, at = Assembly(robot, SX(0, 1), robot.centre), np.zeros((1, 6))
+    loops, at = PosedLoops(robot, robot.centre, Assembly(robot, SX(0, 1), robot.centre), 0.0), np.zeros((1, 6))
 
     def shown(block: np.ndarray) -> int:
         M = np.eye(6)
         M[4:, 4:] = block
-        return RankClaim(robot, SX(ca.DM(size * M)), 0, assembly)._signs_at(at)[0]
+        return RankClaim(loops, SX(ca.DM(size * M)), 0)._signs_at(at)[0]
 
     row, factor = rng.normal(size=(4000, 2)), rng.normal(size=4000)
     blocks = np.stack([row, factor[:, None] * row], axis=1)

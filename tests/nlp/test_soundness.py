@@ -109,7 +109,7 @@ def test_an_interrupt_of_python_proves_no_regular_poses(place: str, monkeypatch:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    target, name = (ranks._RankRule, "divided") if place == "branch" else (Examiner, "examine")
+    target, name = (ranks.RankRule, "divided") if place == "branch" else (Examiner, "examine")
     monkeypatch.setattr(target, name, interrupt)
     # The poses of opposite signs that are known before a box is bisected would refute the claim, as they should.
     problem = build_problem(case, model, box)

@@ -245,7 +245,7 @@ def test_what_no_case_file_can_state_is_refused() -> None:
     cone = BaseJointAngle(0.9, MountingPose((0.0, 0.0, 20.0)))
     other = PlatformJointAngle(0.9, MountingPose((0.0, 0.0, 21.0)))
     model = replace(case.model, name="my-own")
-    renamed = replace(case.model, wrenches=case.model.wrenches[::-1], built=case.model.built[::-1])
+    renamed = replace(case.model, **{key: getattr(case.model, key)[::-1] for key in ("wrenches", "legs", "built")})
     for wrong, fault in (
         (replace(case, model=model), "robot.model.*my-own.*cannot be written to a case file: no such robot"),
         (replace(case, model=renamed), "the robot of this name, with these options, is another one"),

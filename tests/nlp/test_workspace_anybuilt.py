@@ -389,7 +389,7 @@ def wrongly_shown(name: str, tolerance: float, covered: float) -> tuple[int, int
     centre, half = rng.uniform(root.lower, root.upper, (32, 6)), rng.uniform(0, 0.15, (32, 1))
     lower = np.maximum(centre - half * (root.upper - root.lower), root.lower)
     upper = np.minimum(centre + half * (root.upper - root.lower), root.upper)
-    good, assembly, wrong = claim.attempt(lower, upper).holds, claim._assembly, 0
+    good, assembly, wrong = claim.attempt(lower, upper).holds, claim.assembly, 0
 
     def matrices(z: FloatArray) -> FloatArray:
         """The matrices (K, m, c) at closed points (K, n)."""
@@ -398,7 +398,7 @@ def wrongly_shown(name: str, tolerance: float, covered: float) -> tuple[int, int
 
     rows = np.flatnonzero(good)
     if rows.size:
-        design = claim._closed(lower[rows], upper[rows]).near
+        design = claim.closed(lower[rows], upper[rows]).near
         C = np.linalg.pinv(matrices(design))
         for _ in range(8):
             errors = rng.normal(size=(len(rows), len(built.names), 3))

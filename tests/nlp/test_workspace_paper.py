@@ -358,7 +358,7 @@ def test_forms_hold_exact_rows(robot: Legs, kind: TurnKind) -> None:
     lower, upper = random_boxes(root, 12, 0.3, rng)
     lower[6:], upper[6:] = lower[6:], lower[6:] + (upper[6:] - lower[6:]) * 1e-13
     claim = rank(root, robot)
-    M, A, E = claim._matrices(claim._closed(lower, upper))
+    M, A, E = claim._matrices(claim.closed(lower, upper))
     free, length = list(np.flatnonzero(root.upper > root.lower)), six_legs(robot).characteristic_length
     rounded, bent = 0, 0
     for k in range(12):

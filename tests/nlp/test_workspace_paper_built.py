@@ -400,7 +400,7 @@ def test_changes_of_rows_hold_those_of_machines() -> None:
         lower = rng.uniform(root.lower, root.upper, (40, 6))
         upper = np.minimum(lower + 1e-3 * (root.upper - root.lower), root.upper)
         claims = [regular(some.exact, root, each) for each in (0.0, t)]
-        without, bound = (each._matrices(each._closed(lower, upper)).E for each in claims)
+        without, bound = (each._matrices(each.closed(lower, upper)).E for each in claims)
         y = lower + rng.uniform(size=lower.shape) * (upper - lower)
         R, p = box.rotations(y), y[:, :3]
         squares = 1 + y[:, 3:] ** 2

@@ -179,7 +179,7 @@ def test_no_box_with_a_singular_closed_pose_is_shown(name: str, part: float, deg
     points[:, list(problem.independent)] += 0.3 * half[list(problem.independent)] * rng.uniform(-1, 1, (60, 3))
     z = next(each for each in (newton.search(each) for each in points) if each is not None)
     # The assembly that is singular there, and no other.
-    shown._assembly.start = z
+    shown.assembly.start = z
     assert not shown.attempt(*boxes_about(problem.pose_of(z), half, rng)).holds.any()
 
 
@@ -188,7 +188,7 @@ def test_closed_loops_are_where_they_are_shown_to_be(name: str) -> None:
     case = gallery_case(name, 0.1, 20, 4)
     assert case.workspace is not None
     root = pose_root(case.workspace)
-    assembly = rank_claim(case, closed_form(case.model).model, root, "regular")._assembly
+    assembly = rank_claim(case, closed_form(case.model).model, root, "regular").assembly
     own, D = assembly.independent, assembly.dependent
     rng = np.random.default_rng(5)
     half = 0.5 * (root.upper - root.lower)
@@ -229,12 +229,12 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     show_on_leaves(shown, root, tree)
     shown.finish()
     (whole,) = shown._shown
-    shown._assembly.refuse_apart(whole)
+    shown.assembly.refuse_apart(whole)
     lower, upper = whole.lower.copy(), whole.upper.copy()
-    D = shown._assembly.dependent
+    D = shown.assembly.dependent
     lower[0, D], upper[0, D] = lower[0, D] + 0.5, upper[0, D] + 0.5
     with pytest.raises(ProofError, match="same assembly"):
-        shown._assembly.refuse_apart(replace(whole, lower=lower, upper=upper))
+        shown.assembly.refuse_apart(replace(whole, lower=lower, upper=upper))
 
 
 def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
