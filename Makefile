@@ -8,13 +8,19 @@ BIN := $(VENV)/bin
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
+# What solving needs, and beside it what tests, checks and documentation need.
+$(VENV)/solving: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable .
+	touch $@
+
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	$(BIN)/python -m compileall -q models nlp cases
-	touch $@
+	touch $@ $(VENV)/solving
 
-demo: $(VENV)/ready ## set everything up and solve the paper's Section 4.1
+demo: $(VENV)/solving ## set up what solving needs and solve the paper's Section 4.1
 	$(BIN)/screwsynth solve paper-4.1-helical
 
 test: $(VENV)/ready ## set everything up and run every test
