@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick check docs figures bench clean
+.PHONY: help demo test quick check docs figures bench dist clean
 
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -57,6 +57,9 @@ bench: $(VENV)/ready ## compare with other methods and write docs/benchmarks.md;
 		|| $(BIN)/python -m pip install --quiet --editable '.[bench]' \
 		|| for each in $(PEERS); do $(BIN)/python -m pip install --quiet $$each || echo "without $$each"; done
 	$(BIN)/python bench/benchmark.py $(BENCH)
+
+dist: $(VENV)/ready ## build the source distribution and a wheel from it, into dist
+	$(BIN)/python -m build
 
 clean: ## remove the environment and all build results
 	rm -rf $(VENV) build dist *.egg-info nlp/proof/enclosure/_bounds*.so nlp/screening/_screen*.so .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

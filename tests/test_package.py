@@ -124,6 +124,20 @@ def test_a_solve_loads_neither_robots_nor_tables_nor_proofs_that_its_case_has_no
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
+def test_the_citation_is_of_this_version() -> None:
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {version('screwsynth')}\n" in text
+    assert "\nlicense: MIT\n" in text
+
+
+def test_the_targets_that_contributors_are_told_are_those_of_make() -> None:
+    make = (ROOT / "Makefile").read_text(encoding="utf-8")
+    told = [ROOT / "CONTRIBUTING.md", ROOT / "README.md", *(ROOT / ".github" / "workflows").glob("*.yml")]
+    for page in told:
+        for target in re.findall(r"\bmake ([a-z]+)\b(?=`|\n| +#)", page.read_text(encoding="utf-8")):
+            assert f"\n{target}:" in make, f"{page.name}: make {target}"
+
+
 def test_the_readme_python_runs() -> None:
     (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     assert len([line for line in code.splitlines() if line.strip()]) <= 12
@@ -154,7 +168,7 @@ def test_the_readme_output_is_what_the_command_prints() -> None:
 
 
 def test_links_in_the_documentation_lead_somewhere() -> None:
-    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+    for page in [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]:
         for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
