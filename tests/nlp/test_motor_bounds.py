@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -56,6 +57,27 @@ def test_products_and_solutions_of_numbers_have_the_least_rests(*, is_product: b
             most = max(most, *(abs(value - (form.M + e * form.A[:, 0]).item()) for value in values))
         assert most <= form.E.item() * (1 + 1e-12)
         assert form.E.item() <= most * (1 + 1e-9 if is_product else 1.7)
+
+
+def test_what_counts_in_a_ball_of_rotations_is_not_negative_inside_of_it() -> None:
+    """Rotations of which a part is known up to a rest, as those of loops are, on the edge of the ball."""
+    rng, least = np.random.default_rng(1), math.inf
+    for _ in range(40):
+        r, along = rng.normal(size=(2, 3))
+        r, along, rest = r / np.linalg.norm(r), 0.05 * along, rng.uniform(0.0, 0.02, 3)
+        turn = AffineMatrix(r[None, None], along[None, None, None], rest[None, None])
+        claims = SimpleNamespace(free=[3], _ball=1.0)
+        at = MotorClaims._inside(claims, np.array([[math.copysign(1.0, along @ r)]]), turn)[0]  # type: ignore[arg-type]
+        corners = turn.corners(1)[0, :, 0]
+        for where in rng.uniform(size=20):
+            inside = np.array([where, 1.0 - where])
+            whole = inside @ corners
+            # The rotation is nearer to the middle of the ball than its known part is, by as much as it may be.
+            true = whole - rest * np.sign(whole)
+            if np.linalg.norm(true) <= 1.0:
+                assert inside @ at >= 0
+                least = min(least, (inside @ at) / max(at.max(), 1e-300))
+    assert least < 0.1  # some are on the edge
 
 
 def test_no_solution_is_known_where_a_system_may_be_singular() -> None:
