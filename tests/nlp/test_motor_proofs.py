@@ -15,6 +15,7 @@ from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Unproved, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
+from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
 from screwsynth.nlp.proof.workspace.judge import Judgement
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
@@ -102,3 +103,30 @@ def test_a_proof_for_other_loads_or_motions_is_rejected() -> None:
     for motion in (Motion(1.1, 0.5), Motion(1.0, 0.7)):
         with pytest.raises(ProofError, match=r"actuator_speed .* could not be shown"):
             check_workspace_proof(proof, replace(case, loading=LOADING._replace(motion=motion)))
+
+
+def test_numbers_under_a_load_are_not_those_under_another() -> None:
+    """Their trees are the same, and so would be their bounds."""
+    small = {"force": (0.3, 0.1, -1.0), "any_force": 0.2, "any_moment": 0.01}
+    case = replace(robot_of("legs"), loading=Loading((replace(CUT, name="light", **small), CUT)))
+    proof = proof_of(case)[1]
+    light = [each for each in proof.claims if each.name.startswith("actuator_force") and each.name.endswith("light")]
+    assert len(light) == 12
+    heavy = tuple(replace(each, name=each.name.replace("light", "cut")) for each in light)
+    assert {each.name for each in heavy} < {each.name for each in proof.claims}
+    check_workspace_proof(proof, case)
+    others = tuple(each for each in proof.claims if (each.name, each.sense) not in {(h.name, h.sense) for h in heavy})
+    with pytest.raises(ProofError, match=r"actuator_force .* cut.* could not be shown"):
+        check_workspace_proof(replace(proof, claims=(*others, *heavy)), case)
+
+
+def test_boxes_of_numbers_are_of_one_assembly(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = robot_of("3-rps")
+    proof = proof_of(case)[1]
+
+    def apart(*_: object) -> None:
+        raise ProofError("the same assembly")
+
+    monkeypatch.setattr(Assembly, "refuse_apart", apart)
+    with pytest.raises(ProofError, match="the same assembly"):
+        check_workspace_proof(proof, case)
