@@ -140,7 +140,10 @@ def test_the_wheel_holds_every_module_and_case_and_runs(tmp_path: Path) -> None:
     assert not [name for name in held if name.endswith(".so")]
     for folder in ("models", "nlp", "cases"):
         for path in (ROOT / folder).rglob("*"):
-            if path.suffix in (".py", ".toml", ".typed", ".in", ".js", ".css") and "__pycache__" not in path.parts:
+            if (
+                path.suffix in (".py", ".toml", ".ngc", ".typed", ".in", ".js", ".css")
+                and "__pycache__" not in path.parts
+            ):
                 assert f"screwsynth/{path.relative_to(ROOT).as_posix()}" in held
     site = tmp_path / "site"
     subprocess.run([*pip, "install", "--no-deps", "--target", str(site), str(wheel)], check=True)

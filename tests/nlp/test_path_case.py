@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import case_from, output_of, refusal_of, saved, shipped_tables
+from builders import DOCS, case_from, docs_script, output_of, refusal_of, saved, shipped_tables
 
 from screwsynth.nlp import CaseError, PathFile, PathOptions, check_path, load_case, read_path
 from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.path.path import Kind
 from screwsynth.nlp.path.reader import path_of_case
 
 Run = Callable[..., tuple[int, str, str]]
@@ -99,3 +100,42 @@ def test_a_path_is_written_as_it_was_stated() -> None:
         case = case_from(shipped_tables("hexapod-linuxcnc") | {"path": keys})
         assert case.path == PathFile(**keys)
         assert case_from(case.to_toml()).path == case.path
+
+
+def test_the_shipped_program_is_the_written_one_and_a_pocket_with_leaning_walls() -> None:
+    text = find_case("hexapod-pocket").with_suffix(".ngc").read_text(encoding="utf-8")
+    assert docs_script("pocket").program() == text, "run `make docs`"
+    assert text.count("\n") >= 2000
+    path = path_of_case(load_case("hexapod-pocket"))
+    k = np.flatnonzero(path.kinds != Kind.DWELL)
+    s = np.linspace(0, 1, 17)
+    tips, turns = path.poses_at(np.repeat(k, len(s)), np.tile(s, len(k)))
+    tips, axes = 25.4 * (tips - [0, 0, 20]), turns[:, :, 2]
+    # The tool, of radius 6 mm, up from its tip as far as the part's top, at the four walls: at their tops 140 by 90 mm.
+    tilt = math.radians(8)
+    walls = math.cos(tilt) * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    normals = np.hstack([walls, np.full((4, 1), -math.sin(tilt))])
+    heights = np.maximum(-tips[:, 2], 0) / axes[:, 2]
+    gaps = np.array([
+        np.array([70, 45, 70, 45]) * math.cos(tilt) - (tips + part * heights[:, None] * axes) @ normals.T
+        for part in (0.0, 1.0)
+    ])  # fmt: skip
+    in_part = tips[:, 2] < 0
+    assert gaps[:, in_part].min() == pytest.approx(6, abs=1e-3)
+    leaning = np.arccos(axes[:, 2])
+    assert leaning.max() == pytest.approx(tilt, abs=1e-4)
+    along = in_part & (np.abs(leaning - tilt) < 1e-6) & (np.abs(axes[:, :2]).min(axis=1) < 1e-9)
+    touches = np.abs(gaps[:, along].min(axis=2) - 6) < 1e-3
+    assert along.sum() > 1000
+    assert touches.all(axis=0).mean() > 0.95  # all but the ways down to the wall
+    assert tips[:, 2].min() == pytest.approx(-24)
+
+
+def test_the_shipped_program_is_proved_and_its_page_says_so(cli: Run) -> None:
+    shown = output_of(cli("path", "hexapod-pocket"))
+    page = (DOCS / "paths.md").read_text(encoding="utf-8")
+    _, _, rest = page.partition("<!-- begin: screwsynth path hexapod-pocket -->\n```text\n")
+    assert "everything is proved at every point" in shown
+    assert [line.rstrip() for line in shown.partition("numbers at")[0].splitlines()] == rest.partition("```")[
+        0
+    ].splitlines()
