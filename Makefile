@@ -43,6 +43,7 @@ check: $(VENV)/ready build/typing/screwsynth ## check formatting, lint, types an
 
 docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/gallery.py
+	$(BIN)/python -P docs/pocket.py
 	$(BIN)/python -P docs/refresh.py
 	$(BIN)/python -P docs/api.py
 	$(BIN)/python -P docs/tour.py

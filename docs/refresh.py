@@ -56,3 +56,10 @@ with tempfile.TemporaryDirectory() as folder:
 words = ("largest F", "        value", "rb ", "arm ", "p_z ", "actuator rates", "freedoms", "rank of J")
 kept = "".join(line for line in lines if line.startswith(words))
 _put(ROOT / "docs" / "robots.md", "<!-- begin: solve -->", "<!-- end -->", f"```text\n{kept}```\n")
+part = ("path", "hexapod-pocket")
+_put(
+    ROOT / "docs" / "paths.md",
+    f"<!-- begin: screwsynth {' '.join(part)} -->",
+    "<!-- end -->",
+    f"```text\n{_output_of(*part).partition('numbers at')[0]}```\n",
+)

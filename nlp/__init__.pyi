@@ -29,6 +29,7 @@ from .case.limits.singular_values import SmallestSingularValue as SmallestSingul
 from .case.loads import Load as Load
 from .case.loads import Loading as Loading
 from .case.loads import Motion as Motion
+from .case.pathfile import PathFile as PathFile
 from .case.pose import Free as Free
 from .case.pose import OverPoses as OverPoses
 from .case.pose import Pose as Pose
@@ -95,6 +96,9 @@ from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
 from .output.report.webpage import report as report
 from .output.sweeptable import sweep as sweep
+from .path.options import PathOptions as PathOptions
+from .path.path import ProgrammedPath as ProgrammedPath
+from .path.reader import read_path as read_path
 from .program.formulation import formulate as formulate
 from .program.nlp import Nlp as Nlp
 from .program.program import Program as Program
@@ -104,6 +108,8 @@ from .proof.certificate.certificate import CertificateStatus as CertificateStatu
 from .proof.workspace.judge import Judgement as Judgement
 from .proof.workspace.judge import judge_workspace as judge_workspace
 from .proof.workspace.numbers.extremes import Extreme as Extreme
+from .proof.workspace.path_check import check_path as check_path
+from .proof.workspace.path_judge import PathJudgement as PathJudgement
 from .proof.workspace.scale import Scale as Scale
 from .proof.workspace.scale import largest_scale as largest_scale
 from .proof.workspace.verdict import Outcome as Outcome

@@ -217,9 +217,12 @@ def test_the_gallery_of_the_documentation_is_up_to_date() -> None:
 
 
 def test_the_case_file_of_the_documentation_is_valid() -> None:
-    (written,) = re.findall(r"```toml\n(.*?)```", text_of("case-files.md"), flags=re.DOTALL)
-    case = screwsynth.nlp.case_from_tables(tomllib.loads(written), name="shown", source="case-files.md")
+    written, path = re.findall(r"```toml\n(.*?)```", text_of("case-files.md"), flags=re.DOTALL)
+    tables = tomllib.loads(written + path)
+    case = screwsynth.nlp.case_from_tables(tables, name="shown", source="case-files.md")
     assert case.tasks[0].name == "drive the screw"
+    assert case.path is not None
+    assert case.path.file == "part.ngc"
 
 
 def test_the_loads_of_the_documentation_are_valid() -> None:

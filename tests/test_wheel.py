@@ -92,9 +92,10 @@ def test_a_wheel_without_a_compiler_holds_every_module_and_case_and_runs(source:
     (wheel,) = tmp_path.glob("*.whl")
     held = set(zipfile.ZipFile(wheel).namelist())
     assert not [name for name in held if name.endswith(".so")]
+    suffixes = (".py", ".toml", ".ngc", ".typed", ".in", ".js", ".css")
     for folder in ("models", "nlp", "cases"):
         for path in (ROOT / folder).rglob("*"):
-            if path.suffix in (".py", ".toml", ".typed", ".in", ".js", ".css") and "__pycache__" not in path.parts:
+            if path.suffix in suffixes and "__pycache__" not in path.parts:
                 assert f"screwsynth/{path.relative_to(ROOT).as_posix()}" in held
     site = tmp_path / "site"
     subprocess.run([sys.executable, *PIP, "install", "--no-deps", "--target", str(site), str(wheel)], check=True)

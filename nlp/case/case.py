@@ -25,6 +25,7 @@ from .limits.limit import LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import parameter_name, pose_prefixes
+from .pathfile import PathFile
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Sense, Task
@@ -51,6 +52,7 @@ class Case(Whole, Shown):
         over_poses: combination of F over several poses.
         joint_centre_tolerance: largest error of a joint centre in the machine as it is built, length; None for none.
         workspace: poses for which a machine with these dimensions is judged; None for none.
+        path: programmed path along which a machine with these dimensions is judged; None for none.
         loading: loads on the platform, and its fastest motions.
         search: settings of the search.
         method: method that combines several tasks; the average is equation 15.
@@ -78,6 +80,7 @@ class Case(Whole, Shown):
     over_poses: OverPoses = OverPoses.SUM
     joint_centre_tolerance: float | None = None
     workspace: Workspace | None = None
+    path: PathFile | None = None
     loading: Loading = NO_LOADING
     search: Search = field(default_factory=Search)
     method: Method = Method.AVERAGE

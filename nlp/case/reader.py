@@ -33,7 +33,7 @@ from .pose import (
 from .robots import insert_robot_file, model_of_table
 from .schema import Document, ExpectTable, PoseTable, PublishedTable, Range, RotationTable, TaskTable
 from .settings import Expectation, ExpectedValue, Published, Search
-from .source import find_case, inputs_of, read_text, tables_of
+from .source import find_case, inputs_of, named_files, read_text, tables_of
 from .table import case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
@@ -75,9 +75,10 @@ def read_case(name: str, settings: Settings | None = None) -> CaseFile:
     path = find_case(name)
     text = read_text(path)
     tables = tables_of(path, text)
-    inputs = inputs_of(path, tables)  # the names of files leave the tables when a case is made of these
+    # The names of files leave the tables when a case is made of these.
+    inputs, named = inputs_of(path, tables), named_files(tables, path.parent)
     case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
-    return CaseFile(case, text if len(inputs) == 1 and not settings else toml_document(tables), inputs)
+    return CaseFile(case, toml_document(tables) if named or settings else text, inputs)
 
 
 class PoseRows(NamedTuple):
@@ -147,7 +148,7 @@ def case_from_tables(
         name: name of the case in results.
         source: name of the document in messages.
         settings: as for :func:`load_case`.
-        folder: folder beside which the CSV files are that the document names; the current one if left out.
+        folder: folder beside which the files are that the document names; the current one if left out.
 
     Raises:
         CaseError: the document, or a CSV file that it names, holds a fault.
@@ -162,7 +163,7 @@ def case_from_tables(
             for key, value in settings.items():
                 override_number(tables, key, value)
             written = _parse(tables)
-        return _case_of(written, name, source, robot_file)
+        return _case_of(written, name, source, "" if folder is None else str(folder), robot_file)
     except CaseError as error:
         raise (error if error.source else origins.error_in(error, source)) from None
 
@@ -191,13 +192,14 @@ def _kind_of(tables: dict[str, Any]) -> type[Document]:
     return WholeDocument
 
 
-def _case_of(written: Document, name: str, source: str, robot_file: str | None = None) -> Case:
+def _case_of(written: Document, name: str, source: str, folder: str, robot_file: str | None = None) -> Case:
     """Return the case of a document.
 
     Args:
         written: the document.
         name: name of the case in results.
         source: name of the document in messages.
+        folder: of the document; an empty name for the current one.
         robot_file: name of the file from which the robot's definition is; None where the document has it.
 
     Raises:
@@ -236,6 +238,7 @@ def _case_of(written: Document, name: str, source: str, robot_file: str | None =
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
         workspace=written.read_workspace(units),
+        path=written.read_path(folder),
         loading=written.read_loading(units),
         tasks=written.read_tasks(tasks),
         units=units,

@@ -19,6 +19,7 @@ from ..errors import listing
 from ..units import Units
 from .case import Case
 from .loads import NO_LOADING, Loading
+from .pathfile import PathFile
 from .settings import Expectation, Published, Search
 from .table import Table, Vector, fault_of
 from .task import Task
@@ -348,6 +349,14 @@ class Document(Table):
 
         Raises:
             CaseError: the axis of its rotations is zero, or limits hold over a workspace that is not stated.
+        """
+        return None
+
+    def read_path(self, folder: str) -> PathFile | None:  # noqa: ARG002 - it has none
+        """Return the programmed path that the document states; None where it states none.
+
+        Args:
+            folder: of the document, beside which the path's file is.
         """
         return None
 

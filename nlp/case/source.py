@@ -87,7 +87,7 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
 
 
 def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Return the CSV files and the robot file that a document names, which need not exist.
+    """Return the CSV files and the robot file that a document names and whose content it holds; they need not exist.
 
     Args:
         tables: the document, as ``tomllib`` returns it.
@@ -99,9 +99,17 @@ def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
     return (*named_csv_files(tables, folder), *of_robot)
 
 
+def _path_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
+    """Return the file of the programmed path that a document names; the arguments are those of :func:`named_files`."""
+    path = tables.get("path")
+    file = path.get("file") if isinstance(path, dict) else None
+    return (folder / file,) if isinstance(file, str) and file else ()
+
+
 def inputs_of(path: Path, tables: Mapping[str, Any]) -> Mapping[Path, str]:
     """Return the files that a case is read from, as :func:`case_inputs`, from its file and that file's tables."""
-    return {**dict.fromkeys(named_files(tables, path.parent), "a file that the case names"), path: "the case file"}
+    names = (*named_files(tables, path.parent), *_path_files(tables, path.parent))
+    return {**dict.fromkeys(names, "a file that the case names"), path: "the case file"}
 
 
 def case_inputs(name: str) -> Mapping[Path, str]:

@@ -33,8 +33,8 @@ class Table(BaseModel):
         return table
 
 
-#: Parts of a fault's path that stand for branches of a union, and are no keys of a file.
-_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>")
+#: Parts of a fault's path that stand for branches of a union, or for a key of a table, and are no keys of a file.
+_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "[key]")
 
 
 def fault_of(key: str, fault: str) -> PydanticCustomError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
 
@@ -15,8 +15,9 @@ from .checks import check_direction
 from .limits.registry import LimitsTable
 from .loads import Loading
 from .loadtables import GravityTable, LoadTable, MotionTable, ObjectiveTable, loading_of
+from .pathfile import Convention, PathFile
 from .pose import internal_value
-from .schema import Document
+from .schema import Document, FileName
 from .table import Table, Vector, fault_of
 from .task import Task
 from .workspace import TURNS, TurnKind, Turns, Workspace
@@ -76,11 +77,30 @@ class WorkspaceTable(Table):
     rotation: WorkspaceRotationTable | None = Field(default=None, description="left out: no rotation")
 
 
+Six = Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)]
+
+
+class PathTable(Table):
+    """The programmed path along which a machine is judged."""
+
+    file: FileName = Field(description="file beside this one: G-code, or a .csv file of poses")
+    unit: Literal["mm", "in"] | None = Field(default=None, description="unit of a program before G20 or G21")
+    start: Six | None = Field(
+        default=None, description="X, Y, Z, A, B, C, angles in degrees, where the machine stands before a program"
+    )
+    offsets: dict[Literal["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"], Six] = Field(
+        default_factory=dict, description="origins of a program's coordinate systems"
+    )
+    angles: Convention = Field(default=PathFile.angles, description="convention of a program's A, B and C")
+    between: Literal["angles", "slerp"] | None = Field(default=None, description="motion between two points")
+
+
 class WholeDocument(Document):
     """A whole case file."""
 
     limits: LimitsTable | None = Field(default=None, description="limits that a design must keep to be built")
     workspace: WorkspaceTable | None = Field(default=None, description="poses for which a machine is judged")
+    path: PathTable | None = Field(default=None, description="programmed path along which a machine is judged")
     load: list[LoadTable] = Field(default_factory=list, description="loads on the platform")
     motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
     gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
@@ -95,6 +115,10 @@ class WholeDocument(Document):
             return None
         position = [internal_value(value, units, Dimension.LENGTH) for value in self.workspace.position]
         return Workspace(position, _turns(self.workspace.rotation, units), has_limits)
+
+    def read_path(self, folder: str) -> PathFile | None:
+        """Return the programmed path that the document states."""
+        return None if self.path is None else PathFile(folder=folder, **dict(self.path))
 
     def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
         """Return the tasks, that of a number of the actuators in the place of F of a motion."""

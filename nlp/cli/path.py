@@ -30,8 +30,11 @@ if TYPE_CHECKING:
 def path(
     case: CaseName,
     along: Annotated[
-        str, typer.Option("--along", metavar="FILE", help="The path: poses in a .csv file, or a program of G-code.")
-    ],
+        str | None,
+        typer.Option(
+            "--along", metavar="FILE", help="The path, poses in a .csv file or G-code, in place of the case's own."
+        ),
+    ] = None,
     settings: SettingTexts = None,
     of: ResultFile = None,
     unit: Annotated[
@@ -55,7 +58,8 @@ def path(
 
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
-    from ..path.reader import read_path
+    from ..path.options import PathOptions
+    from ..path.reader import options_of, path_of_case, read_path
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
     from ..results.pathwording import path_summary
@@ -68,9 +72,11 @@ def path(
     answer_after(Milestone.BOUND)
     (loaded, _, inputs), chosen = read_machine(case, read_settings(settings), of)
     files = Outputs(json=json_file, csv=csv_file)
-    files.check({**inputs, Path(along): "the path that is read"})
+    files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
+    own = PathOptions() if along is not None or loaded.path is None else options_of(loaded.path)
+    options = _options(own, unit, start, offset or [])
     with spinner("reading the path") as show:
-        programmed = read_path(along, loaded.units, _options(unit, start, offset or []))
+        programmed = path_of_case(loaded, options) if along is None else read_path(along, loaded.units, options)
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, progress=show)
     result = path_result(judged)
@@ -90,14 +96,15 @@ def path(
     raise typer.Exit(0 if result.proved else 1)
 
 
-def _options(unit: str | None, start: str | None, offsets: list[str]) -> PathOptions:
-    """Return the choices that a path's file leaves open.
+def _options(own: PathOptions, unit: str | None, start: str | None, offsets: list[str]) -> PathOptions:
+    """Return the choices that a path's file leaves open: those of the case, but for what is given.
 
     Raises:
         InputError: one is not a list of six numbers.
     """
+    from dataclasses import replace
+
     from ..errors import InputError
-    from ..path.options import PathOptions
 
     def numbers(option: str, text: str) -> list[float]:
         try:
@@ -105,10 +112,15 @@ def _options(unit: str | None, start: str | None, offsets: list[str]) -> PathOpt
         except ValueError:
             raise InputError(f"{option} {text}: must be six numbers with commas: X,Y,Z,A,B,C") from None
 
-    found = {}
+    found = dict(own.offsets)
     for each in offsets:
         name, equals, text = each.partition("=")
         if not equals:
             raise InputError(f"--offset {each}: must be a coordinate system and its origin: G54=X,Y,Z,A,B,C")
         found[name] = numbers("--offset", text)
-    return PathOptions(unit=unit, start=None if start is None else numbers("--start", start), offsets=found)
+    return replace(
+        own,
+        unit=own.unit if unit is None else unit,
+        start=own.start if start is None else numbers("--start", start),
+        offsets=found,
+    )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..case.case import Case
+from ..case.pathfile import PathFile
+from ..errors import CaseError, InputError
 from ..system.reading import read_limited, text_of_bytes
 from ..units import Units
 from .gcode import read_program
@@ -50,6 +53,31 @@ def read_path(file: str | Path, units: Units, options: PathOptions | None = None
     if path.between is Between.SLERP:
         _check_turns(path)
     return path
+
+
+def path_of_case(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
+    """Return the path that a case states.
+
+    Args:
+        case: the case.
+        options: in the place of those that the case states.
+
+    Raises:
+        CaseError: it states none.
+        InputError: its file cannot be read, or holds anything that is not read.
+    """
+    stated = case.path
+    if stated is None:
+        raise CaseError("path", "is missing: give the table [path], or the file of a path", source=case.source)
+    # What is wrong is told with the file's whole name, and results have the stated one.
+    path = read_path(stated.name, case.units, options or options_of(stated))
+    return replace(path, source=stated.file)
+
+
+def options_of(stated: PathFile) -> PathOptions:
+    """Return the options of reading a path that a case states."""
+    between = None if stated.between is None else Between(stated.between)
+    return PathOptions(between, stated.angles, stated.unit, stated.start, stated.offsets)
 
 
 def _check_turns(path: ProgrammedPath) -> None:

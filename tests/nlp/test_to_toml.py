@@ -63,8 +63,8 @@ def differences(one: Any, two: Any, slack: float, where: str = "case") -> list[s
         one, two = (one.name, dict(one.options)), (two.name, dict(two.options))
     if is_dataclass(one) and type(one) is type(two):
         found = []
-        # The file's name is no part of the case.
-        for item in (item for item in fields(one) if item.name != "source"):
+        # The names of its file and folder are no part of the case.
+        for item in (item for item in fields(one) if item.name not in ("source", "folder")):
             found += differences(getattr(one, item.name), getattr(two, item.name), slack, f"{where}.{item.name}")
         return found
     if isinstance(one, Mapping):

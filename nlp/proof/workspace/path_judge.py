@@ -50,7 +50,7 @@ from .verdict import Outcome
 #: Seconds after which a judgement stops where the caller does not say.
 TIME_LIMIT = 600.0
 #: Part of the time that is left that a search takes at most, and gap of a number without a limit, as a part of it.
-_PART, _GAP = 0.5, 1e-3
+_PART, GAP = 0.5, 1e-3
 #: Part of the sizes of positions, or angle, by which the box of all poses is larger than the path.
 _ROOM = 1e-9
 #: Angles from which on the tangent of the half is too large a coordinate.
@@ -129,7 +129,7 @@ def judge_path(
     case: Case,
     path: ProgrammedPath,
     *,
-    gap: float = _GAP,
+    gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
 ) -> PathJudgement:

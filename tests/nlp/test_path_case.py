@@ -1,0 +1,141 @@
+"""Paths that cases name: read beside their files, judged by the command and in Python, and written again."""
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import DOCS, case_from, docs_script, output_of, refusal_of, saved, shipped_tables
+
+from screwsynth.nlp import CaseError, PathFile, PathOptions, check_path, load_case, read_path
+from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.path.path import Kind
+from screwsynth.nlp.path.reader import path_of_case
+
+Run = Callable[..., tuple[int, str, str]]
+
+#: An arc of a quarter, in a program's own coordinates.
+PROGRAM = "G20\nG55 G0 X1 Y0 Z20\nG94 F60\nG3 X0 Y1 I-1 A5\nM2\n"
+
+
+def hexapod_with(folder: Path, *lines: str) -> str:
+    """The name of a case file of LinuxCNC's hexapod with these lines of the table of its path."""
+    text = find_case("hexapod-linuxcnc").read_text(encoding="utf-8")
+    return str(saved(folder / "machine.toml", "\n".join([text, "[path]", *lines, ""])))
+
+
+def test_a_case_names_its_path_and_how_it_is_read(cli: Run, tmp_path: Path) -> None:
+    saved(tmp_path / "part.ngc", PROGRAM)
+    saved(tmp_path / "other.ngc", PROGRAM.replace("G55", "G0 X0 Y0 Z19 A0 B0 C0\nG55"))
+    keys = ['file = "part.ngc"', 'unit = "mm"', "offsets = { G55 = [0, 0, 1, 0, 0, 0] }", "start = [0, 0, 18, 0, 0, 0]"]
+    name, out = hexapod_with(tmp_path, *keys), str(tmp_path / "path.json")
+
+    def result(*flags: str) -> dict[str, object]:
+        output_of(cli("path", name, *flags, "--json", out))
+        found: dict[str, object] = json.loads(Path(out).read_text())["path"]
+        return found
+
+    own = result()
+    assert (own["file"], own["segments"]) == ("part.ngc", 2)
+    path = path_of_case(load_case(name))
+    assert path.knots == pytest.approx(
+        np.array([[0, 0, 18, 0, 0, 0], [1, 0, 21, 0, 0, 0], [0, 1, 21, math.radians(5), 0, 0]]), abs=1e-12
+    )
+    # Choices of the command take the place of those of the case; with a file of its own there are only these.
+    lower = result("--offset", "G55=0,0,0,0,0,0")
+    assert lower["segments"] == 2
+    assert lower["actuators"] != own["actuators"]
+    other = result("--along", str(tmp_path / "other.ngc"))
+    assert (other["file"], other["segments"]) == (str(tmp_path / "other.ngc"), 2)
+    other_path = read_path(tmp_path / "other.ngc", load_case(name).units, PathOptions())
+    assert other_path.knots[:, 2] == pytest.approx([19, 20, 20])
+
+    judged = check_path(load_case(name))
+    assert judged.is_proved
+    lengths = {each.name: each.bound for each in judged.extremes if each.sense.value == "min"}
+    for row, length in zip(own["actuators"], lengths.values(), strict=True):
+        assert row["smallest"] == pytest.approx(length)
+    assert check_path(load_case(name), tmp_path / "other.ngc").path.source == other["file"]
+    assert check_path(load_case("hexapod-linuxcnc"), other_path, gap=0.1).path is other_path
+
+
+def test_other_commands_read_a_case_with_a_path_that_is_not_there(cli: Run, tmp_path: Path) -> None:
+    name = hexapod_with(tmp_path, 'file = "none.ngc"')
+    assert "2.71312" in output_of(cli("evaluate", name))
+    refusal_of(cli("path", name), str(tmp_path / "none.ngc"))
+    refusal_of(cli("path", "hexapod-linuxcnc"), "hexapod-linuxcnc.toml: path: is missing")
+    with pytest.raises(CaseError, match="path: is missing"):
+        check_path(load_case("hexapod-linuxcnc"))
+    saved(tmp_path / "none.ngc", PROGRAM)
+    refusal_of(cli("path", name, "--json", str(tmp_path / "none.ngc")), "is a file that the case names")
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({}, "path.file: is missing"),
+        ({"file": ""}, "path.file = '': must not be empty"),
+        ({"file": "a.ngc", "unit": "cm"}, "path.unit = 'cm': must be one of 'mm' or 'in'"),
+        ({"file": "a.ngc", "start": [1.0, 2.0]}, "path.start: must have 6 entries, got 2"),
+        ({"file": "a.ngc", "offsets": {"G53": [0.0] * 6}}, "path.offsets.G53 = 'G53': must be one of 'G54'"),
+        ({"file": "a.ngc", "angles": "xyx"}, "path.angles = 'xyx': must be one of 'rpy'"),
+        ({"file": "a.ngc", "between": "line"}, "path.between = 'line': must be one of 'angles' or 'slerp'"),
+        ({"file": "a.ngc", "along": 1}, "path.along: no such key; allowed: file, unit"),
+    ],
+)
+def test_faults_of_the_table_are_told(keys: dict[str, object], words: str) -> None:
+    with pytest.raises(CaseError) as error:
+        case_from(shipped_tables("hexapod-linuxcnc") | {"path": keys})
+    assert words in str(error.value).replace('"', "'")
+
+
+def test_a_path_is_written_as_it_was_stated() -> None:
+    stated = {
+        "file": "sub/part.ngc", "unit": "in", "start": [1.0, 2, 3, 4, 5, 6], "angles": "xyz", "between": "slerp",
+        "offsets": {"G59.1": [0.5, 0, 0, 0, 0, 90]},
+    }  # fmt: skip
+    for keys in (stated, {"file": "part.csv"}):
+        case = case_from(shipped_tables("hexapod-linuxcnc") | {"path": keys})
+        assert case.path == PathFile(**keys)
+        assert case_from(case.to_toml()).path == case.path
+
+
+def test_the_shipped_program_is_the_written_one_and_a_pocket_with_leaning_walls() -> None:
+    text = find_case("hexapod-pocket").with_suffix(".ngc").read_text(encoding="utf-8")
+    assert docs_script("pocket").program() == text, "run `make docs`"
+    assert text.count("\n") >= 2000
+    path = path_of_case(load_case("hexapod-pocket"))
+    k = np.flatnonzero(path.kinds != Kind.DWELL)
+    s = np.linspace(0, 1, 17)
+    tips, turns = path.poses_at(np.repeat(k, len(s)), np.tile(s, len(k)))
+    tips, axes = 25.4 * (tips - [0, 0, 20]), turns[:, :, 2]
+    # The tool, of radius 6 mm, up from its tip as far as the part's top, at the four walls: at their tops 140 by 90 mm.
+    tilt = math.radians(8)
+    walls = math.cos(tilt) * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    normals = np.hstack([walls, np.full((4, 1), -math.sin(tilt))])
+    heights = np.maximum(-tips[:, 2], 0) / axes[:, 2]
+    gaps = np.array([
+        np.array([70, 45, 70, 45]) * math.cos(tilt) - (tips + part * heights[:, None] * axes) @ normals.T
+        for part in (0.0, 1.0)
+    ])  # fmt: skip
+    in_part = tips[:, 2] < 0
+    assert gaps[:, in_part].min() == pytest.approx(6, abs=1e-3)
+    leaning = np.arccos(axes[:, 2])
+    assert leaning.max() == pytest.approx(tilt, abs=1e-4)
+    along = in_part & (np.abs(leaning - tilt) < 1e-6) & (np.abs(axes[:, :2]).min(axis=1) < 1e-9)
+    touches = np.abs(gaps[:, along].min(axis=2) - 6) < 1e-3
+    assert along.sum() > 1000
+    assert touches.all(axis=0).mean() > 0.95  # all but the ways down to the wall
+    assert tips[:, 2].min() == pytest.approx(-24)
+
+
+def test_the_shipped_program_is_proved_and_its_page_says_so(cli: Run) -> None:
+    shown = output_of(cli("path", "hexapod-pocket"))
+    page = (DOCS / "paths.md").read_text(encoding="utf-8")
+    _, _, rest = page.partition("<!-- begin: screwsynth path hexapod-pocket -->\n```text\n")
+    assert "everything is proved at every point" in shown
+    assert [line.rstrip() for line in shown.partition("numbers at")[0].splitlines()] == rest.partition("```")[
+        0
+    ].splitlines()
