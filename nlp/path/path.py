@@ -9,6 +9,7 @@ Angles are radians.
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -162,6 +163,21 @@ class ProgrammedPath:
     def arc_segments(self) -> NDArray[np.intp]:
         """Indices (m,) of the segments that are arcs."""
         return np.flatnonzero(self.kinds == Kind.ARC)
+
+    @cached_property
+    def untimed(self) -> NDArray[np.intp]:
+        """Indices of the segments whose time the file does not state."""
+        return np.flatnonzero(np.isnan(self.durations))
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether the file states the time of a motion."""
+        return bool(np.isfinite(self.durations[self.kinds != Kind.DWELL]).any())
+
+    @property
+    def time(self) -> float:
+        """Seconds of the segments whose time is stated."""
+        return math.fsum(self.durations[np.isfinite(self.durations)].tolist())
 
     @cached_property
     def lengths(self) -> FloatArray:

@@ -72,12 +72,22 @@ class PathClaimData(JsonObject):
 
 
 class PathActuatorData(JsonObject):
-    """Coordinate of an actuator along a path: proven smallest and largest values; null where nothing is proved."""
+    """Numbers of an actuator along a path.
+
+    Attributes:
+        actuator: its name.
+        unit: of its coordinate.
+        smallest: proven smallest coordinate; null where nothing is proved.
+        largest: proven largest coordinate.
+        speed: proven largest speed, in this unit by seconds, in the path's motion where it states times; absent without
+            such.
+    """
 
     actuator: str
     unit: str
     smallest: float | None
     largest: float | None
+    speed: Absent[float]
 
 
 class IdleData(JsonObject):
@@ -100,6 +110,8 @@ class PathData(JsonObject):
     Attributes:
         file: its name.
         segments: their number.
+        time: seconds of the segments whose time is stated; absent where none is.
+        untimed: number of the others, of which speeds are not known; absent where no time is stated.
         idle: what moves nothing, in the order of the lines.
         claims: ranks first.
         actuators: of the robot.
@@ -107,6 +119,8 @@ class PathData(JsonObject):
 
     file: str
     segments: int
+    time: Absent[float]
+    untimed: Absent[int]
     idle: tuple[IdleData, ...]
     claims: tuple[PathClaimData, ...]
     actuators: tuple[PathActuatorData, ...]
@@ -138,6 +152,8 @@ def path_result(judged: "PathJudgement") -> PathResult:
         path=PathData(
             file=judged.path.source,
             segments=len(judged.path),
+            time=judged.path.time if judged.path.is_timed else None,
+            untimed=len(judged.path.untimed) if judged.path.is_timed else None,
             idle=tuple(IdleData.of(each) for each in judged.path.idle),
             claims=(*ranks, *numbers),
             actuators=tuple(_actuators(judged)),
@@ -205,10 +221,14 @@ def _actuators(judged: "PathJudgement") -> Iterator[PathActuatorData]:
         names = [f"{measure} limb {joint.name}" for measure in ("leg_length", *ACTUATED)]
         ends = {each.sense: each.bound for each in judged.extremes if each.name in names}
         shown = {sense: units.shown(end, joint.dimension) for sense, end in ends.items() if math.isfinite(end)}
-        if ends:
+        name = f"actuator_speed actuator {joint.name}"
+        speeds = [each for each in judged.extremes if each.name == name and judged.path.is_timed]
+        speed = next((units.shown(each.bound, each.dimension) for each in speeds if math.isfinite(each.bound)), None)
+        if ends or speeds:
             yield PathActuatorData(
                 actuator=joint.name,
                 unit=units.label(joint.dimension),
                 smallest=shown.get(Sense.MIN),
                 largest=shown.get(Sense.MAX),
+                speed=speed,
             )

@@ -15,7 +15,7 @@ from .workspacewording import pose_words
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from .path import PathClaimData, PathFaultData, PathResult
+    from .path import PathClaimData, PathData, PathFaultData, PathResult
     from .workspace import WorkspacePose
 
 #: So many words that move nothing are shown.
@@ -36,6 +36,8 @@ def path_summary(
     yield title_line(case)
     path = result.path
     yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
+    if path.time is not None:
+        yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
     if path.idle:
         words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
         rest = len(path.idle) - _SHOWN
@@ -57,6 +59,14 @@ def path_summary(
     if rows:
         headers = ("number", "unit", "value", "limit", "proven bound", "reached", "outcome", "line", "at")
         yield TextTable(headers, tuple(rows), name="claims", title="numbers at every point of the path")
+
+
+def _untimed_words(path: PathData) -> str:
+    """Return how many segments have no time; else nothing."""
+    if not path.untimed:
+        return ""
+    verb = "has" if path.untimed == 1 else "have"
+    return f"; {path.untimed:,} of {path.segments:,} segments {verb} no time, and speeds there are not known"
 
 
 def first_refuted(result: PathResult) -> PathClaimData | None:

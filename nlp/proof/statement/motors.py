@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from ....models import Dimension
-from ....models.statics import driven_joints
+from ....models.statics import DrivenJoint, driven_joints
 from ...case.case import Case
 from ...case.forces import dimension_of_force, dimension_of_speed
 from ...case.limits.constraint import Reading
@@ -22,8 +22,19 @@ def motor_claims(case: Case) -> Iterator[Claim]:
     Names are those of the limits' constraints at a pose. Of a limit on all actuators and one on a single actuator the
     tighter counts.
     """
+    yield from _tightest(_claims(case))
+
+
+def speed_claims(case: Case) -> Iterator[Claim]:
+    """Yield the claims about the speed of each actuator of a case, with its limits; their motion is another's."""
+    for k, joint in enumerate(driven_joints(case.model)):
+        yield from _tightest(_speeds(case, k, joint))
+
+
+def _tightest(claims: Iterable[Claim]) -> Iterator[Claim]:
+    """Yield claims, of several with the same label the one with the tightest limit."""
     found: dict[tuple[str, str], Claim] = {}
-    for each in _claims(case):
+    for each in claims:
         known = found.setdefault(each.label, each)
         if each.limit is not None and (known.limit is None or each.sense.sign * (known.limit - each.limit) > 0):
             found[each.label] = each
@@ -34,12 +45,10 @@ def _claims(case: Case) -> Iterator[Claim]:
     """Yield the claims for each limit on an actuator, and those of numbers without any."""
     loading = case.loading
     for k, joint in enumerate(driven_joints(case.model) if loading.loads or loading.motion else ()):
-        kinds = ActuatorForce, ActuatorSpeed, ActuatorPower
-        forces, speeds, powers = (_limits(case, kind, joint.name) for kind in kinds)
+        kinds = ActuatorForce, ActuatorPower
+        forces, powers = (_limits(case, kind, joint.name) for kind in kinds)
         reading = Reading(dimension_of_force(joint))
-        for limit in speeds if loading.motion is not None else ():
-            speed = Motor(MotorNumber.SPEED, k, joint.name)
-            yield _claim(speed, "", Sense.MAX, Reading(dimension_of_speed(joint)), limit)
+        yield from _speeds(case, k, joint) if loading.motion is not None else ()
         for load in loading.cases:
             motor = Motor(MotorNumber.FORCE, k, joint.name, load.name)
             for limit in forces:
@@ -52,6 +61,13 @@ def _claims(case: Case) -> Iterator[Claim]:
             for limit, part in itertools.product(powers if loading.motion is not None else (), ("", " backwards")):
                 power = Motor(MotorNumber.POWER, k, joint.name, load.name, is_backwards=bool(part))
                 yield _claim(power, part, Sense.MAX, Reading(Dimension.POWER), limit)
+
+
+def _speeds(case: Case, k: int, joint: DrivenJoint) -> Iterator[Claim]:
+    """Yield the claim about the speed of an actuator for each limit on it, or without one."""
+    for limit in _limits(case, ActuatorSpeed, joint.name):
+        motor = Motor(MotorNumber.SPEED, k, joint.name)
+        yield _claim(motor, "", Sense.MAX, Reading(dimension_of_speed(joint)), limit)
 
 
 def _limits(case: Case, kind: type[ActuatorLimit], actuator: str) -> list[ActuatorLimit | None]:

@@ -32,12 +32,13 @@ from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
 from ..statement.machine import workspace_of_case
 from ..statement.tolerance import Directions
-from .numbers.bound_search import Minimum
+from .numbers.bound_search import Minimum, Number
 from .numbers.expressions import Expressions
 from .numbers.extremes import Extreme, extreme_of, goal_of
 from .numbers.machines import Machines
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
+from .path_motion import speeds_on_path
 from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
 from .ranks.ranks import RankRule
 from .ranks.singular_pose import DeterminantSigns, SingularPose
@@ -177,15 +178,24 @@ def judge_path(
         for group in (reaches, claims):
             searched = _searched(machines, group, gap)
             found += searched
-            pairs = zip(group, searched, strict=True)
-            wrong = {claim: each for claim, each in pairs if each.outcome is Outcome.REFUTED}
-            faults |= _first_faults(machines, wrong, cover)
+            wrong = _refuted(group, searched).values()
+            if wrong:
+                numbers = Expressions(machines.family, ca.vertcat(*[machines.number(claim) for claim, _ in wrong]))
+                faults |= _first_faults(numbers, dict(enumerate(wrong)), cover)
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
         subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
         found = with_strokes(subject, found, partial(_finer, machines, claims))
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
-        found += motor_extremes(subject)
+        bounds = None
+        if path.is_timed:
+            speeds = speeds_on_path(machines, cover, gap)
+            found += speeds.extremes
+            bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
+            if speeds.number is not None:
+                subject = replace(subject, machines=speeds.number.problem)
+                faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
+        found += motor_extremes(subject, speeds=bounds)
     return PathJudgement(case, path, tuple(ranks), tuple(found), faults)
 
 
@@ -232,7 +242,7 @@ def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:
     k = path.arc_segments
     arcs[k] = path.arcs
     axes[k] = [PLANES[plane] for plane in path.planes.tolist()] if len(k) else np.zeros((0, 3), dtype=np.intp)
-    cover = PathCover(path.knots, arcs, axes)
+    cover = PathCover(path.knots, arcs, axes, np.where(np.isfinite(path.durations), path.durations, np.inf))
     lower, upper = cover.boxes(cover.pieces)
     low, high = lower.min(axis=0), upper.max(axis=0)
     low[3:], high[3:] = 2 * np.arctan(low[3:]), 2 * np.arctan(high[3:])
@@ -338,30 +348,39 @@ def _pose(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
     return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
 
 
+def _refuted(claims: Sequence[Claim], found: Sequence[Extreme]) -> dict[int, tuple[Claim, Extreme]]:
+    """Return the claims that are refuted, with their extremes, by their places."""
+    pairs = enumerate(zip(claims, found, strict=True))
+    return {k: pair for k, pair in pairs if pair[1].outcome is Outcome.REFUTED}
+
+
 def _first_faults(
-    machines: Machines, wrong: Mapping[Claim, Extreme], cover: PathCover
+    numbers: Number, wrong: Mapping[int, tuple[Claim, Extreme]], cover: PathCover
 ) -> dict[tuple[str, Sense], Fault]:
     """Return the first known points of the design that are beyond limits, where they are before those of worst values.
 
     There are none where loops have to be followed.
+
+    Args:
+        numbers: of claims.
+        wrong: those of them that are refuted, by their places, with their extremes.
+        cover: of the path.
     """
-    claims = list(wrong)
-    problem, found = machines.family, dict[tuple[str, Sense], Fault]()
-    if problem.problem.dependent or not claims:
+    problem, found = numbers.problem, dict[tuple[str, Sense], Fault]()
+    if problem.problem.dependent or not wrong:
         return found
-    numbers, free = Expressions(problem, ca.vertcat(*map(machines.number, claims))), list(problem.free)
 
     def values(pieces: FloatArray, part: float) -> FloatArray:
-        return numbers.values(problem.exact(cover.points(pieces, part)[:, free]))
+        return numbers.values(problem.exact(problem.path_points(cover, pieces, part)))
 
     count = min(max(_ALL_SAMPLES // len(cover.pieces), _LEAST_SAMPLES), _MOST_SAMPLES)
-    left, parts = dict(enumerate(claims)), np.linspace(0.0, 1.0, count).tolist()
+    left, parts = dict(wrong), np.linspace(0.0, 1.0, count).tolist()
     for rows in cover.blocks():
         if not left:
             break
         block = cover.pieces[rows]
         every = np.stack([values(block, part) for part in parts], axis=1)
-        for k, claim in list(left.items()):
+        for k, (claim, worst) in list(left.items()):
             goal = goal_of(claim)
             least = (goal.limit or 0.0) - goal.slack
             beyond = np.argwhere(every[:, :, k] < least)
@@ -374,7 +393,7 @@ def _first_faults(
                 middle = 0.5 * (low + high)
                 low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)
             place = Place(int(block[row, 0]), high)
-            if place > (wrong[claim].place or place):
+            if place > (worst.place or place):
                 continue
             value = claim.reading.from_value(-claim.sense.sign * float(values(piece, high)[0, k]))
             found[claim.name, claim.sense] = Fault(place, value, _pose(problem, cover, place))

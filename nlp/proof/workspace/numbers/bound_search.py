@@ -256,7 +256,7 @@ class SmallestValues(LoopRule):
         """Take note of values at the ends and in the middle of pieces of a path, where their boxes are known."""
         for part in (0.0, 0.5, 1.0):
             z = boxes.near.copy()
-            z[:, : len(self._problem.free)] = cover.points(along, part)[:, list(self._problem.free)]
+            z[:, self._problem.of_path] = self._problem.path_points(cover, along, part)
             z, s = self._number.closed(z), along[:, 1] + part * (along[:, 2] - along[:, 1])
             kept = np.isfinite(z).all(axis=1) & are_between(z, boxes, self._problem.dependent)
             self._note(z[kept], np.stack([along[kept, 0], s[kept]], axis=1))

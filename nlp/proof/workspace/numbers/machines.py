@@ -69,6 +69,7 @@ class Machines:
         design: this robot over the workspace.
 
     Attributes:
+        case: the case.
         built: the robot with errors of its joint centres.
         family: the machines over the workspace.
         symbols: the machines as symbols of one pose and of errors.
@@ -78,7 +79,7 @@ class Machines:
     """
 
     def __init__(self, case: Case, closed: ClosedForm, design: Problem) -> None:
-        self._case, self._model, self._at = case, closed.model, pose_coordinates(design.box)
+        self.case, self._model, self._at = case, closed.model, pose_coordinates(design.box)
         tolerance = case.joint_centre_tolerance or 0.0
         try:
             self.built = built_model(case.model) if tolerance else BuiltModel(closed.model, (), closed.reaches)
@@ -91,7 +92,7 @@ class Machines:
     @cached_property
     def _design(self) -> Layout:
         """The design as symbols of the pose."""
-        return design_layout(self._case, self._model, self._at)
+        return design_layout(self.case, self._model, self._at)
 
     def extreme(
         self, claim: Claim, *, gap: float = GAP, jobs: int | None = None, paper: PaperRecord | None = None

@@ -68,11 +68,11 @@ class Motors(Number):
         self._numbers = [_parts_of(case, claim) for claim in claims]
         self._parts = list(dict.fromkeys(itertools.chain(*self._numbers)))
         A, D = posed.driven_rows
-        moments = SX(3, 0)
+        row_of_leg = SX(6, 0)
         if not case.model.actuators and self._is_six:
             # A leg's speed follows from its row, and its force from its own column.
             row = [each.limb for each in posed.limbs.wrenches].index(motor.actuator)
-            moments, D = posed.scaled.jacobian[row, 3:].T, D[:, row]
+            row_of_leg, D = posed.scaled.jacobian[row, :].T, D[:, row]
         self._column = 0 if D.shape[1] == 1 else self._actuator
         free, loading = problem.free, self._loading
         is_ball = math.isfinite(problem.box.ball)
@@ -81,8 +81,9 @@ class Motors(Number):
         arms = [-ca.skew(R @ SX([float(part) for part in each.point])) / problem.length for each in loading.loads]
         loads = [each.wrench(R) for each in loading.cases]
         scaled = [ca.vertcat(each[:3], each[3:] / problem.length) for each in loads]
-        parts = [A, D, moments, ca.horzcat(SX(3, 0), *arms), ca.horzcat(SX(6, 0), *scaled), ca.horzcat(SX(1, 0), *turn)]
-        parts = [ca.densify(each) for each in parts]
+        twist = path_twist(problem) if problem.rates else SX(6, 0)
+        parts = [A, D, row_of_leg, twist, ca.horzcat(SX(3, 0), *arms), ca.horzcat(SX(6, 0), *scaled)]
+        parts = [ca.densify(each) for each in (*parts, ca.horzcat(SX(1, 0), *turn))]
         self._shapes = [each.shape for each in parts]
         super().__init__(problem, ca.vertcat(SX(0, 1), *map(ca.vec, parts)), len(claims))
         self._entries = ca.Function("entries", [problem.z], [self.entries])
@@ -100,7 +101,7 @@ class Motors(Number):
         """
         motion = self._loading.motion or Motion()
         with np.errstate(all="ignore"):
-            A, D, _, _, wrenches, _ = self._at(z)
+            A, D, *_, wrenches, _ = self._at(z)
             x = np.linalg.norm(solved(A, D).c[:6, self._column], axis=0)
             ends = [(motion.linear + motion.angular * self._length) / x for _ in self._parts]
             for j, (sense, load) in enumerate(self._parts):
@@ -155,7 +156,7 @@ class Motors(Number):
         return np.asarray(upper)
 
     def _matrices(self, forms: Forms, count: int) -> list[Quadratics]:
-        """Return A, D, moment of the leg, arms and wrenches of loads, and rotations, from forms of them."""
+        """Return A, D, row of the leg, the path's twist, arms and wrenches of loads, and rotations, from forms."""
         ends = np.cumsum([0, *(rows * columns for rows, columns in self._shapes)]).tolist()
         errors = len(self.problem.of_errors) if count else 0
         return [
@@ -165,13 +166,13 @@ class Motors(Number):
 
     def _bounded(self, matrices: Sequence[Quadratics]) -> tuple[list[Quadratics], FloatArray]:
         """Return the parts that are bounded from above, (1, 1) each, and shares (t, B) of coordinates in their rest."""
-        A, D, moments, arms, wrenches, _ = matrices
+        A, D, row, twist, arms, wrenches, _ = matrices
         every, k = solved(A, D)[:6], self._column
         x = every[:, k : k + 1]
         found = []
         for sense, load in self._parts:
             if sense is None:
-                found.append(self._speed(every, moments))
+                found.append(self._speed(every, row, twist))
                 continue
             held = wrenches[:, load : load + 1].by(x).sums(0).times(-sense.sign)
             found.append(held.plus(self._spread(load, x, arms)))
@@ -189,13 +190,21 @@ class Motors(Number):
                 found = found.plus(turned.lengths().times(load.any_moment / self._length))
         return found
 
-    def _speed(self, x: Quadratics, moments: Quadratics) -> Quadratics:
-        """Return the largest speed (1, 1), from the motions of the platform by all actuators, or from a leg's row."""
+    def _speed(self, x: Quadratics, row: Quadratics, twist: Quadratics) -> Quadratics:
+        """Return the largest speed (1, 1) in the case's motions, or that in the path's.
+
+        Args:
+            x: motions of the platform by all actuators.
+            row: of a leg, (6, 1); (6, 0) for other actuators.
+            twist: of the platform in the motion of a path, (6, 1); (6, 0) for the case's motions.
+        """
         motion = self._loading.motion or Motion()
         linear, angular = motion.linear, motion.angular * self._length
-        if moments.c.size:
+        if row.c.size:
+            if twist.c.size:
+                return row.by(twist).sums(0).lengths()
             # The force of a leg has unit size.
-            speed = moments.lengths().times(angular)
+            speed = row[3:].lengths().times(angular)
             return replace(speed, c=speed.c + linear, r=speed.r + ROUNDING * linear)
         if self._is_six:
             eye = np.broadcast_to(np.eye(6)[:, :, None], x.c.shape)
@@ -205,6 +214,8 @@ class Motors(Number):
             weighted = x.times(np.repeat([1.0, length**2], 3)[:, None, None])
             rates = solved(x.transposed.matmul(weighted), weighted.transposed).transposed
         own = rates[:, self._actuator : self._actuator + 1]
+        if twist.c.size:
+            return own.by(twist).sums(0).lengths()
         moved, turned = (part.lengths() for part in (own[:3], own[3:]))
         return moved.times(linear).plus(turned.times(angular))
 
@@ -219,6 +230,17 @@ def _parts_of(case: Case, claim: Claim) -> list[_Part]:
     if not any(each.is_fixed for each, _ in cases[load].parts):
         sense = Sense.MAX  # loads of any direction alone have forces of one size in both
     return [_Part(sense, load), *([_Part()] if motor.number is MotorNumber.POWER else [])]
+
+
+def path_twist(problem: Problem) -> SX:
+    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its numbers in the motion of a path."""
+    rates = SX(6, 1)
+    rates[list(problem.free)] = problem.z[list(problem.rates), :]
+    _, b, c = (2 * ca.atan(t) for t in ca.vertsplit(problem.box.symbols(problem.z)[3:]))
+    about_x = ca.vertcat(ca.cos(c) * ca.cos(b), ca.sin(c) * ca.cos(b), -ca.sin(b))
+    about_y = ca.vertcat(-ca.sin(c), ca.cos(c), 0)
+    omega = about_x * rates[3] + about_y * rates[4] + ca.vertcat(0, 0, rates[5])
+    return ca.vertcat(rates[:3], problem.length * omega)
 
 
 def _shares(found: Quadratics, of: FloatArray, count: int) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -21,6 +21,7 @@ from ...boxes.tree import TreeRecord
 from ...statement.claims import Claim, ClaimKind, searched_claims
 from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_centres
 from ...statement.motors import motor_claims
+from ..robot.path_cover import PathCover
 from ..robot.posed_robot import NotJudgedError, Problem
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
@@ -142,21 +143,35 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
     return extreme_of(claim, found, problem.box.pose(y), errors=errors)
 
 
-def motor_extremes(subject: Subject, *, with_all: bool = True, paper: PaperRecord | None = None) -> Iterator[Extreme]:
+def motor_extremes(
+    subject: Subject,
+    *,
+    with_all: bool = True,
+    speeds: Mapping[str, float] | None = None,
+    paper: PaperRecord | None = None,
+) -> Iterator[Extreme]:
     """Yield the extremes of :func:`~.motors.motor_claims`, all or those with limits, for each actuator and load.
 
     Actuators are much alike: each takes its share of the time left, and the work after them has one too.
+
+    Args:
+        subject: the robot.
+        with_all: whether numbers without limits are yielded too.
+        speeds: proven bounds of the actuators' speeds, by name, which are then not searched; None where they are.
+        paper: records the searches for a proof.
     """
     claims = [each for each in motor_claims(subject.case) if with_all or each.limit is not None]
+    known = dict(speeds or {})
+    if speeds is not None:
+        claims = [each for each in claims if each.motor and each.motor.number is not MotorNumber.SPEED]
     alike = itertools.groupby(claims, lambda claim: claim.motor and claim.motor.whose)
     groups = [list(group) for _, group in alike]
-    speeds: dict[str, float] = {}
     for left, group in zip(range(len(groups), 0, -1), groups, strict=True):
         actuator = group[0].motor.actuator if group[0].motor else ""
         with within(seconds_left() / (left + 1)):
-            found = list(_motor_answers(subject, group, speeds.get(actuator, math.inf), paper))
+            found = list(_motor_answers(subject, group, known.get(actuator, math.inf), paper))
         if group[0].motor and group[0].motor.number is MotorNumber.SPEED:
-            speeds[actuator] = found[0].bound
+            known[actuator] = found[0].bound
         yield from found
 
 
@@ -176,7 +191,7 @@ def _motor_answers(
             raise NotJudgedError(subject.reason)
         number, problem = Motors(subject.machines, subject.case, claims), subject.machines.problem
         z = np.tile(subject.machines.start, (2 * _POINTS, 1))
-        z[:, : len(problem.free)] = _points(problem)[:, list(problem.free)]
+        z[:, problem.of_path] = _points_of_path(problem, problem.cover) if problem.cover else _free_points(problem)
         closed = number.closed(z)
         values = np.nan_to_num(number.values(closed), posinf=0.0, neginf=0.0)
         kinds = [claim.motor and claim.motor.number for claim in claims]
@@ -226,8 +241,20 @@ def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float)
     allowed = gap * (abs(float(number.values(problem.start[None])[0, 0])) or 1.0)
     if not subject.case.joint_centre_tolerance or problem.dependent:
         return allowed
-    z = _points(problem)[:, list(problem.free)]
+    z = _free_points(problem)
     return allowed + float(np.nanmax(number.values(problem.exact(z)) - number.bounds(z, z), initial=0.0))
+
+
+def _points_of_path(problem: Problem, cover: PathCover) -> FloatArray:
+    """Return coordinates (P, c) at random places of a path."""
+    rng = np.random.default_rng(_SEED)
+    k, s = rng.integers(0, len(cover.pieces), 2 * _POINTS), rng.random(2 * _POINTS)
+    return problem.path_points(cover, np.stack([k, s, s], axis=1), 0.0)
+
+
+def _free_points(problem: Problem) -> FloatArray:
+    """Return the free coordinates (P, f) at the poses of :func:`_points`."""
+    return _points(problem)[:, list(problem.free)]
 
 
 def _points(problem: Problem) -> FloatArray:

@@ -317,10 +317,10 @@ def whole_workspace(problem: Problem) -> LoopBoxes:
 
 def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
     """Return boxes that cover the pieces of a path."""
-    free, count = list(problem.free), len(cover.pieces)
+    count = len(cover.pieces)
     ends = np.full((2, count, len(problem.start)), np.nan)
-    for end, found in zip(ends, cover.boxes(cover.pieces), strict=True):
-        end[:, : len(free)] = found[:, free]
+    for end, found in zip(ends, problem.path_boxes(cover, cover.pieces), strict=True):
+        end[:, problem.of_path] = found
     ends[:, :, problem.of_errors] = np.array([[[-problem.tolerance]], [[problem.tolerance]]])
     ends[:, :, list(problem.dependent)] = np.nan
     return LoopBoxes(ends[0], ends[1], _closed_along(problem, cover), np.full(count, not problem.dependent))
@@ -461,9 +461,8 @@ class LoopRule(Rule[Followed]):
         parts, count = some(boxes, np.concatenate([every, every])), len(every)
         middle = 0.5 * (boxes.more.along[:, 1] + boxes.more.along[:, 2])
         parts.more.along[:count, 2] = parts.more.along[count:, 1] = middle
-        lower, upper = cover.boxes(parts.more.along)
-        free = self._problem.free
-        parts.lower[:, : len(free)], parts.upper[:, : len(free)] = lower[:, list(free)], upper[:, list(free)]
+        own = self._problem.of_path
+        parts.lower[:, own], parts.upper[:, own] = self._problem.path_boxes(cover, parts.more.along)
         # Dependent coordinates are found anew, from a closed point nearby.
         D = list(self._problem.dependent)
         parts.lower[:, D] = parts.upper[:, D] = np.nan
@@ -538,7 +537,8 @@ class LoopRule(Rule[Followed]):
 
     def _are_tied(self, one: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
         """Return whether boxes (B,) have a pose in common, and there the same closed point as others."""
-        own = self._independent
+        # Rates may jump from a segment to the next.
+        own = [k for k in self._independent if k not in self._problem.rates]
         meet = ((one.lower <= other.upper) & (other.lower <= one.upper))[:, own].all(axis=1)
         # The closed point of a small box is found to be between the ends of a large one, not the other way.
         return np.asarray(meet & (self._examiner.tied(one, other) | self._examiner.tied(other, one)))

@@ -38,11 +38,13 @@ class PathCover:
         knots: (N + 1, 6) positions, then roll, pitch and yaw, between which they change linearly.
         arcs: (N, 6) centre, radius, growth of the radius, angle and sweep of arcs; NaN of lines.
         axes: (N, 3) axes of the plane of arcs, and the axis along it.
+        seconds: (N,) times of the segments; infinite, as if the platform stood there, where none is known.
     """
 
     knots: FloatArray
     arcs: FloatArray
     axes: NDArray[np.intp]
+    seconds: FloatArray
 
     @property
     def pieces(self) -> FloatArray:
@@ -85,6 +87,43 @@ class PathCover:
             tangents = np.tan(0.5 * each[:, 3:])
             each[:, 3:] = tangents + sign * _OUTWARDS * np.abs(tangents)
         return low, high
+
+    def derivatives(self, pieces: FloatArray, order: int = 1) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, 6) of derivatives of positions and angles by the parameter, over pieces (B, 3).
+
+        Args:
+            pieces: indices of segments, and ends of the parameter.
+            order: 1 or 2.
+        """
+        k = pieces[:, 0].astype(int)
+        change = self.knots[k + 1] - self.knots[k] if order == 1 else np.zeros((len(k), 6))
+        slack = _OUTWARDS * np.abs(change)
+        low, high = change - slack, change + slack
+        arcs = np.flatnonzero(np.isfinite(self.arcs[k, 0]))
+        if arcs.size:
+            _, _, radius, growth, angle, sweep = self.arcs[k[arcs]].T
+            s = pieces[arcs, 1:]
+            radii = radius[:, None] + s * growth[:, None]
+            angles = angle[:, None] + s * sweep[:, None]
+            # Each derivative turns by a right angle: (r c)' = g c + r w c', (r c)'' = 2 g w c' + r w^2 c''.
+            by_growth = order * growth * sweep ** (order - 1)
+            by_radius = radii * (sweep**order)[:, None]
+            size = np.abs(by_growth) + np.abs(by_radius).max(axis=1)
+            size *= 8 + np.abs(angles).max(axis=1)
+            for axis, turn in ((0, 0.0), (1, -0.5 * np.pi)):
+                before, after = (_cosines(angles + turn + 0.5 * np.pi * n) for n in (order - 1, order))
+                one = by_growth[:, None] * before
+                other = by_radius[:, :, None] * after[:, None, :]
+                at = arcs, self.axes[k[arcs], axis]
+                low[at] = one.min(axis=1) + other.min(axis=(1, 2)) - _OUTWARDS * size
+                high[at] = one.max(axis=1) + other.max(axis=(1, 2)) + _OUTWARDS * size
+        return low, high
+
+    def rates(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, 6) of the rates of positions and angles, by seconds, over pieces (B, 3)."""
+        seconds = self.seconds[pieces[:, 0].astype(int), None]
+        low, high = (each / seconds for each in self.derivatives(pieces))
+        return low - _OUTWARDS * np.abs(low), high + _OUTWARDS * np.abs(high)
 
     def points(self, pieces: FloatArray, part: float) -> FloatArray:
         """Return coordinates (B, 6) of computed points of pieces."""

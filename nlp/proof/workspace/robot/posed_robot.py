@@ -63,6 +63,8 @@ class Problem:
         tolerance: largest size of each error, length.
         design: the design alone, of all machines.
         cover: of the path that is meant; None for the whole box.
+        rates: indices of the coordinates that are rates, by seconds, of the pose's numbers in the path's motion: of
+            positions and angles. There is one for each free number, or none.
     """
 
     box: PoseBox
@@ -79,6 +81,7 @@ class Problem:
     tolerance: float = 0.0
     design: Problem | None = field(default=None, repr=False)
     cover: PathCover | None = None
+    rates: tuple[int, ...] = ()
 
     @property
     def problem(self) -> Problem:
@@ -120,6 +123,26 @@ class Problem:
         """Symbols (3 m, 1) of the errors."""
         # With both indices a column stays one where it is empty.
         return self.z[len(self.start) - 3 * len(self.names) :, :]
+
+    @property
+    def of_path(self) -> list[int]:
+        """Indices of the coordinates that a place of a path determines."""
+        return [*range(len(self.free)), *self.rates]
+
+    def path_boxes(self, cover: PathCover, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, c) of these coordinates over pieces (B, 3) of a path."""
+        free = list(self.free)
+        low, high = (each[:, free] for each in cover.boxes(pieces))
+        if self.rates:
+            slow, fast = (each[:, free] for each in cover.rates(pieces))
+            low, high = np.hstack([low, slow]), np.hstack([high, fast])
+        return low, high
+
+    def path_points(self, cover: PathCover, pieces: FloatArray, part: float) -> FloatArray:
+        """Return these coordinates (B, c) at computed points of pieces."""
+        s = pieces[:, 1] + part * (pieces[:, 2] - pieces[:, 1])
+        low, high = self.path_boxes(cover, np.stack([pieces[:, 0], s, s], axis=1))
+        return 0.5 * low + 0.5 * high
 
     def pose_of(self, z: FloatArray) -> FloatArray:
         """Return the six coordinates of the pose (..., 6) at points (..., n)."""

@@ -1,0 +1,107 @@
+"""Speeds of actuators along a path whose motion is known: coordinates of actuators by rates of the pose's numbers.
+
+The rates w of the free numbers of the pose are coordinates of the search, which a piece of the path determines. With
+the loop equations ``L(X, u) = 0`` for the passive joints u that have no closed form, and ``X' = X'(X, w)``,
+
+    L_u u' = -L_X X',        q' = q_X X' + q_u u'
+
+for the coordinates q of the actuators. Forms of the four matrices give those of the speeds over each box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from .....models import FloatArray
+from .....models.arrays import values_at
+from ....evidence.closed_loops import Loops, inverses
+from ...enclosure.forms import Forms
+from ..robot.path_cover import PathCover
+from ..robot.posed_robot import Problem
+from .bound_search import Bounds, Number
+from .quadratic_forms import Quadratics, solved
+
+
+def with_rates(problem: Problem, cover: PathCover) -> Problem:
+    """Return the same machines along a path, with rates of the pose's free numbers as further coordinates."""
+    return _with(problem, cover, ca.vertcat(SX(0, 1), *[SX.sym(f"rate{k}") for k in problem.free]))
+
+
+def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
+    """Return the same machines with symbols (f, 1) of the rates."""
+    free, n = list(problem.free), len(problem.start) - len(problem.of_errors)
+    ends = [each[:, free] for each in cover.rates(cover.pieces)]
+    largest = np.abs(np.concatenate(ends)).max(axis=0)
+    first = [each[0, free] for each in cover.rates(np.zeros((1, 3)))]
+    (start, size), loops = (problem.start, problem.size), problem.loops
+    z = ca.vertcat(problem.z[:n, :], rates, problem.z[n:, :])
+    whole = np.concatenate([size[:n], np.where(largest > 0, largest, 1.0), size[n:]])
+    own = tuple(range(n, n + len(free)))
+    # Errors stay the last coordinates.
+    return replace(
+        problem,
+        loops=Loops(z, loops.equations, loops.every, loops.signs, whole),
+        independent=(*problem.independent, *own),
+        start=np.concatenate([start[:n], 0.5 * first[0] + 0.5 * first[1], start[n:]]),
+        design=None if problem.design is None else _with(problem.design, cover, rates),
+        rates=own,
+    )
+
+
+class PathSpeeds(Number):
+    """Minus the sizes of the speeds of actuators in a path's motion.
+
+    Args:
+        problem: the design, or all machines that are meant, with rates of the pose's numbers.
+        coordinates: (K, 1) of the actuators, in the coordinates of the problem.
+    """
+
+    def __init__(self, problem: Problem, coordinates: SX) -> None:
+        z, of_pose, D = problem.z, range(len(problem.free)), list(problem.dependent)
+        L = problem.equations
+        parts = [
+            ca.jacobian(L, z)[:, D],
+            ca.jtimes(L, z[list(of_pose), :], pose_rates(problem)),
+            ca.jacobian(coordinates, z)[:, D],
+            ca.jtimes(coordinates, z[list(of_pose), :], pose_rates(problem)),
+        ]
+        parts = [ca.densify(each) for each in parts]
+        self._shapes = [each.shape for each in parts]
+        super().__init__(problem, ca.vertcat(SX(0, 1), *map(ca.vec, parts)), coordinates.numel())
+        self._parts = ca.Function("parts", [z], parts)
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Return the values (P, K) at closed points (P, n)."""
+        with np.errstate(all="ignore"):
+            L_u, L_t, q_u, q_t = values_at(self._parts, z)
+            return -np.abs(q_t - q_u @ (inverses(L_u) @ L_t))[:, :, 0]
+
+    def over(self, forms: Forms, count: int) -> Bounds:
+        """Return lower bounds over boxes; see :meth:`.bound_search.Number.over`."""
+        ends = np.cumsum([0, *(rows * columns for rows, columns in self._shapes)]).tolist()
+        L_u, L_t, q_u, speeds = (
+            Quadratics.of(forms.part(slice(begin, end)), count, len(self.problem.of_errors), shape)
+            for begin, end, shape in zip(ends, ends[1:], self._shapes, strict=False)
+        )
+        with np.errstate(all="ignore"):
+            if L_u.c.size:
+                speeds = speeds.plus(q_u.matmul(solved(L_u, L_t).times(-1.0)))
+            upper = np.maximum(speeds.upper(), speeds.times(-1.0).upper())[:, 0].T
+            # The path is divided, whatever coordinate counts.
+            shares = np.abs(speeds.a[:, 0, :count]).transpose(2, 0, 1) + speeds.r[:, 0].T[:, :, None] / max(count, 1)
+        shares[:, :, [k for k, j in enumerate(self.problem.independent) if j in self.problem.rates]] = 0.0
+        return Bounds(np.where(np.isfinite(upper), -upper, -np.inf), shares)
+
+
+def pose_rates(problem: Problem) -> SX:
+    """Return the rates (f, 1) of the pose's free coordinates, of which those of turns are tangents of half angles."""
+    rates = problem.z[list(problem.rates), :]
+    turning = [problem.z[j] if k >= 3 else None for j, k in enumerate(problem.free)]
+    return ca.vertcat(
+        SX(0, 1),
+        *[rates[j] if t is None else 0.5 * (1 + t * t) * rates[j] for j, t in enumerate(turning)],
+    )
