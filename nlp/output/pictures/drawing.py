@@ -183,7 +183,7 @@ def drawing_of_model(model: Model) -> Drawing:
     home = linkage.posture_after(guess, np.array([0, 0, 0, 0, 0, 1.0]), 0.0)
     if home is None or not np.isfinite(home.points).all():
         raise EvaluationError(f"{model.name}: the robot cannot be assembled at its typical values")
-    return replace(_drawing_without_task(None, model, linkage, home), headline=headline)
+    return replace(drawing_without_task(None, model, linkage, home), headline=headline)
 
 
 def drawing_of(
@@ -219,7 +219,7 @@ def drawing_of(
     rates = reciprocal_product(posture.jacobian, twist)
     total = 0.0 if state.is_zero else float(rates @ rates)
     shares = rates**2 / total if total else np.full(len(rates), math.nan)
-    drawing = _drawing_without_task(case, model, linkage, posture)
+    drawing = drawing_without_task(case, model, linkage, posture)
     return replace(
         drawing,
         rows=tuple(
@@ -285,7 +285,7 @@ def _reference(nlp: Nlp, posture: Posture, size: float, pose: int) -> Posture | 
     return start if is_other and np.isfinite(start.points).all() else None
 
 
-def _drawing_without_task(case: Case | None, model: Model, linkage: Linkage, posture: Posture) -> Drawing:
+def drawing_without_task(case: Case | None, model: Model, linkage: Linkage, posture: Posture) -> Drawing:
     """Return a robot's lines, outlines, corners and size at a posture."""
     names = [point.name for point in model.scene.points]
     links = tuple((names.index(link.start), names.index(link.end), link) for link in model.scene.links)

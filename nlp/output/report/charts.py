@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from .markup import Markup, join_markup, tag
 
@@ -45,6 +46,14 @@ class Spot:
     words: str
 
 
+class Band(NamedTuple):
+    """A part of the horizontal axis that is shaded, from and to where, and its class in the page's style."""
+
+    start: float
+    end: float
+    kind: str
+
+
 def line_chart(
     curves: Sequence[Curve],
     spots: Sequence[Spot],
@@ -52,6 +61,10 @@ def line_chart(
     words: str,
     labels: tuple[str, str],
     bounds: Sequence[float] = (),
+    levels: Sequence[float] = (),
+    bands: Sequence[Band] = (),
+    ends: tuple[float, float] | None = None,
+    has_cursor: bool = False,
 ) -> Markup:
     """Return a chart of lines over one axis, or a sentence where no point of the lines has a value.
 
@@ -61,19 +74,40 @@ def line_chart(
         words: the chart's text alternative, a sentence.
         labels: of the horizontal and the vertical axis.
         bounds: values on the horizontal axis, each marked by a vertical line.
+        levels: values on the vertical axis, each marked by a horizontal line.
+        bands: shaded parts of the horizontal axis.
+        ends: of the horizontal axis; as the content needs where they are left out.
+        has_cursor: whether a vertical line follows a slider of the page.
     """
     xs = [x for curve in curves for x in curve.x] + [spot.x for spot in spots] + list(bounds)
     ys = [y for curve in curves for y in curve.y if math.isfinite(y)] + [spot.y for spot in spots]
+    ys += levels if ys else []
     if not ys:
         return tag("p", f"{words} Nothing to draw: F has no value here.")
-    scale = _Scale(_range_with_room(min(xs), max(xs), 0.03), _range_with_room(min(ys), max(ys), 0.08))
-    parts: list[object] = [*_axes(scale, labels)]
-    parts += [tag("path", d=f"M{scale.x(x):.1f} {_TOP:g}V{_HEIGHT - _BOTTOM:g}", class_="bound") for x in bounds]
+    across = _range_with_room(min(xs), max(xs), 0.03) if ends is None else _range_with_room(*ends, 0.0)
+    scale = _Scale(across, _range_with_room(min(ys), max(ys), 0.08))
+    floor = _HEIGHT - _BOTTOM
+    parts: list[object] = [_band(scale, each) for each in bands]
+    parts += _axes(scale, labels)
+    parts += [tag("path", d=f"M{_LEFT:g} {scale.y(y):.1f}H{_WIDTH - _RIGHT:g}", class_="level") for y in levels]
+    parts += [tag("path", d=f"M{scale.x(x):.1f} {_TOP:g}V{floor:g}", class_="bound") for x in bounds]
     parts += [tag("path", d=_path(scale, curve), class_=curve.kind) for curve in curves]
     for spot in spots:
         place = {"cx": f"{scale.x(spot.x):.1f}", "cy": f"{scale.y(spot.y):.1f}", "r": "4.5"}
         parts.append(tag("circle", tag("title", spot.words), class_=spot.kind, **place))
+    if has_cursor:
+        # Its place is a part of the way from the left edge to the right one.
+        start, width = scale.x(scale.across[0]), scale.x(scale.across[1]) - scale.x(scale.across[0])
+        ways = {"data_low": scale.across[0], "data_high": scale.across[1], "data_left": start, "data_width": width}
+        parts.append(tag("path", d=f"M0 {_TOP:g}V{floor:g}", class_="cursor", **ways))
     return _svg(parts, words)
+
+
+def _band(scale: _Scale, band: Band) -> Markup:
+    """Return a shaded part of the horizontal axis."""
+    left, right = scale.x(band.start), scale.x(band.end)
+    size = {"width": f"{max(right - left, 0.5):.1f}", "height": f"{_HEIGHT - _BOTTOM - _TOP:g}"}
+    return tag("rect", x=f"{left:.1f}", y=f"{_TOP:g}", class_=band.kind, **size)
 
 
 def count_chart(values: Sequence[tuple[float, int]], *, words: str, labels: tuple[str, str]) -> Markup:

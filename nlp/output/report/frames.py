@@ -133,7 +133,7 @@ _DIGITS = 11
 #: Rounding error of a rate, in parts of the terms that it sums.
 _ROUNDING = 1e-9
 #: First elevation of the eye, degrees.
-_ELEVATION = 26.0
+ELEVATION = 26.0
 
 
 class PointData(TypedDict):
@@ -299,7 +299,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "forces_words": _forces_words(drawing.forces),
         "reference": None if drawing.reference is None else drawing.reference.points.tolist(),
         "colours": list(RATE_COLOURS),
-        "eye": View(clearest_view(drawing).azimuth, _ELEVATION).axes[2].tolist(),
+        "eye": View(clearest_view(drawing).azimuth, ELEVATION).axes[2].tolist(),
         "zero": zero,
         "frames": [
             _frame_data(drawing, t, posture, rates, units)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -102,6 +103,27 @@ def script_frame(key: str, name: str, words: str) -> Markup:
     """
     waiting = tag("p", f"The {name} appears when its script has started.", class_="waiting script")
     return tag("div", waiting, id=key, class_=key, role="img", aria_label=words)
+
+
+def view_buttons() -> Markup:
+    """Return the buttons that turn a picture in three dimensions."""
+    turns = [("left", "Turn left"), ("right", "Turn right"), ("up", "Tilt up"), ("down", "Tilt down")]
+    turns += [("in", "Nearer"), ("out", "Farther"), ("reset", "First view")]
+    return tag(
+        "div",
+        *(tag("button", words, type="button", data_turn=key) for key, words in turns),
+        class_="controls buttons script",
+        role="group",
+        aria_label="View",
+    )
+
+
+def packed_plotly() -> str:
+    """Return the library of pictures in three dimensions, compressed for a script element to two fifths of its size."""
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415 - only some pages need it
+
+    # Without a time in its head, the same text is always the same bytes.
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode("utf-8"), mtime=0)).decode("ascii")
 
 
 def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold

@@ -7,7 +7,7 @@ import re
 from ..pictures.figures import picture
 from ..pictures.style import RATE_COLOURS
 from .frames import ViewData
-from .markup import Markup, image_source, join_markup, paragraphs, script_frame, tag
+from .markup import Markup, image_source, join_markup, paragraphs, script_frame, tag, view_buttons
 from .report import Report
 
 #: So many drawings stand in a page at most; the other views have their tables only.
@@ -81,20 +81,11 @@ def robot_section(report: Report) -> Markup:
         tag("output", first["frames"][first["zero"]]["words"], id="travelled", for_="travel"),
         class_="controls travel script",
     )
-    turns = [("left", "Turn left"), ("right", "Turn right"), ("up", "Tilt up"), ("down", "Tilt down")]
-    turns += [("in", "Nearer"), ("out", "Farther"), ("reset", "First view")]
-    buttons = tag(
-        "div",
-        *(tag("button", words, type="button", data_turn=key) for key, words in turns),
-        class_="controls buttons script",
-        role="group",
-        aria_label="View",
-    )
     picture = tag(
         "figure",
         script_frame("view", "picture", "The robot in three dimensions; the table below says the same in numbers."),
         drawings(report),
-        buttons,
+        view_buttons(),
         # A copy of the picture is for printing, because browsers do not print WebGL.
         tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions, as in the table below"),
         tag("figcaption", _legend(first), id="view-words"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
-from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +15,7 @@ from ...solver.certified import Certified
 from ...solver.solution import Solution
 from ..files import check_target, write_bytes
 from ..pictures.requirements import check_library
-from .markup import contents_and_body, whole_page
+from .markup import contents_and_body, packed_plotly, whole_page
 from .report import Report, report_of
 from .sections import answer, sections
 
@@ -28,8 +26,6 @@ def page_of(report: Report) -> str:
     Words and tables come first and need no script. The library for the 3-D view is at the end, compressed, and starts
     after the page is first painted.
     """
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415 - only a report needs it
-
     contents, body = contents_and_body(sections(report))
     return whole_page(
         report.case.title or report.case.name,
@@ -37,16 +33,10 @@ def page_of(report: Report) -> str:
         answer(report),
         body,
         contents=contents,
-        scripts=("tools.js", "joints.js", "page.js"),
+        scripts=("tools.js", "joints.js", "robot.js", "page.js"),
         data=report.as_data(),
-        plotly=_packed(get_plotlyjs()),
+        plotly=packed_plotly(),
     )
-
-
-def _packed(text: str) -> str:
-    """Return a text compressed for a script element: the library, most of a page, shrinks to two fifths."""
-    # Without a time in its head, the same text is always the same bytes.
-    return b64encode(gzip.compress(text.encode("utf-8"), mtime=0)).decode("ascii")
 
 
 _WRITTEN = "# The case as Case.to_toml() writes it.\n"

@@ -7,9 +7,7 @@
     if (frame.rates.every((rate) => rate === 0)) frame.F = 0;
   }
   document.documentElement.classList.add("scripted");
-  const INK = "#17212b", MUTED = "#55616c", VELOCITY = "#6d2a8c", FREE = "#0b6b57";
-  const FACES = { base: "#c3ccd5", platform: "#a9c6de" };
-  const FONT = "Arial, 'DejaVu Sans', sans-serif";
+  const VELOCITY = "#6d2a8c", FREE = "#0b6b57";
 
   let view = data.views[0] || null;
   let index = view ? view.zero : 0;
@@ -31,16 +29,6 @@
     return `rgb(${mixed.join(",")})`;
   }
 
-  // Lines given as lists of points, with a gap between them.
-  function lines(name, parts, style, more = {}) {
-    const axes = [[], [], []];
-    for (const part of parts) {
-      for (const point of part) point.forEach((value, k) => axes[k].push(value));
-      axes.forEach((axis) => axis.push(null));
-    }
-    return { type: "scatter3d", mode: "lines", name, x: axes[0], y: axes[1], z: axes[2], line: style, hoverinfo: "skip", showlegend: false, ...more };
-  }
-
   function limbText(frame, limb) {
     const rows = view.rows.map((row, k) => [row, k]).filter(([row]) => row.limb === limb);
     const text = [`<b>limb ${plain(limb)}</b>`];
@@ -60,20 +48,7 @@
     if (view.reference) {
       found.push(lines("start", view.links.map((link) => link.ends.map((end) => view.reference[end])), { color: "#8b959e", width: 2, dash: "dot" }));
     }
-    for (const [body, loop] of Object.entries(view.plates)) {
-      const corners = loop.map((each) => points[each]);
-      const middle = [0, 1, 2].map((k) => corners.reduce((sum, each) => sum + each[k], 0) / corners.length);
-      const all = [...corners, middle], count = corners.length;
-      found.push({
-        type: "mesh3d", name: `${body} face`, x: all.map((p) => p[0]), y: all.map((p) => p[1]), z: all.map((p) => p[2]),
-        i: corners.map((_, k) => k), j: corners.map((_, k) => (k + 1) % count), k: corners.map(() => count),
-        color: FACES[body], opacity: 0.55, hoverinfo: "skip", showlegend: false, lighting: { ambient: 0.9, diffuse: 0.2, specular: 0 },
-      });
-    }
-    const rails = view.links.filter((link) => link.kind === "rail");
-    if (rails.length) found.push(lines("rails", rails.map((link) => link.ends.map((end) => points[end])), { color: "#8a949d", width: 6 }));
-    const edges = view.links.filter((link) => link.limb === null && link.kind !== "rail");
-    if (edges.length) found.push(lines("edges", edges.map((link) => link.ends.map((end) => points[end])), { color: MUTED, width: 4 }));
+    found.push(...bodyTraces(view, points));
     if (view.motion) {
       found.push(lines("axis", [view.motion.line], { color: INK, width: 9 }));
       const along = plus(view.motion.line[1], view.motion.line[0], -1), unit = along.map((each) => each / norm(along));
@@ -128,23 +103,6 @@
     return found;
   }
 
-  // Names of limbs, each on its longest link.
-  function names(frame) {
-    const found = new Map();
-    for (const { limb, kind, ends: [a, b] } of view.links) {
-      if (limb === null || kind === "rail") continue;
-      const way = plus(frame.points[b], frame.points[a], -1), long = norm(way);
-      // Rods of several limbs come together at the platform: a name is on a bar where there is one.
-      const size = long + (kind === "bar" ? 100 * view.size : 0);
-      if (!found.has(limb) || found.get(limb).size < size) found.set(limb, { size, start: frame.points[a], way });
-    }
-    // Each at another height, so that names of limbs side by side do not meet.
-    return [...found].map(([limb, { start, way }], k) => {
-      const [x, y, z] = plus(start, way, 0.22 + (0.56 * ((k * 2.5) % found.size)) / found.size);
-      return { x, y, z, text: (byId("view").clientWidth < 480 ? "" : "limb ") + plain(limb), showarrow: false, xanchor: "center", bgcolor: "rgba(255,255,255,0.82)", borderpad: 1, font: { color: INK, size: 11 } };
-    });
-  }
-
   // Length of an arrow for a velocity of 1; none where nothing moves.
   function speedScale() {
     const fastest = Math.max(0, ...view.frames[view.zero].velocities.map(norm));
@@ -170,25 +128,16 @@
     return [0, 1, 2].map((k) => [Math.min(...every.map((p) => p[k])) - room, Math.max(...every.map((p) => p[k])) + room]);
   }
 
-  function newLayout() {
-    const unit = view.unit ? `, ${plain(view.unit)}` : "";
-    const axis = (name, range) => ({ title: { text: name + unit }, range, autorange: false, backgroundcolor: "#f7f9fa", gridcolor: "#dde3e8", zerolinecolor: "#b9c1c9", showbackground: true, showspikes: false, nticks: 6, ticklen: 3, tickfont: { size: 11 } });
-    const [x, y, z] = ranges();
-    return {
-      margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "#fff", font: { family: FONT, color: INK, size: 12 }, hovermode: "closest",
-      scene: { aspectmode: "data", dragmode: "orbit", xaxis: axis("x", x), yaxis: axis("y", y), zaxis: axis("z", z), camera: camera() },
-    };
-  }
+  const newLayout = () => sceneLayout(ranges(), view.unit, camera());
 
   // From the side that shows most, as near as the whole box with its ticks is seen.
   const camera = () => fittedCamera(ranges(), view.eye, { width: byId("view").clientWidth, height: byId("view").clientHeight });
-  const config = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
 
   function draw() {
     if (!view || !window.Plotly || !layout) return null;
     keep();
-    layout.scene.annotations = names(view.frames[index]);
-    return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, config);
+    layout.scene.annotations = limbNames(view, view.frames[index].points, byId("view").clientWidth < 480);
+    return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, CONFIG);
   }
 
   // The copy for printers follows when the picture has been at rest for a while.
@@ -261,15 +210,7 @@
   }
 
   function turn(key) {
-    const { eye, center } = layout.scene.camera, [x, y, z] = ["x", "y", "z"].map((each) => eye[each] - center[each]), far = Math.hypot(x, y, z);
-    let round = Math.atan2(y, x), up = Math.asin(z / far), distance = far;
-    if (key === "left") round -= Math.PI / 12;
-    if (key === "right") round += Math.PI / 12;
-    if (key === "up") up = Math.min(up + Math.PI / 18, 1.5);
-    if (key === "down") up = Math.max(up - Math.PI / 18, -1.5);
-    if (key === "in") distance /= 1.2;
-    if (key === "out") distance *= 1.2;
-    layout.scene.camera = key === "reset" ? camera() : { ...layout.scene.camera, eye: { x: center.x + distance * Math.cos(up) * Math.cos(round), y: center.y + distance * Math.cos(up) * Math.sin(round), z: center.z + distance * Math.sin(up) } };
+    layout.scene.camera = key === "reset" ? camera() : turnedCamera(layout.scene.camera, key);
     keep();
     window.Plotly.relayout(byId("view"), { "scene.camera": layout.scene.camera });
   }
@@ -293,7 +234,7 @@
       margin: { l: 64, r: 10, t: 12, b: 52 }, paper_bgcolor: "#fff", plot_bgcolor: "#eceff2", font: { family: FONT, color: INK, size: 12 },
       xaxis: { title: { text: plain(label(0)) }, range: [plane.first[0], plane.first[plane.first.length - 1]], zeroline: false },
       yaxis: { title: { text: plain(label(1)) }, range: [plane.second[0], plane.second[plane.second.length - 1]], zeroline: false },
-    }, { displaylogo: false, responsive: true, displayModeBar: false, scrollZoom: false });
+    }, CONFIG);
   }
 
   async function copy() {
