@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .options import (
     CaseName,
-    CsvFile,
     JsonFile,
     Outputs,
     ResultFile,
@@ -17,13 +17,13 @@ from .options import (
     console,
     number_option,
     read_settings,
-    write_csv,
     write_json,
 )
 from .progress import spinner
 
 if TYPE_CHECKING:
     from ..path.options import PathOptions
+    from ..proof.workspace.path_knots import Sampling
     from ..results.workspace import WorkspacePose
 
 
@@ -51,7 +51,16 @@ def path(
     gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a number without a limit.")] = 1e-3,
     time: Time = None,
     json_file: JsonFile = None,
-    csv_file: CsvFile = None,
+    csv_file: Annotated[
+        str | None, typer.Option("--csv", metavar="FILE", help="Write the actuators along the path; - is stdout.")
+    ] = None,
+    step: Annotated[
+        float | None, number_option("--step", "LENGTH", "Length of the path between rows, at turns by 1 degree.")
+    ] = None,
+    within: Annotated[
+        float | None,
+        number_option("--within", "LENGTH", "Rows so that actuators linear between them stay this near the path."),
+    ] = None,
 ) -> None:
     """Prove regular poses and limits at every point of a path."""
     from pathlib import Path
@@ -62,11 +71,12 @@ def path(
     from ..path.reader import options_of, path_of_case, read_path
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
+    from ..results.pathtable import knots_csv
     from ..results.pathwording import path_summary
-    from ..results.text import TextTable
     from ..results.workspaceposes import evaluate_command
     from .paper import read_machine
 
+    sampling = _sampling(step, within, is_written=csv_file is not None)
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
     answer_after(Milestone.BOUND)
@@ -78,7 +88,7 @@ def path(
     with spinner("reading the path") as show:
         programmed = path_of_case(loaded, options) if along is None else read_path(along, loaded.units, options)
         limit = TIME_LIMIT if time is None else time
-        judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, progress=show)
+        judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, sampling=sampling, progress=show)
     result = path_result(judged)
 
     def command(pose: WorkspacePose) -> str:
@@ -86,14 +96,32 @@ def path(
         return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
 
     write_json(json_file, result)
-    summary = list(path_summary(judged.case, result, command))
-    if csv_file is not None:
-        write_csv(csv_file, [each for each in summary if isinstance(each, TextTable)], None)
+    if csv_file is not None and judged.knots is not None:
+        from ..output.files import write_text
+
+        write_text(csv_file, knots_csv(judged.case, programmed, judged.knots))
     if not files.is_piped:
         from ..output.terminal import show as show_on
 
-        show_on(console(), summary)
+        show_on(console(), path_summary(judged.case, result, command))
     raise typer.Exit(0 if result.proved else 1)
+
+
+def _sampling(step: float | None, within: float | None, *, is_written: bool) -> Sampling | None:
+    """Return what the rows of a table are to keep; None for no table.
+
+    Raises:
+        InputError: a length is not positive, or both are given.
+    """
+    from ..errors import InputError
+    from ..proof.workspace.path_knots import Sampling
+
+    for option, length in (("--step", step), ("--within", within)):
+        if length is not None and not 0 < length < math.inf:
+            raise InputError(f"{option} {length:g}: must be a length above 0")
+    if step is not None and within is not None:
+        raise InputError("--step and --within: give one; each states how far rows are from each other")
+    return None if step is None and within is None and not is_written else Sampling(step, within)
 
 
 def _options(own: PathOptions, unit: str | None, start: str | None, offsets: list[str]) -> PathOptions:

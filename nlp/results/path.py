@@ -4,6 +4,9 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ...models import Dimension
 from ...models.statics import driven_joints
 from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
@@ -11,11 +14,14 @@ from ..proof.workspace.numbers.extremes import Extreme
 from ..proof.workspace.verdict import Outcome
 from .jsondata import Absent, Inline, JsonObject
 from .parts import HeadData, VersionsData
+from .pathtable import knot_motion
 from .point import head_data, versions
 from .workspace import WorkspacePose, pose_data
 
 if TYPE_CHECKING:
     from ..proof.workspace.path_judge import PathJudgement, RankOnPath
+    from ..proof.workspace.path_knots import Knots
+    from ..units import Units
 
 
 class PathFaultData(JsonObject):
@@ -81,6 +87,8 @@ class PathActuatorData(JsonObject):
         largest: proven largest coordinate.
         speed: proven largest speed, in this unit by seconds, in the path's motion where it states times; absent without
             such.
+        acceleration: largest size of the change of its speed between knots, by the square of seconds; absent without
+            knots or times.
     """
 
     actuator: str
@@ -88,6 +96,26 @@ class PathActuatorData(JsonObject):
     smallest: float | None
     largest: float | None
     speed: Absent[float]
+    acceleration: Absent[float]
+
+
+class PathKnotsData(JsonObject):
+    """Knots of a path, of which a table has the coordinates of the actuators.
+
+    Attributes:
+        number: of knots.
+        closed: of those that the machine reaches.
+        within: largest distance asked for between the path and the platform's origin, as actuators move linearly from
+            knot to knot; absent where steps were asked for.
+        deviation: the proven largest distance; absent where none was asked for, and null where none is proved.
+        reason: for which none is proved; absent otherwise.
+    """
+
+    number: int
+    closed: int
+    within: Absent[float]
+    deviation: float | None
+    reason: Absent[str]
 
 
 class IdleData(JsonObject):
@@ -115,6 +143,7 @@ class PathData(JsonObject):
         idle: what moves nothing, in the order of the lines.
         claims: ranks first.
         actuators: of the robot.
+        knots: of a table of the actuators; absent where none is asked for.
     """
 
     file: str
@@ -124,6 +153,7 @@ class PathData(JsonObject):
     idle: tuple[IdleData, ...]
     claims: tuple[PathClaimData, ...]
     actuators: tuple[PathActuatorData, ...]
+    knots: Absent[PathKnotsData]
 
 
 class PathResult(JsonObject):
@@ -157,6 +187,7 @@ def path_result(judged: "PathJudgement") -> PathResult:
             idle=tuple(IdleData.of(each) for each in judged.path.idle),
             claims=(*ranks, *numbers),
             actuators=tuple(_actuators(judged)),
+            knots=None if judged.knots is None else _knots_data(judged.case.units, judged.knots),
         ),
         versions=versions(),
     )
@@ -214,9 +245,26 @@ def _fault_data(each: "RankOnPath | Extreme", judged: "PathJudgement") -> PathFa
     )
 
 
+def _knots_data(units: "Units", knots: "Knots") -> PathKnotsData:
+    """Return the knots of a table."""
+    within, deviation = (
+        None if each is None else units.shown(each, Dimension.LENGTH) for each in (knots.within, knots.deviation)
+    )
+    return PathKnotsData(
+        number=len(knots.segments),
+        closed=int(np.isfinite(knots.coordinates).all(axis=1).sum()),
+        within=within,
+        deviation=deviation,
+        reason=knots.reason or None,
+    )
+
+
 def _actuators(judged: "PathJudgement") -> Iterator[PathActuatorData]:
     """Yield the ranges of the actuators."""
-    units = judged.case.units
+    units, accelerations = judged.case.units, dict[str, float]()
+    if judged.knots is not None and judged.path.is_timed:
+        sizes = np.nan_to_num(np.abs(knot_motion(judged.path, judged.knots).accelerations)).max(axis=0)
+        accelerations = dict(zip(judged.knots.actuators, sizes.tolist(), strict=True))
     for joint in driven_joints(judged.case.model):
         names = [f"{measure} limb {joint.name}" for measure in ("leg_length", *ACTUATED)]
         ends = {each.sense: each.bound for each in judged.extremes if each.name in names}
@@ -224,11 +272,13 @@ def _actuators(judged: "PathJudgement") -> Iterator[PathActuatorData]:
         name = f"actuator_speed actuator {joint.name}"
         speeds = [each for each in judged.extremes if each.name == name and judged.path.is_timed]
         speed = next((units.shown(each.bound, each.dimension) for each in speeds if math.isfinite(each.bound)), None)
-        if ends or speeds:
+        acceleration = accelerations.get(joint.name)
+        if ends or speeds or acceleration is not None:
             yield PathActuatorData(
                 actuator=joint.name,
                 unit=units.label(joint.dimension),
                 smallest=shown.get(Sense.MIN),
                 largest=shown.get(Sense.MAX),
                 speed=speed,
+                acceleration=None if acceleration is None else units.shown(acceleration, joint.dimension),
             )

@@ -55,6 +55,9 @@ def path_summary(
         if each.sense is None:
             after = f": {each.reason}" if each.reason else ""
             yield Line(each.outcome.value, label=each.name, tone=TONES[each.outcome], after=after + _place_words(each))
+    yield from _knot_lines(path, case.units.length)
+    if path.time is not None or path.knots is not None:
+        yield _actuator_table(path)
     rows = [_row(case, each) for each in path.claims if each.sense is not None]
     if rows:
         headers = ("number", "unit", "value", "limit", "proven bound", "reached", "outcome", "line", "at")
@@ -67,6 +70,38 @@ def _untimed_words(path: PathData) -> str:
         return ""
     verb = "has" if path.untimed == 1 else "have"
     return f"; {path.untimed:,} of {path.segments:,} segments {verb} no time, and speeds there are not known"
+
+
+def _knot_lines(path: PathData, unit: str) -> Iterator[Line]:
+    """Yield the number of knots, and the distance that is proved between them."""
+    knots = path.knots
+    if knots is None:
+        return
+    lost = knots.number - knots.closed
+    yield Line(f"{knots.number:,}", label="knots", after=f"; {lost:,} of them are not reached" if lost else "")
+    if knots.within is None:
+        return
+    asked = f"{number(knots.within)} {unit}"
+    if knots.deviation is None:
+        yield Line("open", label=f"within {asked}", tone=TONES[Outcome.OPEN], after=f": {knots.reason}")
+    else:
+        words = f"proved: between knots the platform stays within {number(knots.deviation)} {unit} of the path"
+        yield Line(words, label=f"within {asked}", tone=TONES[Outcome.PROVED])
+
+
+def _actuator_table(path: PathData) -> TextTable:
+    """Return the table of the actuators' numbers."""
+
+    def cell(value: float | None) -> str:
+        return "" if value is None else number(value)
+
+    rows = [
+        (each.actuator, each.unit, *map(cell, (each.smallest, each.largest, each.speed, each.acceleration)))
+        for each in path.actuators
+    ]
+    headers = ("actuator", "unit", "smallest", "largest", "speed", "acceleration")
+    title = "proven ranges and largest speeds by seconds, and largest accelerations between knots"
+    return TextTable(headers, tuple(rows), name="actuators", title=title)
 
 
 def first_refuted(result: PathResult) -> PathClaimData | None:

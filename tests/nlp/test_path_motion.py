@@ -1,12 +1,14 @@
 """Speeds of actuators in the motion of a path, against differences of coordinates that are computed one by one."""
 
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, case_from, output_of, saved, shipped_tables, starter_tables
+from builders import Array, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
+from measures import circle_joints
 
 from screwsynth.nlp import Case, Outcome, inverse
 from screwsynth.nlp.case.task import Sense
@@ -16,6 +18,7 @@ from screwsynth.nlp.path.path import ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
+from screwsynth.nlp.proof.workspace.path_knots import Knots, Sampling
 
 Run = Callable[..., tuple[int, str, str]]
 #: Parameters of the points of each segment at which coordinates are computed.
@@ -134,3 +137,139 @@ def test_a_limit_on_speeds_is_that_of_the_path_and_names_the_first_line_beyond_i
     assert result["untimed"] == 1
     assert result["time"] == pytest.approx(np.nansum(path.durations))
     assert max(each["speed"] for each in result["actuators"]) == pytest.approx(worst, rel=2e-3)
+
+
+def knots_along(case: Case, path: ProgrammedPath, within: float) -> Knots:
+    knots = judge_path(case, path, sampling=Sampling(within=within)).knots
+    assert knots is not None
+    return knots
+
+
+def leg_lengths(x: Array) -> Array:
+    """Lengths (N, 6) of LinuxCNC's hexapod at positions and rotation vectors (N, 6), small ones."""
+    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
+    angle = np.linalg.norm(x[:, 3:], axis=1)[:, None, None]
+    axis = x[:, None, 3:] / np.maximum(angle, 1e-300)
+    # Rodrigues' formula.
+    along = np.sum(axis * platform, axis=2)[:, :, None] * axis
+    turned = np.cos(angle) * (platform - along) + np.sin(angle) * np.cross(axis, platform) + along
+    return np.asarray(np.linalg.norm(x[:, None, :3] + turned - base, axis=2))
+
+
+def crank_angles(p: Array) -> Array:
+    """Angles (N, 3) of the delta's cranks from home."""
+    found = []
+    for k in range(3):
+        c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
+        v = np.stack([c * p[:, 0] + s * p[:, 1] + 0.044 - 0.164, c * p[:, 1] - s * p[:, 0], p[:, 2]], 1)
+        reach, size = ((v**2).sum(1) + 0.524**2 - 1.244**2) / (2 * 0.524), np.hypot(v[:, 0], v[:, 2])
+        found.append(np.arctan2(-v[:, 2], v[:, 0]) - np.arccos(reach / size) - math.radians(20))
+    return np.stack(found, axis=1)
+
+
+def poses_with(measure: Callable[[Array], Array], q: Array, x: Array) -> Array:
+    """Solve the forward kinematics by Newton's method with differences: poses (N, m) with coordinates (N, m)."""
+    x, steps = x.copy(), 1e-6 * np.eye(x.shape[1])
+    for _ in range(6):
+        slopes = np.stack([(measure(x + e) - measure(x - e)) / 2e-6 for e in steps], axis=2)
+        x -= np.linalg.solve(slopes, (measure(x) - q)[:, :, None])[:, :, 0]
+    assert np.abs(measure(x) - q).max() < 1e-9
+    return x
+
+
+@pytest.mark.parametrize("name", ["legs", "cranks"])
+def test_the_platform_stays_within_the_tolerance_between_knots(name: str) -> None:
+    case, middle, half = ROBOTS[name]
+    rng, within = np.random.default_rng(7), 1e-3 * half[0]
+    rows = middle + half * rng.uniform(-1, 1, (4, 6))
+    path = table(case, rows, np.cumsum(rng.uniform(0.5, 2, 4)))
+    if name == "legs":
+        text = "G20 G94 F60\nG3 X0 Y0 Z22 A3 C9 I2 J1\nG4 P1\nG18 G2 X0 Z25 K1.5 I0\nG0 X3 A20 B-10\nM2"
+        path = program(case, text, (0, 0, 20, 0, 0, 0))
+    knots = knots_along(case, path, within)
+    assert not knots.reason
+    assert knots.deviation <= within
+    part = np.linspace(0, 1, 101)
+    k = knots.segments[1:]
+    begin, end = np.where(k == knots.segments[:-1], knots.parameters[:-1], 0.0), knots.parameters[1:]
+    q = np.stack([(1 - r) * knots.coordinates[:-1] + r * knots.coordinates[1:] for r in part])
+    poses = path.poses_at(np.tile(k, 101), np.concatenate([begin + r * (end - begin) for r in part]))
+    start, measure = poses.positions, crank_angles
+    if name == "legs":
+        start = np.hstack([start, [rotation_vector(R) for R in poses.rotations]])
+        measure = leg_lengths
+    moved = poses_with(measure, q.reshape(-1, q.shape[2]), start)
+    worst = np.linalg.norm(moved[:, :3] - poses.positions, axis=1)
+    assert worst.max() <= knots.deviation
+    # Knots are not much closer to each other than they have to be.
+    assert worst.max() >= 0.5 * within
+
+
+def rotation_vector(R: Array) -> Array:
+    """Axis times angle (3,) of a rotation by less than half a turn."""
+    v = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine = np.linalg.norm(v)
+    return np.asarray(v * (math.atan2(sine, 0.5 * (np.trace(R) - 1)) / sine if sine > 0 else 1.0))
+
+
+@pytest.mark.parametrize("name", ["cranks in space", "slides", "loops"])
+def test_knots_of_robots_with_loops_are_near_enough_by_their_second_differences(name: str) -> None:
+    case, middle, half = ROBOTS[name]
+    rng, within = np.random.default_rng(3), 1e-3 * half[0]
+    path = table(case, middle + half * rng.uniform(-1, 1, (3, 6)), np.array([0.0, 1.0, 3.0]))
+    knots = knots_along(case, path, within)
+    assert not knots.reason
+    worst = 0.0
+    for j, k in enumerate(knots.segments[1:]):
+        begin = 0.0 if knots.segments[j] != k else knots.parameters[j]
+        middle_s = 0.5 * (begin + knots.parameters[j + 1])
+        pose = path.poses_at([k], middle_s)
+        at = inverse(case, *pose)
+        off = 0.5 * (knots.coordinates[j] + knots.coordinates[j + 1]) - at.coordinates[0]
+        # To first order the platform moves by the motion whose rates these are.
+        moved = np.linalg.lstsq(at.rates[0], off, rcond=1e-9)[0]
+        worst = max(worst, float(np.linalg.norm(moved[3:])))
+    assert 0.5 * within <= worst <= within
+
+
+def test_knots_that_cannot_be_shown_are_said_to_be_open() -> None:
+    case = robot("delta", rb=0.164)
+    # Arms and rods are 1.768 long together.
+    path = table(case, np.array([[0, 0, -1.2, 0, 0, 0], [0, 0, -3.0, 0, 0, 0]]), np.array([0.0, 1.0]))
+    judged = judge_path(case, path, sampling=Sampling(within=1e-3))
+    assert judged.knots is not None
+    assert judged.knots.reason
+    assert judged.knots.deviation is None
+    assert not judged.is_proved
+
+
+def test_the_table_of_actuators_has_poses_times_and_differences(cli: Run, tmp_path: Path) -> None:
+    part, out, result = tmp_path / "part.ngc", tmp_path / "out.csv", tmp_path / "path.json"
+    saved(part, "G20 G94 F60 G90\nG0 X0 Y0 Z20 A0 B0 C0\nG1 X1\nG0 Z21\nG3 X1 Y2 I0 J1\nG1 A5\nM2")
+    arguments = ("path", "hexapod-linuxcnc", "--along", str(part), "--csv", str(out))
+    output_of(cli(*arguments, "--step", "0.25", "--json", str(result)))
+    head, *rows = [line.split(",") for line in out.read_text().splitlines()]
+    assert head[:10] == ["line", "segment", "parameter", "t", "x", "y", "z", "roll", "pitch", "yaw"]
+    assert head[10:12] == ["leg_length 1-", "leg_length 1+"]
+    assert (head[16], head[22]) == ("speed 1-", "acceleration 1-")
+    numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
+    # A line of 1 in, one without a time, half a circle of pi in, and a turn by 5 degrees.
+    assert [int((numbers[1:, 1] == k).sum()) for k in range(4)] == [4, 4, 13, 5]
+    assert numbers[-1, 3] == pytest.approx(1 + math.pi + 5)
+    assert (np.linalg.norm(np.diff(numbers[:, 4:7], axis=0), axis=1) <= 0.25 + 1e-9).all()
+    angles = np.radians(numbers[:, 7:10])
+    assert numbers[:9, 10:16] == pytest.approx(leg_lengths(np.hstack([numbers[:, 4:7], angles])[:9]), abs=1e-12)
+    t, q = numbers[:, 3], numbers[:, 10:16]
+    timed = np.diff(t) > 1e-9
+    assert timed.tolist() == (numbers[1:, 1] != 1).tolist()
+    assert numbers[1:, 16:22][timed] == pytest.approx((np.diff(q, axis=0)[timed].T / np.diff(t)[timed]).T)
+    assert np.isnan(numbers[1:, 16:22][~timed]).all()
+    v, inner = numbers[:, 16:22], slice(2, 4)
+    assert numbers[inner, 22:] == pytest.approx((v[3:5] - v[2:4]) / 0.25)
+    actuators = json.loads(result.read_text())["path"]["actuators"]
+    assert [each["acceleration"] for each in actuators] == pytest.approx(np.nanmax(np.abs(numbers[:, 22:]), axis=0))
+    assert all(each["speed"] >= np.nanmax(np.abs(v[:, k])) for k, each in enumerate(actuators))
+    for more, word in ((("--step", "0"), "--step"), (("--within", "-1"), "--within"), (("--step", "nan"), "--step")):
+        refusal_of(cli(*arguments, *more), f"{word} {more[1]}")
+    refusal_of(cli(*arguments, "--step", "1", "--within", "1"), "--step and --within")
+    refusal_of(cli(*arguments, "--step", "1e-9"), "knots")

@@ -38,6 +38,7 @@ from .numbers.extremes import Extreme, extreme_of, goal_of
 from .numbers.machines import Machines
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
+from .path_knots import Knots, Sampling, knots_of
 from .path_motion import speeds_on_path
 from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
 from .ranks.ranks import RankRule
@@ -109,6 +110,7 @@ class PathJudgement:
         extremes: of reach, limits, actuators and loads.
         faults: the first known point that refutes a limit, by name and sense of the claim, where it is before the one
             of the worst value.
+        knots: places of the path with the joints of the design there; None where none are asked for.
     """
 
     case: Case
@@ -116,10 +118,13 @@ class PathJudgement:
     ranks: tuple[RankOnPath, ...]
     extremes: tuple[Extreme, ...]
     faults: Mapping[tuple[str, Sense], Fault] = field(default_factory=dict)
+    knots: Knots | None = None
 
     @property
     def is_proved(self) -> bool:
-        """Whether all ranks and limits are proved."""
+        """Whether all ranks and limits are proved, and the distance that knots are to keep."""
+        if self.knots is not None and self.knots.reason:
+            return False
         return all(each.outcome is Outcome.PROVED for each in self.ranks) and not any(
             each.fails for each in self.extremes
         )
@@ -132,6 +137,7 @@ def judge_path(
     *,
     gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
+    sampling: Sampling | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> PathJudgement:
     """Judge a machine at every point of a path.
@@ -141,11 +147,13 @@ def judge_path(
         path: in the case's unit of length.
         gap: largest relative gap of a number without a limit.
         time_limit: seconds of all searches.
+        sampling: what knots of the path are to keep; None for no knots.
         progress: called with what is done next.
 
     Raises:
         CaseError: a dimension of the robot is free.
-        InputError: the path has a convention of angles, or angles, that are not covered, or there is no C kernel.
+        InputError: the path has a convention of angles, or angles, that are not covered, there is no C kernel, or knots
+            are too many, or of a robot of which the positions of actuators are not known.
     """
     cover, workspace = _covered(path)
     case = replace(case, workspace=workspace)
@@ -153,6 +161,10 @@ def judge_path(
     kernel()
     report = progress or (lambda _: None)
     with within(time_limit, _PART):
+        knots = None
+        if sampling is not None:
+            report("knots")
+            knots = knots_of(case, path, cover, workspace, sampling)
         closed, box = closed_form(case.model), pose_box(workspace)
         try:
             first = cover.points(cover.pieces[:1], 0.0)[0]
@@ -163,7 +175,8 @@ def judge_path(
                 )
             machines = Machines(case, closed, design)
         except NotJudgedError as error:
-            return PathJudgement(case, path, (RankOnPath(REGULAR, Outcome.OPEN, None, None, 0, 0.0, str(error)),), ())
+            rank = RankOnPath(REGULAR, Outcome.OPEN, None, None, 0, 0.0, str(error))
+            return PathJudgement(case, path, (rank,), (), knots=knots)
         family = machines.family
         ranks = []
         for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
@@ -196,7 +209,7 @@ def judge_path(
                 subject = replace(subject, machines=speeds.number.problem)
                 faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
         found += motor_extremes(subject, speeds=bounds)
-    return PathJudgement(case, path, tuple(ranks), tuple(found), faults)
+    return PathJudgement(case, path, tuple(ranks), tuple(found), faults, knots)
 
 
 def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[Extreme]:

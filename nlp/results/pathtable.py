@@ -1,0 +1,103 @@
+"""Coordinates of actuators along a path as a table, for controllers: knots with times, poses, speeds and accelerations.
+
+Speeds and accelerations are differences between knots: what actuators do that move linearly from one to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...models import Dimension, FloatArray
+from ...models.statics import driven_joints
+from ..path.options import Between
+from ..path.orientation import ORDERS
+from ..system.csvtext import csv_text
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..case.case import Case
+    from ..path.path import ProgrammedPath
+    from ..proof.workspace.path_knots import Knots
+
+#: Number of rows that are made at once.
+_BLOCK = 2**14
+#: Columns of the pose.
+_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+class KnotMotion(NamedTuple):
+    """Motion of the actuators between K knots of a path, in radians; NaN where no time is stated.
+
+    Attributes:
+        times: (K,) seconds from the start; segments without a time take none.
+        speeds: (K, a) of the motion that ends at each knot.
+        accelerations: (K, a) at each knot: change of the speed there by the mean time of the motions about it.
+    """
+
+    times: FloatArray
+    speeds: FloatArray
+    accelerations: FloatArray
+
+
+def knot_motion(path: ProgrammedPath, knots: Knots) -> KnotMotion:
+    """Return the motion of the actuators between knots."""
+    k, s, q = knots.segments, knots.parameters, knots.coordinates
+    durations = np.nan_to_num(path.durations)
+    begins = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
+    before = np.where(k[1:] == k[:-1], s[:-1], 0.0)
+    seconds = np.concatenate([[np.nan], (s[1:] - before) * path.durations[k[1:]]])[:, None]
+    speeds = np.concatenate([np.full((1, q.shape[1]), np.nan), np.diff(q, axis=0)]) / seconds
+    mean = 0.5 * (seconds[1:] + seconds[:-1])
+    changes = np.diff(speeds, axis=0) / mean
+    accelerations = np.concatenate([changes, np.full((1, q.shape[1]), np.nan)])
+    return KnotMotion(begins[k] + s * durations[k], speeds, accelerations)
+
+
+def _angles(path: ProgrammedPath, k: NDArray[np.intp], s: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return roll, pitch and yaw (K, 3) at places: those of the path where it is stated by them."""
+    if path.between is Between.ANGLES and path.order == ORDERS["rpy"]:
+        start = path.knots[k, 3:]
+        return np.asarray(start + s[:, None] * (path.knots[k + 1, 3:] - start))
+    R = rotations
+    pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
+    found = [np.arctan2(R[:, 2, 1], R[:, 2, 2]), pitch, np.arctan2(R[:, 1, 0], R[:, 0, 0])]
+    return np.stack(found, axis=1)
+
+
+def knots_csv(case: Case, path: ProgrammedPath, knots: Knots) -> str:
+    """Return a row for each knot: its line, segment and parameter, time, pose, coordinates, speeds and accelerations.
+
+    Numbers are in the units of the case. Cells are empty where the machine does not reach the pose, or without a time.
+    """
+    units = case.units
+    head = ["line", "segment", "parameter", *(["t"] * path.is_timed), *_POSE]
+    head += [f"{measure} {name}" for measure, name in zip(knots.measures, knots.actuators, strict=True)]
+    scales = np.array([units.to_internal(1.0, each.dimension) for each in driven_joints(case.model)])
+    if path.is_timed:
+        head += [f"{word} {name}" for word in ("speed", "acceleration") for name in knots.actuators]
+    return csv_text(head, _rows(case, path, knots, scales))
+
+
+def _rows(case: Case, path: ProgrammedPath, knots: Knots, scales: FloatArray) -> Iterator[list[float | None]]:
+    """Yield the rows, in which numbers that are not known are None."""
+    motion = knot_motion(path, knots)
+    for begin in range(0, len(knots.segments), _BLOCK):
+        rows = slice(begin, begin + _BLOCK)
+        k, s = knots.segments[rows], knots.parameters[rows]
+        poses = path.poses_at(k, s)
+        angles = _angles(path, k, s, poses.rotations) / case.units.to_internal(1.0, Dimension.ANGLE)
+        parts = [poses.positions, angles, knots.coordinates[rows] / scales]
+        if path.is_timed:
+            times, *others = (each[rows] for each in motion)
+            parts = [times[:, None], *parts, *(each / scales for each in others)]
+        values = np.hstack(parts)
+        known = np.asarray(np.isfinite(values))
+        whole: list[bool] = np.asarray(known.all(axis=1)).tolist()
+        places = zip(path.lines[k].tolist(), k.tolist(), s.tolist(), strict=True)
+        for j, (place, row) in enumerate(zip(places, values.tolist(), strict=True)):
+            cells = row if whole[j] else [x if is_known else None for x, is_known in zip(row, known[j], strict=True)]
+            yield [*place, *cells]
