@@ -45,6 +45,14 @@ def path(
         list[str] | None,
         typer.Option("--offset", metavar="G54=X,Y,Z,A,B,C", help="Origin of a program's coordinate system."),
     ] = None,
+    angles: Annotated[
+        str,
+        typer.Option("--angles", metavar="rpy|xyz|...", help="Convention of a program's A, B, C; LinuxCNC's is rpy."),
+    ] = "rpy",
+    between: Annotated[
+        str | None,
+        typer.Option("--between", metavar="angles|slerp", help="What turns linearly: the angles, or about one axis."),
+    ] = None,
     gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a number without a limit.")] = 1e-3,
     time: Time = None,
     json_file: JsonFile = None,
@@ -70,7 +78,7 @@ def path(
     files = Outputs(json=json_file, csv=csv_file)
     files.check({**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
-        programmed = read_path(along, loaded.units, _options(unit, start, offset or []))
+        programmed = read_path(along, loaded.units, _options(unit, start, offset or [], angles, between))
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, progress=show)
     result = path_result(judged)
@@ -90,14 +98,14 @@ def path(
     raise typer.Exit(0 if result.proved else 1)
 
 
-def _options(unit: str | None, start: str | None, offsets: list[str]) -> PathOptions:
+def _options(unit: str | None, start: str | None, offsets: list[str], angles: str, between: str | None) -> PathOptions:
     """Return the choices that a path's file leaves open.
 
     Raises:
-        InputError: one is not a list of six numbers.
+        InputError: one is not allowed.
     """
     from ..errors import InputError
-    from ..path.options import PathOptions
+    from ..path.options import Between, PathOptions
 
     def numbers(option: str, text: str) -> list[float]:
         try:
@@ -111,4 +119,12 @@ def _options(unit: str | None, start: str | None, offsets: list[str]) -> PathOpt
         if not equals:
             raise InputError(f"--offset {each}: must be a coordinate system and its origin: G54=X,Y,Z,A,B,C")
         found[name] = numbers("--offset", text)
-    return PathOptions(unit=unit, start=None if start is None else numbers("--start", start), offsets=found)
+    if between not in (None, *(each.value for each in Between)):
+        raise InputError(f"--between {between}: must be angles or slerp")
+    return PathOptions(
+        between=None if between is None else Between(between),
+        angles=angles,
+        unit=unit,
+        start=None if start is None else numbers("--start", start),
+        offsets=found,
+    )
