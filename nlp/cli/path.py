@@ -48,6 +48,14 @@ def path(
         list[str] | None,
         typer.Option("--offset", metavar="G54=X,Y,Z,A,B,C", help="Origin of a program's coordinate system."),
     ] = None,
+    angles: Annotated[
+        str | None,
+        typer.Option("--angles", metavar="rpy|xyz|...", help="Convention of a program's A, B, C; LinuxCNC's is rpy."),
+    ] = None,
+    between: Annotated[
+        str | None,
+        typer.Option("--between", metavar="angles|slerp", help="What turns linearly: the angles, or about one axis."),
+    ] = None,
     gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a number without a limit.")] = 1e-3,
     time: Time = None,
     json_file: JsonFile = None,
@@ -84,7 +92,7 @@ def path(
     files = Outputs(json=json_file, csv=csv_file)
     files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
     own = PathOptions() if along is not None or loaded.path is None else options_of(loaded.path)
-    options = _options(own, unit, start, offset or [])
+    options = _options(own, unit, start, offset or [], angles, between)
     with spinner("reading the path") as show:
         programmed = path_of_case(loaded, options) if along is None else read_path(along, loaded.units, options)
         limit = TIME_LIMIT if time is None else time
@@ -124,15 +132,18 @@ def _sampling(step: float | None, within: float | None, *, is_written: bool) -> 
     return None if step is None and within is None and not is_written else Sampling(step, within)
 
 
-def _options(own: PathOptions, unit: str | None, start: str | None, offsets: list[str]) -> PathOptions:
+def _options(
+    own: PathOptions, unit: str | None, start: str | None, offsets: list[str], angles: str | None, between: str | None
+) -> PathOptions:
     """Return the choices that a path's file leaves open: those of the case, but for what is given.
 
     Raises:
-        InputError: one is not a list of six numbers.
+        InputError: one is not allowed.
     """
     from dataclasses import replace
 
     from ..errors import InputError
+    from ..path.options import Between
 
     def numbers(option: str, text: str) -> list[float]:
         try:
@@ -146,8 +157,12 @@ def _options(own: PathOptions, unit: str | None, start: str | None, offsets: lis
         if not equals:
             raise InputError(f"--offset {each}: must be a coordinate system and its origin: G54=X,Y,Z,A,B,C")
         found[name] = numbers("--offset", text)
+    if between not in (None, *(each.value for each in Between)):
+        raise InputError(f"--between {between}: must be angles or slerp")
     return replace(
         own,
+        between=own.between if between is None else Between(between),
+        angles=own.angles if angles is None else angles,
         unit=own.unit if unit is None else unit,
         start=own.start if start is None else numbers("--start", start),
         offsets=found,

@@ -18,7 +18,7 @@ from ..case.pose import LARGEST
 from ..errors import CaseError, InputError
 from ..units import Units
 from .options import Between, PathOptions
-from .orientation import ORDERS, quaternions_from_angles, roll_pitch_yaw, shortest_turns
+from .orientation import ORDERS, order_named, quaternions_from_angles, roll_pitch_yaw, shortest_turns
 from .path import Kind, ProgrammedPath
 
 if TYPE_CHECKING:
@@ -73,11 +73,13 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
         text: of the file.
         source: its name, for messages.
         units: of the case.
-        options: of which the motion between two rows counts here.
+        options: of which the motion between two rows counts here; a convention of angles is for programs alone.
 
     Raises:
         InputError: the table has a fault, or fewer than two points.
     """
+    if order_named(options.angles) != ORDERS["rpy"]:
+        raise InputError(f"{source}: angles = {options.angles!r}: is for programs; tables have roll, pitch and yaw")
     table = _read_table(text, source)
     has_angles = not {"qw", "axis_x", "angle"} & table.columns.keys()
     between = options.between or (Between.ANGLES if has_angles else Between.SLERP)

@@ -327,5 +327,5 @@ def test_the_command_writes_a_result_and_says_how_it_ended(cli: Run, tmp_path: P
     refuted = [each for each in json.loads(out.read_text())["path"]["claims"] if each["outcome"] == "refuted"]
     assert min(each["fault"]["line"] for each in refuted) == 3
     refusal_of(cli("path", "hexapod-linuxcnc", "--along", str(tmp_path / "none.ngc")), "none.ngc")
-    saved(part, "G1 X0 C150\nM2\n")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--along", str(part)), "part.ngc")
+    saved(part, "F10 G1 X0 Y0 Z20 C0\nC360\nM2\n")
+    refusal_of(cli("path", "hexapod-linuxcnc", "--along", str(part)), "part.ngc: line 2: is turned by 149 degrees")

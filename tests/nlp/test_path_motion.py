@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from measures import circle_joints
 from screwsynth.nlp import Case, Outcome, inverse
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.path.gcode import read_program
-from screwsynth.nlp.path.options import PathOptions
+from screwsynth.nlp.path.options import Between, PathOptions
+from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.path import ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
@@ -73,12 +75,16 @@ ROBOTS = {
 }
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_speeds_are_those_of_dense_samples(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [*((name, "rpy") for name in ROBOTS), ("legs", "slerp"), ("legs", "xyz"), ("legs", "yzx"), ("loops", "slerp")],
+)
+def test_speeds_are_those_of_dense_samples(name: str, how: str) -> None:
     case, middle, half = ROBOTS[name]
     rng = np.random.default_rng(len(name))
     rows = middle + half * rng.uniform(-1, 1, (6, 6))
     path = table(case, rows, np.cumsum(rng.uniform(0.5, 2, 6)))
+    path = replace(path, between=Between.SLERP) if how == "slerp" else replace(path, order=ORDERS[how])
     judged, sampled = judge_path(case, path), sampled_speeds(case, path).max(axis=0)
     speeds = largest(judged, "actuator_speed")
     assert [each.outcome for each in speeds] == [Outcome.PROVED] * len(sampled)

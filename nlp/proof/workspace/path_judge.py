@@ -15,17 +15,16 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ....models import FloatArray
+from ....models import FloatArray, frozen_array
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
+from ...case.loads import Motion
 from ...case.pose import Free, Value
 from ...case.task import Sense
-from ...case.workspace import TurnKind, Turns, Workspace
+from ...case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
 from ...errors import InputError, UncoveredError
 from ...interruption import is_requested, one_call, one_search, within
 from ...path.arcs import PLANES
-from ...path.options import Between
-from ...path.orientation import ORDERS
 from ...path.path import ProgrammedPath
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
@@ -44,7 +43,8 @@ from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
 from .ranks.ranks import RankRule
 from .ranks.singular_pose import DeterminantSigns, SingularPose
 from .robot.path_cover import PathCover, Place
-from .robot.pose_box import PoseNumbers, pose_box
+from .robot.path_turns import turns_of_path
+from .robot.pose_box import PoseBox, PoseNumbers
 from .robot.posed_model import RankMatrix
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
 from .verdict import Outcome
@@ -53,10 +53,8 @@ from .verdict import Outcome
 TIME_LIMIT = 600.0
 #: Part of the time that is left that a search takes at most, and gap of a number without a limit, as a part of it.
 _PART, GAP = 0.5, 1e-3
-#: Part of the sizes of positions, or angle, by which the box of all poses is larger than the path.
+#: Part of the sizes of positions by which the box of all poses is wider than a path that stays at one.
 _ROOM = 1e-9
-#: Angles from which on the tangent of the half is too large a coordinate.
-_LARGEST = math.radians(149)
 #: Singular value, in parts of the largest, that counts as 0 at a point of a path, steps in the search of it, and powers
 #: of two of a piece's width at which it begins.
 _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
@@ -152,10 +150,10 @@ def judge_path(
 
     Raises:
         CaseError: a dimension of the robot is free.
-        InputError: the path has a convention of angles, or angles, that are not covered, there is no C kernel, or knots
-            are too many, or of a robot of which the positions of actuators are not known.
+        InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
+            robot of which the positions of actuators are not known.
     """
-    cover, workspace = _covered(path)
+    cover, box, workspace = _covered(path)
     case = replace(case, workspace=workspace)
     workspace_of_case(case)
     kernel()
@@ -165,7 +163,7 @@ def judge_path(
         if sampling is not None:
             report("knots")
             knots = knots_of(case, path, cover, workspace, sampling)
-        closed, box = closed_form(case.model), pose_box(workspace)
+        closed = closed_form(case.model)
         try:
             first = cover.points(cover.pieces[:1], 0.0)[0]
             design = replace(build_problem(case, closed.model, box, first), cover=cover)
@@ -206,7 +204,9 @@ def judge_path(
             found += speeds.extremes
             bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
             if speeds.number is not None:
-                subject = replace(subject, machines=speeds.number.problem)
+                # Powers are those in the path's motion, whether the case states another one or none.
+                moving = case.loading._replace(motion=case.loading.motion or Motion(1.0))
+                subject = replace(subject, case=replace(case, loading=moving), machines=speeds.number.problem)
                 faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
         found += motor_extremes(subject, speeds=bounds)
     return PathJudgement(case, path, tuple(ranks), tuple(found), faults, knots)
@@ -237,36 +237,43 @@ def _finer(
     return machines.searched([claim], gap, is_enough=False)[0]
 
 
-def _covered(path: ProgrammedPath) -> tuple[PathCover, Workspace]:
-    """Return the boxes of a path, and a workspace that holds all of it.
+def _covered(path: ProgrammedPath) -> tuple[PathCover, PoseBox, Workspace]:
+    """Return the boxes of a path, the box of all its poses, and a workspace about it.
 
     Raises:
-        InputError: its angles are not covered.
+        InputError: it has no motion, or its rotations are not covered.
     """
-    if path.between is not Between.ANGLES or path.order != ORDERS["rpy"]:
-        raise InputError(f"{path.source}: paths are judged between roll, pitch and yaw that change linearly alone")
     if not len(path):
         raise InputError(f"{path.source}: has no motion")
-    wide = np.abs(path.knots[:, 3:]).max(axis=1)
-    if wide.max() >= _LARGEST:
-        line = path.lines[max(int(np.argmax(wide >= _LARGEST)) - 1, 0)]
-        raise InputError(f"{path.source}: line {line}: angles must be below {math.degrees(_LARGEST):g} degrees")
+    turns = turns_of_path(path)
     arcs, axes = np.full((len(path), 6), np.nan), np.zeros((len(path), 3), dtype=np.intp)
     k = path.arc_segments
     arcs[k] = path.arcs
     axes[k] = [PLANES[plane] for plane in path.planes.tolist()] if len(k) else np.zeros((0, 3), dtype=np.intp)
-    cover = PathCover(path.knots, arcs, axes, np.where(np.isfinite(path.durations), path.durations, np.inf))
+    seconds = np.where(np.isfinite(path.durations), path.durations, np.inf)
+    cover = PathCover(path.knots[:, :3], arcs, axes, turns, seconds)
     lower, upper = cover.boxes(cover.pieces)
     low, high = lower.min(axis=0), upper.max(axis=0)
-    low[3:], high[3:] = 2 * np.arctan(low[3:]), 2 * np.arctan(high[3:])
-    room = _ROOM * np.concatenate([np.full(3, np.abs(path.knots[:, :3]).max() or 1.0), np.ones(3)])
     if not (high > low).any():  # a path that stays at one pose
-        low[0], high[0] = low[0] - room[0], high[0] + room[0]
-    ends: list[Value] = [
-        Free(a - by, b + by) if b > a else a
-        for a, b, by in zip(low.tolist(), high.tolist(), room.tolist(), strict=True)
-    ]
-    return cover, Workspace(ends[:3], Turns(TurnKind.ROLL_PITCH_YAW, tuple(ends[3:])))
+        room = _ROOM * (np.abs(path.knots[:, :3]).max() or 1.0)
+        low[0], high[0] = low[0] - room, high[0] + room
+    box = PoseBox(
+        turns.kind,
+        frozen_array((0, 0, 1), (3,)),
+        frozen_array(low, (6,)),
+        frozen_array(high, (6,)),
+        math.inf,
+        turns.reference,
+    )
+    about = Turns(TurnKind.ANY_AXIS, (Free(-LARGEST_TURN, LARGEST_TURN),))
+    if turns.kind is TurnKind.ROLL_PITCH_YAW:
+        about = Turns(turns.kind, tuple(_values(2 * np.arctan(low[3:]), 2 * np.arctan(high[3:]))))
+    return cover, box, Workspace(_values(low[:3], high[:3]), about)
+
+
+def _values(low: FloatArray, high: FloatArray) -> list[Value]:
+    """Return ranges, or fixed numbers where both ends are one."""
+    return [Free(a, b) if b > a else a for a, b in zip(low.tolist(), high.tolist(), strict=True)]
 
 
 def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> RankOnPath:

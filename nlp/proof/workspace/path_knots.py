@@ -16,7 +16,7 @@ from ....models import FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.pose import Free, ends_of
-from ...case.workspace import Workspace
+from ...case.workspace import TurnKind, Workspace
 from ...errors import InputError, UncoveredError
 from ...evidence.inverse import InversePoses, inverse
 from ...interruption import is_requested, one_search, why_stopped
@@ -187,6 +187,8 @@ def _machine(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Proble
     Raises:
         NotJudgedError: they are not known, or not as many as the platform's freedoms.
     """
+    if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
+        raise NotJudgedError("its rotations are not roll, pitch and yaw below 149 degrees that change linearly")
     ends = [ends_of(value) for value in (*workspace.position, *workspace.turns.angles)]
     size = max(abs(end) for pair in ends[:3] for end in pair)
     rooms = [_ROOM * (size or 1.0)] * 3 + [_ROOM] * 3

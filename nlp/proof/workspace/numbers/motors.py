@@ -29,6 +29,7 @@ from ....case.case import Case
 from ....case.loads import Motion
 from ....case.motors import Motor, MotorNumber
 from ....case.task import Sense
+from ....case.workspace import TurnKind
 from ...enclosure.forms import Forms
 from ...statement.claims import Claim
 from ..ranks.krawczyk import ROUNDING
@@ -236,7 +237,11 @@ def path_twist(problem: Problem) -> SX:
     """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its numbers in the motion of a path."""
     rates = SX(6, 1)
     rates[list(problem.free)] = problem.z[list(problem.rates), :]
-    _, b, c = (2 * ca.atan(t) for t in ca.vertsplit(problem.box.symbols(problem.z)[3:]))
+    turn = problem.box.symbols(problem.z)[3:]
+    if problem.box.kind is not TurnKind.ROLL_PITCH_YAW:
+        omega = 2 * (rates[3:] + ca.cross(turn, rates[3:])) / (1 + ca.sumsqr(turn))
+        return ca.vertcat(rates[:3], problem.length * omega)
+    _, b, c = (2 * ca.atan(t) for t in ca.vertsplit(turn))
     about_x = ca.vertcat(ca.cos(c) * ca.cos(b), ca.sin(c) * ca.cos(b), -ca.sin(b))
     about_y = ca.vertcat(-ca.sin(c), ca.cos(c), 0)
     omega = about_x * rates[3] + about_y * rates[4] + ca.vertcat(0, 0, rates[5])

@@ -18,6 +18,7 @@ from casadi import SX
 
 from .....models import FloatArray
 from .....models.arrays import values_at
+from ....case.workspace import TurnKind
 from ....evidence.closed_loops import Loops, inverses
 from ...enclosure.forms import Forms
 from ..robot.path_cover import PathCover
@@ -98,10 +99,11 @@ class PathSpeeds(Number):
 
 
 def pose_rates(problem: Problem) -> SX:
-    """Return the rates (f, 1) of the pose's free coordinates, of which those of turns are tangents of half angles."""
+    """Return the rates (f, 1) of the pose's free coordinates, of which angles have tangents of their halves."""
     rates = problem.z[list(problem.rates), :]
-    turning = [problem.z[j] if k >= 3 else None for j, k in enumerate(problem.free)]
+    has_angles = problem.box.kind is TurnKind.ROLL_PITCH_YAW
+    angles = [problem.z[j] if k >= 3 and has_angles else None for j, k in enumerate(problem.free)]
     return ca.vertcat(
         SX(0, 1),
-        *[rates[j] if t is None else 0.5 * (1 + t * t) * rates[j] for j, t in enumerate(turning)],
+        *[rates[j] if t is None else 0.5 * (1 + t * t) * rates[j] for j, t in enumerate(angles)],
     )

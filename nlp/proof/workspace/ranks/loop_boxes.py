@@ -45,8 +45,8 @@ _LEAST = 1e-10
 _MOST = 1.0
 #: Part of itself by which an end of a dependent coordinate moves outwards: several roundings.
 _ROUNDING = 1e-14
-#: Width of a coordinate along a path, as a part of its size, up to which it is fixed.
-_FIXED = 1e-12
+#: Width of a coordinate along a path, as a part of its size, and of at least 1 of rotations, up to which it is fixed.
+_FIXED = 1e-11
 #: Part of their widths by which computed dependent coordinates may be beyond their ends: rounding of Newton's method.
 _CLOSE = 1e-9
 #: Contractions of the closed point at the common face of two boxes: each one squares its width.
@@ -420,6 +420,8 @@ class LoopRule(Rule[Followed]):
         if problem.cover is not None:
             # What is fixed along the path is as wide as its rounding, however often a piece is halved.
             size = np.maximum(np.abs(self._start.lower).max(axis=0), np.abs(self._start.upper).max(axis=0))
+            turns = [j for j, k in enumerate(problem.free) if k >= 3]
+            size[turns] = np.maximum(size[turns], 1.0)
             self.whole[~(self.whole > _FIXED * size)] = 0.0
         # The boxes in which dependent coordinates became known.
         self._roots: list[LoopBoxes] = []

@@ -1,7 +1,7 @@
 """Boxes of poses that cover pieces of a path: hulls in the coordinates of a :class:`~.pose_box.PoseBox`.
 
-Coordinates of a line are monotone between its ends: positions, angles, and tangents of half angles. Those of an arc are
-products of a radius between its ends and of cosines over a range. Ends move outwards by several roundings.
+Positions on a line are monotone between its ends. Those on an arc are products of a radius between its ends and of
+cosines over a range. Ends move outwards by several roundings. Ranges of rotations are those of :mod:`.path_turns`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .....models import FloatArray
+from .path_turns import TINY, PathTurns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,15 +36,17 @@ class PathCover:
     """A path as boxes of poses.
 
     Attributes:
-        knots: (N + 1, 6) positions, then roll, pitch and yaw, between which they change linearly.
+        knots: (N + 1, 3) positions.
         arcs: (N, 6) centre, radius, growth of the radius, angle and sweep of arcs; NaN of lines.
         axes: (N, 3) axes of the plane of arcs, and the axis along it.
+        turns: the rotations.
         seconds: (N,) times of the segments; infinite, as if the platform stood there, where none is known.
     """
 
     knots: FloatArray
     arcs: FloatArray
     axes: NDArray[np.intp]
+    turns: PathTurns
     seconds: FloatArray
 
     @property
@@ -62,7 +65,7 @@ class PathCover:
         k = pieces[:, 0].astype(int)
         start, change = self.knots[k], self.knots[k + 1] - self.knots[k]
         ends = [start + s[:, None] * change for s in (pieces[:, 1], pieces[:, 2])]
-        slack = _OUTWARDS * (np.abs(start) + np.abs(change))
+        slack = _OUTWARDS * (np.abs(start) + np.abs(change)) + TINY
         low, high = np.minimum(*ends) - slack, np.maximum(*ends) + slack
         # Fixed coordinates stay so.
         low, high = (np.where(change == 0, start, each) for each in (low, high))
@@ -83,20 +86,21 @@ class PathCover:
             for end, knots in enumerate((start, self.knots[k + 1])):
                 at = arcs[s[:, end] == end]
                 low[at], high[at] = np.minimum(low[at], knots[at]), np.maximum(high[at], knots[at])
-        for each, sign in ((low, -1.0), (high, 1.0)):
-            tangents = np.tan(0.5 * each[:, 3:])
-            each[:, 3:] = tangents + sign * _OUTWARDS * np.abs(tangents)
-        return low, high
+        turns = self.turns.boxes(k, pieces[:, 1:])
+        return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def derivatives(self, pieces: FloatArray, order: int = 1) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of derivatives of positions and angles by the parameter, over pieces (B, 3).
+        """Return the ends (B, 6) of derivatives of the pose's numbers by the parameter, over pieces (B, 3).
+
+        They are of positions, and of Cayley vectors, or of the angles roll, pitch and yaw.
 
         Args:
             pieces: indices of segments, and ends of the parameter.
-            order: 1 or 2.
+            order: 1, or of roll, pitch and yaw also 2.
         """
         k = pieces[:, 0].astype(int)
-        change = self.knots[k + 1] - self.knots[k] if order == 1 else np.zeros((len(k), 6))
+        turns = self.turns.derivatives(k, pieces[:, 1:]) if order == 1 else np.zeros((2, len(k), 3))
+        change = self.knots[k + 1] - self.knots[k] if order == 1 else np.zeros((len(k), 3))
         slack = _OUTWARDS * np.abs(change)
         low, high = change - slack, change + slack
         arcs = np.flatnonzero(np.isfinite(self.arcs[k, 0]))
@@ -117,10 +121,10 @@ class PathCover:
                 at = arcs, self.axes[k[arcs], axis]
                 low[at] = one.min(axis=1) + other.min(axis=(1, 2)) - _OUTWARDS * size
                 high[at] = one.max(axis=1) + other.max(axis=(1, 2)) + _OUTWARDS * size
-        return low, high
+        return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def rates(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of the rates of positions and angles, by seconds, over pieces (B, 3)."""
+        """Return the ends (B, 6) of the rates of the pose's numbers, by seconds, over pieces (B, 3)."""
         seconds = self.seconds[pieces[:, 0].astype(int), None]
         low, high = (each / seconds for each in self.derivatives(pieces))
         return low - _OUTWARDS * np.abs(low), high + _OUTWARDS * np.abs(high)

@@ -2,7 +2,7 @@
 
 Rotations are covered in coordinates in which ``s R``, with a positive number ``s``, is a polynomial:
 
-* any axis: Cayley vector ``tan(angle / 2) axis``, within a ball;
+* any axis: Cayley vector ``tan(angle / 2) axis``, within a ball, of the turn that follows a reference;
 * one axis: ``tan(angle / 2)``, the first of the three coordinates;
 * roll, pitch and yaw: the tangents of half of each.
 
@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -24,12 +24,16 @@ from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from .....models.arrays import values_at
 from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
+from ....path.orientation import matrices_from_quaternions
 from ...statement.posed_layout import turn_about
 from ...statement.tolerance import PoseCoordinates
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+#: A rotation as a quaternion ``(w, x, y, z)`` of integers, of any size.
+Reference: TypeAlias = "tuple[int, int, int, int]"
+UNTURNED: Reference = (1, 0, 0, 0)
 #: Part of itself by which a tangent may be off: several times the error of a library's function.
 _TANGENT = 2.0**-50
 #: Unit by which ends move outwards: several roundings.
@@ -62,6 +66,7 @@ class PoseBox:
         axis: (3,) unit axis of rotations about one axis.
         lower, upper: (6,) ends of the coordinates: position, then rotation.
         ball: largest squared size of a Cayley vector, rounded up; infinite where rotations are no ball.
+        reference: the rotation with the Cayley vector zero.
     """
 
     kind: TurnKind
@@ -69,6 +74,7 @@ class PoseBox:
     lower: FloatArray
     upper: FloatArray
     ball: float
+    reference: Reference = UNTURNED
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -118,7 +124,11 @@ class PoseBox:
         """Return the coordinates (3,) of a pose's rotation."""
         R = pose.rotation
         if self.kind is not TurnKind.ROLL_PITCH_YAW:
-            r = np.tan(pose.angle / 2) * pose.axis
+            axis, angle = pose.axis, pose.angle
+            if self.reference != UNTURNED:
+                turn, square = _reference_matrix(self.reference)
+                axis, angle = axis_angle_from_matrix(R @ turn.T / square)
+            r = np.tan(angle / 2) * axis
             return np.asarray(r if self.kind is TurnKind.ANY_AXIS else np.array([r @ self.axis, 0.0, 0.0]))
         pitch = math.asin(min(max(-R[2, 0], -1.0), 1.0))
         roll, yaw = math.atan2(R[2, 1], R[2, 2]), math.atan2(R[1, 0], R[0, 0])
@@ -227,7 +237,11 @@ def rotation_of(box: PoseBox, turn: SX) -> SX:
         return about[2] @ about[1] @ about[0]
     r = turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist())
     scaled = 2 / (1 + ca.sumsqr(r)) * r
-    return SX.eye(3) + ca.skew(scaled) + ca.skew(scaled) @ ca.skew(r)
+    turned = SX.eye(3) + ca.skew(scaled) + ca.skew(scaled) @ ca.skew(r)
+    if box.reference == UNTURNED:
+        return turned
+    matrix, square = _reference_matrix(box.reference)
+    return turned @ SX(matrix.tolist()) / square
 
 
 def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
@@ -238,7 +252,16 @@ def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
             one = 1 + turn[k] ** 2
             turned, scale = turn_about(k, 1 - turn[k] ** 2, 2 * turn[k], one) @ turned, one * scale
         return turned, scale
-    return cayley_rotation(turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist()))
+    turned, scale = cayley_rotation(turn if box.kind is TurnKind.ANY_AXIS else turn[0] * SX(box.axis.tolist()))
+    if box.reference == UNTURNED:
+        return turned, scale
+    matrix, square = _reference_matrix(box.reference)
+    return turned @ SX(matrix.tolist()), scale * square
+
+
+def _reference_matrix(reference: Reference) -> tuple[FloatArray, float]:
+    """Return the rotation matrix (3, 3) of a quaternion times its squared size, exactly, and this."""
+    return matrices_from_quaternions(np.array([reference], dtype=np.float64))[0], float(sum(k * k for k in reference))
 
 
 def cayley_rotation(r: SX) -> tuple[SX, SX]:
