@@ -202,6 +202,10 @@ def test_the_gallery_of_the_documentation_is_up_to_date() -> None:
     assert written == docs_script("gallery").table(), "run `make docs`"
 
 
+def test_the_page_of_cases_is_up_to_date() -> None:
+    assert text_of("cases.md") == docs_script("gallery").cases(), "run `make docs`"
+
+
 def test_the_case_file_of_the_documentation_is_valid() -> None:
     (written,) = re.findall(r"```toml\n(.*?)```", text_of("case-files.md"), flags=re.DOTALL)
     case = screwsynth.nlp.case_from_tables(tomllib.loads(written), name="shown", source="case-files.md")
