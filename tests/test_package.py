@@ -154,9 +154,17 @@ def test_the_readme_output_is_what_the_command_prints() -> None:
 
 
 def test_links_in_the_documentation_lead_somewhere() -> None:
-    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
-        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-            assert (page.parent / target).exists(), f"{page.name}: {target}"
+    pages = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+    for page in pages:
+        for target, place in re.findall(r"\]\(([^)#:]*)(?:#([^)]*))?\)", page.read_text(encoding="utf-8")):
+            found = page.parent / target if target else page
+            assert found.exists(), f"{page.name}: {target}"
+            if place:
+                headings = re.findall(r"^#+ (.*)$", found.read_text(encoding="utf-8"), flags=re.MULTILINE)
+                anchors = [re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings]
+                assert place in anchors, f"{page.name}: {target}#{place}"
+    first = text_of("index.md")
+    assert [page.name for page in pages[2:] if page.name != "index.md" and f"]({page.name})" not in first] == []
 
 
 def test_the_robots_of_the_documentation_are_models(capsys: pytest.CaptureFixture[str]) -> None:
