@@ -4,10 +4,12 @@ import re
 from enum import Enum
 
 from docutils.nodes import SkipNode, math, math_block
+from docutils.utils.math import MathError
 from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
+from sphinx.util.logging import getLogger
 from sphinx.writers.html5 import HTML5Translator
 
 import screwsynth.models
@@ -16,6 +18,7 @@ import screwsynth.nlp
 project = "screwsynth"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["figures"]
+highlight_language = "text"
 
 html_theme = "furo"
 html_title = project
@@ -82,7 +85,10 @@ def check_names(_app: Sphinx, env: BuildEnvironment) -> None:
 
 def write_formula(writer: HTML5Translator, node: math | math_block) -> None:
     """Write a formula as MathML, which browsers draw without a script."""
-    writer.body.append(tex2mathml(node.astext(), as_block=isinstance(node, math_block)))
+    try:
+        writer.body.append(tex2mathml(node.astext(), as_block=isinstance(node, math_block)))
+    except MathError as error:
+        getLogger(__name__).warning("%s", error, location=node)
     raise SkipNode
 
 
