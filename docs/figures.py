@@ -42,6 +42,7 @@ SOLVED = (
     "haptic-device",
     "flight-simulator",
     "handling-3-upu",
+    "reachy-mini",
 )
 SLICED = ("hexapod-linuxcnc", "reachy-mini-envelope")
 
