@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick check docs figures bench dist clean
+.PHONY: help demo test quick check docs site figures bench dist clean
 
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -45,8 +45,12 @@ docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/gallery.py
 	$(BIN)/python -P docs/pocket.py
 	$(BIN)/python -P docs/refresh.py
-	$(BIN)/python -P docs/api.py
 	$(BIN)/python -P docs/tour.py
+
+# Once its packages are there, a build needs no network. It ends at the first warning.
+site: $(VENV)/solving ## build the documentation as a site in build/site
+	@$(BIN)/python -c 'import furo, matplotlib, myst_nb, plotly' 2>/dev/null || $(BIN)/python -m pip install --quiet --editable '.[docs]'
+	$(BIN)/python -P -m sphinx --quiet --fail-on-warning --fresh-env --write-all docs build/site
 
 figures: $(VENV)/ready ## draw the pictures of the documentation
 	$(BIN)/python -P docs/figures.py

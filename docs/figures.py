@@ -26,22 +26,25 @@ from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 FOLDER = Path(__file__).parent / "figures"
 #: Columns of the gallery's sheet, and width and height of a robot on it, inches.
 COLUMNS, WIDTH, HEIGHT = 4, 5.2, 4.8
-CASES = {
-    "fig-4-helical": "paper-4.1-helical",
-    "fig-5-rotation": "paper-4.1-rotation",
-    "fig-7-peg-in-hole": "paper-4.2",
-    "fig-8-joint-angle": "paper-4.3",
-    "fig-10-two-free-rotations": "paper-4.4-snu",
-    "fig-11-resisting": "paper-4.4-max",
-    "hexapod-machining": "hexapod-machining",
-    "peg-in-hole": "peg-in-hole",
-    "drilling-spindle": "drilling-spindle",
-    "camera-mount": "camera-mount",
-    "free-wrist": "free-wrist",
-    "haptic-device": "haptic-device",
-    "flight-simulator": "flight-simulator",
-    "handling-3-upu": "handling-3-upu",
-}
+#: Cases whose solution is drawn, and those with slices of their workspace; each picture has its case's name.
+SOLVED = (
+    "paper-4.1-helical",
+    "paper-4.1-rotation",
+    "paper-4.2",
+    "paper-4.3",
+    "paper-4.4-snu",
+    "paper-4.4-max",
+    "hexapod-machining",
+    "peg-in-hole",
+    "drilling-spindle",
+    "camera-mount",
+    "free-wrist",
+    "haptic-device",
+    "flight-simulator",
+    "handling-3-upu",
+    "reachy-mini",
+)
+SLICED = ("hexapod-linuxcnc", "reachy-mini-envelope")
 
 
 def draw_gallery() -> None:
@@ -69,12 +72,11 @@ def case_of_page(page: str, number: int) -> dict[str, object]:
 FOLDER.mkdir(exist_ok=True)
 draw_gallery()
 plot(solve(case_from_tables(case_of_page("robots.md", 0), name="delta", source="robots.md")), FOLDER / "delta.png")
-machine = load_case("hexapod-linuxcnc")
-(FOLDER / "hexapod-linuxcnc-slices.png").write_bytes(picture_of(".png", slices_figure, machine, slices_of(machine)))
-head = load_case("reachy-mini-envelope")
-(FOLDER / "reachy-mini-slices.png").write_bytes(picture_of(".png", slices_figure, head, slices_of(head)))
-for name, case in CASES.items():
-    plot(solve(load_case(case)), FOLDER / f"{name}.png")
+for name in SLICED:
+    machine = load_case(name)
+    (FOLDER / f"{name}.png").write_bytes(picture_of(".png", slices_figure, machine, slices_of(machine)))
+for name in SOLVED:
+    plot(solve(load_case(name)), FOLDER / f"{name}.png")
 for model in (name for name in model_names() if name not in gallery_names()):
     choices = next(((option.name, option.choices) for option in model_options(model) if option.choices), None)
     variants = (

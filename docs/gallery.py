@@ -1,9 +1,11 @@
-"""Write the table of the shipped robot files into docs/robots.md: run by ``make docs``. A test compares them."""
+"""Write docs/cases.md, and the table of robot files in docs/robots.md: run by ``make docs``. A test compares them."""
 
 import re
+import tomllib
 from collections import Counter
 from pathlib import Path
 
+import screwsynth.cases
 import screwsynth.models
 from screwsynth.models import Model, robot_function
 
@@ -11,6 +13,13 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "robots.md"
 FOLDER = Path(screwsynth.models.__file__).parent / "robots"
 OPENING, CLOSING = "<!-- begin: gallery -->", "<!-- end -->"
+CASES = ROOT / "docs" / "cases.md"
+CASES_HEAD = """# Cases
+
+These cases come with the package: each command below finds its case by the name. `make docs` writes this page from the
+case files, and `make figures` draws the pictures. [Choosing](choosing.md) works through six of them;
+[the paper's numbers](reproduction.md) are those of the cases of the paper.
+"""
 
 
 def source_of(text: str) -> str:
@@ -61,8 +70,29 @@ def table() -> str:
     return "\n".join(lines) + "\n"
 
 
+def cases() -> str:
+    """Return the page of all cases: what each asks, the command that answers, and its picture."""
+    parts = [CASES_HEAD]
+    for path in sorted(Path(screwsynth.cases.__file__).parent.glob("*.toml")):
+        text, name = path.read_text(encoding="utf-8"), path.stem
+        tables = tomllib.loads(text)
+        is_judged = "workspace" in tables and tables.get("limits", {}).get("over") != "workspace"
+        question = text.partition("\n#\n")[0].partition("\ntitle = ")[0].removeprefix("# ").replace("\n# ", "\n")
+        parts += [
+            f"## {name}\n",
+            f"*{tables['title']}*\n",
+            f"{question}\n",
+            f"```sh\nscrewsynth {'workspace' if is_judged else 'solve'} {name}\n```\n",
+            f"[The case file](../cases/{name}.toml)\n",
+        ]
+        if (ROOT / "docs" / "figures" / f"{name}.png").exists():
+            parts.append(f"![{tables['title']}](figures/{name}.png)\n")
+    return "\n".join(parts)
+
+
 def main() -> None:
-    """Put the table into the page."""
+    """Write the page of cases, and put the table into the page of robots."""
+    CASES.write_text(cases(), encoding="utf-8")
     pattern = f"({re.escape(OPENING)}\n).*?({re.escape(CLOSING)})"
     old = PAGE.read_text(encoding="utf-8")
     PAGE.write_text(re.sub(pattern, lambda m: m[1] + table() + m[2], old, flags=re.DOTALL), encoding="utf-8")

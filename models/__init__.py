@@ -158,3 +158,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     found: object = getattr(import_module(_JOINTS[name], __name__), name)
     return found
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -48,7 +48,8 @@ class Link:
     """A straight line of the drawing between two named points.
 
     Attributes:
-        start, end: names of the two points.
+        start: name of the first point.
+        end: name of the second one.
         body: the body that the link moves with.
         limb: name of the limb that the link is part of, if any.
         kind: bar, rod or rail.
@@ -173,9 +174,15 @@ class Mark:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """The drawing of a robot: points and straight links, and optionally circles, directions, marks and joints.
+    """The drawing of a robot.
 
-    Joints stand for the round dots at the ends of links, which a drawing without joints has.
+    Attributes:
+        points: its named points.
+        links: straight links between them.
+        circles: circles, such as those of joint centres.
+        directions: directions at points, such as axes.
+        marks: marks of where parameters are measured.
+        joints: joints, in the place of the round dots at the ends of links that a drawing without joints has.
     """
 
     points: tuple[Point, ...] = ()

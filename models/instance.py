@@ -227,7 +227,14 @@ def rates(rows: Sequence[Wrench], twist: SX, length: SX, members: Sequence[Membe
 
 
 def driven(rows: Sequence[Wrench], actuators: Sequence[Actuator], length: SX, members: Sequence[Member] = ()) -> SX:
-    """Return the work rates (m, a) of the rows of :func:`jacobian` for a unit rate of each actuator."""
+    """Return the work rates (m, a) of the rows of :func:`jacobian` for a unit rate of each actuator.
+
+    Args:
+        rows: wrenches.
+        actuators: the actuators.
+        length: (1, 1) characteristic length.
+        members: members, whose rows follow.
+    """
     found = SX(len(rows) + sum(member.size for member in members), len(actuators))
     for k, actuator in enumerate(actuators):
         for i, row in enumerate(rows):

@@ -49,7 +49,8 @@ class Parameter:
         dimension: length, angle (radians) or plain number.
         description: a few words for people.
         typical: a sensible value of each component for a starter case, in some length unit and radians.
-        lower, upper: least and largest value with which the robot exists.
+        lower: least value with which the robot exists.
+        upper: largest such value.
         is_direction: whether the parameter is a unit vector. A fixed one is normalised; a free one has its unit length
             as an equation of the program.
         starter: value of each component in a starter case, where the robot is singular at its typical values; None for
@@ -81,7 +82,8 @@ class Unknown:
         symbol: (1, 1) CasADi symbol.
         dimension: length, angle (radians) or plain number.
         description: a few words for people.
-        lower, upper: finite bounds between which the program searches the assembly, in parts of ``size``.
+        lower: finite bound from which on the program searches the assembly, in parts of ``size``.
+        upper: finite bound up to which it does.
         size: (1, 1) expression of the parameters of the order of the unknown: 1, or a length of the robot's.
     """
 
@@ -174,8 +176,9 @@ class Leg:
         name: name of the limb that the leg is.
         base: (3, 1) centre of its base joint in the world frame, length.
         platform: (3, 1) centre of its platform joint in the platform frame, length.
-        base_error, platform_error: (3, 1) symbols of the error of each joint centre in the machine as it is built, in
-            the frame of that centre, length.
+        base_error: (3, 1) symbols of the error of the joint centre on the base in the machine as it is built, in the
+            frame of that centre, length.
+        platform_error: (3, 1) those of the centre on the platform.
         centres: names of both centres in a :class:`~.displaced.DisplacedRobot`: labels of joints of a limb given joint
             by joint; empty for the name of the leg and its plate.
     """
@@ -243,7 +246,8 @@ class JointScrews:
         joints: label of the joint of each column, such as ``2:3``.
         all: (6, k) screws of all its joints from base to platform as twists, the world's origin as reference.
         driven: indices of the columns of actuated joints.
-        passive_rank, all_rank: ranks of the motions by passive joints, and by all, at almost all dimensions and poses.
+        passive_rank: rank of the motions by passive joints, at almost all dimensions and poses.
+        all_rank: rank of the motions by all joints there.
         member: name of the member of nested loops; empty for a path of joints.
         loops: (m, k) ``L`` of nested loops, without a unit for rates of order 1.
         loop_rank: of the columns of passive joints in ``L``, at almost all dimensions and poses.

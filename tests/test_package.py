@@ -168,9 +168,17 @@ def test_the_readme_output_is_what_the_command_prints() -> None:
 
 
 def test_links_in_the_documentation_lead_somewhere() -> None:
-    for page in [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]:
-        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-            assert (page.parent / target).exists(), f"{page.name}: {target}"
+    own, pages = sorted(ROOT.glob("*.md")), sorted((ROOT / "docs").glob("*.md"))
+    for page in [*own, *pages]:
+        for target, place in re.findall(r"\]\(([^)#:]*)(?:#([^)]*))?\)", page.read_text(encoding="utf-8")):
+            found = page.parent / target if target else page
+            assert found.exists(), f"{page.name}: {target}"
+            if place:
+                headings = re.findall(r"^#+ (.*)$", found.read_text(encoding="utf-8"), flags=re.MULTILINE)
+                anchors = [re.sub(r"[^\w -]", "", each.lower()).replace(" ", "-") for each in headings]
+                assert place in anchors, f"{page.name}: {target}#{place}"
+    first = text_of("index.md")
+    assert [page.name for page in pages if page.name != "index.md" and f"]({page.name})" not in first] == []
 
 
 def test_the_robots_of_the_documentation_are_models(capsys: pytest.CaptureFixture[str]) -> None:
@@ -214,6 +222,10 @@ def test_the_delta_of_the_documentation_is_what_the_commands_print(tmp_path: Pat
 def test_the_gallery_of_the_documentation_is_up_to_date() -> None:
     (written,) = re.findall(r"<!-- begin: gallery -->\n(.*?)<!-- end -->", text_of("robots.md"), flags=re.DOTALL)
     assert written == docs_script("gallery").table(), "run `make docs`"
+
+
+def test_the_page_of_cases_is_up_to_date() -> None:
+    assert text_of("cases.md") == docs_script("gallery").cases(), "run `make docs`"
 
 
 def test_the_case_file_of_the_documentation_is_valid() -> None:

@@ -25,7 +25,7 @@ def race_tables(section: Mapping[str, Any]) -> str:
     parts = [_plan_lines(section), _methods(section["peers"]), _expected(scores)]
     for name, case in section["cases"].items():
         pairs = [pair for pair in section["pairs"] if pair["case"] == name]
-        parts += [f"#### `{name}`\n", _case_lines(name, case, best[name], pairs), _case_table(scores[name])]
+        parts += [f"### `{name}`\n", _case_lines(name, case, best[name], pairs), _case_table(scores[name])]
     return "\n".join(parts)
 
 

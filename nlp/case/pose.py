@@ -42,7 +42,8 @@ class Free:
     """A number that the solver chooses between two bounds.
 
     Attributes:
-        lower, upper: finite bounds, ``lower < upper``.
+        lower: smallest value, finite.
+        upper: largest value, finite and above ``lower``.
         start: value at the first starting point; None for the middle.
     """
 

@@ -42,7 +42,8 @@ class RobotState:
         parameters: components of each parameter, by parameter name; radians for angles.
         position: (3,) ``p``, origin of the platform frame in the world frame, length.
         rotation: (3, 3) ``R``, platform to world coordinates.
-        axis, angle: the rotation as a unit axis (3,) and radians; an axis held fixed has a signed angle.
+        axis: unit axis of the rotation (3,).
+        angle: angle of the rotation, radians; with a sign about an axis that is held fixed.
         jacobian: (m, 6) unit wrenches, force, then moment about the world origin.
         rates: (m,) work rates ``L_i ^ chi``; for a leg driven along its axis, the rate of its length.
         F: ``sum(rates^2)``.
@@ -87,7 +88,8 @@ class StatedPose:
     Attributes:
         position: (3,) ``p``, origin of the platform frame in the world frame, length.
         rotation: (3, 3) ``R``, platform to world coordinates.
-        axis, angle: the rotation as a unit axis (3,) and radians; an axis held fixed has a signed angle.
+        axis: unit axis of the rotation (3,).
+        angle: angle of the rotation, radians; with a sign about an axis that is held fixed.
     """
 
     position: FloatArray

@@ -96,15 +96,17 @@ class Nlp(Whole):
         case: the case of the program, for names and units.
         sense: whether the objective is maximised or minimised.
         arguments: (k,) values of the program's arguments.
-        lower, upper: (n,) bounds of the variables, ``lower < upper``.
+        lower: (n,) lower bounds of the variables.
+        upper: (n,) upper bounds, ``lower < upper``.
         start: (n,) first starting point.
-        g_lower, g_upper: (c,) lower and upper sides of the constraints: infinite where there is none, equal for an
-            equation.
+        g_lower: (c,) lower sides of the constraints, infinite where there is none.
+        g_upper: (c,) upper sides; those of an equation are its lower ones.
         constant_limits: limits of the case that depend on no variable and hold, so that they are no constraints of the
             program.
         families: limits on many pairs of values. Of their pairs only those in ``pairs`` are constraints; see
             :mod:`.pairs`.
-        implied, fixed_families: what else the fixed numbers make hold, as in :class:`~.layout.Layout`.
+        implied: constraints that the fixed numbers make hold, as in :class:`~.layout.Layout`.
+        fixed_families: families of pairs that they make hold.
         pairs: family, first and second index of these pairs; their constraints are the program's last.
         pair_count: number of constraints that these pairs have.
         in_home_mode: whether a search of the whole box keeps to home's working mode of a robot given joint by joint.

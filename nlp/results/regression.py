@@ -86,7 +86,15 @@ class PublishedCheck:
 
 @dataclass(frozen=True)
 class CaseCheck:
-    """Checks of a case."""
+    """Checks of a case.
+
+    Attributes:
+        name: name of the case.
+        title: its title.
+        expected: checks of its expected numbers.
+        published: checks of its published numbers.
+        seconds: wall time of the solve.
+    """
 
     name: str
     title: str

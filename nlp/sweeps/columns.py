@@ -32,13 +32,17 @@ class SweepColumns:
         active: sides of bounds and limits that each design lies on.
         multipliers: of the active sides.
         verdict: on each point.
-        stationarity, feasibility, curvature: (N,) evidence.
-        starts, converged: (N,) number of searches, and of those that converged.
+        stationarity: (N,) evidence, as the two that follow.
+        feasibility: (N,) largest distance outside a side.
+        curvature: (N,) smallest eigenvalue of the reduced Hessian.
+        starts: (N,) number of searches.
+        converged: (N,) number of those that converged.
         engine: whose point it is.
         seconds: (N,) wall time.
         note: reason of a refusal; that limits over a workspace are taken at the stated pose alone, or not proved.
         certificate: status of each proof; empty texts without ``certified``.
-        bound, gap: (N,) proven bound, and its distance from F.
+        bound: (N,) proven bound of F.
+        gap: (N,) its distance from F.
     """
 
     numbers: Mapping[str, FloatArray]
