@@ -30,8 +30,16 @@ if TYPE_CHECKING:
 def path(
     case: CaseName,
     along: Annotated[
-        str, typer.Option("--along", metavar="FILE", help="The path: poses in a .csv file, or a program of G-code.")
-    ],
+        str | None,
+        typer.Option("--along", metavar="FILE", help="The path: poses in a .csv file, or a program of G-code."),
+    ] = None,
+    ranges: Annotated[
+        bool, typer.Option("--range", help="How far each coordinate can move from a pose, and each two.")
+    ] = False,
+    most: Annotated[
+        str | None,
+        typer.Option("--most", metavar="LENGTH,ANGLE", help="Largest motion to each side with --range."),
+    ] = None,
     settings: SettingTexts = None,
     of: ResultFile = None,
     unit: Annotated[
@@ -39,7 +47,9 @@ def path(
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option("--start", metavar="X,Y,Z,A,B,C", help="Where the machine stands before a program."),
+        typer.Option(
+            "--start", metavar="X,Y,Z,A,B,C", help="Where the machine stands: before a program, or the pose of --range."
+        ),
     ] = None,
     offset: Annotated[
         list[str] | None,
@@ -65,12 +75,29 @@ def path(
 
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
+    if (along is None) != ranges:
+        raise InputError("path: needs --along FILE or --range" + (", not both" if ranges else ""))
+    for name, given, needed in (
+        ("--most", most, ranges),
+        ("--unit", unit, not ranges),
+        ("--offset", offset, not ranges),
+    ):
+        if given and not needed:
+            raise InputError(f"{name}: needs {'--along FILE' if ranges else '--range'}")
+    options = _options(unit, start, offset or [])
     answer_after(Milestone.BOUND)
     (loaded, _, inputs), chosen = read_machine(case, read_settings(settings), of)
     files = Outputs(json=json_file, csv=csv_file)
+    if along is None:
+        from .axisranges import show_ranges
+
+        files.check(inputs)
+        with spinner("the pose") as show:
+            found = show_ranges(loaded, options.start, most, time, files, show)
+        raise typer.Exit(0 if found.proved else 1)
     files.check({**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
-        programmed = read_path(along, loaded.units, _options(unit, start, offset or []))
+        programmed = read_path(along, loaded.units, options)
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, progress=show)
     result = path_result(judged)
