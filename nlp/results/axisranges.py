@@ -1,6 +1,5 @@
 """How far a platform can move from a pose, as a result and in words."""
 
-import itertools
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from .wording import title_line
 from .workspace import WorkspacePose, pose_data
 
 if TYPE_CHECKING:
-    from ..proof.workspace.axis_ranges import AxisRanges, RangeEnd, Stop
+    from ..proof.workspace.axis_ranges import AxisRanges, RangeEnd, RangeStop
 
 
 class StopData(JsonObject):
@@ -108,6 +107,7 @@ class AxisRangesResult(JsonObject):
         axes: the independent coordinates alone.
         pairs: each two of them.
         not_alone: coordinates that cannot change alone, as other numbers of the pose follow from them.
+        reason: why the work ended before all axes and pairs were judged; absent otherwise.
         versions: of the programs.
     """
 
@@ -119,6 +119,7 @@ class AxisRangesResult(JsonObject):
     axes: tuple[AxisData, ...]
     pairs: tuple[PairData, ...]
     not_alone: tuple[str, ...]
+    reason: Absent[str]
     versions: VersionsData
 
 
@@ -153,6 +154,7 @@ def axis_ranges_result(found: "AxisRanges") -> AxisRangesResult:
             for each in found.pairs
         ),
         not_alone=found.others,
+        reason=found.reason or None,
         versions=versions(),
     )
 
@@ -166,7 +168,7 @@ def _end_data(end: "RangeEnd", dimension: Dimension, units: Units) -> RangeEndDa
     )
 
 
-def _stop_data(stop: "Stop", units: Units) -> StopData:
+def _stop_data(stop: "RangeStop", units: Units) -> StopData:
     """Return a claim in a case's units."""
     each, number_of = stop.extreme, dict[str, Any](key=None, unit=None, sense=None, limit=None, value=None)
     if each is not None:
@@ -216,6 +218,8 @@ def axis_ranges_summary(case: Case, result: AxisRangesResult) -> Iterator[Line |
     if result.not_alone:
         text = f"{', '.join(result.not_alone)}: other numbers of the pose follow; judge a workspace"
         yield Line(text, label="cannot change alone", tone=Tone.CAUTION)
+    if result.reason:
+        yield Line(f"{result.reason}: not every axis and pair is judged", label="stopped", tone=Tone.CAUTION)
     if not result.axes:
         return
     length, angle = (number(each, digits=4) for each in result.largest)
@@ -231,11 +235,15 @@ def _matrix(result: AxisRangesResult) -> TextTable:
     names = [each.axis for each in result.axes]
     factors = {each.axes: each.factor for each in result.pairs}
     rows = [
-        (one, *("" if k <= i else number(factors[one, other], digits=3) for k, other in enumerate(names) if k))
-        for i, one in itertools.islice(enumerate(names), len(names) - 1)
+        (one, *(_factor_words(factors.get((one, other))) for k, other in enumerate(names) if k)) for one in names[:-1]
     ]
     title = "two at once: part of both ranges, about the pose, that is proved"
     return TextTable(("axis", *names[1:]), tuple(rows), name="pairs", title=title)
+
+
+def _factor_words(factor: float | None) -> str:
+    """Return a factor; empty where there is none."""
+    return "" if factor is None else number(factor, digits=3)
 
 
 def _pair_words(pair: PairData) -> str:

@@ -218,3 +218,9 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--unit", "mm"), "--unit: needs --along FILE")
     refusal_of(cli("path", "hexapod-linuxcnc", "--along", "a.ngc", "--most", "1,1"), "--most: needs --range")
     refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--most", "1,-1"), "--most 1,-1: must be two positive")
+
+
+def test_without_time_nothing_is_claimed() -> None:
+    found = axis_ranges(hexapod(leg_length={"min": 17, "max": 43}), time_limit=0)
+    assert {each.outcome for each in found.stops} == {Outcome.OPEN}
+    assert found.axes == found.pairs == ()

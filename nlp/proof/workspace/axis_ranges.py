@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -23,7 +23,7 @@ from ...case.case import Case
 from ...case.limits.legs import Actuator
 from ...case.pose import Free
 from ...errors import InputError, nearest
-from ...interruption import is_requested, one_call, one_search, within
+from ...interruption import is_requested, one_call, one_search, why_stopped, within
 from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
@@ -38,6 +38,7 @@ from .robot.pose_box import PoseNumbers, pose_box
 from .robot.posed_robot import NotJudgedError, build_problem
 from .verdict import Outcome, RankVerdict
 
+_T = TypeVar("_T")
 #: Seconds for all judgements where the caller does not say; the part of the time that one takes at most, so that a
 #: shorter motion is tried where it does not end, and that a search takes of it.
 TIME_LIMIT, _EACH, _PART = 120.0, 1 / 32, 0.5
@@ -51,7 +52,7 @@ _GAP, _STILL = 0.5, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Stop:
+class RangeStop:
     """A claim that is not proved at a pose, or on the way to it.
 
     Attributes:
@@ -84,7 +85,7 @@ class RangeEnd:
 
     value: float
     failed: float | None
-    stop: Stop | None
+    stop: RangeStop | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,7 @@ class PairRange:
     axes: tuple[str, str]
     factor: float
     failed: float | None
-    stop: Stop | None
+    stop: RangeStop | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,15 +135,17 @@ class AxisRanges:
         axes: ranges of the independent coordinates alone.
         pairs: of each two of them.
         others: independent coordinates that do not move alone, as other numbers of the pose follow from them.
+        reason: why the work ended before all axes and pairs were judged; else empty.
     """
 
     case: Case
     start: FloatArray
     most: tuple[float, float]
-    stops: tuple[Stop, ...]
+    stops: tuple[RangeStop, ...]
     axes: tuple[AxisRange, ...] = ()
     pairs: tuple[PairRange, ...] = ()
     others: tuple[str, ...] = ()
+    reason: str = ""
 
 
 class _Found(NamedTuple):
@@ -150,14 +153,14 @@ class _Found(NamedTuple):
 
     proved: float
     failed: float | None
-    stop: Stop | None
+    stop: RangeStop | None
 
 
 class _Failed(NamedTuple):
     """The first part known of a range that is not proved, its claim, and whether that is where it fails first."""
 
     part: float
-    stop: Stop
+    stop: RangeStop
     is_first: bool = False
 
 
@@ -191,15 +194,7 @@ def axis_ranges(
         InputError: the pose is free or none, no coordinate has a name, or the largest ranges are not positive.
     """
     here = _of_case(case) if start is None else np.array(start, dtype=np.float64)
-    if here.shape != (6,) or not np.isfinite(here).all():
-        raise InputError("the pose must be six finite numbers: x, y, z, roll, pitch, yaw")
-    wide = np.abs(here[3:]) >= _WIDEST
-    if wide.any():
-        name, value = AXES[3 + int(np.argmax(wide))], here[3:][wide][0]
-        raise InputError(f"{name} = {math.degrees(value):g} deg: must be within {math.degrees(_WIDEST):g} degrees")
-    for name in axes:
-        if name not in AXES:
-            raise InputError(f"axis {name!r}: no such coordinate; {nearest(name, AXES)}")
+    _check(here, axes)
     # The workspace says nothing here, but a judged machine has one.
     case = replace(case, workspace=box_about(here, {0: (here[0] - 1.0, here[0] + 1.0)}))
     workspace_of_case(case)
@@ -210,25 +205,47 @@ def axis_ranges(
     with within(time_limit, _EACH):
         report("the pose")
         alone, others = coordinates_alone(case, here, most[0])
-        left = tuple(AXES[k] for k in others)
+        nothing = AxisRanges(case, here, most, (), others=tuple(AXES[k] for k in others))
         if not alone:
-            return AxisRanges(case, here, most, (), others=left)
+            return nothing
         # A path has a motion.
         near = here.copy()
         near[alone[0]] += _STILL * most[alone[0] // 3]
-        judged = _judged(case, here, near)
+        with within(None, _PART):
+            judged = _judged(case, here, near)
         if not judged.is_proved:
-            return AxisRanges(case, here, most, tuple(each.stop for each in _failures(judged)))
-        has_whole = any(_is_over_poses(each) for each in judged.extremes)
-        found = []
-        for k in (k for k in alone if AXES[k] in axes):
+            return replace(nothing, stops=tuple(each.stop for each in _failures(judged)))
+        has_whole, found = any(_is_over_poses(each) for each in judged.extremes), list[AxisRange]()
+        for k in _until_requested(k for k in alone if AXES[k] in axes):
             report(AXES[k])
             found.append(_range(case, here, k, most[k // 3], has_whole=has_whole))
         pairs, samples = [], _samples(case, here, found)
-        for one, other in itertools.combinations(found, 2):
+        for one, other in _until_requested(itertools.combinations(found, 2)):
             report(f"{one.axis} and {other.axis}")
             pairs.append(_pair(case, here, samples, one, other))
-    return AxisRanges(case, here, most, (), tuple(found), tuple(pairs), left)
+        reason = why_stopped() if is_requested() else ""
+        return replace(nothing, axes=tuple(found), pairs=tuple(pairs), reason=reason)
+
+
+def _until_requested(items: Iterable[_T]) -> Iterator[_T]:
+    """Return items until the work is to stop."""
+    return itertools.takewhile(lambda _: not is_requested(), items)
+
+
+def _check(start: FloatArray, axes: Sequence[str]) -> None:
+    """Refuse what is no pose, and names of no coordinates.
+
+    Raises:
+        InputError: it is refused.
+    """
+    if start.shape != (6,) or not np.isfinite(start).all():
+        raise InputError("the pose must be six finite numbers: x, y, z, roll, pitch, yaw")
+    for name, value in zip(AXES[3:], start[3:].tolist(), strict=True):
+        if abs(value) >= _WIDEST:
+            raise InputError(f"{name} = {math.degrees(value):g} deg: must be within {math.degrees(_WIDEST):g} degrees")
+    for name in axes:
+        if name not in AXES:
+            raise InputError(f"axis {name!r}: no such coordinate; {nearest(name, AXES)}")
 
 
 def _of_case(case: Case) -> FloatArray:
@@ -354,7 +371,11 @@ def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
         elif not (is_requested() and first.stop.outcome is Outcome.OPEN and failed is not None):
             # A judgement that was stopped says nothing where a claim is known to fail.
             failed, stop = first.part, first.stop
-        if part == proved == 1 or is_requested() or (failed is not None and failed - proved <= tolerance):
+        if part == proved == 1 or (failed is not None and failed - proved <= tolerance):
+            return _Found(proved, failed, stop)
+        if is_requested():
+            # Between what is proved and what fails nothing is known.
+            stop = None if stop is None else replace(stop, outcome=Outcome.OPEN, reason=why_stopped())
             return _Found(proved, failed, stop)
         if failed is None:
             part, step = min(part + step, 1.0), 8 * step
@@ -389,7 +410,7 @@ def _failures(judged: PathJudgement | Judgement) -> Iterator[_Failed]:
     for name, rank in zip((REGULAR, CONSTRAINTS), ranks, strict=False):
         if rank.outcome is not Outcome.PROVED:
             place = rank.place if isinstance(rank, RankOnPath) and rank.outcome is Outcome.REFUTED else None
-            stop = Stop(name, rank.outcome, None, math.nan, rank.pose, rank.reason)
+            stop = RangeStop(name, rank.outcome, None, math.nan, rank.pose, rank.reason)
             found.append(_Failed(place.parameter if place else 1.0, stop, is_first=place is not None))
     for each in judged.extremes:
         if each.fails:
@@ -397,7 +418,7 @@ def _failures(judged: PathJudgement | Judgement) -> Iterator[_Failed]:
             place, value, pose = faults.get(key, (each.place, each.reached, each.pose))
             if each.outcome is not Outcome.REFUTED or _is_over_poses(each):
                 place = None
-            stop = Stop(each.name, each.outcome, each, value, pose, each.reason)
+            stop = RangeStop(each.name, each.outcome, each, value, pose, each.reason)
             part = place.parameter if place else 1.0
             found.append(_Failed(part, stop, is_first=part < 1 or key in faults))
     yield from sorted(found, key=lambda each: (each.part, each.stop.outcome is not Outcome.REFUTED))
