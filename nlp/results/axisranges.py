@@ -243,7 +243,7 @@ def _matrix(result: AxisRangesResult) -> TextTable:
 
 def _factor_words(factor: float | None) -> str:
     """Return a factor; empty where there is none."""
-    return "" if factor is None else number(factor, digits=3)
+    return "" if factor is None else number(factor, digits=3) if factor else "open"
 
 
 def _pair_words(pair: PairData) -> str:

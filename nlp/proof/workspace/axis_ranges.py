@@ -44,11 +44,12 @@ _T = TypeVar("_T")
 TIME_LIMIT, _EACH, _PART = 120.0, 1 / 32, 0.5
 #: Largest angle moved by, where none is asked for, and largest angle of a pose.
 LARGEST_ANGLE, _WIDEST = math.radians(90), math.radians(148)
-#: Accuracy of an end, and of a range that a limit over all of it cuts, as a part of the largest range; of two
-#: coordinates together, as a part of their ranges.
-TOLERANCE, _WHOLE, PAIRED = 1e-6, 1e-3, 0.01
-#: Gap of numbers, of which verdicts alone are asked for, and a motion that is none, as a part of the largest one.
-_GAP, _STILL = 0.5, 1e-12
+#: Accuracy of an end, as a part of the largest range, where the first point that refutes its claim is computed, and of
+#: another one; of a range that a limit over all of it cuts, and of two coordinates together, as a part of their ranges.
+TOLERANCE, HALVED, _WHOLE, PAIRED = 1e-6, 1e-4, 1e-3, 0.01
+#: Gap of numbers, of which verdicts alone are asked for, a motion that is none, as a part of the largest
+#: one, and parts of an accuracy that are a short step.
+_GAP, _STILL, _SHORT = 0.5, 1e-12, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,7 +300,7 @@ def _range(case: Case, start: FloatArray, k: int, most: float, *, has_whole: boo
         first = next(_failures(judged))
         return first._replace(part=first.part * part)
 
-    ends = [_largest(partial(one_way, way), TOLERANCE) for way in ways]
+    ends = [_largest(partial(one_way, way), HALVED) for way in ways]
     found = [RangeEnd(at(each.proved, way)[k], None, None) for each, way in zip(ends, ways, strict=True)]
     beyond = [None if each.failed is None else at(each.failed, way)[k] for each, way in zip(ends, ways, strict=True)]
     found = [replace(e, failed=b, stop=f.stop) for e, b, f in zip(found, beyond, ends, strict=True)]
@@ -360,18 +361,23 @@ def _pair(case: Case, start: FloatArray, samples: EdgeSamples | None, *ranges: A
 
 def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
     """Return the largest part of a range that is proved, to a tolerance, looking next to a guess of it first."""
-    proved, failed, stop = 0.0, None, None
+    failed: float | None = None
+    stop: RangeStop | None = None
+    proved = 0.0
     # Both sides of the guess lie within the tolerance.
     step = 0.8 * tolerance
     part = 1.0 if guess >= 1 else max(guess - 0.5 * step, 0.5 * guess)
     while True:
-        first = judge(part)
+        first, before = judge(part), failed
         if first is None:
             proved = part
         elif not (is_requested() and first.stop.outcome is Outcome.OPEN and failed is not None):
             # A judgement that was stopped says nothing where a claim is known to fail.
             failed, stop = first.part, first.stop
-        if part == proved == 1 or (failed is not None and failed - proved <= tolerance):
+        # Just before a point that is known to refute, claims may hold all the way; steps must not be short, though.
+        is_sharp = first is not None and first.is_first and (before is None or before - first.part > _SHORT * TOLERANCE)
+        least = TOLERANCE if is_sharp else tolerance
+        if part == proved == 1 or (failed is not None and failed - proved <= least):
             return _Found(proved, failed, stop)
         if is_requested():
             # Between what is proved and what fails nothing is known.
@@ -379,9 +385,8 @@ def _largest(judge: _Judge, tolerance: float, guess: float = 1.0) -> _Found:
             return _Found(proved, failed, stop)
         if failed is None:
             part, step = min(part + step, 1.0), 8 * step
-        elif first is not None and first.is_first and failed > tolerance:
-            # Just before a point that is known to refute, claims may hold all the way.
-            part = failed - 0.5 * tolerance
+        elif is_sharp:
+            part = max(failed - 0.5 * TOLERANCE, 0.5 * (proved + failed))
         else:
             part = 0.5 * (proved + failed)
 
@@ -395,7 +400,7 @@ def _judged(case: Case, start: FloatArray, *ends: FloatArray) -> PathJudgement:
         np.zeros(0, dtype=np.uint8), ORDERS["rpy"], Between.ANGLES,
     )  # fmt: skip
     with one_search():
-        return judge_path(case, path, gap=_GAP, time_limit=None)
+        return judge_path(case, path, gap=_GAP, time_limit=None, limits_alone=True)
 
 
 def _failures(judged: PathJudgement | Judgement) -> Iterator[_Failed]:

@@ -131,6 +131,7 @@ def judge_path(
     *,
     gap: float = _GAP,
     time_limit: float | None = TIME_LIMIT,
+    limits_alone: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> PathJudgement:
     """Judge a machine at every point of a path.
@@ -140,6 +141,7 @@ def judge_path(
         path: in the case's unit of length.
         gap: largest relative gap of a number without a limit.
         time_limit: seconds of all searches.
+        limits_alone: whether numbers of actuators without a limit are left out.
         progress: called with what is done next.
 
     Raises:
@@ -170,7 +172,8 @@ def judge_path(
                 report(name)
                 ranks.append(_rank(family, matrix, name, cover))
         report("limits")
-        names = [item.name for item in case.model.quantities if item.name in (*ACTUATED, "leg_length")]
+        asked = () if limits_alone else (*ACTUATED, "leg_length")
+        names = [item.name for item in case.model.quantities if item.name in asked]
         reaches, claims = machines.symbols.claims(names, with_objective=False)
         found: list[Extreme] = []
         faults: dict[tuple[str, Sense], Fault] = {}
@@ -185,7 +188,7 @@ def judge_path(
         found = with_strokes(subject, found, partial(_finer, machines, claims))
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
-        found += motor_extremes(subject)
+        found += motor_extremes(subject, with_all=not limits_alone)
     return PathJudgement(case, path, tuple(ranks), tuple(found), faults)
 
 
