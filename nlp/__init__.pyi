@@ -105,6 +105,12 @@ from .program.program import Program as Program
 from .proof.certificate.branch_and_bound import certify_program as certify_program
 from .proof.certificate.certificate import Certificate as Certificate
 from .proof.certificate.certificate import CertificateStatus as CertificateStatus
+from .proof.workspace.axis_ranges import AxisRange as AxisRange
+from .proof.workspace.axis_ranges import AxisRanges as AxisRanges
+from .proof.workspace.axis_ranges import PairRange as PairRange
+from .proof.workspace.axis_ranges import RangeEnd as RangeEnd
+from .proof.workspace.axis_ranges import RangeStop as RangeStop
+from .proof.workspace.axis_ranges import axis_ranges as axis_ranges
 from .proof.workspace.judge import Judgement as Judgement
 from .proof.workspace.judge import judge_workspace as judge_workspace
 from .proof.workspace.numbers.extremes import Extreme as Extreme

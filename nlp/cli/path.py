@@ -35,6 +35,13 @@ def path(
             "--along", metavar="FILE", help="The path, poses in a .csv file or G-code, in place of the case's own."
         ),
     ] = None,
+    ranges: Annotated[
+        bool, typer.Option("--range", help="How far each coordinate can move from a pose, and each two.")
+    ] = False,
+    most: Annotated[
+        str | None,
+        typer.Option("--most", metavar="LENGTH,ANGLE", help="Largest motion to each side with --range."),
+    ] = None,
     settings: SettingTexts = None,
     of: ResultFile = None,
     unit: Annotated[
@@ -42,7 +49,9 @@ def path(
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option("--start", metavar="X,Y,Z,A,B,C", help="Where the machine stands before a program."),
+        typer.Option(
+            "--start", metavar="X,Y,Z,A,B,C", help="Where the machine stands: before a program, or the pose of --range."
+        ),
     ] = None,
     offset: Annotated[
         list[str] | None,
@@ -87,12 +96,23 @@ def path(
     sampling = _sampling(step, within, is_written=csv_file is not None)
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
+    elsewhere = ("--along", along), ("--unit", unit), ("--offset", offset), ("--angles", angles), ("--between", between)
+    for name, given in [*elsewhere, ("--step", step), ("--within", within)] if ranges else [("--most", most)]:
+        if given:
+            raise InputError(f"{name}: is not for --range" if ranges else f"{name}: needs --range")
     answer_after(Milestone.BOUND)
     (loaded, _, inputs), chosen = read_machine(case, read_settings(settings), of)
     files = Outputs(json=json_file, csv=csv_file)
-    files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
-    own = PathOptions() if along is not None or loaded.path is None else options_of(loaded.path)
+    own = PathOptions() if along is not None or ranges or loaded.path is None else options_of(loaded.path)
     options = _options(own, unit, start, offset or [], angles, between)
+    if ranges:
+        from .axisranges import show_ranges
+
+        files.check(inputs)
+        with spinner("the pose") as show:
+            found = show_ranges(loaded, options.start, most, time, files, show)
+        raise typer.Exit(0 if found.proved else 1)
+    files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
         programmed = path_of_case(loaded, options) if along is None else read_path(along, loaded.units, options)
         limit = TIME_LIMIT if time is None else time

@@ -131,7 +131,8 @@ def judge_workspace(
     check_leg_error(case, leg_error)
     workspace = own if workspace is None else workspace
     with within(time_limit, _PART):
-        numbers = _Numbers(case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
+        whole = (case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
+        numbers = _Numbers(*whole, at_once=until_fault)
         homes, meant = Homes(case, numbers.box, numbers.names, numbers.machines), numbers.meant
         ranks = (
             Ranks(not_judged(numbers.box, numbers.reason), None)
@@ -155,6 +156,7 @@ class _Numbers:
     Attributes:
         case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper: as in
             :func:`judge_workspace`.
+        at_once: whether verdicts alone are asked for: limits are then decided by one search where that can.
         box: the poses.
         closed: the robot without unknowns in closed form.
         names: measures that are numbers of the robot.
@@ -173,6 +175,7 @@ class _Numbers:
     jobs: int | None
     progress: Callable[[str, int, int], None] | None
     paper: PaperRecord | None
+    at_once: bool = False
 
     def __post_init__(self) -> None:
         self.box, self.closed = pose_box(self.workspace), closed_form(self.case.model)
@@ -233,7 +236,8 @@ class _Numbers:
         is_closed = closed.reaches and is_reached
         layout = closed_layout(case, closed, workspace) if is_closed else posed_layout(case, workspace)
         claims = claims_of(layout, self.names, with_objective=self.with_objective)
-        decided = self._in_home(self.meant, is_reached=is_reached) if self.meant and closed.model.unknowns else []
+        is_together = self.meant is not None and (bool(closed.model.unknowns) or (self.at_once and is_reached))
+        decided = self._in_home(self.meant, is_reached=is_reached) if self.meant and is_together else []
         yield from self._proved(claims, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper), decided)
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Extreme]:
@@ -246,7 +250,7 @@ class _Numbers:
         claims = alone.symbols.claims(self.names, with_objective=self.with_objective)[1]
         limited = alone.followed([claim for claim in claims if claim.limit is not None], gap=self.gap)
         yield from (each for each in limited if each.outcome is not Outcome.OPEN)
-        for claim in claims if is_reached else ():
+        for claim in claims if is_reached and self.closed.model.unknowns else ():
             if claim.limit is None:
                 yield alone.extreme(claim, gap=self.gap, jobs=self.jobs)
 

@@ -136,6 +136,7 @@ def judge_path(
     gap: float = GAP,
     time_limit: float | None = TIME_LIMIT,
     sampling: Sampling | None = None,
+    limits_alone: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> PathJudgement:
     """Judge a machine at every point of a path.
@@ -146,6 +147,7 @@ def judge_path(
         gap: largest relative gap of a number without a limit.
         time_limit: seconds of all searches.
         sampling: what knots of the path are to keep; None for no knots.
+        limits_alone: whether numbers of actuators without a limit are left out.
         progress: called with what is done next.
 
     Raises:
@@ -182,7 +184,8 @@ def judge_path(
                 report(name)
                 ranks.append(_rank(family, matrix, name, cover))
         report("limits")
-        names = [item.name for item in case.model.quantities if item.name in (*ACTUATED, "leg_length")]
+        asked = () if limits_alone else (*ACTUATED, "leg_length")
+        names = [item.name for item in case.model.quantities if item.name in asked]
         reaches, claims = machines.symbols.claims(names, with_objective=False)
         found: list[Extreme] = []
         faults: dict[tuple[str, Sense], Fault] = {}
@@ -198,18 +201,30 @@ def judge_path(
         found = with_strokes(subject, found, partial(_finer, machines, claims))
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
-        bounds = None
-        if path.is_timed:
-            speeds = speeds_on_path(machines, cover, gap)
-            found += speeds.extremes
-            bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
-            if speeds.number is not None:
-                # Powers are those in the path's motion, whether the case states another one or none.
-                moving = case.loading._replace(motion=case.loading.motion or Motion(1.0))
-                subject = replace(subject, case=replace(case, loading=moving), machines=speeds.number.problem)
-                faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
-        found += motor_extremes(subject, speeds=bounds)
+        found += _of_actuators(subject, machines, cover, gap, faults, with_all=not limits_alone)
     return PathJudgement(case, path, tuple(ranks), tuple(found), faults, knots)
+
+
+def _of_actuators(
+    subject: Subject,
+    machines: Machines,
+    cover: PathCover,
+    gap: float,
+    faults: dict[tuple[str, Sense], Fault],
+    *,
+    with_all: bool,
+) -> list[Extreme]:
+    """Return the numbers of actuators along a path, in its own motion where that is known; adds faults of speeds."""
+    if not np.isfinite(cover.seconds).any():
+        return list(motor_extremes(subject, with_all=with_all))
+    speeds, case = speeds_on_path(machines, cover, gap), subject.case
+    bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
+    if speeds.number is not None:
+        # Powers are those in the path's motion, whether the case states another one or none.
+        moving = case.loading._replace(motion=case.loading.motion or Motion(1.0))
+        subject = replace(subject, case=replace(case, loading=moving), machines=speeds.number.problem)
+        faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
+    return [*speeds.extremes, *motor_extremes(subject, speeds=bounds, with_all=with_all)]
 
 
 def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[Extreme]:

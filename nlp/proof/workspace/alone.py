@@ -1,0 +1,87 @@
+"""Coordinates of a pose that a platform can change alone, the others held."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ....models import FloatArray
+from ....models.joints.closedform import closed_form
+from ...case.case import Case
+from ...case.pose import Free, Value
+from ...case.workspace import TurnKind, Turns, Workspace
+from ...evidence.closed_loops import DEPENDENT
+from .edge_samples import coordinates_of
+from .robot.pose_box import pose_box, rotation_of
+from .robot.posed_robot import NotJudgedError, Problem, build_problem
+
+#: The six coordinates of a pose, in order: the position, and ``Rz(yaw) Ry(pitch) Rx(roll)``.
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+#: Part of the robot's size, or angle, by which the coordinates are moved to see which of them are independent, and
+#: the largest work of a constraint, as a part, that is none.
+_NEAR, _ZERO = 1e-3, 1e-9
+
+
+class Coordinates(NamedTuple):
+    """Indices of the independent coordinates of a pose.
+
+    Attributes:
+        alone: those that can change while the others are held.
+        others: those from which other numbers of the pose follow.
+    """
+
+    alone: list[int]
+    others: list[int]
+
+
+def box_about(start: FloatArray, ends: dict[int, tuple[float, float]]) -> Workspace:
+    """Return the box of poses in which some coordinates have ranges."""
+    values: list[Value] = start.tolist()
+    for k, (low, high) in ends.items():
+        values[k] = Free(low, high)
+    return Workspace(values[:3], Turns(TurnKind.ROLL_PITCH_YAW, tuple(values[3:])))
+
+
+def coordinates_alone(case: Case, start: FloatArray, length: float) -> Coordinates:
+    """Return the coordinates by which a robot's freedoms are counted.
+
+    Args:
+        case: the machine.
+        start: (6,) the pose: position, length, and roll, pitch and yaw, radians.
+        length: of the order of the robot's.
+    """
+    half = _NEAR * np.array([length] * 3 + [1.0] * 3)
+    box = pose_box(box_about(start, {k: (start[k] - half[k], start[k] + half[k]) for k in range(6)}))
+    try:
+        problem = build_problem(case, closed_form(case.model).model, box)
+    except NotJudgedError:
+        return Coordinates(list(range(len(AXES))), [])
+    if not problem.dependent:
+        # Loops of a robot that is given by its rows are not known: its constraint wrenches must do no work.
+        work = np.zeros(6) if problem.unactuated is None else _work(problem, problem.unactuated.matrix, start)
+        return Coordinates(np.flatnonzero(work <= _ZERO).tolist(), [])
+    # Where other numbers of the pose follow, the loops do not close as one of them moves alone.
+    own, loops = [k for k in problem.independent if k < len(AXES)], problem.loops
+    moved = np.tile(problem.start, (len(own), 1))
+    moved[:, : len(AXES)] = coordinates_of(start + np.diag(half)[own])
+    found = loops.all_closed(moved.T, range(len(AXES), len(problem.start)), zero=DEPENDENT).T
+    is_alone = [bool(np.isfinite(each).all()) and loops.is_closed(each) for each in found]
+    pairs = list(zip(own, is_alone, strict=True))
+    return Coordinates(*([k for k, alone in pairs if alone is kind] for kind in (True, False)))
+
+
+def _work(problem: Problem, matrix: ca.SX, start: FloatArray) -> FloatArray:
+    """Return the largest work (6,) of unit constraint wrenches of a robot without loops as each coordinate changes."""
+    turn = ca.SX.sym("turn", 3)
+    rotation = rotation_of(problem.box, turn)
+    slopes = ca.Function("slopes", [turn], [ca.jacobian(ca.vec(rotation), turn), rotation])
+    changes, R = (np.array(each) for each in slopes(np.tan(0.5 * start[3:])))
+    twists = np.eye(6)
+    for k in range(3):
+        omega = changes[:, k].reshape(3, 3, order="F") @ R.T
+        twists[3:, 3 + k] = omega[2, 1], omega[0, 2], omega[1, 0]
+    rows = problem.posed.values(matrix, problem.start)[:, :6]
+    sizes = np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(np.abs(rows / np.where(sizes > 0, sizes, 1.0) @ twists).max(axis=0))

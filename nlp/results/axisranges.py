@@ -1,0 +1,266 @@
+"""How far a platform can move from a pose, as a result and in words."""
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from ...models import Dimension
+from ..case.case import Case
+from ..case.task import Sense
+from ..proof.statement.claims import CONSTRAINTS, REGULAR
+from ..proof.workspace.verdict import Outcome
+from ..units import Units
+from .jsondata import Absent, Inline, JsonObject, Vector6, finite_or_none
+from .parts import HeadData, VersionsData
+from .point import head_data, versions
+from .rounding import number
+from .text import Line, TextTable, Tone
+from .wording import title_line
+from .workspace import WorkspacePose, pose_data
+
+if TYPE_CHECKING:
+    from ..proof.workspace.axis_ranges import AxisRanges, RangeEnd, RangeStop
+
+
+class StopData(JsonObject):
+    """A claim that is not proved at a pose, or on the way to it.
+
+    Attributes:
+        name: the claim.
+        outcome: refuted at the pose, or open on the way to it.
+        key: dotted key, below ``limits``, of the limit in the case; absent of a rank.
+        unit: of the limit; absent of a rank.
+        sense: whether the number is below a smallest or above a largest value; absent of a rank.
+        limit: the limit; absent of a rank.
+        value: of the number at the pose; null where it is not known, and of a rank.
+        pose: the pose; null where none is known.
+        reason: why the claim is open, or how a singular pose was found; absent without one.
+    """
+
+    name: str
+    outcome: Outcome
+    key: Absent[str]
+    unit: Absent[str]
+    sense: Absent[Sense]
+    limit: Absent[float]
+    value: float | None
+    pose: WorkspacePose | None
+    reason: Absent[str]
+
+
+class RangeEndData(JsonObject):
+    """An end of a proved range.
+
+    Attributes:
+        value: everything is proved up to it.
+        failed: the first value known beyond it at which not everything is; absent at the end of the largest range.
+        limited_by: what fails there; absent with ``failed``.
+    """
+
+    value: float
+    failed: Absent[float]
+    limited_by: Absent[StopData]
+
+
+class AxisData(JsonObject):
+    """How far a coordinate can move alone.
+
+    Attributes:
+        axis: ``x``, ``y``, ``z``, ``roll``, ``pitch`` or ``yaw``.
+        unit: of its values.
+        at: its value at the pose.
+        lower, upper: the ends of the proved range about the pose.
+    """
+
+    axis: str
+    unit: str
+    at: float
+    lower: RangeEndData
+    upper: RangeEndData
+
+
+class PairData(JsonObject):
+    """How far two coordinates can move at once.
+
+    Attributes:
+        axes: both.
+        factor: everything is proved in the box of their ranges times this factor, about the pose.
+        failed: the smallest factor known at which not everything is; absent where the whole box is proved.
+        limited_by: what fails there; absent with ``failed``.
+    """
+
+    axes: tuple[str, ...]
+    factor: float
+    failed: Absent[float]
+    limited_by: Absent[StopData]
+
+
+class AxisRangesResult(JsonObject):
+    """Result of asking how far a platform can move from a pose.
+
+    Attributes:
+        head: the case.
+        proved: whether everything is proved at the pose, and a range about it of a coordinate.
+        pose: position, and roll, pitch and yaw.
+        largest: length and angle by which coordinates were moved at most.
+        faults: what is not proved at the pose itself.
+        axes: the independent coordinates alone.
+        pairs: each two of them.
+        not_alone: coordinates that cannot change alone, as other numbers of the pose follow from them.
+        reason: why the work ended before all axes and pairs were judged; absent otherwise.
+        versions: of the programs.
+    """
+
+    head: Inline[HeadData]
+    proved: bool
+    pose: Vector6
+    largest: tuple[float, ...]
+    faults: tuple[StopData, ...]
+    axes: tuple[AxisData, ...]
+    pairs: tuple[PairData, ...]
+    not_alone: tuple[str, ...]
+    reason: Absent[str]
+    versions: VersionsData
+
+
+def axis_ranges_result(found: "AxisRanges") -> AxisRangesResult:
+    """Return the ranges as a result."""
+    units = found.case.units
+    kinds = (*[Dimension.LENGTH] * 3, *[Dimension.ANGLE] * 3)
+    moves = any(each.lower.value < each.upper.value for each in found.axes)
+    return AxisRangesResult(
+        head=head_data(found.case),
+        proved=not found.stops and moves,
+        pose=tuple(units.shown(float(value), kind) for value, kind in zip(found.start, kinds, strict=True)),
+        largest=tuple(units.shown(most, kind) for most, kind in zip(found.most, kinds[2:4], strict=True)),
+        faults=tuple(_stop_data(each, units) for each in found.stops),
+        axes=tuple(
+            AxisData(
+                axis=each.axis,
+                unit=units.label(each.dimension),
+                at=units.shown(each.at, each.dimension),
+                lower=_end_data(each.lower, each.dimension, units),
+                upper=_end_data(each.upper, each.dimension, units),
+            )
+            for each in found.axes
+        ),
+        pairs=tuple(
+            PairData(
+                axes=each.axes,
+                factor=each.factor,
+                failed=each.failed,
+                limited_by=None if each.stop is None else _stop_data(each.stop, units),
+            )
+            for each in found.pairs
+        ),
+        not_alone=found.others,
+        reason=found.reason or None,
+        versions=versions(),
+    )
+
+
+def _end_data(end: "RangeEnd", dimension: Dimension, units: Units) -> RangeEndData:
+    """Return an end in a case's units."""
+    return RangeEndData(
+        value=units.shown(end.value, dimension),
+        failed=None if end.failed is None else units.shown(end.failed, dimension),
+        limited_by=None if end.stop is None else _stop_data(end.stop, units),
+    )
+
+
+def _stop_data(stop: "RangeStop", units: Units) -> StopData:
+    """Return a claim in a case's units."""
+    each, number_of = stop.extreme, dict[str, Any](key=None, unit=None, sense=None, limit=None, value=None)
+    if each is not None:
+        number_of = {
+            "key": each.key,
+            "unit": units.label(each.dimension),
+            "sense": each.sense,
+            "limit": None if each.limit is None else units.shown(each.limit, each.dimension),
+            "value": finite_or_none(units.shown(stop.value, each.dimension)) if math.isfinite(stop.value) else None,
+        }
+    return StopData(
+        name=stop.name,
+        outcome=stop.outcome,
+        pose=None if stop.pose is None else pose_data(stop.pose, units),
+        reason=stop.reason or None,
+        **number_of,
+    )
+
+
+def axis_ranges_tables(result: AxisRangesResult) -> Iterator[TextTable]:
+    """Yield the ranges, a row for each coordinate, and the factors, a row for each pair."""
+    rows = [
+        (
+            each.axis,
+            each.unit,
+            *(number(value, abs(each.at) + abs(value)) for value in (each.at, each.lower.value, each.upper.value)),
+            *map(_end_words, (each.lower, each.upper)),
+        )
+        for each in result.axes
+    ]
+    headers = ("axis", "unit", "at", "from", "to", "limited below by", "limited above by")
+    yield TextTable(headers, tuple(rows), name="axes", title="each alone: proved at every point")
+    pairs = [(*each.axes, number(each.factor), _pair_words(each)) for each in result.pairs]
+    yield TextTable(("axis", "and", "factor", "limited by"), tuple(pairs), name="pairs")
+
+
+def axis_ranges_summary(case: Case, result: AxisRangesResult) -> Iterator[Line | TextTable]:
+    """Yield how far the platform can move: the pose, the ranges of each coordinate, and factors of each two."""
+    yield title_line(case)
+    units = case.units
+    position, angles = (", ".join(number(value, 1.0) for value in part) for part in (result.pose[:3], result.pose[3:]))
+    label = units.label(Dimension.ANGLE)
+    yield Line(f"{position} {units.length}; roll, pitch, yaw {angles} {label}", label="pose")
+    for each in result.faults:
+        value = "" if each.value is None else f": {number(each.value)} {each.unit}".rstrip()
+        yield Line(_stop_words(each), label="not proved there", tone=Tone.FAULT, after=value)
+    if result.not_alone:
+        text = f"{', '.join(result.not_alone)}: other numbers of the pose follow; judge a workspace"
+        yield Line(text, label="cannot change alone", tone=Tone.CAUTION)
+    if result.reason:
+        yield Line(f"{result.reason}: not every axis and pair is judged", label="stopped", tone=Tone.CAUTION)
+    if not result.axes:
+        return
+    length, angle = (number(each, digits=4) for each in result.largest)
+    yield Line(f"by {length} {units.length} or {angle} {label} at most, to each side", label="moved")
+    table, _ = axis_ranges_tables(result)
+    yield table
+    if result.pairs:
+        yield _matrix(result)
+
+
+def _matrix(result: AxisRangesResult) -> TextTable:
+    """Return the factors of pairs as a table with a row and a column for each coordinate."""
+    names = [each.axis for each in result.axes]
+    factors = {each.axes: each.factor for each in result.pairs}
+    rows = [
+        (one, *(_factor_words(factors.get((one, other))) for k, other in enumerate(names) if k)) for one in names[:-1]
+    ]
+    title = "two at once: part of both ranges, about the pose, that is proved"
+    return TextTable(("axis", *names[1:]), tuple(rows), name="pairs", title=title)
+
+
+def _factor_words(factor: float | None) -> str:
+    """Return a factor; empty where there is none."""
+    return "" if factor is None else number(factor, digits=3) if factor else "open"
+
+
+def _pair_words(pair: PairData) -> str:
+    """Return what limits two coordinates."""
+    return "nothing more" if pair.limited_by is None else _stop_words(pair.limited_by)
+
+
+def _end_words(end: RangeEndData) -> str:
+    """Return what limits an end of a range."""
+    return "the largest range" if end.limited_by is None else _stop_words(end.limited_by)
+
+
+def _stop_words(stop: StopData) -> str:
+    """Return a claim that is not proved: what happens, or that it is open."""
+    if stop.outcome is Outcome.OPEN:
+        return f"open: {stop.name}" + (f", {stop.reason}" if stop.reason else "")
+    if stop.limit is None:
+        return {REGULAR: "J is singular", CONSTRAINTS: "constraint wrenches lose rank"}.get(stop.name, stop.name)
+    side = "below" if stop.sense is Sense.MIN else "above"
+    return f"{stop.name} {side} {number(stop.limit)} {stop.unit}".rstrip()
