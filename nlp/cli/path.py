@@ -23,7 +23,11 @@ from .options import (
 from .progress import spinner
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..path.options import PathOptions
+    from ..proof.workspace.path_judge import PathJudgement
+    from ..results.path import PathResult
     from ..results.workspace import WorkspacePose
 
 
@@ -49,6 +53,14 @@ def path(
     time: Time = None,
     json_file: JsonFile = None,
     csv_file: CsvFile = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="Draw numbers along the path: a .png, .svg or .pdf file."),
+    ] = None,
+    page: Annotated[
+        str | None,
+        typer.Option("--html", metavar="FILE", help="Write a page: verdicts, curves, robot; - is stdout."),
+    ] = None,
 ) -> None:
     """Prove regular poses and limits at every point of a path."""
     from pathlib import Path
@@ -66,8 +78,12 @@ def path(
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
     answer_after(Milestone.BOUND)
-    (loaded, _, inputs), chosen = read_machine(case, read_settings(settings), of)
-    files = Outputs(json=json_file, csv=csv_file)
+    (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
+    files = Outputs(json=json_file, csv=csv_file, plot=plot, html=page)
+    if page is not None:
+        from ..output.pictures.requirements import check_library
+
+        check_library("plotly", "pages with a robot")
     files.check({**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
         programmed = read_path(along, loaded.units, _options(unit, start, offset or []))
@@ -83,11 +99,29 @@ def path(
     summary = list(path_summary(judged.case, result, command))
     if csv_file is not None:
         write_csv(csv_file, [each for each in summary if isinstance(each, TextTable)], None)
+    if plot is not None or page is not None:
+        _draw(files, judged, result, text, command)
     if not files.is_piped:
         from ..output.terminal import show as show_on
 
         show_on(console(), summary)
     raise typer.Exit(0 if result.proved else 1)
+
+
+def _draw(
+    files: Outputs, judged: PathJudgement, result: PathResult, text: str, command: Callable[[WorkspacePose], str]
+) -> None:
+    """Write the picture and the page."""
+    from ..output.files import write_text
+    from ..output.pictures.pathpanels import path_picture
+    from ..output.pictures.paths import path_figure
+    from ..output.report.path import path_page
+    from ..proof.workspace.path_samples import samples_of
+
+    picture = path_picture(judged, samples_of(judged), result)
+    files.draw("plot", path_figure, picture)
+    if (target := files["html"]) is not None:
+        write_text(target, path_page(picture, text, command))
 
 
 def _options(unit: str | None, start: str | None, offsets: list[str]) -> PathOptions:
