@@ -227,7 +227,10 @@ def test_a_delta_on_a_page_keeps_its_arms_and_rods() -> None:
     apart = ~picture.samples.joints.closed
     assert apart.any()
     assert np.isnan(picture.margins[apart]).all()
-    assert picture.samples.is_violated[apart].all()
+    assert not picture.samples.is_violated[apart].any()
+    assert picture.samples.is_apart.tolist() == apart.tolist()
+    for at in picture.at[apart]:
+        assert any(each.start <= at <= each.end for each in picture.bands)
 
 
 def test_the_command_writes_picture_and_page(cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -164,7 +164,9 @@ class PathPicture:
         if any(each.is_refuted for each in self.bands):
             notes.append("Red: segments that are known to violate a claim; a vertical line is the first fault of one.")
         if any(not each.is_refuted for each in self.bands):
-            notes.append("Grey: segments named by claims that are open, which may be so elsewhere too.")
+            notes.append(
+                "Grey: segments in which joints are not known somewhere, or which open claims name among others."
+            )
         unplaced = [each.name for each in checked_claims(self.result) if _is_open(each) and each.segment is None]
         if unplaced:
             notes.append(f"Open, with no place known: {', '.join(unplaced)}.")
@@ -285,6 +287,7 @@ def _marks(result: PathResult, way: Way) -> Iterator[PathMark]:
 def _bands(samples: PathSamples, result: PathResult, way: Way) -> Iterator[PathBand]:
     """Yield the segments that are not proved, as far as it is known which these are."""
     state = np.zeros(len(way.knots) - 1, dtype=int)
+    state[samples.points.segments[samples.is_apart]] = 1
     for each in checked_claims(result):
         if _is_open(each) and each.segment is not None:
             state[each.segment] = 1

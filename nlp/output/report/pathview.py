@@ -18,10 +18,10 @@ from .frames import ELEVATION, JointData, LinkData, PointData, joint_data, link_
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Postures of a page, and points of the path and of curves, at most.
-_POSTURES, _POINTS = 300, 600
-#: Part of the robot's size to which coordinates are rounded: a page shows less.
-_FINE = 1e-7
+#: Postures of a page and their numbers, and points of the path, at most.
+_POSTURES, _NUMBERS, _POINTS = 300, 60_000, 600
+#: Part of the robot's size to which coordinates are rounded, and part of 1 for directions: a page shows less.
+_FINE, _ROUGH = 1e-7, 1e-4
 #: Room around everything that is drawn, in parts of the robot's size.
 _ROOM = 0.08
 #: Margin, percent, from which on its colour stays the same.
@@ -83,7 +83,9 @@ def path_view(picture: PathPicture) -> PathView | None:
     case, model, joints = judged.case, judged.case.model, samples.joints
     if joints is None or not joints.closed.any():
         return None
-    shown = thinned(picture, _POSTURES, np.flatnonzero(joints.closed))
+    scene = model.scene
+    numbers = 3 * (len(scene.points) + sum(1 + len(each.axes) for each in scene.joints))
+    shown = thinned(picture, min(_POSTURES, _NUMBERS // numbers), np.flatnonzero(joints.closed))
     linkage = Linkage(model, case.fixed_parameters("postures have fixed dimensions"), case.characteristic_length)
     postures = [
         linkage.posture_at(samples.poses.rotations[k], samples.poses.positions[k], joints.unknowns[k]) for k in shown
@@ -169,7 +171,7 @@ def _frame(picture: PathPicture, k: int, posture: Posture, size: float) -> PathF
         "at": float(picture.at[k]),
         "position": _rounded(posture.position, size),
         "points": _rounded(posture.points, size),
-        "joints": [_rounded(each, size) for each in posture.joints],
+        "joints": [[*_rounded(each[:1], size), *_rounded(each[1:], _ROUGH / _FINE)] for each in posture.joints],
     }
 
 

@@ -96,10 +96,14 @@ class PathSamples:
 
     @property
     def is_violated(self) -> NDArray[np.bool_]:
-        """Whether a limit is violated, or the robot is not assembled, at each point (P,)."""
-        apart = np.zeros(len(self._none), dtype=bool) if self.joints is None else ~self.joints.closed
+        """Whether a limit is violated at each point (P,)."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(apart | (self.least < _VIOLATED))
+            return np.asarray(self.least < _VIOLATED)
+
+    @property
+    def is_apart(self) -> NDArray[np.bool_]:
+        """Whether the joints are not known at each point (P,): out of reach, or where loops could not be followed."""
+        return np.zeros(len(self._none), dtype=bool) if self.joints is None else ~self.joints.closed
 
     @property
     def _none(self) -> FloatArray:
@@ -124,7 +128,7 @@ def samples_of(judged: PathJudgement, most: int = MOST_POINTS) -> PathSamples:
     if joints is not None:
         speeds = np.einsum("pai,pi->pa", joints.rates, twists_at(path, points))
     numbers, left_out = _numbers(replace(judged, case=case), poses, joints)
-    keys, margins = _margins(numbers)
+    keys, margins = _margins(numbers, len(points.parameters))
     return PathSamples(points, poses, joints, speeds, numbers, left_out, keys, margins)
 
 
@@ -207,7 +211,7 @@ def _read(claims: Sequence[Claim], values: FloatArray) -> Iterator[SampledNumber
         yield SampledNumber(claim, np.array([read(each) if math.isfinite(each) else math.nan for each in own]))
 
 
-def _margins(numbers: Sequence[SampledNumber]) -> tuple[tuple[str, ...], FloatArray]:
+def _margins(numbers: Sequence[SampledNumber], count: int) -> tuple[tuple[str, ...], FloatArray]:
     """Return the keys (K,) of limits, and the smallest margin (K, P) of each."""
     limited = [each for each in numbers if each.limit is not None]
     ends = {(each.claim.name, each.claim.sense): each.limit or 0.0 for each in limited}
@@ -217,7 +221,7 @@ def _margins(numbers: Sequence[SampledNumber]) -> tuple[tuple[str, ...], FloatAr
         size = abs(limit if other is None else limit - other) or float(np.nanmax(np.abs(each.values), initial=0.0))
         margin = each.claim.sense.sign * (limit - each.values) / (size or 1.0)
         found[each.claim.key] = np.fmin(found.get(each.claim.key, margin), margin)
-    return tuple(found), np.array(list(found.values())).reshape(len(found), -1)
+    return tuple(found), np.array(list(found.values())).reshape(len(found), count)
 
 
 _OTHER = {Sense.MIN: Sense.MAX, Sense.MAX: Sense.MIN}
