@@ -147,7 +147,10 @@ class PathPicture:
         for k, key in ((k, self.samples.keys[k]) for k in shown):
             dimension = numbers[key].claim.reading.dimension
             value = number(units.shown(numbers[key].limit or 0.0, dimension))
-            found.append((k, f"{key} = {value} {units.label(dimension)}".rstrip()))
+            # A relation is a difference that is compared with 0.
+            found.append(
+                (k, key if key.startswith("custom[") else f"{key} = {value} {units.label(dimension)}".rstrip())
+            )
         return found
 
     @property

@@ -141,7 +141,8 @@ def _add_legend(figure: Figure, picture: PathPicture, notes: Sequence[str]) -> N
         handles.append(Line2D([], [], color=colour, linewidth=1.6, label=legible(f"actuator {name}")))
     if any(each.is_other for panel in picture.panels for each in panel.curves):
         handles.append(Line2D([], [], color=MUTED, linestyle="--", label="the smaller of two values"))
-    handles.append(Line2D([], [], color=RED, linewidth=1.0, label="limit"))
+    if any(panel.limits for panel in picture.panels) or picture.margins.size:
+        handles.append(Line2D([], [], color=RED, linewidth=1.0, label="limit"))
     legend = figure.legend(
         handles=handles,
         loc="outside lower left",
@@ -159,5 +160,5 @@ def _add_legend(figure: Figure, picture: PathPicture, notes: Sequence[str]) -> N
 
 def _columns(handles: Sequence[Line2D]) -> int:
     """Return the number of columns of a legend, in at most two rows where its words are short."""
-    longest = max(len(str(each.get_label())) for each in handles)
+    longest = max((len(str(each.get_label())) for each in handles), default=0)
     return max(1, min(len(handles), int(120 / (longest + 5))))

@@ -133,7 +133,7 @@ def _legend(picture: PathPicture, has_marks: bool) -> Markup:
     """Return what the colours of the path mean."""
     entries = [tag("li", _swatch(LIMIT_COLOURS[k % len(LIMIT_COLOURS)]), words) for k, words in picture.limits]
     if (picture.margins < 0).any():
-        entries.append(tag("li", _swatch(_RED), "beyond it"))
+        entries.append(tag("li", _swatch(_RED), "beyond a limit"))
     parts = []
     if entries:
         parts.append(
@@ -157,7 +157,8 @@ def _curves(picture: PathPicture) -> Markup:
     ]
     if any(each.is_other for panel in picture.panels for each in panel.curves):
         entries.append(tag("li", "dashed: the smaller of two values"))
-    entries.append(tag("li", _swatch(_RED), "limit"))
+    if any(panel.limits for panel in picture.panels) or picture.margins.size:
+        entries.append(tag("li", _swatch(_RED), "limit"))
     if picture.marks:
         entries.append(tag("li", f"dotted: first faults of claims, {marks_text(picture.marks)}"))
     shown = thinned(picture, _POINTS, np.arange(len(picture.at)))

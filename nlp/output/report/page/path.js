@@ -36,7 +36,7 @@
     }
     found.push(...jointTraces(view, frame, INK), ...pathTraces());
     const dots = (name, places, marker, more = {}) => ({ type: "scatter3d", mode: "markers", name, x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]), marker, hoverinfo: "skip", showlegend: false, ...more });
-    found.push(dots("platform's origin", [frame.position], { size: 7, color: "#fff", line: { color: INK, width: 2 } }));
+    found.push(dots("platform's origin", [frame.position], { size: 4, color: "#fff", line: { color: INK, width: 2 } }));
     if (view.marks.length) found.push(dots("faults", view.marks.map((each) => each.position), { symbol: "diamond", size: 7, color: RED }, { hoverinfo: "text", hovertext: view.marks.map((each) => plain(each.words)) }));
     return found;
   }
