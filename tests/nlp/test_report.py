@@ -787,6 +787,10 @@ def test_the_robot_runs_along_its_path(opened: Callable[..., Any], tmp_path: Pat
     assert len(set(chrome.execute_script(places))) == 1
     check_clean(chrome)
     assert chrome.find_element("id", "travelled").text == view["frames"][view["first"]]["words"]
+    names = chrome.execute_script(
+        "return document.getElementById('view').layout.scene.annotations.map((each) => each.text)"
+    )
+    assert names[-1] == "line 3"
     for index in (0, len(view["frames"]) - 1):
         chrome.execute_script(MOVE, index)
         frame = view["frames"][index]

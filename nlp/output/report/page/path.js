@@ -1,6 +1,6 @@
 (() => {
   const byId = (id) => document.getElementById(id);
-  const view = JSON.parse(byId("data").textContent).view, RED = "#a3250f", NONE = "#68747f", BEYOND = -2;
+  const view = JSON.parse(byId("data").textContent).view, RED = "#a3250f", NONE = "#68747f", BEYOND = -2, MOST = 6;
   document.documentElement.classList.add("scripted");
   // Colours of margins, from 0 to the largest that has a colour of its own.
   const MARGINS = [RED, "#e08a3c", "#9aa3ab", "#08519c"].map((each, k) => [k / 3, each]);
@@ -37,16 +37,20 @@
     found.push(...jointTraces(view, frame, INK), ...pathTraces());
     const dots = (name, places, marker, more = {}) => ({ type: "scatter3d", mode: "markers", name, x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]), marker, hoverinfo: "skip", showlegend: false, ...more });
     found.push(dots("platform's origin", [frame.position], { size: 4, color: "#fff", line: { color: INK, width: 2 } }));
-    if (view.marks.length) found.push(dots("faults", view.marks.map((each) => each.position), { symbol: "diamond", size: 7, color: RED }, { hoverinfo: "text", hovertext: view.marks.map((each) => plain(each.words)) }));
+    if (view.marks.length) found.push(dots("faults", view.marks.map((each) => each.position), { symbol: "diamond", size: 5, color: RED }, { hoverinfo: "text", hovertext: view.marks.map((each) => plain(each.words)) }));
     return found;
   }
+
+  // The lines of the first faults, each once.
+  const faultNames = () => [...new Map(view.marks.map(({ words, position }) => [words.split(":")[0], position]).reverse())].reverse().slice(0, MOST)
+    .map(([text, [x, y, z]]) => ({ x, y, z, text: plain(text), showarrow: false, yshift: 16, bgcolor: "rgba(255,255,255,0.82)", borderpad: 1, font: { color: RED, size: 12 } }));
 
   const camera = () => fittedCamera(view.ranges, view.eye, { width: byId("view").clientWidth, height: byId("view").clientHeight });
 
   function draw() {
     if (!window.Plotly || !layout) return null;
     keep();
-    layout.scene.annotations = limbNames(view, view.frames[index].points, byId("view").clientWidth < 480);
+    layout.scene.annotations = [...limbNames(view, view.frames[index].points, byId("view").clientWidth < 480), ...faultNames()];
     return window.Plotly.react(byId("view"), traces(view.frames[index]), layout, CONFIG);
   }
 
