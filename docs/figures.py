@@ -1,8 +1,8 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
 The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
-robots with their parameters; slices of a workspace; the gallery of robots given joint by joint on one sheet, and the
-Delta of robots.md.
+robots with their parameters; slices of a workspace and a path; the gallery of robots given joint by joint on one sheet,
+and the Delta of robots.md.
 """
 
 import re
@@ -19,9 +19,16 @@ from screwsynth.nlp.case.robots import model_options
 from screwsynth.nlp.output.pictures.drawing import drawing_of_model
 from screwsynth.nlp.output.pictures.figures import picture_of
 from screwsynth.nlp.output.pictures.painting import Panel
+from screwsynth.nlp.output.pictures.pathpanels import path_picture
+from screwsynth.nlp.output.pictures.paths import path_figure
 from screwsynth.nlp.output.pictures.view import clearest_view
 from screwsynth.nlp.output.pictures.workspaces import slices_figure
+from screwsynth.nlp.path.gcode import read_program
+from screwsynth.nlp.path.options import PathOptions
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
+from screwsynth.nlp.proof.workspace.path_samples import samples_of
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
+from screwsynth.nlp.results.path import path_result
 
 FOLDER = Path(__file__).parent / "figures"
 #: Columns of the gallery's sheet, and width and height of a robot on it, inches.
@@ -62,6 +69,14 @@ def draw_gallery() -> None:
     figure.savefig(FOLDER / "gallery.png", dpi=60, metadata={"Software": None})
 
 
+def path_of_page(page: str) -> str:
+    """Return the program of G-code that a page of the documentation shows."""
+    text = (FOLDER.parent / page).read_text(encoding="utf-8")
+    return next(
+        block for block in re.findall(r"^```text\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE) if "G94" in block
+    )
+
+
 def case_of_page(page: str, number: int) -> dict[str, object]:
     """Return the tables of one of the case files that a page of the documentation shows."""
     text = (FOLDER.parent / page).read_text(encoding="utf-8")
@@ -77,6 +92,11 @@ for name in SLICED:
     (FOLDER / f"{name}.png").write_bytes(picture_of(".png", slices_figure, machine, slices_of(machine)))
 for name in SOLVED:
     plot(solve(load_case(name)), FOLDER / f"{name}.png")
+machine = load_case("hexapod-linuxcnc")
+program = read_program(path_of_page("paths.md").splitlines(), "part.ngc", machine.units, PathOptions())
+judged = judge_path(machine, program)
+drawn = path_picture(judged, samples_of(judged), path_result(judged))
+(FOLDER / "hexapod-linuxcnc-path.png").write_bytes(picture_of(".png", path_figure, drawn))
 for model in (name for name in model_names() if name not in gallery_names()):
     choices = next(((option.name, option.choices) for option in model_options(model) if option.choices), None)
     variants = (

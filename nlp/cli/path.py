@@ -22,8 +22,12 @@ from .options import (
 from .progress import spinner
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
     from ..path.options import PathOptions
+    from ..proof.workspace.path_judge import PathJudgement
     from ..proof.workspace.path_knots import Sampling
+    from ..results.path import PathResult
     from ..results.workspace import WorkspacePose
 
 
@@ -78,6 +82,14 @@ def path(
         float | None,
         number_option("--within", "LENGTH", "Rows so that actuators linear between them stay this near the path."),
     ] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option("--plot", metavar="FILE", help="Draw numbers along the path: a .png, .svg or .pdf file."),
+    ] = None,
+    page: Annotated[
+        str | None,
+        typer.Option("--html", metavar="FILE", help="Write a page: verdicts, curves, robot; - is stdout."),
+    ] = None,
 ) -> None:
     """Prove regular poses and limits at every point of a path."""
     from pathlib import Path
@@ -88,7 +100,6 @@ def path(
     from ..path.reader import options_of, path_of_case, read_path
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
-    from ..results.pathtable import knots_csv
     from ..results.pathwording import path_summary
     from ..results.workspaceposes import evaluate_command
     from .paper import read_machine
@@ -96,13 +107,15 @@ def path(
     sampling = _sampling(step, within, is_written=csv_file is not None)
     if not 1e-9 <= gap < 1:
         raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
-    elsewhere = ("--along", along), ("--unit", unit), ("--offset", offset), ("--angles", angles), ("--between", between)
-    for name, given in [*elsewhere, ("--step", step), ("--within", within)] if ranges else [("--most", most)]:
-        if given:
-            raise InputError(f"{name}: is not for --range" if ranges else f"{name}: needs --range")
+    _refuse_elsewhere(
+        {"--along": along, "--unit": unit, "--offset": offset, "--angles": angles, "--between": between}
+        | {"--step": step, "--within": within, "--plot": plot, "--html": page},
+        most,
+        ranges=ranges,
+    )
     answer_after(Milestone.BOUND)
-    (loaded, _, inputs), chosen = read_machine(case, read_settings(settings), of)
-    files = Outputs(json=json_file, csv=csv_file)
+    (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
+    files = Outputs(json=json_file, csv=csv_file, plot=plot, html=page)
     own = PathOptions() if along is not None or ranges or loaded.path is None else options_of(loaded.path)
     options = _options(own, unit, start, offset or [], angles, between)
     if ranges:
@@ -112,6 +125,10 @@ def path(
         with spinner("the pose") as show:
             found = show_ranges(loaded, options.start, most, time, files, show)
         raise typer.Exit(0 if found.proved else 1)
+    if page is not None:
+        from ..output.pictures.requirements import check_library
+
+        check_library("plotly", "pages with a robot")
     files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
         programmed = path_of_case(loaded, options) if along is None else read_path(along, loaded.units, options)
@@ -124,15 +141,48 @@ def path(
         return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
 
     write_json(json_file, result)
-    if csv_file is not None and judged.knots is not None:
-        from ..output.files import write_text
-
-        write_text(csv_file, knots_csv(judged.case, programmed, judged.knots))
+    _write(files, judged, result, text, command)
     if not files.is_piped:
         from ..output.terminal import show as show_on
 
         show_on(console(), path_summary(judged.case, result, command))
     raise typer.Exit(0 if result.proved else 1)
+
+
+def _refuse_elsewhere(along: Mapping[str, object], most: str | None, *, ranges: bool) -> None:
+    """Refuse options of paths beside ``--range``, and its own without it.
+
+    Raises:
+        InputError: one is given.
+    """
+    from ..errors import InputError
+
+    for name, given in along.items() if ranges else [("--most", most)]:
+        if given not in (None, []):
+            raise InputError(f"{name}: is not for --range" if ranges else f"{name}: needs --range")
+
+
+def _write(
+    files: Outputs, judged: PathJudgement, result: PathResult, text: str, command: Callable[[WorkspacePose], str]
+) -> None:
+    """Write the table of actuators, the picture and the page."""
+    from ..output.files import write_text
+
+    if (target := files["csv"]) is not None and judged.knots is not None:
+        from ..results.pathtable import knots_csv
+
+        write_text(target, knots_csv(judged.case, judged.path, judged.knots))
+    if files["plot"] is None and files["html"] is None:
+        return
+    from ..output.pictures.pathpanels import path_picture
+    from ..output.pictures.paths import path_figure
+    from ..output.report.path import path_page
+    from ..proof.workspace.path_samples import samples_of
+
+    picture = path_picture(judged, samples_of(judged), result)
+    files.draw("plot", path_figure, picture)
+    if (target := files["html"]) is not None:
+        write_text(target, path_page(picture, text, command))
 
 
 def _sampling(step: float | None, within: float | None, *, is_written: bool) -> Sampling | None:

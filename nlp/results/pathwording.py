@@ -42,13 +42,10 @@ def path_summary(
         words = ", ".join(f"{each.word} (line {each.line})" for each in path.idle[:_SHOWN])
         rest = len(path.idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="moves nothing")
-    checked = [each for each in path.claims if each.sense is None or each.limit is not None]
-    counts = ", ".join(f"{sum(each.outcome is one for each in checked)} {one.value}" for one in _ORDER)
-    words = "everything is proved at every point" if result.proved else f"not everything is proved: {counts}"
-    yield Line(words, label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+    yield Line(verdict_words(result), label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
     wrong = first_refuted(result)
     if wrong is not None and wrong.fault is not None:
-        yield Line(_fault_words(wrong, wrong.fault), label="first fault", tone=Tone.FAULT)
+        yield Line(fault_words(wrong, wrong.fault), label="first fault", tone=Tone.FAULT)
         if command is not None:
             yield Line(command(wrong.fault.pose), label="see it")
     for each in path.claims:
@@ -104,14 +101,28 @@ def _actuator_table(path: PathData) -> TextTable:
     return TextTable(headers, tuple(rows), name="actuators", title=title)
 
 
+def checked_claims(result: PathResult) -> list[PathClaimData]:
+    """Return the claims that are demanded of every point: ranks, and numbers with limits."""
+    return [each for each in result.path.claims if each.sense is None or each.limit is not None]
+
+
+def verdict_words(result: PathResult) -> str:
+    """Return the answer: whether everything is proved, or how many claims are refuted, open and proved."""
+    if result.proved:
+        return "everything is proved at every point"
+    checked = checked_claims(result)
+    counts = ", ".join(f"{sum(each.outcome is one for each in checked)} {one.value}" for one in _ORDER)
+    return f"not everything is proved: {counts}"
+
+
 def first_refuted(result: PathResult) -> PathClaimData | None:
     """Return the claim that is refuted at the first known point in the order of the path; None without one."""
-    claims = [(each, each.fault) for each in result.path.claims if each.sense is None or each.limit is not None]
+    claims = [(each, each.fault) for each in checked_claims(result)]
     places = [(fault.segment, fault.parameter, k) for k, (_, fault) in enumerate(claims) if fault is not None]
     return claims[min(places)[2]][0] if places else None
 
 
-def _fault_words(each: PathClaimData, fault: PathFaultData) -> str:
+def fault_words(each: PathClaimData, fault: PathFaultData) -> str:
     """Return a refuted claim at its first known point."""
     where = f"line {fault.line}, {number(fault.parameter, 1.0)} of its segment"
     if each.limit is None or fault.value is None:

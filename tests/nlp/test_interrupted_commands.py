@@ -70,7 +70,10 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "certify": ("small.toml", "--gap", "0.2", "--starts", "1", "--json", "out.json", "--proof", "out.proof"),
     "verify-proof": ("given.proof",),
     "workspace": ("fixed.toml", "--gap", "0.2", "--json", "out.json", "--proof", "out.proof"),
-    "path": ("fixed.toml", "--along", "path.csv", "--json", "out.json", "--csv", "out.csv"),
+    "path": (
+        *("fixed.toml", "--along", "path.csv", "--json", "out.json", "--csv", "out.csv"),
+        *("--plot", "out.svg", "--html", "out.html"),
+    ),
     "check": ("small.toml", "fixed.toml", "--json", "out.json", "--junit", "out.xml"),
     "evaluate": ("fixed.toml", "--json", "out.json"),
     "inverse": ("fixed.toml", "--poses", "given.csv", "--csv", "out.csv"),
@@ -224,4 +227,4 @@ def test_an_interrupted_front_has_no_gap(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_says_that_it_is_interrupted(name: str, press: Press, folder: Path) -> None:
-    press_at_moments(name, press, folder, 2 if name == "report" else 4)  # a page takes seconds
+    press_at_moments(name, press, folder, 2 if name in ("report", "path") else 4)  # a page takes seconds

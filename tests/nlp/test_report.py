@@ -770,6 +770,62 @@ def test_slider_shows_each_pose(opened: Callable[..., Any], tmp_path: Path, thre
     assert browser.find_element("id", "posed").text.endswith("the worst")
 
 
+PATH_LIMBS = """
+return document.getElementById("view").data.filter((each) => each.name.startsWith("limb "))
+  .map((each) => [each.x, each.y, each.z].map((values) => values.slice(0, 2)))"""
+
+
+@pytest.mark.browser
+def test_the_robot_runs_along_its_path(opened: Callable[..., Any], tmp_path: Path, cli: Run) -> None:
+    part, target = saved(tmp_path / "part.csv", "t,x,y,z\n0,0,0,20\n2,18,0,22\n3,4,3,21\n"), tmp_path / "path.html"
+    assert cli("path", "hexapod-linuxcnc", "--along", str(part), "--html", str(target))[0] == 1
+    chrome = opened(target, 420)
+    view = data_of(chrome)["view"]
+    assert chrome.execute_script("return document.documentElement.scrollWidth") <= 420
+    # Charts stand below each other.
+    places = "return [...document.querySelectorAll('.chart')].map((each) => each.getBoundingClientRect().left)"
+    assert len(set(chrome.execute_script(places))) == 1
+    check_clean(chrome)
+    assert chrome.find_element("id", "travelled").text == view["frames"][view["first"]]["words"]
+    names = chrome.execute_script(
+        "return document.getElementById('view').layout.scene.annotations.map((each) => each.text)"
+    )
+    assert names[-1] == "line 3"
+    slider = chrome.find_element("id", "travel")
+    for index in (0, len(view["frames"]) - 1):
+        chrome.execute_script(MOVE, index)
+        frame = view["frames"][index]
+        shown = [[[frame["points"][end][k] for end in link["ends"]] for k in range(3)] for link in limb_lines(view)]
+        assert until(lambda shown=shown: sorted(chrome.execute_script(PATH_LIMBS)) == sorted(shown))
+        assert chrome.find_element("id", "travelled").text == frame["words"]
+        # The cursor of each chart is at its end.
+        cursor = "const at = document.querySelector('.cursor'); return [at.getAttribute('transform'), at.dataset]"
+        moved, ends = chrome.execute_script(cursor)
+        part_of_way = (frame["at"] - float(ends["low"])) / (float(ends["high"]) - float(ends["low"]))
+        expected = float(ends["left"]) + part_of_way * float(ends["width"])
+        assert float(re.findall(r"translate\(([\d.]+) 0\)", moved)[0]) == pytest.approx(expected, abs=0.01)
+    # The robot runs from the beginning; the slider goes on by keyboard where it was stopped.
+    chrome.execute_script(MOVE, 0)
+    press = "const button = document.getElementById('play'); button.click(); return button.textContent"
+    assert chrome.execute_script(press) == "Pause"
+    assert until(lambda: int(slider.get_property("value")) > 0)
+    stop = "const button = document.getElementById('play'); if (button.textContent === 'Pause') button.click()"
+    chrome.execute_script(stop)
+    assert chrome.find_element("id", "play").text == "Play"
+    slider.send_keys("\ue012")  # the left arrow
+    reached = int(slider.get_property("value"))
+    chrome.execute_async_script(FRAMES)
+    assert int(slider.get_property("value")) == reached < len(view["frames"]) - 1
+    assert slider.get_attribute("aria-valuetext") == view["frames"][reached]["words"]
+    chrome.execute_script(CHOOSE, "colour", "margin")
+    names = "return document.getElementById('view').data.map((each) => each.name)"
+    assert until(lambda: "path margin" in chrome.execute_script(names))
+
+
+def limb_lines(view: dict[str, Any]) -> list[dict[str, Any]]:
+    return [link for link in view["links"] if link["limb"] is not None]
+
+
 @pytest.mark.browser
 def test_wide_tables_of_a_curve_say_that_they_scroll(browser: Any, tmp_path: Path, cli: Run) -> None:
     curve = tmp_path / "curve.html"

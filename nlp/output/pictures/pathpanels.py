@@ -1,0 +1,329 @@
+"""Content of pictures of a path: curves of numbers along it, limits, faults and margins, in the units of the case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ....models import Dimension, FloatArray
+from ....models.statics import driven_joints
+from ...case.forces import dimension_of_speed
+from ...case.motors import MotorNumber
+from ...case.task import Sense
+from ...path.sampling import Way, WayKind, way_of
+from ...proof.workspace.path_judge import PathJudgement
+from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
+from ...proof.workspace.verdict import Outcome
+from ...results.path import PathClaimData, PathResult
+from ...results.pathwording import checked_claims
+from ...results.rounding import number
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Sentence that says what a picture is worth.
+SAMPLED = "Sampled for the picture; the verdicts are proved."
+#: Colours of actuators: distinct with any colour blindness.
+ACTUATOR_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00", "#56b4e9")
+#: Colours of limits, where one of them is the nearest.
+LIMIT_COLOURS = ("#08519c", "#e08a3c", "#0b6b57", "#a3559e", "#8a5a00", "#5aa0d8", "#68747f", "#3b3b8f")
+#: Most load cases that have panels.
+_LOADS = 4
+#: Most lines that are named together.
+_LINES = 6
+#: Sizes of forces and speeds beyond which a curve has a gap, as near singular poses, which would hide all others: in
+#: parts of the size that most of them do not pass, and of the largest limit.
+_MOST, _BEYOND, _PAST = 95, 10.0, 3.0
+#: Smallest margin of a curve, percent.
+_LEAST_MARGIN = -100.0
+
+
+class PathCurve(NamedTuple):
+    """A number at P points.
+
+    Attributes:
+        name: of the actuator.
+        place: index of the actuator, which chooses the colour.
+        values: (P,) in the case's unit; NaN where there is none.
+        is_other: whether it is the smallest of two values, the largest of which is another curve.
+    """
+
+    name: str
+    place: int
+    values: FloatArray
+    is_other: bool = False
+
+
+class PathPanel(NamedTuple):
+    """Curves over the way along a path.
+
+    Attributes:
+        title: a few words.
+        unit: of the curves; empty for plain numbers.
+        curves: at least one.
+        limits: of the case, in this unit.
+        is_cut: whether values that would hide all others are left out.
+    """
+
+    title: str
+    unit: str
+    curves: tuple[PathCurve, ...]
+    limits: tuple[float, ...]
+    is_cut: bool = False
+
+    @property
+    def label(self) -> str:
+        """Title and unit."""
+        return f"{self.title}, {self.unit}" if self.unit else self.title
+
+
+class PathMark(NamedTuple):
+    """A place at which a claim is known to be violated, the first of its claim.
+
+    Attributes:
+        at: way to it.
+        line: of the file.
+        place: index of its segment, and parameter.
+        names: of the claims.
+    """
+
+    at: float
+    line: int
+    place: tuple[int, float]
+    names: tuple[str, ...]
+
+
+class PathBand(NamedTuple):
+    """Segments that follow each other and are not proved: from and to where, and whether they are known to fail."""
+
+    start: float
+    end: float
+    is_refuted: bool
+
+
+@dataclass(frozen=True, eq=False)
+class PathPicture:
+    """Content of a picture of a path.
+
+    Attributes:
+        judged: the verdicts.
+        samples: the machine at points of the path.
+        result: the verdicts as people read them.
+        way: how far the path has come.
+        at: (P,) the way to the points.
+        label: of the way, with its unit.
+        panels: the curves.
+        margins: (P,) the smallest margin, percent; empty without limits.
+        marks: places of faults.
+        bands: segments that are not proved.
+    """
+
+    judged: PathJudgement
+    samples: PathSamples
+    result: PathResult
+    way: Way
+    at: FloatArray
+    label: str
+    panels: tuple[PathPanel, ...]
+    margins: FloatArray
+    marks: tuple[PathMark, ...]
+    bands: tuple[PathBand, ...]
+
+    @property
+    def drawn_margins(self) -> FloatArray:
+        """The smallest margins (P,), percent, as curves show them: near singular poses they would hide all others."""
+        return np.maximum(self.margins, _LEAST_MARGIN)
+
+    @property
+    def limits(self) -> list[tuple[int, str]]:
+        """Indices and words of the limits that are the nearest somewhere."""
+        shown = sorted({*self.samples.nearest.tolist()} - {-1})
+        units, numbers = self.judged.case.units, {each.claim.key: each for each in self.samples.numbers}
+        found = []
+        for k, key in ((k, self.samples.keys[k]) for k in shown):
+            dimension = numbers[key].claim.reading.dimension
+            value = number(units.shown(numbers[key].limit or 0.0, dimension))
+            # A relation is a difference that is compared with 0.
+            found.append(
+                (k, key if key.startswith("custom[") else f"{key} = {value} {units.label(dimension)}".rstrip())
+            )
+        return found
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences about what is shown."""
+        notes = [SAMPLED]
+        if self.margins.size:
+            notes.append(
+                "The margin is the distance from the nearest limit, in parts of the distance between a number's two "
+                "limits, or of its only limit; it is below 0 beyond a limit."
+            )
+            if (self.margins < _LEAST_MARGIN).any():
+                notes.append(f"Margins are drawn down to {_LEAST_MARGIN:g} %.")
+        if any(each.is_refuted for each in self.bands):
+            notes.append("Red: segments that are known to violate a claim; a vertical line is the first fault of one.")
+        if any(not each.is_refuted for each in self.bands):
+            notes.append(
+                "Grey: segments in which joints are not known somewhere, or which open claims name among others."
+            )
+        unplaced = [each.name for each in checked_claims(self.result) if _is_open(each) and each.segment is None]
+        if unplaced:
+            notes.append(f"Open, with no place known: {', '.join(unplaced)}.")
+        if self.judged.case.joint_centre_tolerance:
+            notes.append("The curves are those of the design itself, without its tolerance.")
+        if any(each.is_cut for each in self.panels):
+            notes.append("Curves have gaps where forces or speeds are more than ten times as large as elsewhere.")
+        if self.samples.left_out:
+            notes.append(f"Not drawn: {', '.join(self.samples.left_out)}.")
+        more = len(self.judged.case.loading.cases) - _LOADS
+        if more > 0:
+            notes.append(f"Forces under {more} further loads are not drawn.")
+        return notes
+
+
+def path_picture(judged: PathJudgement, samples: PathSamples, result: PathResult) -> PathPicture:
+    """Return the content of a picture of a judged path."""
+    way = way_of(judged.path)
+    units = {WayKind.TIME: ", s", WayKind.LENGTH: f", {judged.case.units.length}", WayKind.SEGMENTS: ""}
+    panels = (*_coordinates(judged, samples), *_speeds(judged, samples), *_forces(judged, samples))
+    least = 100 * samples.least if len(samples.keys) else np.zeros(0)
+    return PathPicture(
+        judged,
+        samples,
+        result,
+        way,
+        way.at(samples.points),
+        f"{way.kind.value}{units[way.kind]}",
+        panels,
+        np.where(np.isfinite(least), least, np.nan),
+        tuple(_marks(result, way)),
+        tuple(_bands(samples, result, way)),
+    )
+
+
+def _coordinates(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
+    """Yield the coordinates of the actuators, those of a kind in a panel."""
+    joints = samples.joints
+    if joints is None:
+        return
+    drives = driven_joints(judged.case.model)
+    for measure in dict.fromkeys(joints.measures):
+        own = [k for k, each in enumerate(joints.measures) if each == measure]
+        dimension = Dimension.ANGLE if measure == "actuator_angle" else Dimension.LENGTH
+        factor = judged.case.units.shown(1.0, dimension)
+        curves = [PathCurve(drives[k].name, k, factor * joints.coordinates[:, k]) for k in own]
+        names = {f"{measure} limb {drives[k].name}" for k in own}
+        limits = {each.limit for each in judged.extremes if each.name in names and each.limit is not None}
+        words = {"leg_length": "leg lengths", "actuator_angle": "actuator angles"}.get(measure, "actuator lengths")
+        yield PathPanel(words, judged.case.units.label(dimension), tuple(curves), tuple(factor * x for x in limits))
+
+
+def _speeds(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
+    """Yield the speeds along a path whose segments have times, and the largest ones of the case's motions."""
+    units, every = judged.case.units, motor_numbers(samples.numbers, MotorNumber.SPEED).get("", [])
+    limited = {each.claim.motor.actuator: each.limit for each in every if each.claim.motor and each.limit is not None}
+    timed = [(k, each) for k, each in enumerate(driven_joints(judged.case.model)) if k < samples.speeds.shape[1]]
+    if np.isfinite(samples.speeds).any():
+        for dimension in dict.fromkeys(dimension_of_speed(each) for _, each in timed):
+            own = [(k, each) for k, each in timed if dimension_of_speed(each) is dimension]
+            factor = units.shown(1.0, dimension)
+            curves = tuple(PathCurve(each.name, k, factor * samples.speeds[:, k]) for k, each in own)
+            ends = {factor * limited[each.name] for _, each in own if each.name in limited}
+            limits = tuple(sign * end for end in ends for sign in (-1, 1))
+            yield _without_peaks(PathPanel("speeds along the path", units.label(dimension), curves, limits))
+    yield from _of_motors(judged, every, "largest speeds in the motions of the case")
+
+
+def _forces(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
+    """Yield the forces of the actuators under each load."""
+    found = motor_numbers(samples.numbers, MotorNumber.FORCE)
+    for load, every in list(found.items())[:_LOADS]:
+        yield from _of_motors(judged, every, f"forces, load {load}")
+
+
+def _of_motors(judged: PathJudgement, every: Sequence[SampledNumber], title: str) -> Iterator[PathPanel]:
+    """Yield panels of numbers of actuators, those of one unit in each."""
+    units = judged.case.units
+    for dimension in dict.fromkeys(each.claim.reading.dimension for each in every):
+        own, factor = [each for each in every if each.claim.reading.dimension is dimension], units.shown(1.0, dimension)
+        curves, shown = [], dict[int, FloatArray]()
+        # Largest values come first: a smallest one that is the same, as under a load with one direction, is left out.
+        for each in sorted(own, key=lambda each: each.claim.sense is Sense.MIN):
+            motor = each.claim.motor
+            if motor is None or (motor.place in shown and np.allclose(shown[motor.place], each.values, equal_nan=True)):
+                continue
+            is_other = motor.place in shown
+            shown.setdefault(motor.place, each.values)
+            curves.append(PathCurve(motor.actuator, motor.place, factor * each.values, is_other))
+        limits = {factor * each.limit for each in own if each.limit is not None}
+        yield _without_peaks(PathPanel(title, units.label(dimension), tuple(curves), tuple(sorted(limits))))
+
+
+def _without_peaks(panel: PathPanel) -> PathPanel:
+    """Return a panel whose curves have gaps where they are far larger than elsewhere."""
+    sizes = np.abs(np.concatenate([each.values for each in panel.curves]))
+    sizes = sizes[np.isfinite(sizes)]
+    if not sizes.size:
+        return panel
+    most = max(_BEYOND * float(np.percentile(sizes, _MOST)), _PAST * max(map(abs, panel.limits), default=0.0))
+    if sizes.max() <= most:
+        return panel
+    kept = [each._replace(values=np.where(np.abs(each.values) <= most, each.values, np.nan)) for each in panel.curves]
+    return panel._replace(curves=tuple(kept), is_cut=True)
+
+
+def _marks(result: PathResult, way: Way) -> Iterator[PathMark]:
+    """Yield the places of faults, in the order of the path."""
+    faults = [(each.fault, each.name) for each in checked_claims(result) if each.fault is not None]
+    ordered = sorted(faults, key=lambda each: (each[0].segment, each[0].parameter))
+    for place, group in groupby(ordered, key=lambda each: (each[0].segment, each[0].parameter)):
+        own = list(group)
+        start, end = way.knots[place[0]], way.knots[place[0] + 1]
+        at = float(start + place[1] * (end - start))
+        yield PathMark(at, own[0][0].line, place, tuple(name for _, name in own))
+
+
+def _bands(samples: PathSamples, result: PathResult, way: Way) -> Iterator[PathBand]:
+    """Yield the segments that are not proved, as far as it is known which these are."""
+    state = np.zeros(len(way.knots) - 1, dtype=int)
+    state[samples.points.segments[samples.is_apart]] = 1
+    for each in checked_claims(result):
+        if _is_open(each) and each.segment is not None:
+            state[each.segment] = 1
+    state[samples.points.segments[samples.is_violated]] = 2
+    state[[each.fault.segment for each in checked_claims(result) if each.fault is not None]] = 2
+    for kind, group in groupby(range(len(state)), key=lambda k: int(state[k])):
+        own = list(group)
+        if kind:
+            yield PathBand(float(way.knots[own[0]]), float(way.knots[own[-1] + 1]), kind == 2)
+
+
+def _is_open(claim: PathClaimData) -> bool:
+    return claim.outcome is Outcome.OPEN
+
+
+def marks_text(marks: Sequence[PathMark]) -> str:
+    """Return the lines of faults that stand together, such as ``lines 4, 5``."""
+    lines = list(dict.fromkeys(each.line for each in marks))
+    more = [f"and {len(lines) - _LINES} more"] if len(lines) > _LINES else []
+    return f"line{'s' * (len(lines) > 1)} {', '.join([*map(str, lines[:_LINES]), *more])}"
+
+
+def actuator_names(picture: PathPicture) -> dict[int, str]:
+    """Return the names of the actuators that have curves, by their places."""
+    return {each.place: each.name for panel in picture.panels for each in panel.curves}
+
+
+def percent(margin: float) -> str:
+    """Return a margin as people read it."""
+    return f"{number(margin, 100.0, digits=3)} %"
+
+
+def nearest_parts(nearest: NDArray[np.intp], key: int, values: FloatArray) -> FloatArray:
+    """Return values (P,) where a limit is the nearest, and at the next point, so that lines have no gaps; else NaN."""
+    own = nearest == key
+    return np.where(own | np.concatenate([[False], own[:-1]]), values, np.nan)

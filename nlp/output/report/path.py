@@ -1,0 +1,256 @@
+"""A page about a judged path: verdicts, the robot along the path, curves of its numbers, places of faults."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...results.jsondata import json_data
+from ...results.pathwording import checked_claims, fault_words, first_refuted, path_summary, verdict_words
+from ...results.tables import origin_table
+from ...results.text import Line
+from ...results.workspace import WorkspacePose
+from ...results.workspacewording import pose_words
+from ..pictures.figures import picture as picture_file
+from ..pictures.pathpanels import (
+    ACTUATOR_COLOURS,
+    LIMIT_COLOURS,
+    PathPanel,
+    PathPicture,
+    actuator_names,
+    marks_text,
+    nearest_parts,
+)
+from .charts import Band, Curve, line_chart
+from .markup import (
+    Markup,
+    answer_box,
+    contents_and_body,
+    html_table,
+    image_source,
+    join_markup,
+    packed_plotly,
+    paragraphs,
+    script_frame,
+    tag,
+    view_buttons,
+    whole_page,
+)
+from .pathview import MOST_MARGIN, PathView, path_view, thinned
+
+#: Points of a curve of the page.
+_POINTS = 600
+#: Colour of limits, and of the path beyond one.
+_RED = "#a3250f"
+
+
+def path_page(picture: PathPicture, text: str, command: Callable[[WorkspacePose], str]) -> str:
+    """Return the whole page, which opens without a network; verdicts and curves need no script.
+
+    Args:
+        picture: the path with its verdicts.
+        text: text of the case file.
+        command: returns the command that shows a pose.
+    """
+    case, result = picture.judged.case, picture.result
+    title = case.title or case.name
+    view = path_view(picture)
+    sections = [
+        # One section, through which the slider stays in sight.
+        ("robot", "The robot along the path", join_markup([_robot(picture, view), _curves(picture)])),
+        ("verdicts", "Verdicts", _verdicts(picture)),
+        ("refuted", "Places that refute a claim", _refuted(picture, command)),
+        ("origin", "Case text and versions", _origin(picture, text)),
+    ]
+    contents, body = contents_and_body(sections)
+    words = verdict_words(result)
+    answers = [f"{words[0].upper()}{words[1:]}."]
+    first = first_refuted(result)
+    if first is not None and first.fault is not None:
+        answers.append(f"First fault: {fault_words(first, first.fault)}.")
+    return whole_page(
+        f"{title} - {picture.judged.path.source}",
+        f"{case.name}, robot {case.model.name}, along {picture.judged.path.source}",
+        answer_box(answers, is_answer=result.proved),
+        body,
+        heading=title,
+        contents=contents,
+        styles=("workspace.css", "path.css"),
+        scripts=() if view is None else ("tools.js", "joints.js", "robot.js", "path.js"),
+        data={"result": json_data(result), "view": None if view is None else view.data},
+        plotly="" if view is None else packed_plotly(),
+    )
+
+
+def _verdicts(picture: PathPicture) -> Markup:
+    """Return the lines and tables that the terminal shows, without the title."""
+    _, *items = path_summary(picture.judged.case, picture.result)
+    parts = [
+        paragraphs([each]) if isinstance(each, Line) else html_table(each, each.title, id=f"path-{each.name}")
+        for each in items
+    ]
+    words = (
+        "Each proved claim holds at every point of every segment, and not only at samples. A proven bound is not "
+        "passed by any point; the value reached is met in the line, and at the pose, named beside it."
+    )
+    return join_markup([*parts, tag("p", words)])
+
+
+def _robot(picture: PathPicture, view: PathView | None) -> Markup:
+    """Return the 3-D view with its slider and its legend."""
+    if view is None:
+        return paragraphs(["There is no point of the path at which the joints of the robot are known."])
+    data, last = view.data, len(view.data["frames"]) - 1
+    words = data["frames"][data["first"]]["words"]
+    controls = tag(
+        "p",
+        tag("button", "Play", type="button", id="play"),
+        tag("label", "Along the path", for_="travel"),
+        tag("input", type="range", id="travel", min=0, max=last, step=1, value=data["first"], aria_valuetext=words),
+        tag("output", words, id="travelled", for_="travel"),
+        class_="controls travel along script",
+    )
+    options = [tag("option", "nearest limit", value="nearest"), tag("option", "margin", value="margin")]
+    colour = tag("label", "Colour of the path: ", for_="colour"), tag("select", *options, id="colour")
+    still = image_source(picture_file([view.drawing], ".svg"))
+    flat = "This browser has no WebGL: the robot is drawn flat and does not move, but the curves follow the slider."
+    figure = tag(
+        "figure",
+        script_frame("view", "picture", "The robot in three dimensions, and the path of its platform's origin."),
+        tag("p", flat, class_="flat-words", role="status"),
+        tag("img", src=still, alt=f"The robot, {words}.", class_="still chosen"),
+        view_buttons(),
+        tag("img", id="view-copy", class_="copy", alt="The robot in three dimensions"),
+        tag("figcaption", _legend(picture, data["marks"] != []), id="view-words"),
+    )
+    coloured = [tag("p", *colour, class_="controls script")] if data["limits"] else []
+    note = "Without a script nothing moves; the curves and tables are here all the same."
+    return join_markup([controls, *coloured, figure, tag("noscript", tag("p", note))])
+
+
+def _legend(picture: PathPicture, has_marks: bool) -> Markup:
+    """Return what the colours of the path mean."""
+    entries = [tag("li", _swatch(LIMIT_COLOURS[k % len(LIMIT_COLOURS)]), words) for k, words in picture.limits]
+    if (picture.margins < 0).any():
+        entries.append(tag("li", _swatch(_RED), "beyond a limit"))
+    parts = []
+    if entries:
+        parts.append(
+            tag("p", "The path of the platform's origin has the colour of its nearest limit:", class_="by-limit")
+        )
+        parts.append(tag("ul", *entries, class_="legend by-limit"))
+        words = f" from 0 % (red) to {MOST_MARGIN} % and more (blue)."
+        bar = tag("span", class_="scale margins", aria_hidden="true")
+        parts.append(tag("p", "The colour of the path is its smallest margin,", words, bar, class_="by-margin"))
+    words = "Red diamonds: the first faults of claims." if has_marks else ""
+    dark = " Joints: dark where an actuator drives them." if picture.judged.case.model.scene.joints else ""
+    return join_markup([*parts, tag("p", f"{words}{dark}".strip())])
+
+
+def _curves(picture: PathPicture) -> Markup:
+    """Return charts of all numbers along the path, with a cursor at the posture shown."""
+    names = actuator_names(picture)
+    entries = [
+        tag("li", _swatch(ACTUATOR_COLOURS[place % len(ACTUATOR_COLOURS)]), f"actuator {name}")
+        for place, name in names.items()
+    ]
+    if any(each.is_other for panel in picture.panels for each in panel.curves):
+        entries.append(tag("li", "dashed: the smaller of two values"))
+    if any(panel.limits for panel in picture.panels) or picture.margins.size:
+        entries.append(tag("li", _swatch(_RED), "limit"))
+    if picture.marks:
+        entries.append(tag("li", f"dotted: first faults of claims, {marks_text(picture.marks)}"))
+    shown = thinned(picture, _POINTS, np.arange(len(picture.at)))
+    charts = [_panel(picture, each, shown) for each in picture.panels]
+    if picture.margins.size:
+        charts.append(_margins(picture, shown))
+    return join_markup(
+        [
+            tag("h3", "Curves along the path"),
+            paragraphs(picture.notes),
+            tag("ul", *entries, class_="legend"),
+            tag("div", *charts, class_="charts along"),
+        ]
+    )
+
+
+def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
+    """Return the chart of a panel."""
+    at = picture.at[shown].tolist()
+    count = len(ACTUATOR_COLOURS)
+    curves = [
+        Curve(at, each.values[shown].tolist(), f"curve a{each.place % count}{' other' * each.is_other}")
+        for each in panel.curves
+    ]
+    every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
+    ends = (
+        f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip()
+        if every.size
+        else ", of which none is known"
+    )
+    return _chart(picture, curves, f"{panel.title}{ends}", panel.unit, panel.limits)
+
+
+def _margins(picture: PathPicture, shown: list[int]) -> Markup:
+    """Return the chart of the smallest margin."""
+    at, nearest = picture.at[shown].tolist(), picture.samples.nearest[shown]
+    curves = [
+        Curve(at, nearest_parts(nearest, k, picture.drawn_margins[shown]).tolist(), f"curve l{k % len(LIMIT_COLOURS)}")
+        for k, _ in picture.limits
+    ]
+    known = picture.margins[np.isfinite(picture.margins)]
+    words = f"smallest margin of all limits, at least {known.min():.3g} %" if known.size else "no margin is known"
+    return _chart(
+        picture, curves or [Curve(at, picture.drawn_margins[shown].tolist(), "curve")], words, "margin, %", (0.0,)
+    )
+
+
+def _chart(picture: PathPicture, curves: list[Curve], words: str, label: str, limits: tuple[float, ...]) -> Markup:
+    """Return a chart over the way along the path, with faults and segments that are not proved."""
+    words = f"{words[0].upper()}{words[1:]}."
+    chart = line_chart(
+        curves,
+        [],
+        words=words,
+        labels=(picture.label, label),
+        bounds=[each.at for each in picture.marks],
+        levels=limits,
+        bands=[Band(each.start, each.end, "refuted" if each.is_refuted else "open") for each in picture.bands],
+        ends=(float(picture.way.knots[0]), float(picture.way.knots[-1])),
+        has_cursor=True,
+    )
+    return tag("figure", tag("figcaption", words), chart)
+
+
+def _swatch(colour: str) -> Markup:
+    """Return a small box of a colour."""
+    return tag("span", class_="swatch", style=f"--fill: {colour}")
+
+
+def _refuted(picture: PathPicture, command: Callable[[WorkspacePose], str]) -> Markup:
+    """Return each refuted claim with its first known fault and the command that shows it; empty without one."""
+    case = picture.judged.case
+    return join_markup(
+        part
+        for claim in checked_claims(picture.result)
+        if claim.fault is not None
+        for part in (
+            tag("h3", fault_words(claim, claim.fault)),
+            tag("p", f"At {pose_words(case, claim.fault.pose)}."),
+            tag(
+                "pre",
+                tag("code", command(claim.fault.pose)),
+                tabindex="0",
+                aria_label="Command",
+                class_="command",
+            ),
+        )
+    )
+
+
+def _origin(picture: PathPicture, text: str) -> Markup:
+    """Return versions, and the text of the case."""
+    table = html_table(origin_table(picture.result.versions), "What the numbers depend on", id="versions")
+    shown = tag("pre", tag("code", text, id="case-text"), tabindex="0", aria_label="Case text")
+    return join_markup([table, tag("h3", "Case file"), shown])

@@ -1,0 +1,101 @@
+"""Points spread over a path, the way to them, and velocities there: for pictures."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...models import FloatArray
+from .path import Kind, ProgrammedPath
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Points beside the ends of segments, where these leave room for them.
+_INSIDE = 600
+#: Part of a segment over which a velocity is a difference: a rotation in it is small, and its rounding too.
+_STEP = 1e-5
+
+
+class Points(NamedTuple):
+    """Points of a path, in its order: indices (P,) of segments, and parameters (P,) from 0 to 1."""
+
+    segments: NDArray[np.intp]
+    parameters: FloatArray
+
+
+class WayKind(enum.Enum):
+    """Number that says how far a path has come."""
+
+    TIME = "time"
+    LENGTH = "length along the path"
+    SEGMENTS = "segments"
+
+
+class Way(NamedTuple):
+    """How far a path has come at the knots (n + 1,): seconds, length, or number of segments."""
+
+    kind: WayKind
+    knots: FloatArray
+
+    def at(self, points: Points) -> FloatArray:
+        """Return the numbers (P,) at points."""
+        start = self.knots[points.segments]
+        return np.asarray(start + points.parameters * (self.knots[points.segments + 1] - start))
+
+
+def spread_points(path: ProgrammedPath, most: int, also: Sequence[tuple[int, float]] = ()) -> Points:
+    """Return points spread over a path by the sizes of its motions, positions and angles alike.
+
+    Both ends of each segment are among them, unless the path has too many for that.
+
+    Args:
+        path: the path.
+        most: number of points.
+        also: segments and parameters of further points.
+    """
+    count, turned = len(path), np.abs(np.diff(path.knots[:, 3:], axis=0)).sum(axis=1)
+    shares = path.lengths / (path.lengths.sum() or 1.0) + turned / (turned.sum() or 1.0)
+    shares = shares / shares.sum() if shares.any() else np.full(count, 1 / count)
+    if 2 * count <= most:
+        inside = np.floor(shares * min(_INSIDE, most - 2 * count)).astype(int) + 2
+        segments = np.repeat(np.arange(count), inside)
+        first = np.repeat(np.cumsum(inside) - inside, inside)
+        parameters = (np.arange(len(segments)) - first) / np.repeat(inside - 1, inside)
+    else:
+        ends = np.concatenate([[0.0], np.cumsum(shares)])
+        at = np.linspace(0.0, ends[-1], most)
+        segments = np.clip(np.searchsorted(ends[1:], at), 0, count - 1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            parameters = np.clip(np.nan_to_num((at - ends[segments]) / shares[segments]), 0.0, 1.0)
+    every = np.concatenate([np.stack([segments, parameters], axis=1), np.reshape(also, (-1, 2))])
+    every = np.unique(every, axis=0)
+    return Points(every[:, 0].astype(np.intp), every[:, 1])
+
+
+def way_of(path: ProgrammedPath) -> Way:
+    """Return how far a path has come: its time if that is known throughout, else its length, if each motion has one."""
+    kinds = ((WayKind.TIME, path.durations), (WayKind.LENGTH, path.lengths))
+    for kind, sizes in kinds:
+        moves = (path.kinds != Kind.DWELL) if kind is WayKind.LENGTH else np.ones(len(path), dtype=bool)
+        if np.isfinite(sizes).all() and (sizes[moves] > 0).all() and sizes.any():
+            return Way(kind, np.concatenate([[0.0], np.cumsum(sizes)]))
+    return Way(WayKind.SEGMENTS, np.arange(len(path) + 1.0))
+
+
+def twists_at(path: ProgrammedPath, points: Points) -> FloatArray:
+    """Return motions (P, 6) of the platform: angular velocity, then that of its origin, both in the world frame.
+
+    They are per second where the durations of segments are known, and NaN elsewhere.
+    """
+    segments, s = points
+    ends = np.clip(s - _STEP, 0.0, 1.0), np.clip(s + _STEP, 0.0, 1.0)
+    (start, R), (end, Q) = (path.poses_at(segments, each) for each in ends)
+    turn = 0.5 * (Q @ R.transpose(0, 2, 1) - R @ Q.transpose(0, 2, 1))
+    turns = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        seconds = (ends[1] - ends[0]) * path.durations[segments]
+        return np.asarray(np.hstack([turns, end - start]) / seconds[:, None])

@@ -1,0 +1,237 @@
+"""Numbers of a machine at points of a path, for pictures: they show what happens there, and prove nothing.
+
+Of all machines within a tolerance the design is shown. Limits on strokes are about the whole path, and have no value at
+a point.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ....models import FloatArray, axis_angle_from_matrix
+from ....models.joints.closedform import ClosedForm, closed_form
+from ...case.motors import Motor, MotorNumber
+from ...case.task import Sense
+from ...errors import InputError, UncoveredError
+from ...evidence.inverse import InversePoses, inverse
+from ...path.path import Poses
+from ...path.sampling import Points, spread_points, twists_at
+from ..statement.claims import Claim, searched_claims
+from ..statement.motors import motor_claims
+from .numbers.expressions import Expressions
+from .numbers.machines import Machines
+from .numbers.motors import Motors
+from .numbers.searched import Subject
+from .path_judge import PathJudgement
+from .robot.path_cover import Place
+from .robot.pose_box import PoseNumbers, pose_box
+from .robot.posed_robot import NotJudgedError, build_problem
+from .verdict import Outcome
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Number of points on a path.
+MOST_POINTS = 2000
+#: Margin below which a limit counts as violated: beyond rounding.
+_VIOLATED = -1e-9
+
+
+class SampledNumber(NamedTuple):
+    """A number of a claim at points (P,) of a path, radians for angles; NaN where the robot is not assembled."""
+
+    claim: Claim
+    values: FloatArray
+
+    @property
+    def limit(self) -> float | None:
+        """The limit, radians for an angle; None without one."""
+        return None if self.claim.limit is None else self.claim.reading.from_value(self.claim.limit)
+
+
+@dataclass(frozen=True, eq=False)
+class PathSamples:
+    """A machine at P points of a path.
+
+    Attributes:
+        points: the points.
+        poses: of the platform.
+        joints: positions of all joints; None where those of the actuators are not known.
+        speeds: (P, a) of the actuators, radians or length per second; NaN where the path has no time.
+        numbers: of all claims with limits at a pose, and of actuators.
+        left_out: keys of limits that have no values here.
+        keys: of the limits that have.
+        margins: (K, P) the smallest distance from each of these limits, in parts of the distance between a number's two
+            limits, or else of the limit; below 0 beyond it.
+    """
+
+    points: Points
+    poses: Poses
+    joints: InversePoses | None
+    speeds: FloatArray
+    numbers: tuple[SampledNumber, ...]
+    left_out: tuple[str, ...]
+    keys: tuple[str, ...]
+    margins: FloatArray
+
+    @property
+    def least(self) -> FloatArray:
+        """The smallest of all margins (P,); NaN where the robot is not assembled, or without a limit."""
+        return np.asarray(np.fmin.reduce(self.margins, axis=0, initial=np.inf) if len(self.keys) else self._none)
+
+    @property
+    def nearest(self) -> NDArray[np.intp]:
+        """Indices (P,) of the limits with the smallest margins; -1 where none is known."""
+        if not len(self.keys):
+            return np.full(len(self._none), -1)
+        found = np.argmin(np.where(np.isfinite(self.margins), self.margins, np.inf), axis=0)
+        return np.where(np.isfinite(self.margins).any(axis=0), found, -1)
+
+    @property
+    def is_violated(self) -> NDArray[np.bool_]:
+        """Whether a limit is violated at each point (P,)."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.least < _VIOLATED)
+
+    @property
+    def is_apart(self) -> NDArray[np.bool_]:
+        """Whether the joints are not known at each point (P,): out of reach, or where loops could not be followed."""
+        return np.zeros(len(self._none), dtype=bool) if self.joints is None else ~self.joints.closed
+
+    @property
+    def _none(self) -> FloatArray:
+        return np.full(len(self.points.parameters), np.nan)
+
+
+def samples_of(judged: PathJudgement, most: int = MOST_POINTS) -> PathSamples:
+    """Return a judged machine at points of its path, among them all places that a verdict names.
+
+    Args:
+        judged: the verdicts.
+        most: number of points that are spread over the path.
+    """
+    path, case = judged.path, replace(judged.case, joint_centre_tolerance=None)
+    points = spread_points(path, most, [(each.segment, each.parameter) for each in places_of(judged)])
+    poses = path.poses_at(*points)
+    try:
+        joints: InversePoses | None = inverse(case, *poses)
+    except InputError:
+        joints = None
+    speeds = np.zeros((len(points.parameters), 0))
+    if joints is not None:
+        speeds = np.einsum("pai,pi->pa", joints.rates, twists_at(path, points))
+    numbers, left_out = _numbers(replace(judged, case=case), poses, joints)
+    keys, margins = _margins(numbers, len(points.parameters))
+    return PathSamples(points, poses, joints, speeds, numbers, left_out, keys, margins)
+
+
+def places_of(judged: PathJudgement) -> list[Place]:
+    """Return the places of the verdicts on ranks and limits that are not proved."""
+    found = [each.place for each in judged.ranks if each.outcome is not Outcome.PROVED]
+    found += [each.place for each in judged.extremes if each.fails]
+    found += [each.place for each in judged.faults.values()]
+    return sorted({each for each in found if each is not None})
+
+
+def _numbers(
+    judged: PathJudgement, poses: Poses, joints: InversePoses | None
+) -> tuple[tuple[SampledNumber, ...], tuple[str, ...]]:
+    """Return the numbers of claims at poses, and the keys of limits without values."""
+    case, closed = judged.case, closed_form(judged.case.model)
+    claims = [*searched_claims(case), *motor_claims(case)]
+    keys = [each.key for each in claims if each.limit is not None]
+    if case.workspace is None or (joints is None and closed.model.unknowns):
+        return (), tuple(dict.fromkeys(keys))
+    box = pose_box(case.workspace)
+    turns = [axis_angle_from_matrix(each) for each in poses.rotations]
+    pairs = zip(poses.positions, poses.rotations, turns, strict=True)
+    at = np.array([box.coordinates(PoseNumbers(p, R, *turn)) for p, R, turn in pairs])
+    try:
+        problem = build_problem(case, closed.model, box, at[0])
+        machines = Machines(case, closed, problem)
+    except NotJudgedError:
+        return (), tuple(dict.fromkeys(keys))
+    z = np.hstack([at[:, list(problem.free)], _unknowns(closed, joints, len(at))])
+    if joints is not None:
+        z[~joints.closed] = np.nan
+    found, left_out = [], []
+    posed = [each for each in machines.symbols.claims((), with_objective=False)[1] if each.limit is not None]
+    if posed:
+        numbers = Expressions(problem, ca.vertcat(*map(machines.number, posed)))
+        found += list(_read(posed, numbers.values(z)))
+    subject = Subject(case, closed.model, problem)
+    for group in _groups(claims):
+        try:
+            found += list(_read(group, _values(subject, group, z)))
+        except (NotJudgedError, UncoveredError):
+            left_out += [each.key for each in group if each.key]
+    return tuple(found), tuple(dict.fromkeys(left_out))
+
+
+def _unknowns(closed: ClosedForm, joints: InversePoses | None, count: int) -> FloatArray:
+    """Return the positions (P, u) of the passive joints that are coordinates of a problem."""
+    if joints is None:
+        return np.zeros((count, 0))
+    return joints.unknowns[:, [joints.joints.index(each.name) for each in closed.model.unknowns]]
+
+
+def _groups(claims: Sequence[Claim]) -> Iterator[list[Claim]]:
+    """Yield the claims whose numbers are computed together: those of one actuator."""
+    for whose, group in itertools.groupby(claims, lambda each: each.motor and each.motor.place):
+        own = list(group)
+        yield from [own] if whose is not None else ([each] for each in own)
+
+
+def _values(subject: Subject, group: Sequence[Claim], z: FloatArray) -> FloatArray:
+    """Return the numbers (P, K) of claims, smallest ones, and minus the largest ones.
+
+    Raises:
+        NotJudgedError, UncoveredError: they are not known.
+    """
+    number = Motors(subject.problem, subject.case, group) if group[0].motor else subject.number(group[0])
+    with np.errstate(all="ignore"):
+        known = np.isfinite(z).all(axis=1)
+        values = np.full((len(z), len(group)), np.nan)
+        values[known] = number.values(z[known])
+    return values
+
+
+def _read(claims: Sequence[Claim], values: FloatArray) -> Iterator[SampledNumber]:
+    """Yield numbers as people read them, from values (P, K) that are the smallest ones, and minus the largest ones."""
+    for claim, column in zip(claims, values.T, strict=True):
+        read = claim.reading.from_value
+        own = (-claim.sense.sign * column).tolist()
+        yield SampledNumber(claim, np.array([read(each) if math.isfinite(each) else math.nan for each in own]))
+
+
+def _margins(numbers: Sequence[SampledNumber], count: int) -> tuple[tuple[str, ...], FloatArray]:
+    """Return the keys (K,) of limits, and the smallest margin (K, P) of each."""
+    limited = [each for each in numbers if each.limit is not None]
+    ends = {(each.claim.name, each.claim.sense): each.limit or 0.0 for each in limited}
+    found: dict[str, FloatArray] = {}
+    for each in limited:
+        limit, other = each.limit or 0.0, ends.get((each.claim.name, _OTHER[each.claim.sense]))
+        size = abs(limit if other is None else limit - other) or float(np.nanmax(np.abs(each.values), initial=0.0))
+        margin = each.claim.sense.sign * (limit - each.values) / (size or 1.0)
+        found[each.claim.key] = np.fmin(found.get(each.claim.key, margin), margin)
+    return tuple(found), np.array(list(found.values())).reshape(len(found), count)
+
+
+_OTHER = {Sense.MIN: Sense.MAX, Sense.MAX: Sense.MIN}
+
+
+def motor_numbers(numbers: Sequence[SampledNumber], kind: MotorNumber) -> dict[str, list[SampledNumber]]:
+    """Return the numbers of actuators of a kind, by load; the load of a speed is empty."""
+    found: dict[str, list[SampledNumber]] = {}
+    for each in numbers:
+        motor = each.claim.motor or Motor(MotorNumber.COORDINATE)
+        if motor.number is kind:
+            found.setdefault(motor.load, []).append(each)
+    return found
