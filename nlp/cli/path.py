@@ -67,7 +67,7 @@ def path(
     ] = None,
     between: Annotated[
         str | None,
-        typer.Option("--between", metavar="angles|slerp", help="What turns linearly: the angles, or about one axis."),
+        typer.Option("--between", metavar="angles|slerp", help="Turns between points: linear angles, or one axis."),
     ] = None,
     gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a number without a limit.")] = 1e-3,
     time: Time = None,

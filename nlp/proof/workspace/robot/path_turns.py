@@ -278,9 +278,8 @@ def _reference(quaternions: FloatArray) -> Reference:
     for step in range(1, _STEPS + 1):
         middle += (some[int(np.argmin(some @ middle))] - middle) / (step + 1)
     parts = np.rint(_ROUND * middle / max(float(np.abs(middle).max()), np.finfo(float).tiny)).astype(int).tolist()
-    common = math.gcd(*parts) or 1
-    w, x, y, z = (part // common for part in parts)
-    return w, x, y, z
+    w, x, y, z = (part // (math.gcd(*parts) or 1) for part in parts)
+    return (w, x, y, z) if any(parts) else UNTURNED
 
 
 def _varying(angles: FloatArray, order: Order, reference: Reference) -> FloatArray:
