@@ -12,10 +12,11 @@ from ..proof.workspace.verdict import Outcome
 from .jsondata import Absent, Inline, JsonObject
 from .parts import HeadData, VersionsData
 from .point import head_data, versions
-from .workspace import WorkspacePose, pose_data
+from .workspace import BindingData, DesignData, WorkspacePose, pose_data
 
 if TYPE_CHECKING:
     from ..proof.workspace.path_judge import PathJudgement, RankOnPath
+    from ..solver.over_path import PathProof
 
 
 class PathFaultData(JsonObject):
@@ -72,7 +73,14 @@ class PathClaimData(JsonObject):
 
 
 class PathActuatorData(JsonObject):
-    """Coordinate of an actuator along a path: proven smallest and largest values; null where nothing is proved."""
+    """Coordinate of an actuator along a path.
+
+    Attributes:
+        actuator: its name.
+        unit: of its coordinate.
+        smallest: proven smallest value; null where nothing is proved.
+        largest: proven largest value; null where nothing is proved.
+    """
 
     actuator: str
     unit: str
@@ -128,10 +136,33 @@ class PathResult(JsonObject):
     versions: VersionsData
 
 
+class PathProofData(JsonObject):
+    """Proof of a design along its path, by exchange of poses.
+
+    Attributes:
+        proved: whether all ranks and limits are proved at every point.
+        joint_centre: the proof is about all machines whose joint centres are off by at most this; absent where it is
+            about the exact machine alone.
+        tighter: part of themselves by which the program's limits at the poses are tighter than the case's.
+        designs: each design that was judged; the last is the answer.
+        poses: of the constraints.
+        file: name of the path's file.
+        segments: their number.
+        claims: ranks first.
+    """
+
+    proved: bool
+    joint_centre: Absent[float]
+    tighter: float
+    designs: tuple[DesignData, ...]
+    poses: tuple[BindingData, ...]
+    file: str
+    segments: int
+    claims: tuple[PathClaimData, ...]
+
+
 def path_result(judged: "PathJudgement") -> PathResult:
     """Return the verdicts as a result."""
-    ranks = [_claim_data(each, judged) for each in judged.ranks]
-    numbers = [_number_data(each, judged) for each in judged.extremes]
     return PathResult(
         head=head_data(judged.case),
         proved=judged.is_proved,
@@ -139,11 +170,33 @@ def path_result(judged: "PathJudgement") -> PathResult:
             file=judged.path.source,
             segments=len(judged.path),
             idle=tuple(IdleData.of(each) for each in judged.path.idle),
-            claims=(*ranks, *numbers),
+            claims=_claims(judged),
             actuators=tuple(_actuators(judged)),
         ),
         versions=versions(),
     )
+
+
+def path_proof_data(proof: "PathProof") -> PathProofData:
+    """Return the proof of a solved design as a result."""
+    judged = proof.judgement
+    units = judged.case.units
+    return PathProofData(
+        proved=proof.is_proved,
+        joint_centre=judged.case.joint_centre_tolerance,
+        tighter=proof.tighter,
+        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
+        poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
+        file=judged.path.source,
+        segments=len(judged.path),
+        claims=_claims(judged),
+    )
+
+
+def _claims(judged: "PathJudgement") -> tuple[PathClaimData, ...]:
+    """Return the claims, ranks first."""
+    ranks = [_claim_data(each, judged) for each in judged.ranks]
+    return (*ranks, *(_number_data(each, judged) for each in judged.extremes))
 
 
 def _number_data(each: "Extreme", judged: "PathJudgement") -> PathClaimData:
