@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 
@@ -194,6 +195,32 @@ class Case(Whole, Shown):
             if pose.rotation.axis is not None:
                 names[f"{prefix}angle"] = Dimension.ANGLE
         return names
+
+    @property
+    def limits_over(self) -> Literal["", "workspace", "path"]:
+        """Where limits hold beside the stated poses: over the workspace, or along the path; empty for nowhere."""
+        if self.workspace is not None and self.workspace.has_limits:
+            return "workspace"
+        return "path" if self.path is not None and self.path.has_limits else ""
+
+    @property
+    def limits_where(self) -> str:
+        """The same in words; empty for nowhere."""
+        return {"": "", "workspace": "over the workspace", "path": "along the path"}[self.limits_over]
+
+    @property
+    def stated_pose_notice(self) -> str:
+        """Sentence about what takes the limits at the stated pose although they hold elsewhere too; else empty."""
+        return self.limits_where and f"the limits are taken at the stated pose alone, not {self.limits_where}"
+
+    def at_stated_poses(self) -> Case:
+        """Return the case with limits at the stated poses alone."""
+        workspace, path = self.workspace, self.path
+        return replace(
+            self,
+            workspace=None if workspace is None else replace(workspace, has_limits=False),
+            path=None if path is None else replace(path, has_limits=False),
+        )
 
     @property
     def as_limited(self) -> LimitedCase:

@@ -29,6 +29,7 @@ class PathFile:
         offsets: (6,) origins of a program's coordinate systems by their names, such as ``"G54"``.
         angles: convention of a program's A, B and C.
         between: ``"angles"`` or ``"slerp"``, the motion between two points; None for that of the file.
+        has_limits: whether a solve must find a design that is regular and keeps the case's limits along the path.
     """
 
     file: str
@@ -38,6 +39,7 @@ class PathFile:
     offsets: Mapping[str, Sequence[float]] = field(default_factory=dict)
     angles: Convention = "rpy"
     between: Literal["angles", "slerp"] | None = None
+    has_limits: bool = False
 
     @property
     def name(self) -> Path:

@@ -357,6 +357,9 @@ class Document(Table):
 
         Args:
             folder: of the document, beside which the path's file is.
+
+        Raises:
+            CaseError: limits hold along a path that is not stated.
         """
         return None
 

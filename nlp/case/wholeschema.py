@@ -117,8 +117,13 @@ class WholeDocument(Document):
         return Workspace(position, _turns(self.workspace.rotation, units), has_limits)
 
     def read_path(self, folder: str) -> PathFile | None:
-        """Return the programmed path that the document states."""
-        return None if self.path is None else PathFile(folder=folder, **dict(self.path))
+        """Return the programmed path that the document states, along which its limits may hold."""
+        has_limits = self.limits is not None and self.limits.over == "path"
+        if self.path is None:
+            if has_limits:
+                raise CaseError("limits.over", "needs the table [path], which names its file", "path")
+            return None
+        return PathFile(folder=folder, has_limits=has_limits, **dict(self.path))
 
     def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
         """Return the tasks, that of a number of the actuators in the place of F of a motion."""

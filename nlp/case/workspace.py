@@ -102,13 +102,6 @@ class Workspace:
         if not any(isinstance(value, Free) for value in (*self.position, *turns.angles)):
             raise CaseError("workspace", "is one pose: give at least one number as { min, max }")
 
-    @property
-    def stated_pose_notice(self) -> str:
-        """Sentence about what takes the limits at the stated pose although they are for the workspace; else empty."""
-        if not self.has_limits:
-            return ""
-        return "the limits are taken at the stated pose alone, not over the workspace"
-
     def to_keys(self, units: Units) -> dict[str, TomlValue | None]:
         """Return the table of a case file that states this workspace."""
         turns = self.turns

@@ -201,8 +201,8 @@ def _limits(case: Case) -> dict[str, TomlValue | None]:
         CaseError: two limits need different values of one key.
     """
     found: dict[str, TomlValue | None] = {}
-    if case.workspace is not None and case.workspace.has_limits:
-        found["over"] = "workspace"
+    if case.limits_over:
+        found["over"] = case.limits_over
     for limit in case.limits:
         _merge(found, limit.to_keys(case.model, case.units), "limits")
     return found

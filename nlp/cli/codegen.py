@@ -34,8 +34,8 @@ def codegen(
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
     typer.echo(size_words(loaded, files))
-    if loaded.workspace is not None and loaded.workspace.has_limits:
-        typer.echo(loaded.workspace.stated_pose_notice)
+    if loaded.limits_over:
+        typer.echo(loaded.stated_pose_notice)
     if measure:
         files = _measured(files, identifier(loaded.name))
     write_folder(out, files, force=force)

@@ -78,5 +78,4 @@ def solve(
         from ..results.summary import case_summary
 
         show(console(), case_summary(loaded, result))
-    kept = solution.workspace is None or solution.workspace.is_proved
-    raise typer.Exit(0 if solution.status.is_answer and is_proved and kept else 1)
+    raise typer.Exit(0 if solution.status.is_answer and is_proved and solution.keeps_limits else 1)

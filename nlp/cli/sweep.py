@@ -188,12 +188,12 @@ def _show(found: Sweep, out: str, files: Outputs) -> int:
 
 
 def _notice(found: Sweep, out: str) -> str | None:
-    """Return the notice that limits over a workspace are taken at the stated pose alone; None where they are not."""
+    """Return the notice that limits elsewhere are taken at the stated pose alone; None where they are not."""
     from ..output.sweeptable import table_rows
     from ..sweeps.columns import stated_pose_note
 
     case = found.source.case_at(found.points.settings(0))
-    if case.workspace is None or not case.workspace.has_limits:
+    if not case.limits_over:
         return None
     return stated_pose_note(case, [row.note for row in table_rows(out, found)])
 

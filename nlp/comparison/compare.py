@@ -110,6 +110,8 @@ def compare(
     """
     began = time.perf_counter()
     contenders = read_robots(robots, case)
+    if case.limits_over == "path":
+        raise CaseError("limits.over", "is for one robot: robots are not compared along a path", "path", case.source)
     check_seconds(time_limit)
     _check_numbers(size, part, scale=scale)
     if certified:

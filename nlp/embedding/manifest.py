@@ -145,7 +145,7 @@ def manifest_text(nlp: Nlp, columns: NumberColumns, names: Mapping[str, str], fi
         "sense": nlp.sense.value,
         "F_unit": numbers.pop("F_unit"),
         **{key: _objects(own) for key, own in numbers.items()},
-        "notice": "" if case.workspace is None else case.workspace.stated_pose_notice,
+        "notice": case.stated_pose_notice,
         "seeds": int(names["nseeds"]),
         "statuses": [{"code": code, "name": name, "meaning": text} for code, (name, text) in enumerate(statuses)],
         "measured": [],

@@ -27,6 +27,7 @@ from .parts import (
 )
 
 if TYPE_CHECKING:
+    from .path import PathProofData
     from .workspace import WorkspaceProofData
 
 
@@ -168,6 +169,7 @@ class SolveResult(JsonObject):
         starts: outcome of the starts.
         certificate: the proven bound; null where none was asked for.
         workspace: proof over the workspace; absent where no limit holds there.
+        path: proof along the path; absent where no limit holds there.
         seed: of the starting points.
         versions: of the programs.
         seconds: wall time.
@@ -189,6 +191,7 @@ class SolveResult(JsonObject):
     starts: StartsData
     certificate: CertificateData | None
     workspace: Absent["WorkspaceProofData"]
+    path: Absent["PathProofData"]
     seed: int
     versions: VersionsData
     seconds: float

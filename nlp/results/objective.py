@@ -14,6 +14,7 @@ from .jsondata import Absent, JsonObject, finite_or_none
 
 if TYPE_CHECKING:
     from ..proof.workspace.judge import Judgement
+    from ..proof.workspace.path_judge import PathJudgement
     from ..solver.certified import Certified
 
 if TYPE_CHECKING:
@@ -66,13 +67,14 @@ def certified_objective(certified: "Certified") -> ObjectiveData | None:
     if certificate is None:
         return None
     value = None if math.isnan(certificate.incumbent) else certificate.incumbent
-    if solution.workspace is not None and value is not None and solution.case.tasks[0].measure:
-        value = over_workspace(solution.case, solution.workspace.judgement)
+    proof = solution.workspace or solution.path
+    if proof is not None and value is not None and solution.case.tasks[0].measure:
+        value = over_workspace(solution.case, proof.judgement)
     return objective_data(solution.case, value, certificate)
 
 
-def over_workspace(case: Case, judged: "Judgement") -> float:
-    """Return a proven bound, for every pose of a workspace, of the number of the actuators that a case minimises."""
+def over_workspace(case: Case, judged: "Judgement | PathJudgement") -> float:
+    """Return a proven bound, for every pose of a workspace or path, of the number that a case minimises."""
     start = f"{case.tasks[0].measure}."
     return max(abs(each.bound) for each in judged.extremes if each.key.startswith(start))
 

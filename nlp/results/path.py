@@ -16,11 +16,12 @@ from .jsondata import Absent, Inline, JsonObject
 from .parts import HeadData, VersionsData
 from .pathtable import knot_motion
 from .point import head_data, versions
-from .workspace import WorkspacePose, pose_data
+from .workspace import BindingData, DesignData, WorkspacePose, pose_data
 
 if TYPE_CHECKING:
     from ..proof.workspace.path_judge import PathJudgement, RankOnPath
     from ..proof.workspace.path_knots import Knots
+    from ..solver.over_path import PathProof
     from ..units import Units
 
 
@@ -172,10 +173,33 @@ class PathResult(JsonObject):
     versions: VersionsData
 
 
+class PathProofData(JsonObject):
+    """Proof of a design along its path, by exchange of poses.
+
+    Attributes:
+        proved: whether all ranks and limits are proved at every point.
+        joint_centre: the proof is about all machines whose joint centres are off by at most this; absent where it is
+            about the exact machine alone.
+        tighter: part of themselves by which the program's limits at the poses are tighter than the case's.
+        designs: each design that was judged; the last is the answer.
+        poses: of the constraints.
+        file: name of the path's file.
+        segments: their number.
+        claims: ranks first.
+    """
+
+    proved: bool
+    joint_centre: Absent[float]
+    tighter: float
+    designs: tuple[DesignData, ...]
+    poses: tuple[BindingData, ...]
+    file: str
+    segments: int
+    claims: tuple[PathClaimData, ...]
+
+
 def path_result(judged: "PathJudgement") -> PathResult:
     """Return the verdicts as a result."""
-    ranks = [_claim_data(each, judged) for each in judged.ranks]
-    numbers = [_number_data(each, judged) for each in judged.extremes]
     return PathResult(
         head=head_data(judged.case),
         proved=judged.is_proved,
@@ -185,12 +209,34 @@ def path_result(judged: "PathJudgement") -> PathResult:
             time=judged.path.time if judged.path.is_timed else None,
             untimed=len(judged.path.untimed) if judged.path.is_timed else None,
             idle=tuple(IdleData.of(each) for each in judged.path.idle),
-            claims=(*ranks, *numbers),
+            claims=_claims(judged),
             actuators=tuple(_actuators(judged)),
             knots=None if judged.knots is None else _knots_data(judged.case.units, judged.knots),
         ),
         versions=versions(),
     )
+
+
+def path_proof_data(proof: "PathProof") -> PathProofData:
+    """Return the proof of a solved design as a result."""
+    judged = proof.judgement
+    units = judged.case.units
+    return PathProofData(
+        proved=proof.is_proved,
+        joint_centre=judged.case.joint_centre_tolerance,
+        tighter=proof.tighter,
+        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
+        poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
+        file=judged.path.source,
+        segments=len(judged.path),
+        claims=_claims(judged),
+    )
+
+
+def _claims(judged: "PathJudgement") -> tuple[PathClaimData, ...]:
+    """Return the claims, ranks first."""
+    ranks = [_claim_data(each, judged) for each in judged.ranks]
+    return (*ranks, *(_number_data(each, judged) for each in judged.extremes))
 
 
 def _number_data(each: "Extreme", judged: "PathJudgement") -> PathClaimData:

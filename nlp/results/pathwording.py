@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.task import Sense
@@ -11,11 +11,11 @@ from .rounding import number
 from .text import Line, TextTable, Tone
 from .wording import title_line
 from .workspacemotors import TONES
-from .workspacewording import pose_words
+from .workspacewording import exchange_lines, machine_lines, pose_words, tightest_table
 
 if TYPE_CHECKING:
     from ..case.case import Case
-    from .path import PathClaimData, PathData, PathFaultData, PathResult
+    from .path import PathClaimData, PathData, PathFaultData, PathProofData, PathResult
     from .workspace import WorkspacePose
 
 #: So many words that move nothing are shown.
@@ -55,7 +55,12 @@ def path_summary(
     yield from _knot_lines(path, case.units.length)
     if path.time is not None or path.knots is not None:
         yield _actuator_table(path)
-    rows = [_row(case, each) for each in path.claims if each.sense is not None]
+    yield from claims_table(case, path.claims)
+
+
+def claims_table(case: Case, claims: Sequence[PathClaimData]) -> Iterator[TextTable]:
+    """Yield the table of the numbers among claims."""
+    rows = [_row(case, each) for each in claims if each.sense is not None]
     if rows:
         headers = ("number", "unit", "value", "limit", "proven bound", "reached", "outcome", "line", "at")
         yield TextTable(headers, tuple(rows), name="claims", title="numbers at every point of the path")
@@ -113,6 +118,21 @@ def verdict_words(result: PathResult) -> str:
     checked = checked_claims(result)
     counts = ", ".join(f"{sum(each.outcome is one for each in checked)} {one.value}" for one in _ORDER)
     return f"not everything is proved: {counts}"
+
+
+def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line | TextTable]:
+    """Yield the proof of a solved design along its path."""
+    whole = f"{proof.file}, {proof.segments:,} segment{'s' * (proof.segments != 1)}: "
+    if proof.proved:
+        words = "proved: regular and within the limits at every point"
+        yield Line(whole + words, label="path", tone=Tone.ANSWER)
+    else:
+        count = proof.designs[-1].unproved
+        words = f"not proved: {count} claim{'' if count == 1 else 's'} refuted or open"
+        yield Line(whole + words, label="path", tone=Tone.NO_ANSWER)
+    yield from exchange_lines(proof, "path")
+    yield from machine_lines(case, proof.joint_centre)
+    yield from tightest_table(proof.claims, "tightest limits along the path")
 
 
 def first_refuted(result: PathResult) -> PathClaimData | None:

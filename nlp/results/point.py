@@ -49,10 +49,10 @@ def head_data(case: Case) -> HeadData:
 
 
 def stated_pose_notice(case: Case) -> str | None:
-    """Return the notice that limits over the workspace are taken at the stated pose alone; None for other cases."""
-    if case.workspace is None or case.tasks[0].measure:  # which is bounded from poses of the workspace
+    """Return the notice that limits elsewhere are taken at the stated pose alone; None for other cases."""
+    if case.tasks[0].measure:  # which is bounded from poses of the workspace or the path
         return None
-    return case.workspace.stated_pose_notice or None
+    return case.stated_pose_notice or None
 
 
 @cache

@@ -31,7 +31,9 @@ from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
     from ..solver.certified import Certified
+    from ..solver.over_path import PathProof
     from ..solver.semi_infinite import WorkspaceProof
+    from .path import PathProofData
     from .workspace import WorkspaceProofData
 
 
@@ -40,6 +42,7 @@ def task_result(
     task: int = 0,
     certificate: Certificate | None = None,
     workspace: WorkspaceProof | None = None,
+    path: PathProof | None = None,
 ) -> SolveResult:
     """Return the whole result of the program of one task.
 
@@ -48,14 +51,16 @@ def task_result(
         task: index of that task in the case.
         certificate: of the same program.
         workspace: proof over the workspace.
+        path: proof along the path.
     """
     nlp, x, state = solution.nlp, solution.x, solution.state
     answer = solution.status.is_answer
     margins = () if state is None else margins_data(nlp, x, optimal=answer)
     solved = answer and state is not None
     value = objective(nlp, x, state) if solved else math.nan
-    if solved and workspace is not None and nlp.case.tasks[0].measure:
-        value = over_workspace(nlp.case, workspace.judgement)
+    proof = workspace or path
+    if solved and proof is not None and nlp.case.tasks[0].measure:
+        value = over_workspace(nlp.case, proof.judgement)
     return SolveResult.of(
         solution,
         head=head_data(nlp.case),
@@ -73,6 +78,7 @@ def task_result(
         starts=starts_data(solution),
         certificate=certificate_data(certificate),
         workspace=None if workspace is None else _proof_data(workspace),
+        path=None if path is None else _path_data(path),
         versions=versions(),
     )
 
@@ -82,6 +88,13 @@ def _proof_data(workspace: WorkspaceProof) -> WorkspaceProofData | None:
     from .workspace import proof_data  # noqa: PLC0415 - few cases have one, and it loads the room of proofs
 
     return proof_data(workspace)
+
+
+def _path_data(path: PathProof) -> PathProofData:
+    """Return the proof along the path."""
+    from .path import path_proof_data  # noqa: PLC0415 - few cases have one, and it loads the room of proofs
+
+    return path_proof_data(path)
 
 
 def starts_data(solution: ProgramSolution) -> StartsData:
@@ -172,6 +185,6 @@ def result_of(found: Solution | Certified) -> CaseResult:
     certificates = () if isinstance(found, Solution) else found.tasks
     if solution.combination is None:
         certificate = certificates[0] if certificates else None
-        return task_result(solution.outcomes[0].own, 0, certificate, solution.workspace)
+        return task_result(solution.outcomes[0].own, 0, certificate, solution.workspace, solution.path)
     combined = None if isinstance(found, Solution) else found.combined
     return combined_result(solution, solution.combination, certificates, combined)

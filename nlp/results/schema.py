@@ -21,6 +21,7 @@ from .evidence import CertifiedResult
 from .explorations import FrontResult, SweepResult
 from .jsondata import JsonObject, JsonValue, Mark, kinds_of
 from .parts import SCHEMA
+from .path import PathResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 
@@ -33,6 +34,7 @@ RESULTS: tuple[type[JsonObject], ...] = (
     ChecksResult,
     TradeoffResult,
     WorkspaceResult,
+    PathResult,
     ComparisonResult,
     FrontResult,
     SweepResult,
@@ -181,6 +183,7 @@ Result: TypeAlias = (
     | ChecksResult
     | TradeoffResult
     | WorkspaceResult
+    | PathResult
     | ComparisonResult
     | FrontResult
     | SweepResult

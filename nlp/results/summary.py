@@ -59,12 +59,16 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
 
         yield from proof_lines(result.workspace)
         yield from proof_digest(case, result.workspace)
+    if result.path is not None:
+        from .pathwording import path_proof_lines  # noqa: PLC0415 - in the same way
+
+        yield from path_proof_lines(case, result.path)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
         yield from robot_tables(case, result.robot)
     if result.limits:
         size = 0.0 if result.robot is None else size_of_F(result.robot)
-        yield limit_table(result.limits, size, limits_title(case, result.workspace))
+        yield limit_table(result.limits, size, limits_title(case, result.workspace or result.path))
     if result.tolerance is not None:
         yield tolerance_line(result.tolerance, result.F, case.units)
     yield from evidence_lines(result)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .data import SolveResult
     from .evaluation import PrincipalMotionsData
     from .parts import LimitData, MarginData, RobotData, VersionsData
+    from .path import PathProofData
     from .workspace import WorkspaceProofData
 
 #: So many places where a limit is active are named.
@@ -51,19 +52,19 @@ def principal_table(motions: PrincipalMotionsData, units: Units, size: float) ->
     return TextTable(("resisted", "F", "motion"), tuple(rows), "motions")
 
 
-def limits_title(case: Case, proof: WorkspaceProofData | None = None) -> str:
-    """Return at which poses the rows of the limits hold, where a case has limits over a workspace; else nothing.
+def limits_title(case: Case, proof: WorkspaceProofData | PathProofData | None = None) -> str:
+    """Return at which poses the rows of the limits hold, where a case has limits beside its poses; else nothing.
 
     Args:
         case: the case.
-        proof: of a solved design over the workspace, in which some of its poses became constraints.
+        proof: of a solved design over the workspace or along the path, of which some poses became constraints.
     """
-    if case.workspace is None or not case.workspace.has_limits:
+    if not case.limits_over:
         return ""
     stated = "limits at the stated pose" if case.pose_count == 1 else "limits at the stated poses"
     if proof is None or not proof.poses:
-        return f"{stated}, not over the workspace"
-    return f"{stated}, and where a pose of the workspace became a constraint of its limit"
+        return f"{stated}, not {case.limits_where}"
+    return f"{stated}, and where a pose of the {case.limits_over} became a constraint of its limit"
 
 
 def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") -> TextTable:

@@ -19,6 +19,7 @@ from .workspacemotors import TONES, ends_of_motor, motor_tables
 from .workspaceposes import seeing_lines
 
 if TYPE_CHECKING:
+    from .path import PathClaimData, PathProofData
     from .workspace import (
         ExtremeData,
         MachineData,
@@ -68,14 +69,17 @@ def machine_lines(case: Case, joint_centre: float | None) -> Iterator[Line]:
         yield Line(words, label="machines")
 
 
-def tightest_table(extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
+def tightest_table(
+    extremes: Sequence[ExtremeData | PathClaimData], title: str = "tightest limits over every pose"
+) -> Iterator[TextTable]:
     """Yield the claims that are nearest to their limits: refuted ones first, then open ones."""
     limited = [each for each in extremes if each.limit is not None]
     limited.sort(key=lambda each: (_ORDER.index(each.outcome), ordered(_room(each))))
-    seen: dict[str, ExtremeData] = {}
+    seen: dict[str, ExtremeData | PathClaimData] = {}
     for each in limited:
         # The nearest of each limit stands for all legs and joints.
-        seen.setdefault(f"{each.outcome} {each.key}", each)
+        key = getattr(each, "key", None) or f"{each.name.partition(' ')[0]} {each.sense}"
+        seen.setdefault(f"{each.outcome} {key}", each)
     rows = [
         (
             each.name,
@@ -88,10 +92,10 @@ def tightest_table(extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
     ]
     if rows:
         headers = ("nearest to its limit", "limit", "proven", "reached", "outcome")
-        yield TextTable(headers, tuple(rows), name="tightest", title="tightest limits over every pose")
+        yield TextTable(headers, tuple(rows), name="tightest", title=title)
 
 
-def _room(each: ExtremeData) -> float:
+def _room(each: ExtremeData | PathClaimData) -> float:
     """Return the distance of a claim's bound from its limit, as a part of the limit; negative beyond it."""
     limit = each.limit or 0.0
     value = each.bound if each.bound is not None else each.reached
@@ -176,10 +180,20 @@ def proof_lines(proof: WorkspaceProofData | None) -> Iterator[Line]:
         count = proof.designs[-1].unproved
         words = f"not proved: {count} claim{'' if count == 1 else 's'} refuted or open"
         yield Line(words, label="workspace", tone=Tone.NO_ANSWER)
+    yield from exchange_lines(proof, "workspace")
+
+
+def exchange_lines(proof: WorkspaceProofData | PathProofData, where: str) -> Iterator[Line]:
+    """Yield the designs of an exchange, and the number of its poses.
+
+    Args:
+        proof: of a solved design.
+        where: of what the poses are.
+    """
     steps = ", ".join(f"{each.F:.7g} ({each.unproved} refuted or open)" for each in proof.designs)
     yield Line(f"F = {steps}", label="designs")
     count = len(proof.poses)
-    words = f"{count} pose{'' if count == 1 else 's'} of the workspace became constraints"
+    words = f"{count} pose{'' if count == 1 else 's'} of the {where} became constraints"
     tighter = count and proof.tighter
     after = f", tighter than the limits by {tighter:g} of the program's number" if tighter else ""
     yield Line(words, label="exchange", after=after)

@@ -132,9 +132,11 @@ def certify(
     options = CertifyOptions(gap, above, time_limit, jobs)
     case = found.case if isinstance(found, Solution) else found
     with within(time_limit):
-        if case.tasks[0].measure and case.workspace is not None and case.workspace.has_limits:
+        if case.tasks[0].measure and case.limits_over:
             if with_proof:
-                raise OptionError("proof: the poses of a workspace from which the bound follows are in no case file")
+                raise OptionError(
+                    f"proof: the poses of the {case.limits_over} from which the bound follows are in no case file"
+                )
             solution = found if isinstance(found, Solution) else solve(case, starts=starts, seed=seed, jobs=jobs)
             return _certify_from_poses(solution, options, progress)
         return _certify(found, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=with_proof)

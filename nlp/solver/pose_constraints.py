@@ -19,7 +19,16 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import Dimension, FloatArray, Model, RobotInstance, Substitution, frozen_vector, instantiate
+from ...models import (
+    Dimension,
+    FloatArray,
+    Model,
+    RobotInstance,
+    Substitution,
+    axis_angle_from_matrix,
+    frozen_vector,
+    instantiate,
+)
 from ...models.instance import homogenised
 from ...models.joints.closedform import Reach, closed_form
 from ...models.rows import independent_rows
@@ -27,6 +36,7 @@ from ..case.case import Case
 from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.joints import JointAngle
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ..path.path import SymbolicPose
 from ..program.actuators import level_constraints
 from ..program.nlp import Nlp
 from ..program.places import Scalar
@@ -126,13 +136,20 @@ class PoseConstraints:
 
     Args:
         nlp: the program without them.
-        case: the case, with a workspace.
+        case: the case.
+        middle: pose by whose determinant of J others are measured; that in the middle of the workspace if left out.
+        place: of the frame in which poses are given, in the program's variables; the world's if left out.
     """
 
-    def __init__(self, nlp: Nlp, case: Case) -> None:
-        if case.workspace is None:
-            raise TypeError("a case with limits over its workspace has a workspace")
-        self._nlp, self._case, self._box = nlp, case, pose_box(case.workspace)
+    def __init__(
+        self, nlp: Nlp, case: Case, middle: PoseNumbers | None = None, place: SymbolicPose | None = None
+    ) -> None:
+        if middle is None:
+            if case.workspace is None:
+                raise TypeError("a case with limits over its workspace has a workspace")
+            box = pose_box(case.workspace)
+            middle = box.pose(0.5 * (box.lower + box.upper))
+        self._nlp, self._case, self._middle, self._place = nlp, case, middle, place
         self._closed = closed_form(case.model, extended=True)
         names = [item.name for item in case.model.unknowns]
         own = nlp.program.places.unknowns[0] if names else ()
@@ -250,11 +267,12 @@ class PoseConstraints:
         self, pose: PoseNumbers, errors: FloatArray | None, problem: Problem, x: FloatArray, where: str
     ) -> _ClosedPose | None:
         """Return a machine at a pose; None where the loops of the design (n,) do not close there."""
-        nlp, count, y = self._nlp, len(problem.free), self._box.coordinates(pose)
+        nlp, count, box = self._nlp, len(problem.free), problem.box
+        y = box.coordinates(self._numbers(pose, x))
         start = _closed_at(problem, y)
-        if start is None:
-            return None
         dependent = [j for j in problem.dependent if j < count]
+        if start is None or (dependent and self._place is not None):
+            return None
         places = [problem.free[j] for j in dependent]
         model, reaches = self._closed.model, self._closed.reaches
         parameters, reference = nlp.program.robot.parameters, nlp.program.robot.reference
@@ -266,9 +284,11 @@ class PoseConstraints:
         symbols, coordinates = SX.sym("w", len(names)), SX(y)
         for j, place in enumerate(places):
             coordinates[place] = symbols[j]
-        lower, upper = self._box.lower[places], self._box.upper[places]
+        lower, upper = box.lower[places], box.upper[places]
         room, unknowns = _BEYOND * (upper - lower), symbols[len(places) :]
-        given = Substitution(parameters, unknowns, rotation_of(self._box, coordinates[3:]), coordinates[:3], reference)
+        at = SymbolicPose(coordinates[:3], rotation_of(box, coordinates[3:]))
+        at = at if self._place is None else self._placed(pose)
+        given = Substitution(parameters, unknowns, at.rotation, at.position, reference)
         robot = self._robot(model, given)
         values = [each.value for each in reaches]
         shown = ca.Function("reach", Substitution.identity(model).all, values).call(given.all) if values else []
@@ -284,6 +304,22 @@ class PoseConstraints:
         )
         equations = self._equations(closed, x, where)
         return replace(closed, equations=equations) if len(equations) == len(names) else None
+
+    def _placed(self, pose: PoseNumbers) -> SymbolicPose:
+        """Return a pose in the world."""
+        position, rotation, place = SX(pose.position.tolist()), SX(pose.rotation.tolist()), self._place
+        if place is None:
+            return SymbolicPose(position, rotation)
+        return SymbolicPose(place.position + place.rotation @ position, place.rotation @ rotation)
+
+    def _numbers(self, pose: PoseNumbers, x: FloatArray) -> PoseNumbers:
+        """Return a pose in the world at a point (n,)."""
+        if self._place is None:
+            return pose
+        placed, program = self._placed(pose), self._nlp.program
+        function = ca.Function("placed", [program.x, program.p], [ca.densify(each) for each in placed])
+        position, rotation = (each.full() for each in function(x, self._nlp.arguments))
+        return PoseNumbers(position.ravel(), rotation, *axis_angle_from_matrix(rotation))
 
     @cached_property
     def _built(self) -> BuiltModel:
@@ -330,9 +366,8 @@ class PoseConstraints:
         length = self._case.characteristic_length
         model = self._closed.model
         if robot.jacobian.shape[0] == robot.jacobian.shape[1] and not (model.unknowns or model.members):
-            middle = self._box.pose(0.5 * (self._box.lower + self._box.upper))
-            position, rotation = SX(middle.position.tolist()), SX(middle.rotation.tolist())
-            design = Substitution(self._nlp.program.robot.parameters, SX(0, 1), rotation, position)
+            middle = self._placed(self._middle)
+            design = Substitution(self._nlp.program.robot.parameters, SX(0, 1), middle.rotation, middle.position)
             ratio = ca.det(_rows(robot, length)) / ca.det(_rows(self._robot(model, design), length))
             return BoundedConstraint(Constraint(name, ratio, NUMBER), _DETERMINANT, math.inf)
         one, other = (_rows(each, length) for each in (robot, self._nlp.program.robot))

@@ -12,8 +12,9 @@ Source: J. W. Blankenship, J. E. Falk, *Infinitely constrained optimization prob
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from ..proof.enclosure.engine import kernel
 from ..proof.statement.machine import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import Judgement, judge_workspace
-from ..proof.workspace.numbers.extremes import prove_extreme
+from ..proof.workspace.numbers.extremes import Extreme, prove_extreme
 from ..proof.workspace.ranks.ranks import not_judged
 from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
@@ -39,7 +40,7 @@ from .multistart import ProgramSolution
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
 
 #: Gap of the proofs: several of them fit between a limit of the constraints and that of the case.
-_GAP = 2e-4
+GAP = 2e-4
 #: Part of a minimised level by which the same number over the workspace may be larger.
 LEVEL_ROOM = 1e-3
 #: Reason for ranks that are not judged.
@@ -51,6 +52,8 @@ MOST_EXCHANGES = 40
 SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
 #: Called after each exchange with the number of exchanges, F, and the number of claims that are not proved.
 ExchangeProgress = Callable[[int, float, int], None]
+#: Verdicts on a design.
+Judged = TypeVar("Judged")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,25 @@ class WorkspaceProof:
         return not _faults(self.judgement)
 
 
+@dataclass(frozen=True, eq=False)
+class Exchange(Generic[Judged]):
+    """What the exchange leads to.
+
+    Attributes:
+        found: solution of the last program.
+        judgement: of its design; None where it has no answer, as are all others then.
+        poses: of the constraints, in the order in which they were found.
+        history: F, and the number of claims that were not proved, of each design in turn.
+        first: judgement of the first design.
+    """
+
+    found: ProgramSolution
+    judgement: Judged | None
+    poses: tuple[BindingPose, ...]
+    history: tuple[tuple[float, int], ...]
+    first: Judged | None
+
+
 @one_call
 def solve_over_workspace(
     case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None
@@ -92,32 +114,69 @@ def solve_over_workspace(
         CaseError: the case has several tasks or poses.
         InputError: the C kernel was not built.
     """
-    if len(case.tasks) > 1 or case.pose_count > 1:
-        raise CaseError("limits.over", "needs a case with one task and one stated pose", "workspace", case.source)
-    kernel()  # before any solve where it is missing
+    check_one_pose(case)
     nlp = formulate(case)
-    constraints, binding, history = PoseConstraints(nlp, case), list[BindingPose](), list[tuple[float, int]]()
-    first: Judgement | None = None
+
+    def judged(solved: ProgramSolution) -> tuple[Case, Judgement, list[BindingPose | None]]:
+        design = design_of(case, solved.nlp, solved.x)
+        found = _judged(with_objective(design, solved.F))
+        return design, found, _faults(found)
+
+    done = exchanged(nlp, PoseConstraints(nlp, case), judged, solve_one, progress)
+    if done.judgement is None or done.first is None:
+        return done.found, None
+    return done.found, WorkspaceProof(done.judgement, done.poses, done.history, done.first)
+
+
+def check_one_pose(case: Case) -> None:
+    """Refuse a case whose limits hold beside its poses and that has several tasks or poses, and a missing C kernel.
+
+    Raises:
+        CaseError: the case has several tasks or poses.
+        InputError: the C kernel was not built.
+    """
+    if len(case.tasks) > 1 or case.pose_count > 1:
+        raise CaseError("limits.over", "needs a case with one task and one stated pose", case.limits_over, case.source)
+    kernel()  # before any solve where it is missing
+
+
+def exchanged(
+    nlp: Nlp,
+    constraints: PoseConstraints,
+    judge: Callable[[ProgramSolution], tuple[Case, Judged, list[BindingPose | None]]],
+    solve_one: SolveOne,
+    progress: ExchangeProgress | None,
+) -> Exchange[Judged]:
+    """Return what the exchange of poses leads to.
+
+    Args:
+        nlp: the program without constraints from poses.
+        constraints: such constraints, none yet.
+        judge: returns the design of a solution, with the poses for which it is judged as its workspace; the judgement;
+            and a pose for each claim that is not proved, None for one that is open without a pose.
+        solve_one: solves a program.
+        progress: called after each exchange.
+    """
+    binding, history = list[BindingPose](), list[tuple[float, int]]()
+    first: Judged | None = None
     found = solve_one(nlp, ())
     while found.status.is_answer:
-        design = design_of(case, nlp, found.x)
-        judged = _judged(_with_objective(design, found.F))
+        design, judged, faults = judge(found)
         first = judged if first is None else first
-        faults = _faults(judged)
         history.append((found.F, len(faults)))
         if progress is not None:
             progress(len(history), found.F, len(faults))
         fresh = [each for each in faults if each is not None and not any(map(each.is_same, binding))]
         fresh = constraints.added(design, fresh, found.x)
         if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
-            return found, WorkspaceProof(judged, tuple(binding), tuple(history), first)
+            return Exchange(found, judged, tuple(binding), tuple(history), first)
         binding += fresh
         nlp = constraints.program
         found = solve_one(nlp, [np.concatenate([found.x, nlp.start[len(found.x) :]])])
-    return found, None
+    return Exchange(found, None, (), (), None)
 
 
-def _with_objective(design: Case, level: float) -> Case:
+def with_objective(design: Case, level: float) -> Case:
     """Return a design with a limit on the numbers of its actuators that are minimised: the level and a little more."""
     measure = design.tasks[0].measure
     kinds = {each.key: each for each in (ActuatorForce, ActuatorSpeed, ActuatorPower)}
@@ -135,10 +194,10 @@ def _judged(case: Case) -> Judgement:
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     if closed.reaches:
         layout, claims = reach_claims(case, closed, workspace)
-        found = tuple(prove_extreme(layout, claim, gap=_GAP, jobs=1) for claim in claims)
+        found = tuple(prove_extreme(layout, claim, gap=GAP, jobs=1) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
             return Judgement(case, workspace, not_judged(pose_box(workspace), _UNREACHED), found)
-    return judge_workspace(case, gap=_GAP, jobs=1, with_objective=False)
+    return judge_workspace(case, gap=GAP, jobs=1, with_objective=False)
 
 
 def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
@@ -165,19 +224,23 @@ def _faults(judged: Judgement) -> list[BindingPose | None]:
         )
     if judged.constraints is not None and judged.constraints.outcome is not Outcome.PROVED:
         faults.append(None)
-    by_name = {(each.name, each.sense): each for each in judged.extremes}
-    for each in judged.extremes:
+    return [*faults, *faults_of_numbers(judged.extremes)]
+
+
+def faults_of_numbers(extremes: Sequence[Extreme]) -> Iterator[BindingPose | None]:
+    """Yield a pose for each number whose limit is not proved; None for one that is open without a pose."""
+    by_name = {(each.name, each.sense): each for each in extremes}
+    for each in extremes:
         if not each.fails:
             continue
         if each.pose is None:
-            faults.append(None)
+            yield None
         elif each.key.startswith("actuator."):
             limb = each.name.partition(" limb ")[2]
             short, long = (by_name[f"leg_length limb {limb}", sense].pose for sense in (Sense.MIN, Sense.MAX))
-            faults.append(None if short is None else BindingPose(each.name, short, long, _errors(each.errors)))
+            yield None if short is None else BindingPose(each.name, short, long, _errors(each.errors))
         else:
-            faults.append(BindingPose(each.name, each.pose, None, _errors(each.errors)))
-    return faults
+            yield BindingPose(each.name, each.pose, None, _errors(each.errors))
 
 
 def _errors(found: JointErrors | None) -> FloatArray | None:

@@ -22,6 +22,7 @@ from .status import Status
 
 if TYPE_CHECKING:
     from .. import Picture
+    from .over_path import PathProof
     from .semi_infinite import WorkspaceProof
 
 
@@ -148,6 +149,7 @@ class Solution(Whole, Shown, Answer):
         seconds: wall time.
         workspace: proof that the design keeps its limits over the workspace; None where no limit holds there, or the
             program has no answer.
+        path: proof that it keeps its limits along the path; None in the same cases.
     """
 
     case: Case
@@ -157,6 +159,7 @@ class Solution(Whole, Shown, Answer):
     combination: Combination | None
     seconds: float
     workspace: WorkspaceProof | None = None
+    path: PathProof | None = None
 
     def __repr__(self) -> str:
         if self.combination is None:
@@ -166,6 +169,11 @@ class Solution(Whole, Shown, Answer):
             found = f", {len(self.outcomes)} tasks by {self.combination.method.value}"
             found += "" if value is None else f", value {value:.7g}"
         return f"<Solution of {self.case.name!r}: {self.status.value}{found}>"
+
+    @property
+    def keeps_limits(self) -> bool:
+        """Whether no limit over a workspace or along a path stays without proof."""
+        return all(proof is None or proof.is_proved for proof in (self.workspace, self.path))
 
     @property
     def decided_by(self) -> ProgramSolution | None:

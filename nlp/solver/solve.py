@@ -52,21 +52,27 @@ def solve(
     Raises:
         CaseError: the case contradicts itself, or has several tasks and nothing free.
         InputError: the objective is to be compiled, and there is no C compiler or it fails; or limits hold over a
-            workspace, which needs a proof, and the C kernel was not built.
+            workspace or along a path, which needs a proof, and the C kernel was not built; or the path cannot be read.
     """
     began = time.perf_counter()
     search = case.search.but(starts, seed, compiled=compiled)
     phase(Phase.FORMULATING, 0, len(case.tasks))
-    if case.workspace is not None and case.workspace.has_limits:
-        from .semi_infinite import solve_over_workspace  # noqa: PLC0415 - other solves start without workspaces
+    if case.limits_over:
+        # Other solves start without workspaces.
+        from .over_path import solve_over_path  # noqa: PLC0415
+        from .semi_infinite import solve_over_workspace  # noqa: PLC0415
 
         after_start = None if progress is None else partial(progress, case.tasks[0].name)
 
         def solve_one(nlp: Nlp, first: Sequence[FloatArray]) -> ProgramSolution:
             return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
 
-        own, proof = solve_over_workspace(case, solve_one)
-        solution = replace(solution_of_one_task(case, own), workspace=proof)
+        if case.limits_over == "path":
+            own, along = solve_over_path(case, solve_one)
+            solution = replace(solution_of_one_task(case, own), path=along)
+        else:
+            own, proof = solve_over_workspace(case, solve_one)
+            solution = replace(solution_of_one_task(case, own), workspace=proof)
     else:
         nlps = formulate_each(case)
         solution = solve_programs(case, nlps, search, jobs=jobs, progress=progress, solver=solver, phase=phase)

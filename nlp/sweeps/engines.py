@@ -11,7 +11,6 @@ import enum
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -57,13 +56,13 @@ def solve_point(
         starts: number of starting points.
         seed: seed instead of the case's.
         proof_seconds: seconds for the certificate of the point; None for no certificate.
-        at_stated_pose: whether limits over a workspace are taken at the stated pose alone.
+        at_stated_pose: whether limits over a workspace or along a path are taken at the stated pose alone.
     """
     began = time.perf_counter()
     try:
         case = source.case_at(settings)
-        if at_stated_pose and case.workspace is not None:
-            case = replace(case, workspace=replace(case.workspace, has_limits=False))
+        if at_stated_pose:
+            case = case.at_stated_poses()
         solution = solve(case, starts=starts, seed=seed, jobs=1)
     except CaseError as error:
         return Row(index, REFUSED, None, seconds=time.perf_counter() - began, note=str(error))
@@ -96,8 +95,7 @@ def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
     program = own.nlp.program
     decided = solution.decided_by
     evidence: Evidence | None = solution.evidence
-    is_unproved = solution.workspace is not None and not solution.workspace.is_proved
-    note = "not proved over the workspace" if is_unproved else ""
+    note = "" if solution.keeps_limits else f"not proved {solution.case.limits_where}"
     row = Row(index, solution.status.value, None, engine="ipopt", seconds=seconds, note=note)
     row = row._replace(
         x=tuple(units.shown(float(solution.x[k]), program.variables[k].dimension) for k in design_indices(program))
@@ -159,9 +157,8 @@ class CompiledEngine:
         self.library = _compile(self.places)
         sides = self.places.nlp.sides.sides
         self._side_names = [f"{side.name} {side.bound}" for side in sides]
-        workspace = self.places.nlp.case.workspace
         # All points are solved in one way, those that Ipopt solves too.
-        self._note = "" if workspace is None else workspace.stated_pose_notice
+        self._note = self.places.nlp.case.stated_pose_notice
         self._slopes: dict[tuple[int, float], float] = {}
 
     def solve(self, indices: Sequence[int], values: FloatArray) -> Solved:
@@ -335,7 +332,7 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
         raise InputError("--engine compiled: has no certificates; leave it out, or leave out --certify")
     if wanted is EngineKind.IPOPT or job.certified:
         cases = [job.source.case_at(dict(zip(job.names, values, strict=True))) for values in job.chosen]
-        if job.certified or any(each.workspace and each.workspace.has_limits for each in cases):
+        if job.certified or any(each.limits_over for each in cases):
             kernel()  # before any solve where it is missing
         return Choice(EngineKind.IPOPT, "" if wanted else "a certificate is of one solve by Ipopt")
     try:

@@ -5,14 +5,29 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
-from builders import DOCS, case_from, docs_script, output_of, refusal_of, saved, shipped_tables
+from builders import DOCS, Array, case_from, docs_script, output_of, refusal_of, saved, shipped_tables
+from measures import circle_joints
 
-from screwsynth.nlp import CaseError, PathFile, PathOptions, check_path, load_case, read_path
+from screwsynth.nlp import (
+    CaseError,
+    PathFile,
+    PathOptions,
+    check_path,
+    json_data,
+    load_case,
+    load_result,
+    read_path,
+    solve,
+)
 from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.case.toml import toml_document
 from screwsynth.nlp.path.path import Kind
 from screwsynth.nlp.path.reader import path_of_case
+from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.solver.status import Status
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -139,3 +154,69 @@ def test_the_shipped_program_is_proved_and_its_page_says_so(cli: Run) -> None:
     assert [line.rstrip() for line in shown.partition("numbers at")[0].splitlines()] == rest.partition("```")[
         0
     ].splitlines()
+
+
+#: An arc of a quarter and a line, in inches, about LinuxCNC's hexapod 20 in above its base.
+ARC = "G20\nG94 F60\nG1 X3 Y0 Z20\nG3 X0 Y3 Z21 I-3 A5\nG1 X-4 B-6\nM2\n"
+
+
+def design_along(folder: Path, **keys: object) -> dict[str, object]:
+    """Tables of a hexapod whose base is free and whose legs are limited along a path."""
+    saved(folder / "arc.ngc", ARC)
+    tables = shipped_tables("hexapod-linuxcnc")
+    tables["robot"]["parameters"]["x1"] = {"min": 15, "max": 35}
+    tables["limits"] = {"over": "path", "leg_length": {"min": 25, "max": 40}}
+    tables |= {"path": {"file": str(folder / "arc.ngc")}, "solve": {"starts": 3}}
+    return tables | keys
+
+
+def legs_along(radius: Array, positions: Array, rotations: Array) -> Array:
+    """Lengths (R, N, 6) of the legs of hexapods with bases of these radii at poses, from the joints alone."""
+    _, platform = circle_joints({"x1": 1.0, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
+    base = np.array([circle_joints({"x1": each, "x2": 11.5, "x3": 0.0, "x4": 0.1})[0] for each in radius])
+    tips = positions[:, None, :] + np.einsum("nij,kj->nki", rotations, platform)
+    return np.asarray(np.linalg.norm(tips[None] - base[:, None], axis=3))
+
+
+def test_a_design_keeps_its_limits_along_a_path_and_is_the_best_of_a_grid(tmp_path: Path) -> None:
+    case = case_from(design_along(tmp_path))
+    solution = solve(case)
+    path = path_of_case(case)
+    k, s = np.repeat(np.arange(len(path)), 501), np.tile(np.linspace(0, 1, 501), len(path))
+    radius = np.linspace(15, 35, 801)
+    lengths = legs_along(radius, *path.poses_at(k, s)).reshape(len(radius), -1)
+    kept = radius[(lengths.min(axis=1) >= 25) & (lengths.max(axis=1) <= 40)]
+    # The narrowest base has the largest F: 6 (20 in / length of a leg)^2.
+    home = legs_along(kept[:1], np.array([[0.0, 0, 20]]), np.eye(3)[None])[0, 0, 0]
+    assert solution.status is Status.OPTIMAL
+    assert solution.path is not None
+    assert solution.path.is_proved
+    (found,) = solution.path.judgement.case.components("x1")
+    assert found > kept[0] - (radius[1] - radius[0])
+    assert found == pytest.approx(kept[0], rel=3e-3)
+    assert pytest.approx(6 * (20 / home) ** 2, rel=5e-3) == solution.F
+    # Limits at the stated pose alone have a narrower base.
+    assert solution.path.history[0][1] > 0
+    assert solve(case.at_stated_poses()).F > 1.05 * solution.F
+    assert case_from(case.to_toml()).limits_over == "path"
+
+
+def test_the_proof_along_a_path_is_a_result(cli: Run, tmp_path: Path) -> None:
+    case, out = saved(tmp_path / "case.toml", toml_document(design_along(tmp_path))), tmp_path / "out.json"
+    shown = output_of(cli("solve", str(case), "--json", str(out)))
+    assert "2 segments: proved: regular and within the limits at every point" in " ".join(shown.split())
+    written = json.loads(out.read_text())
+    jsonschema.validate(written, result_schema())
+    assert json_data(load_result(out)) == written
+    assert written["path"]["proved"]
+    assert {each["line"] for each in written["path"]["claims"][1:]} <= {4, 5}
+    output_of(cli("path", str(case), "--of", str(out)))
+    # Of no base all legs are so short: the path has no design.
+    status, shown, _ = cli("solve", str(case), "--set", "limits.leg_length.max=25.5")
+    assert status == 1
+    assert "proved: regular" not in shown
+    refusal_of(
+        cli("solve", str(saved(tmp_path / "none.toml", case.read_text().replace("arc.ngc", "no.ngc")))), "no.ngc"
+    )
+    wrong = case_from(design_along(tmp_path)).to_toml().partition("[path]")[0]
+    refusal_of(cli("solve", str(saved(tmp_path / "without.toml", wrong))), "limits.over", "needs the table [path]")

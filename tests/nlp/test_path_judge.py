@@ -259,6 +259,15 @@ def test_cranks_of_a_delta_are_those_of_its_closed_form() -> None:
             assert found.reached == pytest.approx(end, abs=2e-3)
 
 
+@pytest.mark.parametrize(("turn", "far"), [(0, (0.1, 0.01)), (12, (0.1, 0.01)), (12, (0.1, 0)), (12, (0.1, 0.1))])
+def test_a_delta_does_not_turn_along_a_path(turn: float, far: tuple[float, float]) -> None:
+    tables = starter_tables("delta")
+    tables["robot"]["parameters"] |= {"rb": 0.164, "arm": 0.2, "rod": 0.9}
+    case = case_from(tables | {"limits": {"actuator_angle": {"min": -60, "max": 60}}})
+    judged = judge_path(case, table(case, (0, 0, -0.95, 0, 0, turn), (*far, -0.95, 0, 0, turn)))
+    assert judged.is_proved == (turn == 0)
+
+
 def test_a_path_out_of_reach_is_refuted_and_no_rank_is() -> None:
     tables = starter_tables("delta")
     tables["robot"]["parameters"]["rb"] = 0.164

@@ -491,10 +491,4 @@ def test_what_takes_the_limits_at_the_stated_pose_says_so(tmp_path: Path) -> Non
     assert result["notice"] == notice
     jsonschema.validate(result, result_schema())
     assert notice in " ".join(run.output.split())
-    assert workspace_of_case_notice("hexapod-machining") == ""
-
-
-def workspace_of_case_notice(name: str) -> str:
-    """Notice of a shipped case."""
-    workspace = load_case(name).workspace
-    return "" if workspace is None else workspace.stated_pose_notice
+    assert load_case("hexapod-machining").stated_pose_notice == ""

@@ -55,8 +55,9 @@ class _OpenTable(Table):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, IntervalTable]
 
-    over: Literal["poses", "workspace"] = Field(
-        default="poses", description="whether the limits hold at the stated poses alone, or over the workspace too"
+    over: Literal["poses", "workspace", "path"] = Field(
+        default="poses",
+        description="whether the limits hold at the stated poses alone, or over the workspace or along the path too",
     )
 
 

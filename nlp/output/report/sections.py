@@ -11,10 +11,12 @@ from ...results.checks import published_table
 from ...results.data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult
 from ...results.jointwording import limb_part_table
 from ...results.objective import objective_words
+from ...results.pathwording import claims_table, path_proof_lines
 from ...results.point import task_data
 from ...results.robottables import combined_design_table, robot_tables, solved_design_table
 from ...results.rounding import number, size_of_F
 from ...results.tables import active_table, limit_table, limits_title, margin_table, origin_table, outcome_table
+from ...results.text import Line
 from ...results.wording import (
     certificate_lines,
     costliest_words,
@@ -112,6 +114,16 @@ def workspace_section(report: Report) -> Markup:
     return join_markup([paragraphs(proof_lines(result.workspace)), *tables])
 
 
+def path_section(report: Report) -> Markup:
+    """Return the proof of the design along its path; empty where no limit holds there."""
+    result = report.result
+    if isinstance(result, CombinedResult) or result.path is None:
+        return Markup("")
+    lines = (each for each in path_proof_lines(report.case, result.path) if isinstance(each, Line))
+    tables = claims_table(report.case, [each for each in result.path.claims if each.limit is not None])
+    return join_markup([paragraphs(lines), *(html_table(each, each.title, id=f"path-{each.name}") for each in tables)])
+
+
 def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
     """Return a chart of the bound and the incumbent against time, from a history of (seconds, bound, incumbent)."""
     if not history:
@@ -153,6 +165,7 @@ def sections(report: Report) -> list[tuple[str, str, Markup]]:
         ("evidence", "Evidence of optimality", evidence_section(report)),
         ("certificate", "Certificate", certificate_section(report)),
         ("workspace", "Workspace", workspace_section(report)),
+        ("path", "Path", path_section(report)),
         ("published", "Published and computed", published_section(report)),
         ("origin", "Case text and versions", _origin(report)),
     ]
@@ -293,7 +306,7 @@ def _limits(report: Report) -> Markup:
     if not limits:
         return Markup("")
     caption = "Margin and cost of each limit"
-    proof = report.result.workspace if isinstance(report.result, SolveResult) else None
+    proof = report.result.workspace or report.result.path if isinstance(report.result, SolveResult) else None
     held = limits_title(report.case, proof)
     caption += f": {held}" if held else ""
     robot = report.result.robot

@@ -162,7 +162,7 @@ def claim_words(case: Case, statement: Statement, bound: float | None) -> str:
         bound: upper bound of the maximised value, minus F for a minimum; None where there is no feasible point.
     """
     where = f"within the limits of {case.name}"
-    if case.workspace is not None and case.workspace.stated_pose_notice:
+    if case.limits_over:
         where += ", taken at the stated pose alone,"
     if has_modes(case.model):
         where += " in home's working mode" if statement.in_home_mode else " in every working mode"

@@ -173,6 +173,9 @@ def judge_path(
                 raise NotJudgedError(
                     "its platform has fewer than six freedoms, and the path states more of its numbers"
                 )
+            # An equation of a number that hardly changes counts as one that follows from others, but must hold.
+            if not np.array_equal(design.start[: len(design.free)], first[list(design.free)]):
+                raise NotJudgedError("its loops could not be closed at the first point of the path")
             machines = Machines(case, closed, design)
         except NotJudgedError as error:
             rank = RankOnPath(REGULAR, Outcome.OPEN, None, None, 0, 0.0, str(error))
