@@ -271,6 +271,12 @@ def test_the_table_of_actuators_has_poses_times_and_differences(cli: Run, tmp_pa
     actuators = json.loads(result.read_text())["path"]["actuators"]
     assert [each["acceleration"] for each in actuators] == pytest.approx(np.nanmax(np.abs(numbers[:, 22:]), axis=0))
     assert all(each["speed"] >= np.nanmax(np.abs(v[:, k])) for k, each in enumerate(actuators))
+    shown = output_of(cli(*arguments, "--within", "0.01", "--json", str(result)))
+    knots = json.loads(result.read_text())["path"]["knots"]
+    assert knots["within"] == 0.01
+    assert 0 < knots["deviation"] <= 0.01
+    assert knots["number"] == knots["closed"] == len(out.read_text().splitlines()) - 1
+    assert "within 0.01 in proved" in " ".join(shown.split())
     for more, word in ((("--step", "0"), "--step"), (("--within", "-1"), "--within"), (("--step", "nan"), "--step")):
         refusal_of(cli(*arguments, *more), f"{word} {more[1]}")
     refusal_of(cli(*arguments, "--step", "1", "--within", "1"), "--step and --within")
