@@ -30,6 +30,8 @@ Values = dict[str, Array]
 POINTS, CLOSED, STEPS = 10_000, 300, 12
 SINGULAR = 1e9
 GALLERY = ("6-pus", "6-rss", "6-rus", "6-ups", "delta", "orthoglide", "planar-3-rrr", "planar-3-prr", "planar-3-rpr")
+#: Of the programs, by minutes.
+FEED = 100
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 
 
@@ -52,6 +54,17 @@ class Segment(NamedTuple):
             found[:, first] = self.centre[0] + np.hypot(*arm) * np.cos(angle)
             found[:, second] = self.centre[1] + np.hypot(*arm) * np.sin(angle)
         return found
+
+    def seconds(self, scale: float) -> float:
+        """Return the time of the motion, with lengths of the case times a scale in those of the program."""
+        way = self.end[:3] - self.start[:3]
+        length = float(np.linalg.norm(way))
+        if self.plane:
+            first, second, along = PLANES[self.plane]
+            radius = np.hypot(*(self.start[[first, second]] - self.centre))
+            length = float(np.hypot(radius * self.sweep, way[along]))
+        turn = float(np.linalg.norm(np.degrees(self.end[3:] - self.start[3:])))
+        return 60 / FEED * (length * scale if length else turn)
 
     def line(self, scale: float) -> str:
         """Return the words of a program."""
@@ -114,7 +127,7 @@ def judged_path(tables: Tables, path: list[Segment], rng: np.random.Generator) -
     scale = {"m": 1000.0, "mm": 1.0, "in": 1.0}[label]
     tables = tables | {"units": tables.get("units", {}) | {"length": label}}
     begin = Segment(path[0].start, path[0].start)
-    lines = [f"{'G20' if label == 'in' else 'G21'} G90 G94 F100", begin.line(scale)]
+    lines = [f"{'G20' if label == 'in' else 'G21'} G90 G94 F{FEED}", begin.line(scale)]
     lines += [each.line(scale) for each in path]
     with tempfile.TemporaryDirectory() as folder:
         case, program, out = (Path(folder) / name for name in ("case.toml", "part.ngc", "result.json"))
@@ -123,7 +136,8 @@ def judged_path(tables: Tables, path: list[Segment], rng: np.random.Generator) -
         words = ["--time", str(rng.choice([8, 15])), "--gap", str(rng.choice([0.1, 0.01, 1e-3]))]
         code, _, err = command("path", str(case), "--along", str(program), *words, "--json", str(out))
         if out.exists():
-            return json.loads(out.read_text(encoding="utf-8")) | {"status": code}, {}
+            seconds = [each.seconds(scale) for each in path]
+            return json.loads(out.read_text(encoding="utf-8")) | {"status": code, "seconds": seconds}, {}
     if code == 2:
         return None, {"counts": {f"refused: {err.strip()[-60:]}": 1}, "faults": []}
     return None, {"counts": {"failed": 1}, "faults": [err]}
@@ -169,6 +183,16 @@ class Attack:
             best = max(best, float(found.max()))
         return best
 
+    def speed(self, actuator: str, seconds: list[float]) -> float:
+        """Return the largest mean speed between samples, of an actuator whose coordinates are known; -inf of others."""
+        best = -np.inf
+        for values, time in zip(self.sampled, seconds, strict=True):
+            for quantity in ("leg_length", "actuator_length", "actuator_angle"):
+                own = values.get(f"{quantity} limb {actuator}")
+                if own is not None:
+                    best = max(best, np.nanmax(np.abs(np.diff(own)), initial=-np.inf) * (len(own) - 1) / time)
+        return float(best)
+
     def value(self, name: str, place: Tables) -> float:
         """Return the number of the design at a place of a result."""
         return float(self.at(place["segment"], np.array([place["parameter"]]), 0)[name][0])
@@ -203,6 +227,12 @@ def judge(attack: Attack, result: Tables, label: str) -> tuple[Counter[str], lis
             lengths = [attack.largest(f"leg_length limb {name.split()[-1]}", way) for way in (1.0, -1.0)]
             long, short = lengths[0], -lengths[1]
             found = sign * (long - short if "stroke" in own else 2 * short - long)
+        elif own.startswith("actuator_speed"):
+            found = attack.speed(name.removeprefix("actuator_speed actuator "), result["seconds"])
+            scale = attack.unit if each["unit"].startswith(("deg", "rad")) else 1.0
+            counts[f"speeds of {label}: {'not ' * (not np.isfinite(found))}sampled"] += 1
+            if np.isfinite(found) and outcome == "proved":
+                counts[f"speeds proved within {'2 %' if each['bound'] * scale <= 1.02 * found else 'more'}"] += 1
         elif own not in attack.sampled[0]:
             counts[f"not judged: {re.sub('[0-9:+-]+', '', own)}"] += 1
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.task import Sense
@@ -94,15 +94,24 @@ def _knot_lines(path: PathData, unit: str) -> Iterator[Line]:
 def _actuator_table(path: PathData) -> TextTable:
     """Return the table of the actuators' numbers."""
 
-    def cell(value: float | None) -> str:
-        return "" if value is None else number(value)
+    def column(word: str, values: Iterable[float | None]) -> list[str]:
+        """Return a column with its head; none where nothing is known."""
+        cells = ["" if each is None else number(each) for each in values]
+        return [word, *cells] if any(cells) else []
 
-    rows = [
-        (each.actuator, each.unit, *map(cell, (each.smallest, each.largest, each.speed, each.acceleration)))
-        for each in path.actuators
+    every = path.actuators
+    columns = [
+        ["actuator", *(each.actuator for each in every)],
+        ["unit", *(each.unit for each in every)],
+        column("smallest", (each.smallest for each in every)),
+        column("largest", (each.largest for each in every)),
+        column("speed", (each.speed for each in every)),
+        column("acceleration", (each.acceleration for each in every)),
     ]
-    headers = ("actuator", "unit", "smallest", "largest", "speed", "acceleration")
-    title = "proven ranges and largest speeds by seconds, and largest accelerations between knots"
+    headers, *rows = zip(*filter(None, columns), strict=True)
+    has_knots = path.knots is not None and path.time is not None
+    title = "proven ranges and largest speeds by seconds" if path.time is not None else "proven ranges"
+    title += ", and largest accelerations between knots" if has_knots else ""
     return TextTable(headers, tuple(rows), name="actuators", title=title)
 
 

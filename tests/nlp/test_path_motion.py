@@ -1,5 +1,6 @@
 """Speeds of actuators in the motion of a path, against differences of coordinates that are computed one by one."""
 
+import cmath
 import json
 import math
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
 from screwsynth.nlp.proof.workspace.path_knots import Knots, Sampling
+from screwsynth.nlp.proof.workspace.robot.path_cover import PathCover
 
 Run = Callable[..., tuple[int, str, str]]
 #: Parameters of the points of each segment at which coordinates are computed.
@@ -275,7 +277,88 @@ def test_the_table_of_actuators_has_poses_times_and_differences(cli: Run, tmp_pa
     actuators = json.loads(result.read_text())["path"]["actuators"]
     assert [each["acceleration"] for each in actuators] == pytest.approx(np.nanmax(np.abs(numbers[:, 22:]), axis=0))
     assert all(each["speed"] >= np.nanmax(np.abs(v[:, k])) for k, each in enumerate(actuators))
+    shown = output_of(cli(*arguments, "--within", "0.01", "--json", str(result)))
+    knots = json.loads(result.read_text())["path"]["knots"]
+    assert knots["within"] == 0.01
+    assert 0 < knots["deviation"] <= 0.01
+    assert knots["number"] == knots["closed"] == len(out.read_text().splitlines()) - 1
+    assert "within 0.01 in proved" in " ".join(shown.split())
     for more, word in ((("--step", "0"), "--step"), (("--within", "-1"), "--within"), (("--step", "nan"), "--step")):
         refusal_of(cli(*arguments, *more), f"{word} {more[1]}")
     refusal_of(cli(*arguments, "--step", "1", "--within", "1"), "--step and --within")
     refusal_of(cli(*arguments, "--step", "1e-9"), "knots")
+
+
+def test_speeds_are_those_of_every_machine_within_the_tolerance() -> None:
+    tolerance = 0.05
+    tables = shipped_tables("hexapod-linuxcnc") | {"limits": {}, "tolerance": {"joint_centre": tolerance}}
+    case, rng = case_from(tables), np.random.default_rng(5)
+    path = table(case, ROBOTS["legs"][1] + ROBOTS["legs"][2] * rng.uniform(-1, 1, (3, 6)), np.array([0.0, 1.0, 2.0]))
+    bounds = np.array([each.bound for each in largest(judge_path(case, path), "actuator_speed")])
+    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
+    most = np.zeros(6)
+    for _ in range(200):
+        e, f = rng.normal(size=(2, 6, 3))
+        e, f = (tolerance * each / np.linalg.norm(each, axis=1)[:, None] for each in (e, f))
+        for k in range(2):
+            p, R = path.poses_at([k] * 101, np.linspace(0, 1, 101))
+            spans = p[:, None] + np.einsum("nij,kj->nki", R, platform + f) - base - e
+            q = np.linalg.norm(spans, axis=2)
+            most = np.maximum(most, np.abs(np.diff(q, axis=0)).max(axis=0) * 100 / path.durations[k])
+    assert (most <= bounds).all()
+    assert (bounds <= 1.02 * most).all()
+
+
+def test_powers_are_forces_times_the_speeds_of_the_path() -> None:
+    tables = shipped_tables("hexapod-linuxcnc") | {"limits": {}, "motion": {"linear": 100}}
+    case = case_from(tables | {"load": [{"name": "cut", "force": [3, -2, 10], "moment": [5, 0, 2]}]})
+    path = program(case, "G94 F60\nG3 X0 Y0 Z22 A3 C9 I2 J1\nG1 X3\nM2", (0, 0, 20, 0, 0, 0))
+    judged = judge_path(case, path)
+    assert len(largest(judged, "actuator_speed")) == 6
+    found = []
+    for k in range(len(path)):
+        at = inverse(case, *path.poses_at([k] * len(SAMPLES), SAMPLES))
+        # By virtual work: a unit rate of one leg moves the platform by a column of the inverse of all rates.
+        motions = np.linalg.inv(at.rates)
+        forces = -np.einsum("i,nik->nk", [5, 0, 2, 3, -2, 10], motions)
+        speeds = np.abs(np.diff(at.coordinates, axis=0)) * (len(SAMPLES) - 1) / path.durations[k]
+        found.append(np.stack([np.maximum(sign * 0.5 * (forces[1:] + forces[:-1]), 0) * speeds for sign in (1, -1)]))
+    sampled = np.concatenate(found, axis=1).max(axis=1)
+    # Gaps are parts of the largest power.
+    gap = 0.02 * sampled.max()
+    for k, leg in enumerate(("1-", "1+", "2-", "2+", "3-", "3+")):
+        forward, backward = (each.bound for each in largest(judged, f"actuator_power actuator {leg}"))
+        assert sampled[0, k] * (1 - 1e-4) <= forward <= 1.01 * sampled[0, k] + gap
+        assert sampled[1, k] * (1 - 1e-4) <= backward <= 1.01 * sampled[1, k] + gap
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_derivatives_of_arcs_whose_radius_grows_are_between_their_bounds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    arc = rng.uniform([-1, -1, 0.5, -0.1, -3, -9], [1, 1, 3, 0.1, 3, 9])
+    knots = rng.uniform(-1, 1, (2, 6))
+    plane = [(0, 1, 2), (2, 0, 1), (1, 2, 0)][seed % 3]
+    cover = PathCover(knots, arc[None], np.array([plane]), np.array([2.0]))
+    change = knots[1] - knots[0]
+
+    def pose(s: complex) -> list[complex]:
+        found = [complex(x) for x in knots[0] + s * change]
+        radius, angle = arc[2] + s * arc[3], arc[4] + s * arc[5]
+        found[plane[0]], found[plane[1]] = arc[0] + radius * cmath.cos(angle), arc[1] + radius * cmath.sin(angle)
+        return found
+
+    for _ in range(50):
+        low, high = np.sort(rng.uniform(0, 1, 2))
+        piece = np.array([[0, low, high]])
+        for s in np.linspace(low, high, 9):
+            # Derivatives by a complex step, and by its real part.
+            step = 1e-4
+            values = np.array(pose(s + 1j * step))
+            first, second = values.imag / step, 2 * (np.array(pose(s)).real - values.real) / step**2
+            for order, found in ((1, first), (2, second)):
+                lower, upper = cover.derivatives(piece, order)
+                assert (lower[0] - 1e-5 <= found).all()
+                assert (found <= upper[0] + 1e-5).all()
+        lower, upper = cover.derivatives(np.array([[0, low, low]]))
+        assert (upper - lower).max() < 1e-11
+        assert cover.rates(np.array([[0, low, low]]))[0] == pytest.approx(lower / 2, abs=1e-11)

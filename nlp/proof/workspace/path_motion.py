@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 from casadi import SX
 
+from ....models import FloatArray
 from ....models.statics import driven_joints
 from ...errors import UncoveredError
 from ..statement.claims import ACTUATED, Claim
@@ -19,6 +21,9 @@ from .numbers.machines import Machines
 from .numbers.path_speeds import PathSpeeds, with_rates
 from .robot.path_cover import PathCover
 from .robot.posed_robot import NotJudgedError
+
+#: Number of places at which the width of a bound over machines is taken.
+_POINTS, _SEED = 64, 0
 
 
 class SpeedsOnPath(NamedTuple):
@@ -40,7 +45,11 @@ def speeds_on_path(machines: Machines, cover: PathCover, gap: float) -> SpeedsOn
     claims, number = list(speed_claims(machines.case)), None
     try:
         number = PathSpeeds(with_rates(machines.family, cover), coordinates_of(machines))
-        every = smallest_values(number, [goal_of(claim, 0.0, gap, is_enough=False) for claim in claims])
+        goals = [
+            goal_of(claim, wider, gap, is_enough=False)
+            for claim, wider in zip(claims, _wider(number, cover).tolist(), strict=True)
+        ]
+        every = smallest_values(number, goals)
     except (NotJudgedError, UncoveredError) as error:
         every = [Minimum(reason=str(error))] * len(claims)
     found = []
@@ -49,6 +58,21 @@ def speeds_on_path(machines: Machines, cover: PathCover, gap: float) -> SpeedsOn
         pose = problem.box.pose(problem.pose_of(each.at)) if math.isfinite(each.value) else None
         found.append(extreme_of(claim, each, pose))
     return SpeedsOnPath(claims, found, number)
+
+
+def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
+    """Return by how much bounds at places are beyond the values of the design there, (K,): no smaller boxes help.
+
+    They are those of all machines.
+    """
+    problem = number.problem
+    if not problem.names or problem.problem.dependent:
+        return np.zeros(number.count)
+    rng = np.random.default_rng(_SEED)
+    k, s = rng.integers(0, len(cover.pieces), _POINTS), rng.random(_POINTS)
+    z = problem.path_points(cover, np.stack([k, s, s], axis=1), 0.0)
+    beyond = number.values(problem.exact(z)) - number.bounds(z, z)
+    return np.asarray(np.nan_to_num(beyond, posinf=0.0).max(axis=0))
 
 
 def coordinates_of(machines: Machines) -> SX:

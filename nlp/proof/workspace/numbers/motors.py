@@ -102,9 +102,12 @@ class Motors(Number):
         """
         motion = self._loading.motion or Motion()
         with np.errstate(all="ignore"):
-            A, D, *_, wrenches, _ = self._at(z)
+            A, D, _, twist, _, wrenches, _ = self._at(z)
             x = np.linalg.norm(solved(A, D).c[:6, self._column], axis=0)
-            ends = [(motion.linear + motion.angular * self._length) / x for _ in self._parts]
+            fast = np.asarray(motion.linear + motion.angular * self._length)
+            if twist.c.size:
+                fast = np.linalg.norm(twist.c[:3, 0], axis=0) + np.linalg.norm(twist.c[3:, 0], axis=0)
+            ends = [fast / x for _ in self._parts]
             for j, (sense, load) in enumerate(self._parts):
                 if sense is not None:
                     parts = [each for each, _ in self._loading.cases[load].parts]

@@ -50,6 +50,7 @@ def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
         start=np.concatenate([start[:n], 0.5 * first[0] + 0.5 * first[1], start[n:]]),
         design=None if problem.design is None else _with(problem.design, cover, rates),
         rates=own,
+        resting=problem,
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import casadi as ca
@@ -327,10 +327,24 @@ def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
 
 
 def _closed_along(problem: Problem, cover: PathCover) -> FloatArray:
-    """Return closed points (N, n) in the middle of segments, each from the one before; the start where one is lost."""
+    """Return closed points (N, n) of the design in the middle of segments, or in one before where one is lost."""
+    near, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.dependent)
+    if D:
+        design = problem.problem
+        free, followed = len(problem.free), _followed(design.resting or design, cover)
+        near[:, D], near[:, :free] = followed[:, D], followed[:, :free]
+    return near
+
+
+@lru_cache(maxsize=2)
+def _followed(problem: Problem, cover: PathCover) -> FloatArray:
+    """Return closed points (N, n) in the middle of segments, each from the one before; the start where one is lost.
+
+    The searches of one path share them.
+    """
     near, free, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.free), problem.dependent
     z = problem.start.copy()
-    points = [cover.points(cover.pieces, part)[:, free] for part in (0.5, 1.0)] if D else []
+    points = [cover.points(cover.pieces, part)[:, free] for part in (0.5, 1.0)]
     for k, both in enumerate(zip(*points, strict=True)):
         for point in both:
             moved = z.copy()
@@ -338,6 +352,7 @@ def _closed_along(problem: Problem, cover: PathCover) -> FloatArray:
             moved = problem.loops.all_closed(moved[:, None], D)[:, 0]
             z = moved if np.isfinite(moved).all() else z
             near[k] = z if point is both[0] else near[k]
+    near.flags.writeable = False
     return near
 
 

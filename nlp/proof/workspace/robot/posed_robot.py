@@ -65,6 +65,7 @@ class Problem:
         cover: of the path that is meant; None for the whole box.
         rates: indices of the coordinates that are rates, by seconds, of the pose's numbers in the path's motion: of
             positions and angles. There is one for each free number, or none.
+        resting: the design without rates, of a design with them.
     """
 
     box: PoseBox
@@ -82,6 +83,7 @@ class Problem:
     design: Problem | None = field(default=None, repr=False)
     cover: PathCover | None = None
     rates: tuple[int, ...] = ()
+    resting: Problem | None = field(default=None, repr=False)
 
     @property
     def problem(self) -> Problem:
