@@ -275,6 +275,33 @@ def test_both_rules_of_roll_pitch_and_yaw_give_the_same_verdicts(
         assert one.reached == pytest.approx(also.reached, rel=2e-3, abs=1e-3)
 
 
+def test_every_number_is_the_same_in_all_coordinates(monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = shipped_tables("hexapod-linuxcnc")
+    tables["limits"] = {"base_joint_angle": {"max": 60}, "platform_joint_angle": {"max": 80}}
+    tables["load"] = [{"name": "push", "force": [1, 2, -10]}]
+    case = case_from(tables)
+    # Where yaw alone varies, both motions are the same.
+    path = table(case, np.array([(0, 0, 20, 0, 0, -20), (1, 1, 21, 0, 0, 25.0)]))
+    every = [turns_of_path(path), turns_of_path(replace(path, between=Between.SLERP))]
+    every.append(LinearAngles(path.knots[:, 3:], path.order, 1.0, (8, 1, -2, 3)))
+    judged = []
+    for turns in every:
+        monkeypatch.setattr(path_judge, "turns_of_path", lambda _, turns=turns: turns)
+        judged.append(judge_path(case, path))
+    own, *others = judged
+    assert len(own.extremes) == 36
+    for other in others:
+        assert outcomes(own) == outcomes(other)
+        reached, bounds = (
+            [[getattr(each, name) for each in found.extremes] for found in (own, other)]
+            for name in ("reached", "bound")
+        )
+        np.testing.assert_allclose(*reached, rtol=5e-3)
+        # Bounds within limits are as wide as boxes are.
+        is_free = np.array([each.limit is None for each in own.extremes])
+        np.testing.assert_allclose(*np.array(bounds)[:, is_free], rtol=2e-2)
+
+
 @pytest.mark.parametrize("between", Between)
 def test_a_singular_pose_is_crossed_or_touched_by_turns(between: Between) -> None:
     # The octahedral platform is singular where it is turned by a right angle.
