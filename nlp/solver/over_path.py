@@ -8,6 +8,7 @@ from functools import partial
 
 from ...models import FloatArray, axis_angle_from_matrix
 from ..case.case import Case
+from ..case.pose import Free
 from ..interruption import one_call
 from ..path.placing import in_frame, in_world, placed
 from ..path.reader import path_of_case, stated_path
@@ -74,6 +75,9 @@ def solve_over_path(
     check_one_pose(case)
     nlp, numbers, frame = with_place(formulate(case), case)
     path = path_of_case(case) if frame is None else stated_path(case)
+    if frame is not None and case.path is not None:
+        # What is not covered after such a turn is refused before any solve.
+        placed(path, [0.0] * 3 + [float(isinstance(value, Free) or value != 0) for value in case.path.place[3:]])
     start = path.poses_at([0], 0.0)
     first = PoseNumbers(start.positions[0], start.rotations[0], *axis_angle_from_matrix(start.rotations[0]))
 

@@ -272,6 +272,16 @@ def test_a_path_in_another_place(tmp_path: Path, text: str, place: tuple[float, 
     assert found.rotations == pytest.approx(expected.rotations, abs=1e-12)
 
 
+def test_a_free_turn_that_is_not_covered_is_refused_before_a_solve(tmp_path: Path) -> None:
+    tables = design_along(tmp_path)
+    tables["path"]["place"] = {"roll": {"min": -5, "max": 5}}
+    with pytest.raises(InputError, match="line 4: an arc is not covered with roll or pitch"):
+        solve(case_from(tables))
+    tables["path"]["place"] = {"yaw": {"min": -5, "max": 175}}
+    with pytest.raises(CaseError, match=r"path.place.yaw.max = 175.0: must be between"):
+        case_from(tables)
+
+
 def test_the_place_of_a_path_and_the_design_are_the_best_of_a_grid(cli: Run, tmp_path: Path) -> None:
     saved(tmp_path / "line.ngc", LINE)
     tables = design_along(tmp_path)
