@@ -103,6 +103,8 @@ class Case(Whole, Shown):
         _check_tolerance(self)
         if self.workspace is not None:
             self.workspace.check(self.units)
+        if self.path is not None:
+            self.path.check(self.units)
         if not 1 / LARGEST <= check_real(self.characteristic_length, "robot.characteristic_length") <= LARGEST:
             raise CaseError("robot.characteristic_length", "must be positive and finite", self.characteristic_length)
 

@@ -17,6 +17,8 @@ _Place: TypeAlias = tuple[Any, int | str]
 
 #: Stands before the dotted key of a limit.
 _LIMITS = "limits."
+#: Stands before the name of a number of a path's place.
+_PLACE = "path.place."
 #: What a free number has.
 _ENDS = ("min", "max", "start")
 #: Beginning of the name of a number of a task, such as ``task.pitch`` or ``task[1].point_x``.
@@ -34,7 +36,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         tables: the document, as ``tomllib`` returns it; changed in place.
         name: the name in the case; behind the name of a free number ``.min``, ``.max`` or ``.start`` may stand; or
             the dotted key of a limit, such as ``limits.leg_length.max``, or of a number of a task, such as
-            ``task.pitch`` and ``task.point_x``, with its place among several as in ``task[1].pitch``.
+            ``task.pitch`` and ``task.point_x``, with its place among several as in ``task[1].pitch``; or of the place
+            of a path, such as ``path.place.x``.
         value: a number, or three, in the file's units.
 
     Raises:
@@ -42,6 +45,9 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     """
     if name.startswith(_LIMITS):
         _override_limit(tables, name, value)
+        return
+    if name.startswith(_PLACE):
+        _override_place(tables, name, value)
         return
     if _TASK.fullmatch(name):
         _override_task(tables, name, value)
@@ -101,6 +107,20 @@ def _override_task(tables: dict[str, Any], name: str, value: float | list[float]
         raise CaseError(name, f"cannot be set; {nearest(name, places)}")
     table, place = places[name]
     table[place] = value
+
+
+def _override_place(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
+    """Replace or add a number of a path's place; arguments and errors are those of :func:`override_number`."""
+    key, _, end = name.removeprefix(_PLACE).partition(".")
+    path = tables.get("path")
+    if not isinstance(path, dict):
+        raise CaseError(name, "cannot be set: the case has no path")
+    table = path.setdefault("place", {})
+    if end:
+        if not isinstance(table.get(key), dict):
+            raise CaseError(name, f"cannot be set: {_PLACE}{key} is not free")
+        table, key = table[key], end
+    table[key] = value
 
 
 def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[str]]:

@@ -238,7 +238,7 @@ def _case_of(written: Document, name: str, source: str, folder: str, robot_file:
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
         workspace=written.read_workspace(units),
-        path=written.read_path(folder),
+        path=written.read_path(folder, units),
         loading=written.read_loading(units),
         tasks=written.read_tasks(tasks),
         units=units,

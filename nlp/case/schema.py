@@ -352,11 +352,12 @@ class Document(Table):
         """
         return None
 
-    def read_path(self, folder: str) -> PathFile | None:  # noqa: ARG002 - it has none
+    def read_path(self, folder: str, units: Units) -> PathFile | None:  # noqa: ARG002 - it has none
         """Return the programmed path that the document states; None where it states none.
 
         Args:
             folder: of the document, beside which the path's file is.
+            units: the document's units.
 
         Raises:
             CaseError: limits hold along a path that is not stated.

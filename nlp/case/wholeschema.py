@@ -15,9 +15,9 @@ from .checks import check_direction
 from .limits.registry import LimitsTable
 from .loads import Loading
 from .loadtables import GravityTable, LoadTable, MotionTable, ObjectiveTable, loading_of
-from .pathfile import Convention, PathFile
+from .pathfile import PLACE, Convention, PathFile
 from .pose import internal_value
-from .schema import Document, FileName
+from .schema import Document, FileName, Value
 from .table import Table, Vector, fault_of
 from .task import Task
 from .workspace import TURNS, TurnKind, Turns, Workspace
@@ -80,6 +80,17 @@ class WorkspaceTable(Table):
 Six = Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)]
 
 
+class PlaceTable(Table):
+    """The place of a path's frame in the world; free numbers are chosen by a solve with limits over the path."""
+
+    x: Value = Field(default=0.0, description="position")
+    y: Value = Field(default=0.0, description="position")
+    z: Value = Field(default=0.0, description="position")
+    roll: Value = Field(default=0.0, description="first turn, about the world's x")
+    pitch: Value = Field(default=0.0, description="second turn, about the world's y")
+    yaw: Value = Field(default=0.0, description="third turn, about the world's z")
+
+
 class PathTable(Table):
     """The programmed path along which a machine is judged."""
 
@@ -93,6 +104,7 @@ class PathTable(Table):
     )
     angles: Convention = Field(default=PathFile.angles, description="convention of a program's A, B and C")
     between: Literal["angles", "slerp"] | None = Field(default=None, description="motion between two points")
+    place: PlaceTable | None = Field(default=None, description="of the path's frame; left out: that of the world")
 
 
 class WholeDocument(Document):
@@ -116,14 +128,19 @@ class WholeDocument(Document):
         position = [internal_value(value, units, Dimension.LENGTH) for value in self.workspace.position]
         return Workspace(position, _turns(self.workspace.rotation, units), has_limits)
 
-    def read_path(self, folder: str) -> PathFile | None:
+    def read_path(self, folder: str, units: Units) -> PathFile | None:
         """Return the programmed path that the document states, along which its limits may hold."""
         has_limits = self.limits is not None and self.limits.over == "path"
         if self.path is None:
             if has_limits:
                 raise CaseError("limits.over", "needs the table [path], which names its file", "path")
             return None
-        return PathFile(folder=folder, has_limits=has_limits, **dict(self.path))
+        given, stated = dict(self.path), self.path.place
+        given["place"] = tuple(
+            0.0 if stated is None else internal_value(getattr(stated, name), units, dimension)
+            for name, dimension in PLACE.items()
+        )
+        return PathFile(folder=folder, has_limits=has_limits, **given)
 
     def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
         """Return the tasks, that of a number of the actuators in the place of F of a motion."""

@@ -88,7 +88,7 @@ def _lines(case: Case) -> Iterator[str]:
     if case.workspace is not None:
         yield from toml_table("[workspace]", case.workspace.to_keys(case.units))
     if case.path is not None:
-        yield from toml_table("[path]", case.path.to_keys())
+        yield from toml_table("[path]", case.path.to_keys(units))
     settings = {key: getattr(case.search, key) for key in ("starts", "seed", "max_iterations", "screen")}
     yield from toml_table("[solve]", {key: each for key, each in settings.items() if each != getattr(Search, key)})
     yield from _expectation(case.expect)

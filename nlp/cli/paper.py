@@ -38,12 +38,13 @@ def read_machine(name: str, settings: Settings, of: str | None) -> Machine:
     """
     from ..case.reader import read_case
     from ..errors import one_line
-    from ..results.settings import dimensions_of, load_answer, robot_of
+    from ..results.settings import dimensions_of, load_answer, place_of, robot_of
 
     if of is None:
         return Machine(read_case(name, settings), settings)
     case, result = read_case(name).case, load_answer(of)
-    chosen = {**dimensions_of(robot_of(result, f"--of {of}", case, of_any_case=True), case), **settings}
+    robot = robot_of(result, f"--of {of}", case, of_any_case=True)
+    chosen = {**dimensions_of(robot, case), **place_of(result, case), **settings}
     if result.head.case != case.name:
         typer.echo(f"--of {one_line(of)}: has the dimensions of the case {one_line(result.head.case)!r}", err=True)
     return Machine(read_case(name, chosen), chosen)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..case.case import Case
 from ..case.pathfile import PathFile
+from ..case.pose import Free
 from ..errors import CaseError, InputError
 from ..system.reading import read_limited, text_of_bytes
 from ..units import Units
@@ -16,6 +17,7 @@ from .gcode import read_program
 from .options import Between, PathOptions
 from .orientation import quaternions_from_angles, shortest_turns
 from .path import ProgrammedPath
+from .placing import placed
 from .poses_csv import read_poses
 
 #: Size of the largest file, bytes: some ten million lines.
@@ -56,16 +58,27 @@ def read_path(file: str | Path, units: Units, options: PathOptions | None = None
 
 
 def path_of_case(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the path that a case states.
+    """Return the path that a case states, in its place.
 
     Args:
         case: the case.
         options: in the place of those that the case states.
 
     Raises:
-        CaseError: it states none.
-        InputError: its file cannot be read, or holds anything that is not read.
+        CaseError: it states none, or a number of its place is free.
+        InputError: its file cannot be read, or holds anything that is not read, or that is not covered in its place.
     """
+    path, stated = stated_path(case, options), case.path
+    numbers = () if stated is None else stated.place
+    fixed = [value for value in numbers if not isinstance(value, Free)]
+    if stated is not None and stated.free:
+        fault = "is free, and a path is judged in one place: give it with --set, or a result with --of"
+        raise CaseError(f"path.place.{stated.free[0]}", fault, source=case.source)
+    return placed(path, fixed)
+
+
+def stated_path(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
+    """Return the path that a case states, in its own frame; arguments and errors are those of :func:`path_of_case`."""
     stated = case.path
     if stated is None:
         raise CaseError("path", "is missing: give the table [path], or the file of a path", source=case.source)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...models import Dimension
 from ...models.statics import driven_joints
+from ..case.pathfile import PLACE
 from ..case.task import Sense
 from ..proof.statement.claims import ACTUATED
 from ..proof.workspace.numbers.extremes import Extreme
@@ -173,6 +174,26 @@ class PathResult(JsonObject):
     versions: VersionsData
 
 
+class PlaceData(JsonObject):
+    """Place of a path's frame in the world.
+
+    Attributes:
+        x: first coordinate of its origin.
+        y: second coordinate.
+        z: third coordinate.
+        roll: first turn, about the world's x.
+        pitch: second turn, about the world's y.
+        yaw: third turn, about the world's z.
+    """
+
+    x: float
+    y: float
+    z: float
+    roll: float
+    pitch: float
+    yaw: float
+
+
 class PathProofData(JsonObject):
     """Proof of a design along its path, by exchange of poses.
 
@@ -185,6 +206,7 @@ class PathProofData(JsonObject):
         poses: of the constraints.
         file: name of the path's file.
         segments: their number.
+        place: of the path's frame.
         claims: ranks first.
     """
 
@@ -195,6 +217,7 @@ class PathProofData(JsonObject):
     poses: tuple[BindingData, ...]
     file: str
     segments: int
+    place: PlaceData
     claims: tuple[PathClaimData, ...]
 
 
@@ -229,6 +252,12 @@ def path_proof_data(proof: "PathProof") -> PathProofData:
         poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
         file=judged.path.source,
         segments=len(judged.path),
+        place=PlaceData(
+            **{
+                name: units.shown(value, dimension)
+                for (name, dimension), value in zip(PLACE.items(), proof.place, strict=True)
+            }
+        ),
         claims=_claims(judged),
     )
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from ..case.pathfile import PLACE
+from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
 from .rounding import number
@@ -139,6 +141,15 @@ def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line | TextTa
         count = proof.designs[-1].unproved
         words = f"not proved: {count} claim{'' if count == 1 else 's'} refuted or open"
         yield Line(whole + words, label="path", tone=Tone.NO_ANSWER)
+    stated = case.path
+    for (name, dimension), value in zip(PLACE.items(), () if stated is None else stated.place, strict=False):
+        if value != 0:
+            given = getattr(proof.place, name)
+            between = ""
+            if isinstance(value, Free):
+                ends = (number(case.units.shown(end, dimension)) for end in (value.lower, value.upper))
+                between = f", free between {' and '.join(ends)}"
+            yield Line(f"{number(given)} {case.units.label(dimension)}", label=f"place {name}", after=between)
     yield from exchange_lines(proof, "path")
     yield from machine_lines(case, proof.joint_centre)
     yield from tightest_table(proof.claims, "tightest limits along the path")

@@ -71,6 +71,14 @@ def dimensions_of(robot: RobotData, case: Case) -> Settings:
     }
 
 
+def place_of(result: Answer, case: Case) -> Settings:
+    """Return the free numbers of a path's place in a result by the names that they have in its case; none without."""
+    path = result.path if isinstance(result, SolveResult) else None
+    if path is None or case.path is None:
+        return {}
+    return {f"path.place.{name}": getattr(path.place, name) for name in case.path.free}
+
+
 def _pose_settings(prefix: str, pose: Pose, data: PoseData) -> Settings:
     """Return the numbers of a pose; those of a rotation only where it is free."""
     found: dict[str, float | list[float]] = {

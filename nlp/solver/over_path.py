@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
-from ...models import axis_angle_from_matrix
+from ...models import FloatArray, axis_angle_from_matrix
 from ..case.case import Case
+from ..case.pose import Free
 from ..interruption import one_call
-from ..path.reader import path_of_case
+from ..path.placing import in_frame, in_world, placed
+from ..path.reader import path_of_case, stated_path
 from ..program.formulation import formulate
 from ..proof.statement.claims import REGULAR
 from ..proof.workspace.path_judge import PathJudgement, judge_path
 from ..proof.workspace.robot.pose_box import PoseNumbers
 from ..proof.workspace.verdict import Outcome
 from .multistart import ProgramSolution
+from .placement import with_place
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
 from .semi_infinite import (
     GAP,
@@ -34,12 +38,14 @@ class PathProof:
 
     Attributes:
         judgement: of the design.
+        place: (6,) of the path's frame: position, then roll, pitch and yaw, radians.
         poses: poses of the constraints, in the order in which they were found.
         history: F, and the number of claims that were not proved, of each design in turn.
         tighter: part of themselves by which the limits of the constraints are tighter than those of the case.
     """
 
     judgement: PathJudgement
+    place: tuple[float, ...]
     poses: tuple[BindingPose, ...]
     history: tuple[tuple[float, int], ...]
     tighter: float = TIGHTER
@@ -67,18 +73,40 @@ def solve_over_path(
             covered, or the C kernel was not built.
     """
     check_one_pose(case)
-    path, nlp = path_of_case(case), formulate(case)
+    nlp, numbers, frame = with_place(formulate(case), case)
+    path = path_of_case(case) if frame is None else stated_path(case)
+    if frame is not None and case.path is not None:
+        # What is not covered after such a turn is refused before any solve.
+        placed(path, [0.0] * 3 + [float(isinstance(value, Free) or value != 0) for value in case.path.place[3:]])
     start = path.poses_at([0], 0.0)
-    middle = PoseNumbers(start.positions[0], start.rotations[0], *axis_angle_from_matrix(start.rotations[0]))
+    first = PoseNumbers(start.positions[0], start.rotations[0], *axis_angle_from_matrix(start.rotations[0]))
 
     def judged(solved: ProgramSolution) -> tuple[Case, PathJudgement, list[BindingPose | None]]:
-        found = judge_path(with_objective(design_of(case, solved.nlp, solved.x), solved.F), path, gap=GAP)
-        return found.case, found, list(_faults(found))
+        place = numbers(solved.x)
+        along = path if frame is None else placed(path, place.tolist())
+        found = judge_path(with_objective(design_of(case, solved.nlp, solved.x), solved.F), along, gap=GAP)
+        faults = _faults(found)
+        if frame is None:
+            return found.case, found, list(faults)
+        return found.case, found, [None if each is None else _moved(each, partial(in_frame, place)) for each in faults]
 
-    done = exchanged(nlp, PoseConstraints(nlp, case, middle), judged, solve_one, progress)
+    done = exchanged(nlp, PoseConstraints(nlp, case, first, frame), judged, solve_one, progress)
     if done.judgement is None:
         return done.found, None
-    return done.found, PathProof(done.judgement, done.poses, done.history)
+    place, poses = numbers(done.found.x), done.poses
+    if frame is not None:
+        poses = tuple(_moved(each, partial(in_world, place)) for each in poses)
+    return done.found, PathProof(done.judgement, tuple(place.tolist()), poses, done.history)
+
+
+def _moved(each: BindingPose, move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]) -> BindingPose:
+    """Return a claim at poses that are moved from one frame to another, from position and rotation."""
+
+    def moved(pose: PoseNumbers) -> PoseNumbers:
+        position, rotation = move(pose.position, pose.rotation)
+        return PoseNumbers(position, rotation, *axis_angle_from_matrix(rotation))
+
+    return each._replace(pose=moved(each.pose), longest=None if each.longest is None else moved(each.longest))
 
 
 def _faults(judged: PathJudgement) -> Iterator[BindingPose | None]:

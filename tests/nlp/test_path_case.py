@@ -2,19 +2,21 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
-from builders import DOCS, Array, case_from, docs_script, output_of, refusal_of, saved, shipped_tables
+from builders import DOCS, Array, case_from, docs_script, output_of, refusal_of, saved, shipped_tables, turn_about
 from measures import circle_joints
 
 from screwsynth.nlp import (
     CaseError,
+    InputError,
     PathFile,
     PathOptions,
+    certify,
     check_path,
     json_data,
     load_case,
@@ -24,7 +26,7 @@ from screwsynth.nlp import (
 )
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.toml import toml_document
-from screwsynth.nlp.path.path import Kind
+from screwsynth.nlp.path.path import Kind, Poses
 from screwsynth.nlp.path.reader import path_of_case
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.status import Status
@@ -220,3 +222,141 @@ def test_the_proof_along_a_path_is_a_result(cli: Run, tmp_path: Path) -> None:
     )
     wrong = case_from(design_along(tmp_path)).to_toml().partition("[path]")[0]
     refusal_of(cli("solve", str(saved(tmp_path / "without.toml", wrong))), "limits.over", "needs the table [path]")
+
+
+#: A line of 8 in, from the origin of a frame of its own.
+LINE = "G20\nG94 F60\nG1 X0 Y0 Z0\nG1 X8 A4\nM2\n"
+#: The same without a turn, and a quarter of a circle.
+STRAIGHT, QUARTER = LINE.replace(" A4", ""), "G20\nG94 F60\nG1 X3 Y0 Z0\nG3 X0 Y3 I-3 Z1 B2\nM2\n"
+
+
+def at_place(place: Sequence[float], poses: Poses) -> Poses:
+    """Poses with a frame that is moved and turned by roll, pitch and yaw."""
+    R = turn_about((0, 0, 1), place[5]) @ turn_about((0, 1, 0), place[4]) @ turn_about((1, 0, 0), place[3])
+    return Poses(poses.positions @ R.T + np.array(place[:3]), np.einsum("ij,njk->nik", R, poses.rotations))
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        (QUARTER, (1.0, -2, 3, 0, 0, 0), ""),
+        (QUARTER, (1.0, -2, 3, 0, 0, 0.7), ""),
+        (QUARTER, (0.0, 0, 0, 0.1, 0, 0.7), "line 4: an arc is not covered with roll or pitch"),
+        (QUARTER.replace("G20", "G20\nG18").replace("Y3 I-3 Z1", "Y0 Z3 I-3"), (1.0, 2, 3, 0, 0, 0), ""),
+        (QUARTER.replace("G20", "G20\nG18").replace("Y3 I-3 Z1", "Y0 Z3 I-3"), (0.0, 0, 0, 0, 0, 1), "outside of the"),
+        (LINE, (1.0, 2, 3, 0, 0, -1), ""),
+        (LINE, (1.0, 2, 3, 0, 0.2, 0), "line 4: angles that change linearly are not covered with roll or pitch"),
+        (STRAIGHT, (1.0, 2, 3, 0.3, -0.2, 1), ""),
+    ],
+)
+def test_a_path_in_another_place(tmp_path: Path, text: str, place: tuple[float, ...], words: str) -> None:
+    saved(tmp_path / "part.ngc", text)
+    units = load_case("hexapod-linuxcnc").units
+    names = ("x", "y", "z", "roll", "pitch", "yaw")
+    keys = {
+        name: math.degrees(each) if k > 2 else each for k, (name, each) in enumerate(zip(names, place, strict=True))
+    }
+    case = case_from(shipped_tables("hexapod-linuxcnc") | {"path": {"file": str(tmp_path / "part.ngc"), "place": keys}})
+    again = case_from(case.to_toml()).path
+    assert again is not None
+    assert again.place == pytest.approx(place, abs=1e-15)
+    if words:
+        with pytest.raises(InputError, match=words):
+            path_of_case(case)
+        return
+    path, own = path_of_case(case), read_path(tmp_path / "part.ngc", units)
+    s = np.linspace(0, 1, 33)
+    k = np.zeros(len(s), dtype=np.intp)
+    found, expected = path.poses_at(k, s), at_place(place, own.poses_at(k, s))
+    assert found.positions == pytest.approx(expected.positions, abs=1e-12)
+    assert found.rotations == pytest.approx(expected.rotations, abs=1e-12)
+
+
+def test_a_free_turn_that_is_not_covered_is_refused_before_a_solve(tmp_path: Path) -> None:
+    tables = design_along(tmp_path)
+    tables["path"]["place"] = {"roll": {"min": -5, "max": 5}}
+    with pytest.raises(InputError, match="line 4: an arc is not covered with roll or pitch"):
+        solve(case_from(tables))
+    tables["path"]["place"] = {"yaw": {"min": -5, "max": 175}}
+    with pytest.raises(CaseError, match=r"path.place.yaw.max = 175.0: must be between"):
+        case_from(tables)
+
+
+def test_the_place_of_a_path_and_the_design_are_the_best_of_a_grid(cli: Run, tmp_path: Path) -> None:
+    saved(tmp_path / "line.ngc", LINE)
+    tables = design_along(tmp_path)
+    place = {"x": {"min": -10.0, "max": 10.0, "start": 5.0}, "y": 1.0, "z": 18.0}
+    tables["path"] = {"file": str(tmp_path / "line.ngc"), "place": place}
+    tables["limits"] = {"over": "path", "leg_length": {"min": 25, "max": 32}}
+    case, out = saved(tmp_path / "case.toml", toml_document(tables)), tmp_path / "out.json"
+    shown = " ".join(output_of(cli("solve", str(case), "--json", str(out))).split())
+    result = json.loads(out.read_text())
+    path = read_path(tmp_path / "line.ngc", load_case(str(case)).units)
+    s, radius, shift = np.linspace(0, 1, 41), np.linspace(18, 30, 121), np.linspace(-10, 10, 201)
+    poses = path.poses_at(np.zeros(len(s), dtype=np.intp), s)
+    kept = np.zeros((len(radius), len(shift)), dtype=bool)
+    for k, x in enumerate(shift):
+        lengths = legs_along(radius, *at_place((x, 1, 18, 0, 0, 0), poses)).reshape(len(radius), -1)
+        kept[:, k] = (lengths.min(axis=1) >= 25) & (lengths.max(axis=1) <= 32)
+    home = legs_along(radius, np.array([[0.0, 0, 20]]), np.eye(3)[None])[:, 0, 0]
+    kept &= ((home >= 25) & (home <= 32))[:, None]
+    best = int(np.argmax(kept.any(axis=1)))
+    assert best > 0
+    assert result["path"]["proved"]
+    assert math.isclose(result["parameters"]["x1"], radius[best], rel_tol=5e-3)
+    near = shift[kept[best]]
+    assert near.min() - 0.2 <= result["path"]["place"]["x"] <= near.max() + 0.2
+    assert np.ptp(near) < 2
+    assert (result["path"]["place"]["y"], result["path"]["place"]["z"]) == (1.0, 18.0)
+    assert "free between -10 and 10" in shown
+    # The machine and the place of the result, and another place, which has no machine.
+    output_of(cli("path", str(case), "--of", str(out)))
+    refusal_of(cli("path", str(case), "--set", "x1=20"), "path.place.x: is free")
+    assert cli("path", str(case), "--of", str(out), "--set", "path.place.x=6")[0] == 1
+    assert cli("solve", str(case), "--set", "path.place.x.min=5")[0] == 1
+    refusal_of(cli("solve", str(case), "--set", "path.place.y.min=5"), "path.place.y is not free")
+    refusal_of(cli("solve", str(case), "--set", "path.place.a=5"), "path.place.a: no such key")
+
+
+def test_the_least_force_over_the_places_of_a_path_is_that_of_a_grid(tmp_path: Path) -> None:
+    saved(tmp_path / "line.ngc", LINE)
+    tables = design_along(tmp_path)
+    tables["robot"]["parameters"]["x1"] = 26.5
+    tables["limits"] = {"over": "path", "leg_length": {"min": 20, "max": 40}}
+    ends = {"min": -12.0, "max": 0.0, "start": -9.0}
+    tables["path"] = {"file": str(tmp_path / "line.ngc"), "place": {"x": ends, "z": 19.0, "yaw": 20.0}}
+    push = np.array([0.0, 1.0, -10.0])
+    del tables["task"]
+    tables |= {"load": [{"name": "push", "force": push.tolist()}], "objective": {"minimise": "actuator_force"}}
+    case = case_from(tables)
+    found = certify(case, gap=1e-3)
+    proof = found.solution.path
+    assert found.solution.status is Status.OPTIMAL
+    assert proof is not None
+    assert proof.is_proved
+
+    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
+    s = np.linspace(0, 1, 41)
+    own = read_path(tmp_path / "line.ngc", case.units).poses_at(np.zeros(len(s), dtype=np.intp), s)
+
+    def largest(x: float) -> float:
+        """Largest force of a leg along the path in its place, by the balance of forces and moments."""
+        sizes = []
+        for position, rotation in zip(*at_place((x, 0, 19, 0, 0, math.radians(20)), own), strict=True):
+            arms = platform @ rotation.T
+            along = position + arms - base
+            along /= np.linalg.norm(along, axis=1)[:, None]
+            wrenches = np.hstack([along, np.cross(arms, along)])
+            sizes.append(np.abs(np.linalg.solve(wrenches.T, np.array([*push, 0, 0, 0]))).max())
+        return max(sizes)
+
+    grid = np.linspace(-12, 0, 241)
+    forces = np.array([largest(x) for x in grid.tolist()])
+    best = int(np.argmin(forces))
+    assert 0 < best < len(grid) - 1
+    assert math.isclose(found.solution.F, forces[best], rel_tol=3e-3)
+    assert abs(proof.place[0] - grid[best]) < 0.2
+    assert largest(proof.place[0]) < forces[best] * (1 + 2e-3)
+    # The bound is one of every place.
+    assert found.certificate is not None
+    assert 0.99 * forces[best] < found.certificate.bound < forces[best]

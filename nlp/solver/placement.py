@@ -1,0 +1,73 @@
+"""The place of a path as variables of a program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ...models import FloatArray, frozen_vector
+from ..case.case import Case
+from ..case.pathfile import PLACE
+from ..case.pose import Free
+from ..path.orientation import ORDERS, symbolic_rotation
+from ..path.path import SymbolicPose
+from ..program.nlp import Nlp
+from ..program.places import Scalar
+
+
+class Placement(NamedTuple):
+    """A program with the free numbers of a path's place.
+
+    Attributes:
+        nlp: the program.
+        numbers: returns the place (6,) at a point of the program, or of one with further variables.
+        frame: the place as expressions; None where nothing of it is free.
+    """
+
+    nlp: Nlp
+    numbers: Callable[[FloatArray], FloatArray]
+    frame: SymbolicPose | None
+
+
+def with_place(nlp: Nlp, case: Case) -> Placement:
+    """Return a program with the free numbers of the place of its case's path as variables."""
+    place = () if case.path is None else case.path.place
+    free = [k for k, value in enumerate(place) if isinstance(value, Free)]
+    fixed = np.array([0.0 if isinstance(value, Free) else value for value in place])
+    # The level of an epigraph stays the last variable.
+    epigraph = nlp.program.places.epigraph
+    first = nlp.n if epigraph is None else epigraph.level
+
+    def numbers(x: FloatArray) -> FloatArray:
+        found = fixed.copy()
+        found[free] = x[first : first + len(free)]
+        return found
+
+    if not free:
+        return Placement(nlp, numbers, None)
+    symbols, every = SX.sym("place", len(free)), SX(fixed.tolist())
+    every[free] = symbols
+    # With both indices below a column stays one where it is empty.
+    ranges = [value for value in place if isinstance(value, Free)]
+    names, program = list(PLACE.items()), nlp.program
+    added = [Scalar(f"path.place.{names[k][0]}", names[k][1]) for k in free]
+    if epigraph is not None:
+        epigraph = replace(epigraph, level=first + len(free))
+    wide = replace(
+        nlp,
+        program=replace(
+            program,
+            variables=(*program.variables[:first], *added, *program.variables[first:]),
+            x=ca.vertcat(program.x[:first, :], symbols, program.x[first:, :]),
+            places=replace(program.places, epigraph=epigraph),
+        ),
+        lower=frozen_vector(np.insert(nlp.lower, first, [value.lower for value in ranges])),
+        upper=frozen_vector(np.insert(nlp.upper, first, [value.upper for value in ranges])),
+        start=frozen_vector(np.insert(nlp.start, first, [value.first for value in ranges])),
+    )
+    return Placement(wide, numbers, SymbolicPose(every[:3], symbolic_rotation(every[3:], ORDERS["rpy"])))
