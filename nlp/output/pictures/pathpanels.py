@@ -223,7 +223,7 @@ def _coordinates(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPa
 
 
 def _speeds(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
-    """Yield the speeds along a path whose segments have times, and the largest ones of the case's motions."""
+    """Yield the speeds along a path whose segments have times, or else the largest ones of the case's motions."""
     units, every = judged.case.units, motor_numbers(samples.numbers, MotorNumber.SPEED).get("", [])
     limited = {each.claim.motor.actuator: each.limit for each in every if each.claim.motor and each.limit is not None}
     timed = [(k, each) for k, each in enumerate(driven_joints(judged.case.model)) if k < samples.speeds.shape[1]]
@@ -235,7 +235,8 @@ def _speeds(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:
             ends = {factor * limited[each.name] for _, each in own if each.name in limited}
             limits = tuple(sign * end for end in ends for sign in (-1, 1))
             yield _without_peaks(PathPanel("speeds along the path", units.label(dimension), curves, limits))
-    yield from _of_motors(judged, every, "largest speeds in the motions of the case")
+    if not judged.path.is_timed:
+        yield from _of_motors(judged, every, "largest speeds in the motions of the case")
 
 
 def _forces(judged: PathJudgement, samples: PathSamples) -> Iterator[PathPanel]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ....models import FloatArray, axis_angle_from_matrix
 from ....models.joints.closedform import ClosedForm, closed_form
+from ...case.case import Case
 from ...case.motors import Motor, MotorNumber
 from ...case.task import Sense
 from ...errors import InputError, UncoveredError
@@ -24,7 +25,7 @@ from ...evidence.inverse import InversePoses, inverse
 from ...path.path import Poses
 from ...path.sampling import Points, spread_points, twists_at
 from ..statement.claims import Claim, searched_claims
-from ..statement.motors import motor_claims
+from ..statement.motors import motor_claims, speed_claims
 from .numbers.expressions import Expressions
 from .numbers.machines import Machines
 from .numbers.motors import Motors
@@ -128,6 +129,8 @@ def samples_of(judged: PathJudgement, most: int = MOST_POINTS) -> PathSamples:
     if joints is not None:
         speeds = np.einsum("pai,pi->pa", joints.rates, twists_at(path, points))
     numbers, left_out = _numbers(replace(judged, case=case), poses, joints)
+    if path.is_timed:
+        numbers = (*numbers, *_own_speeds(case, speeds))
     keys, margins = _margins(numbers, len(points.parameters))
     return PathSamples(points, poses, joints, speeds, numbers, left_out, keys, margins)
 
@@ -145,8 +148,12 @@ def _numbers(
 ) -> tuple[tuple[SampledNumber, ...], tuple[str, ...]]:
     """Return the numbers of claims at poses, and the keys of limits without values."""
     case, closed = judged.case, closed_form(judged.case.model)
-    claims = [*searched_claims(case), *motor_claims(case)]
-    keys = [each.key for each in claims if each.limit is not None]
+    motors, lost = list(motor_claims(case)), list[Claim]()
+    if judged.path.is_timed:  # then speeds are those of the path, and powers of [motion] are not asked for
+        lost = [each for each in motors if each.motor and each.motor.number is MotorNumber.POWER]
+        motors = [each for each in motors if each.motor and each.motor.number is MotorNumber.FORCE]
+    claims = [*searched_claims(case), *motors]
+    keys = [each.key for each in (*claims, *lost) if each.limit is not None]
     if case.workspace is None or (joints is None and closed.model.unknowns):
         return (), tuple(dict.fromkeys(keys))
     box = pose_box(case.workspace)
@@ -161,7 +168,7 @@ def _numbers(
     z = np.hstack([at[:, list(problem.free)], _unknowns(closed, joints, len(at))])
     if joints is not None:
         z[~joints.closed] = np.nan
-    found, left_out = [], []
+    found, left_out = [], [each.key for each in lost if each.limit is not None]
     posed = [each for each in machines.symbols.claims((), with_objective=False)[1] if each.limit is not None]
     if posed:
         numbers = Expressions(problem, ca.vertcat(*map(machines.number, posed)))
@@ -173,6 +180,13 @@ def _numbers(
         except (NotJudgedError, UncoveredError):
             left_out += [each.key for each in group if each.key]
     return tuple(found), tuple(dict.fromkeys(left_out))
+
+
+def _own_speeds(case: Case, speeds: FloatArray) -> Iterator[SampledNumber]:
+    """Yield the sizes of speeds (P, a) of actuators in the path's own motion; NaN where it has no time."""
+    for claim in speed_claims(case) if speeds.shape[1] else ():
+        k = claim.motor.place if claim.motor else 0
+        yield SampledNumber(claim, np.array([claim.reading.from_value(each) for each in np.abs(speeds[:, k]).tolist()]))
 
 
 def _unknowns(closed: ClosedForm, joints: InversePoses | None, count: int) -> FloatArray:
