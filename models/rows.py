@@ -49,7 +49,7 @@ def independent_rows(jacobians: Sequence[FloatArray]) -> tuple[int, ...]:
 
     def worst(rows: tuple[int, ...]) -> float:
         values = [np.linalg.svd(each[list(rows)], compute_uv=False) for each in jacobians]
-        return min((float(each[-1] / each[0]) for each in values if each.size), default=1.0)
+        return min((float(each[-1] / each[0]) if each[0] else 0.0 for each in values if each.size), default=1.0)
 
     return max(sorted(each for each in sets if len(each) == most), key=worst)
 

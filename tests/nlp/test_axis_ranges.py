@@ -225,9 +225,9 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     status, shown, _ = cli("path", "hexapod-linuxcnc", "--range", "--start", "0,0,50,0,0,0")
     assert status == 1
     assert "leg_length limb 3+ above 43 in: 54.63139 in" in shown
-    refusal_of(cli("path", "hexapod-linuxcnc"), "--along FILE or --range")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--along", "a.ngc"), "not both")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--unit", "mm"), "--unit: needs --along FILE")
+    refusal_of(cli("path", "hexapod-linuxcnc"), "the table [path], or the file of a path")
+    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--along", "a.ngc"), "--along: is not for --range")
+    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--unit", "mm"), "--unit: is not for --range")
     refusal_of(cli("path", "hexapod-linuxcnc", "--along", "a.ngc", "--most", "1,1"), "--most: needs --range")
     refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--most", "1,-1"), "--most 1,-1: must be two positive")
 

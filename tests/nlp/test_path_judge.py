@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import Array, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
 
@@ -80,6 +80,7 @@ def hexapod(limits: str = "") -> Case:
     return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": {"leg_length": limits} if limits else {}})
 
 
+@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.tuples(*[st.floats(-9, 9)] * 6, *[st.floats(-140, 140)] * 6),
     st.sampled_from([(17, "IJ"), (18, "KI"), (19, "JK")]),
@@ -110,13 +111,15 @@ def test_boxes_of_pieces_hold_their_points(
     for is_upper in halves:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_upper else (low, middle)
-    for k in range(2):
+    for k in range(len(path)):
         lower, upper = cover.boxes(np.array([[k, low, high]]))
         s = np.array([low, high, min(max(low + part * (high - low), low), high)])
         y = points_of(path, k, s)
         y[:, 3:] = np.tan(0.5 * y[:, 3:])
         assert (np.minimum(y - lower, upper - y) >= 0).all()
         assert (upper - lower <= 200 * turns * (high - low) * (1 + upper[:, 3:].max() ** 2) + 1e-9).any()
+    if len(path) == 1:  # a line that moves nothing
+        return
     # Segments meet in a pose, so that loops can be followed from one to the next.
     one, other = cover.boxes(np.array([[0, low, 1.0], [1, 0, high]]))
     assert (one.max(axis=0) <= other.min(axis=0)).all()

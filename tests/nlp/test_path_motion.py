@@ -23,6 +23,7 @@ from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
 from screwsynth.nlp.proof.workspace.path_knots import Knots, Sampling
 from screwsynth.nlp.proof.workspace.robot.path_cover import PathCover
+from screwsynth.nlp.proof.workspace.robot.path_turns import Tangents
 
 Run = Callable[..., tuple[int, str, str]]
 #: Parameters of the points of each segment at which coordinates are computed.
@@ -338,7 +339,7 @@ def test_derivatives_of_arcs_whose_radius_grows_are_between_their_bounds(seed: i
     arc = rng.uniform([-1, -1, 0.5, -0.1, -3, -9], [1, 1, 3, 0.1, 3, 9])
     knots = rng.uniform(-1, 1, (2, 6))
     plane = [(0, 1, 2), (2, 0, 1), (1, 2, 0)][seed % 3]
-    cover = PathCover(knots, arc[None], np.array([plane]), np.array([2.0]))
+    cover = PathCover(knots[:, :3], arc[None], np.array([plane]), Tangents(knots[:, 3:]), np.array([2.0]))
     change = knots[1] - knots[0]
 
     def pose(s: complex) -> list[complex]:
