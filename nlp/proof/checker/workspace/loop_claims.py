@@ -28,6 +28,9 @@ from .pose_boxes import COORDINATES, Attempt, PoseRoot
 _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
+#: Parts of a length, or radians, by which a number of the pose is moved to test equations that were left out, their
+#: largest residual then, and the number of coordinates of positions.
+_SHORT, _ROUNDING, _POSITION = 1e-3, 1e-12, 3
 
 
 class PosedLoops(NamedTuple):
@@ -77,7 +80,23 @@ def posed_loops(
         raise ProofError(f"the check has no rule for {error}") from None
     if built is not None:
         _refuse_other_freedoms(robot, assembly)
+    if len(needed) < robot.equations.numel():
+        _refuse_narrow(robot, assembly, root)
     return PosedLoops(robot, start, assembly, tolerance)
+
+
+def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> None:
+    """Refuse an equation that was left out as a number of the pose hardly changes, and does not hold where it does."""
+    for j in (each for each in assembly.independent if each < len(robot.free)):
+        k = robot.free[j]
+        for end in (root.lower[k], root.upper[k]):
+            to = assembly.start[None].copy()
+            near = _SHORT * (robot.length if k < _POSITION else 1.0)
+            to[0, j] = np.clip(end, to[0, j] - near, to[0, j] + near)
+            (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
+            every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
+            if np.isfinite(z).all() and not np.abs(every).max(initial=0.0) <= _ROUNDING:
+                raise ProofError("the loops do not close all over the workspace")
 
 
 def _refuse_other_freedoms(robot: PosedRobot, assembly: Assembly) -> None:

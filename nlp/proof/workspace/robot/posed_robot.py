@@ -39,6 +39,9 @@ _CLOSED = 1e-9
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
 _SEED = 0
+#: Parts of a length, or radians, by which a number of the pose is moved at most where an equation that was left out is
+#: tested, and its largest residual then: several roundings.
+_NEAR, _ROUNDING = 1e-3, 1e-12
 
 
 class NotJudgedError(ValueError):
@@ -205,6 +208,7 @@ def build_problem(case: Case, model: Model, box: PoseBox, at: FloatArray | None 
     middle[list(dependent)] = start[list(dependent)]
     moved = loops.all_closed(middle[:, None], dependent)[:, 0]
     start = moved if loops.is_closed(moved) else start
+    _check_left_out(loops, start, dependent, box, case.characteristic_length)
     chosen = _chosen(posed, model, start, needed, case.characteristic_length)
     posed = posed.reduced(chosen)
     return Problem(
@@ -219,6 +223,27 @@ def build_problem(case: Case, model: Model, box: PoseBox, at: FloatArray | None 
         posed=posed,
         chosen=chosen,
     )
+
+
+def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...], box: PoseBox, length: float) -> None:
+    """Refuse a robot with a loop equation that was left out and does not hold where a number of the pose moves.
+
+    An equation of a number that hardly changes in a narrow workspace counts as one that follows from others.
+
+    Raises:
+        NotJudgedError: an equation does not hold.
+    """
+    own = [j for j in range(len(box.free)) if j not in dependent]
+    if loops.every.numel() == loops.count or not own:
+        return
+    # Each number alone, to both ends of its range, or so near that the loops stay in their assembly.
+    points = np.repeat(start[:, None], 2 * len(own), axis=1)
+    for k, j in enumerate(own):
+        at, near = box.free[j], _NEAR * (length if box.free[j] < 3 else 1.0)
+        points[j, 2 * k : 2 * k + 2] = np.clip([box.lower[at], box.upper[at]], start[j] - near, start[j] + near)
+    off = loops.residuals(loops.all_closed(points, dependent) if dependent else points)
+    if (off > _ROUNDING).any():
+        raise NotJudgedError("its loops do not close all over the workspace: the platform cannot move in all numbers")
 
 
 def family_of(case: Case, built: BuiltModel, design: Problem, tolerance: float) -> Problem:
