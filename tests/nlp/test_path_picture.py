@@ -118,6 +118,17 @@ def test_faults_are_marked_and_their_segments_are_shaded(spindle: PathPicture) -
     assert spindle.samples.is_violated.tolist() == ((lengths(spindle.at) > 43 * (1 + 3e-9)).any(axis=1) | fast).tolist()
 
 
+def test_the_first_force_beyond_its_limit_is_found(spindle: PathPicture) -> None:
+    """Not the place of the largest force, which the search names."""
+    limit = 0.9 * np.abs(panel(spindle, "forces, load cutting")).max()
+    tables = shipped_tables("hexapod-spindle") | {"limits": {"actuator_force": {"max": limit}}}
+    picture = pictured(case_from(tables), KNOTS)
+    beyond = np.abs(panel(picture, "forces, load cutting")) > limit
+    (mark, *_), first = picture.marks, int(np.argmax(beyond.any(axis=1)))
+    assert 0 < first < len(beyond) - 1
+    assert picture.at[first - 1] <= mark.at <= picture.at[first]
+
+
 def test_the_picture_has_its_panels(spindle: PathPicture) -> None:
     figure = path_figure(spindle)
     titles = [axes.get_title(loc="left") for axes in figure.axes]

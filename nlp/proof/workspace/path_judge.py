@@ -6,6 +6,7 @@ are those of its points. Every machine within the case's tolerance on joint cent
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,11 +31,13 @@ from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
 from ..statement.machine import workspace_of_case
+from ..statement.motors import motor_claims
 from ..statement.tolerance import Directions
 from .numbers.bound_search import Minimum, Number
 from .numbers.expressions import Expressions
 from .numbers.extremes import Extreme, extreme_of, goal_of
 from .numbers.machines import Machines
+from .numbers.motors import Motors
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
 from .path_knots import Knots, Sampling, knots_of
@@ -219,7 +222,9 @@ def _of_actuators(
 ) -> list[Extreme]:
     """Return the numbers of actuators along a path, in its own motion where that is known; adds faults of speeds."""
     if not np.isfinite(cover.seconds).any():
-        return list(motor_extremes(subject, with_all=with_all))
+        found = list(motor_extremes(subject, with_all=with_all))
+        faults |= _motor_faults(subject, found, cover)
+        return found
     speeds, case = speeds_on_path(machines, cover, gap), subject.case
     bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
     if speeds.number is not None:
@@ -227,7 +232,22 @@ def _of_actuators(
         moving = case.loading._replace(motion=case.loading.motion or Motion(1.0))
         subject = replace(subject, case=replace(case, loading=moving), machines=speeds.number.problem)
         faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
-    return [*speeds.extremes, *motor_extremes(subject, speeds=bounds, with_all=with_all)]
+    found = list(motor_extremes(subject, speeds=bounds, with_all=with_all))
+    faults |= _motor_faults(subject, found, cover)
+    return [*speeds.extremes, *found]
+
+
+def _motor_faults(subject: Subject, found: Sequence[Extreme], cover: PathCover) -> dict[tuple[str, Sense], Fault]:
+    """Return the first known points at which forces, powers and speeds in any direction are beyond their limits."""
+    wrong = {(each.name, each.sense): each for each in found if each.outcome is Outcome.REFUTED}
+    claims = [each for each in motor_claims(subject.case) if (each.name, each.sense) in wrong]
+    faults: dict[tuple[str, Sense], Fault] = {}
+    for _, group in itertools.groupby(claims, lambda claim: claim.motor and claim.motor.place):
+        own = list(group)
+        if subject.machines is not None:
+            refuted = {k: (each, wrong[each.name, each.sense]) for k, each in enumerate(own)}
+            faults |= _first_faults(Motors(subject.machines, subject.case, own), refuted, cover)
+    return faults
 
 
 def _searched(machines: Machines, claims: Sequence[Claim], gap: float) -> list[Extreme]:
