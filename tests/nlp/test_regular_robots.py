@@ -9,6 +9,7 @@ import casadi as ca
 import flint
 import numpy as np
 import pytest
+from builders import case_from, starter_tables
 from hexapods import bounds_of, smallest, values_of
 from kernel_enclosures import enclose
 from numpy_engine import first_order
@@ -260,6 +261,15 @@ def touching_case() -> Case:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if sign * determinant(middle) > 0 else (low, middle)
     return case(low)
+
+
+def test_a_wrist_does_not_translate() -> None:
+    tables = starter_tables("spherical-3-rrr")
+    tables["robot"]["parameters"]["radius"] = 0.1
+    tables["workspace"] = {"position": [{"min": -0.02, "max": 0.02}] * 3}
+    found = judge_workspace(case_from(tables | {"limits": {}}), time_limit=20)
+    assert found.regularity.outcome is Outcome.OPEN
+    assert "cannot move in the numbers of the pose" in found.regularity.reason
 
 
 def test_a_determinant_that_touches_zero_is_refuted_with_the_pose() -> None:

@@ -204,6 +204,8 @@ def build_problem(case: Case, model: Model, box: PoseBox, at: FloatArray | None 
     needed = _needed(loops, start, count)
     loops = loops.some(needed)
     dependent = _dependent(loops, start, count)
+    if count and set(range(count)) <= set(dependent):
+        raise NotJudgedError("the platform cannot move in the numbers of the pose that the workspace frees")
     # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
     middle[list(dependent)] = start[list(dependent)]
     moved = loops.all_closed(middle[:, None], dependent)[:, 0]
