@@ -97,7 +97,8 @@ class AxisRange:
         axis: its name.
         dimension: length or angle.
         at: its value at the pose.
-        lower, upper: the ends of the proved range about the pose.
+        lower: the lower end of the proved range about the pose.
+        upper: the upper end.
     """
 
     axis: str
