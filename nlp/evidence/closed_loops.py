@@ -63,9 +63,9 @@ class Loops:
         residual, signs = (each.full().ravel() for each in self._every(z))
         return bool((np.abs(residual) <= 1e3 * _CLOSED).all() and (signs > 0).all())
 
-    def residuals(self, z: FloatArray) -> FloatArray:
-        """Return the largest left sides (B,) of all equations at points (n, B), of those left out too."""
-        return np.asarray(np.abs(values_at(self._every, z.T)[0]).max(axis=(1, 2), initial=0.0))
+    def every_value(self, z: FloatArray) -> FloatArray:
+        """Return the left sides (B, e) of all equations at points (n, B), of those left out too."""
+        return np.asarray(values_at(self._every, z.T)[0][:, :, 0])
 
     @np.errstate(all="ignore")
     def all_closed(

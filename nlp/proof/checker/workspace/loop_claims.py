@@ -28,8 +28,8 @@ from .pose_boxes import COORDINATES, Attempt, PoseRoot
 _OFF, _SPREAD, _TESTS, _CLOSED, _SEED = 1e-2, 0.5, 4, 1e-9, 2
 #: Singular values below this part of the largest are zero.
 _ZERO = 1e-9
-#: Parts of a length, or radians, by which a number of the pose is moved to test equations that were left out, their
-#: largest residual then, and the number of coordinates of positions.
+#: Parts of a length, or radians, by which a number of the pose is moved to test equations that were left out, the
+#: largest change of their left sides then, and the number of coordinates of positions.
 _SHORT, _ROUNDING, _POSITION = 1e-3, 1e-12, 3
 
 
@@ -87,6 +87,9 @@ def posed_loops(
 
 def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> None:
     """Refuse an equation that was left out as a number of the pose hardly changes, and does not hold where it does."""
+    equations = ca.vertcat(robot.equations, robot.loops)
+    # Constants of a robot that should be 0 may be rounding of its numbers.
+    first = robot.at(equations, assembly.start)
     for j in (each for each in assembly.independent if each < len(robot.free)):
         k = robot.free[j]
         for end in (root.lower[k], root.upper[k]):
@@ -94,8 +97,8 @@ def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> Non
             near = _SHORT * (robot.length if k < _POSITION else 1.0)
             to[0, j] = np.clip(end, to[0, j] - near, to[0, j] + near)
             (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
-            every = robot.at(ca.vertcat(robot.equations, robot.loops), z)
-            if np.isfinite(z).all() and not np.abs(every).max(initial=0.0) <= _ROUNDING:
+            off = np.abs(robot.at(equations, z) - first)
+            if np.isfinite(z).all() and not off.max(initial=0.0) <= _ROUNDING:
                 raise ProofError("the loops do not close all over the workspace")
 
 

@@ -40,7 +40,7 @@ _CLOSED = 1e-9
 _ZERO = 1e-9
 _SEED = 0
 #: Parts of a length, or radians, by which a number of the pose is moved at most where an equation that was left out is
-#: tested, and its largest residual then: several roundings.
+#: tested, and the largest change of its left side then: several roundings.
 _NEAR, _ROUNDING = 1e-3, 1e-12
 
 
@@ -243,8 +243,9 @@ def _check_left_out(loops: Loops, start: FloatArray, dependent: tuple[int, ...],
     for k, j in enumerate(own):
         at, near = box.free[j], _NEAR * (length if box.free[j] < 3 else 1.0)
         points[j, 2 * k : 2 * k + 2] = np.clip([box.lower[at], box.upper[at]], start[j] - near, start[j] + near)
-    off = loops.residuals(loops.all_closed(points, dependent) if dependent else points)
-    if (off > _ROUNDING).any():
+    moved = loops.all_closed(points, dependent) if dependent else points
+    # Constants of a robot that should be 0 may be rounding of its numbers.
+    if (np.abs(loops.every_value(moved) - loops.every_value(start[:, None])) > _ROUNDING).any():
         raise NotJudgedError("its loops do not close all over the workspace: the platform cannot move in all numbers")
 
 
