@@ -42,7 +42,7 @@ def timed(folder: str, count: int = 10_000) -> None:
             "screwsynth.nlp",
             "sweep",
             CASE,
-            "--points",
+            "--over",
             str(file),
             "--out",
             str(out),

@@ -133,7 +133,10 @@ from .solver.interface import SolverResult as SolverResult
 from .solver.interface import StopReason as StopReason
 from .solver.multistart import ProgramSolution as ProgramSolution
 from .solver.multistart import solve_program as solve_program
+from .solver.rounding import round_design as round_design
+from .solver.solution import Choice as Choice
 from .solver.solution import Combination as Combination
+from .solver.solution import Rounding as Rounding
 from .solver.solution import Solution as Solution
 from .solver.solution import TaskOutcome as TaskOutcome
 from .solver.solve import solve as solve

@@ -271,7 +271,7 @@ def examine(seed: int) -> Row:
         words += ["--leg-error", repr(leg_error)]
     for name in ("base_joint_angle", "platform_joint_angle", "condition_number", "smallest_singular_value"):
         if rng.random() < 0.15:
-            words += ["--of-quantity", name]
+            words += ["--quantity", name]
     result, row = judged(text_of(tables), *words)
     if result is None:
         return row

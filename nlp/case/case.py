@@ -51,6 +51,7 @@ class Case(Whole, Shown):
         displacements: displacements of the pose above, one for each pose that the robot takes.
         further: other stated poses, with their displacements. The robot's dimensions are the same at all poses.
         over_poses: combination of F over several poses.
+        worst_everywhere: whether F is its worst over all poses at which limits hold, beside the stated ones.
         joint_centre_tolerance: largest error of a joint centre in the machine as it is built, length; None for none.
         workspace: poses for which a machine with these dimensions is judged; None for none.
         path: programmed path along which a machine with these dimensions is judged; None for none.
@@ -79,6 +80,7 @@ class Case(Whole, Shown):
     displacements: tuple[Displacement, ...] = (HERE,)
     further: Sequence[Pose] = ()
     over_poses: OverPoses = OverPoses.SUM
+    worst_everywhere: bool = False
     joint_centre_tolerance: float | None = None
     workspace: Workspace | None = None
     path: PathFile | None = None
@@ -98,6 +100,8 @@ class Case(Whole, Shown):
         store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
         store(self, "further", _check_further_poses(self))
         store(self, "tasks", _check_tasks(self))
+        _check_choices(self)
+        _check_worst_everywhere(self)
         _check_loading(self)
         self.limits.check(self.as_limited)
         _check_tolerance(self)
@@ -213,13 +217,15 @@ class Case(Whole, Shown):
     @property
     def stated_pose_notice(self) -> str:
         """Sentence about what takes the limits at the stated pose although they hold elsewhere too; else empty."""
-        return self.limits_where and f"the limits are taken at the stated pose alone, not {self.limits_where}"
+        taken = "the limits and F" if self.worst_everywhere else "the limits"
+        return self.limits_where and f"{taken} are taken at the stated pose alone, not {self.limits_where}"
 
     def at_stated_poses(self) -> Case:
-        """Return the case with limits at the stated poses alone."""
+        """Return the case with F and limits at the stated poses alone."""
         workspace, path = self.workspace, self.path
         return replace(
             self,
+            worst_everywhere=False,
             workspace=None if workspace is None else replace(workspace, has_limits=False),
             path=None if path is None else replace(path, has_limits=False),
         )
@@ -228,6 +234,23 @@ class Case(Whole, Shown):
     def as_limited(self) -> LimitedCase:
         """The part of the case that its limits read."""
         return LimitedCase(self.model, self.units, self.scalars, self.loading)
+
+
+def _check_worst_everywhere(case: Case) -> None:
+    """Refuse an F that is its worst over all poses, where it means nothing.
+
+    Raises:
+        CaseError: in the words of a case file.
+    """
+    if not case.worst_everywhere:
+        return
+    key = "objective.over"
+    if not case.limits_over:
+        raise CaseError(key, "needs limits that hold there too: [limits] over")
+    if len(case.tasks) > 1:
+        raise CaseError(key, "is for a case with one [[task]]", case.limits_over)
+    if case.pose_count > 1 and case.over_poses is not OverPoses.WORST:
+        raise CaseError("combine.over_poses", "must be 'worst' beside objective.over", case.over_poses.value)
 
 
 def _check_loading(case: Case) -> None:
@@ -245,6 +268,29 @@ def _check_loading(case: Case) -> None:
         loading.check_work(case.model)
     if loading.stiffness is not None:
         loading.stiffness_of([joint.name for joint in driven_joints(case.model)])
+
+
+def _check_choices(case: Case) -> None:
+    """Refuse listed values of a direction's components, and a combination that cannot tell the best of them.
+
+    Raises:
+        CaseError: in the words of a case file.
+    """
+    listed = [
+        item
+        for item in case.model.parameters
+        if any(isinstance(value, Free) and value.values for value in case.components(item.name))
+    ]
+    for item in listed:
+        key = f"robot.parameters.{item.name}"
+        if item.is_direction:
+            raise CaseError(key, "must be numbers or { min, max }: components of a direction have no values to choose")
+        if len(case.tasks) > 1 and case.method is Method.AVERAGE:
+            fault = f"must be 'weighted-sum' or 'worst-case' where {key} has values: their average is none of them"
+            raise CaseError("combine.method", fault, case.method.value)
+        if case.method is Method.WORST_CASE and len({task.sense for task in case.tasks}) > 1:
+            fault = f"must be 'weighted-sum' where {key} has values and tasks have both senses"
+            raise CaseError("combine.method", fault, case.method.value)
 
 
 def _check_measure(case: Case, task: Task) -> None:
@@ -313,7 +359,7 @@ def _check_parameters(case: Case) -> dict[str, tuple[Value, ...]]:
 
 def _allowed_form(parameter: Parameter) -> str:
     """Return the form of a parameter's value in a case file, for messages."""
-    one = "a number or { min, max }"
+    one = "a number or { min, max } or { values }"
     return one if len(parameter.typical) == 1 else f"a list of {len(parameter.typical)}, each {one}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
@@ -41,6 +42,8 @@ def check_value(
     """
     if not isinstance(value, Free):
         return _check_number(value, key, dimension, units, domain)
+    if value.values:
+        return _check_values(value, key, dimension, units, domain)
     lower = _check_number(value.lower, f"{key}.min", dimension, units, domain)
     upper = _check_number(value.upper, f"{key}.max", dimension, units, domain)
     if not lower < upper:
@@ -50,6 +53,20 @@ def check_value(
     if start is not None:
         start = _check_number(start, f"{key}.start", dimension, units, (lower, upper))
     return Free(lower, upper, start)
+
+
+def _check_values(value: Free, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> Free:
+    """Return a number that has one of a few values; the arguments and errors are those of :func:`check_value`."""
+    listed = [
+        _check_number(each, f"{key}.values[{k}]", dimension, units, domain) for k, each in enumerate(value.values)
+    ]
+    found = Free.among(listed)
+    for one, other in pairwise(found.values):
+        if one == other:
+            raise CaseError(f"{key}.values", "must not have a value twice", units.shown(one, dimension))
+    if len(listed) < 2:
+        raise CaseError(f"{key}.values", "must have at least 2 entries; a fixed value is a number alone")
+    return found
 
 
 def _check_number(value: float, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> float:

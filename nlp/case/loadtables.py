@@ -63,11 +63,21 @@ class GravityTable(Table):
 
 
 class ObjectiveTable(Table):
-    """A number of the actuators that is optimised instead of F."""
+    """What is optimised: a number of the actuators instead of F, or the worst F of all poses."""
 
-    minimise: Literal["actuator_force", "actuator_speed", "actuator_power"] = Field(
-        description="its largest size over loads, actuators and poses is made as small as possible"
+    minimise: Literal["actuator_force", "actuator_speed", "actuator_power"] | None = Field(
+        default=None, description="its largest size over loads, actuators and poses is made as small as possible"
     )
+    over: Literal["workspace", "path"] | None = Field(
+        default=None, description="F is its worst over all poses there, where the limits must hold too"
+    )
+
+    @model_validator(mode="after")
+    def _refuse_nothing(self) -> ObjectiveTable:
+        """Return the table, or refuse one that says nothing."""
+        if self.minimise is None and self.over is None:
+            raise fault_of("minimise", "is missing: give minimise, over, or both")
+        return self
 
 
 def loading_of(

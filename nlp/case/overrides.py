@@ -58,6 +58,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         table, place = places[whole]
         if not isinstance(table[place], dict):
             raise CaseError(name, f"cannot be set: {whole} is not free")
+        if "values" in table[place]:
+            raise CaseError(name, f"cannot be set: {whole} has one of a few values, and no ends")
         table[place][end] = value
         return
     if name not in places:
@@ -68,7 +70,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
 
 def _allowed(name: str, tables: Mapping[str, Any], places: Mapping[str, _Place], rotations: list[str]) -> str:
     """Return the names that can be set, those of ends, limits and tasks by an example each, as a hint."""
-    free = [each for each, (table, place) in places.items() if isinstance(table[place], dict)]
+    written = {each: table[place] for each, (table, place) in places.items()}
+    free = [each for each, value in written.items() if isinstance(value, dict) and "values" not in value]
     ends = [f"{each}.{end}" for each in free for end in _ENDS]
     tasks = sorted(task_numbers(tables), key=len)
     others = [

@@ -10,9 +10,9 @@ from __future__ import annotations
 import enum
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -45,11 +45,24 @@ class Free:
         lower: smallest value, finite.
         upper: largest value, finite and above ``lower``.
         start: value at the first starting point; None for the middle.
+        values: the only values that the number may have, ascending from ``lower`` to ``upper``, such as those of a
+            catalogue; none for every value between the bounds. For dimensions of a robot.
     """
 
     lower: float
     upper: float
     start: float | None = None
+    values: tuple[float, ...] = ()
+
+    @classmethod
+    def among(cls, values: Iterable[float]) -> Free:
+        """Return a number that has one of a few values, such as those of a catalogue; at least two.
+
+        Raises:
+            ValueError: there is no value.
+        """
+        listed = tuple(sorted(values))
+        return cls(min(listed), max(listed), None, listed)
 
     @property
     def first(self) -> float:
@@ -67,10 +80,19 @@ class StatedRange(Protocol):
     max: float
 
 
-def internal_value(written: float | StatedRange, units: Units, dimension: Dimension) -> Value:
+@runtime_checkable
+class StatedValues(Protocol):
+    """The values of a number as a table of a case file states them, in the file's units."""
+
+    values: list[float]
+
+
+def internal_value(written: float | StatedRange | StatedValues, units: Units, dimension: Dimension) -> Value:
     """Return a fixed or free number of a case file, radians for an angle."""
     if isinstance(written, float | int):
         return units.to_internal(written, dimension)
+    if isinstance(written, StatedValues):
+        return Free.among(units.to_internal(value, dimension) for value in written.values)
     start = getattr(written, "start", None)  # which a range of poses does not have
     return Free(
         units.to_internal(written.min, dimension),
@@ -83,6 +105,8 @@ def written_value(value: Value, units: Units, dimension: Dimension) -> TomlValue
     """Return a fixed or free number in the case's unit, the inverse of :func:`internal_value`."""
     if not isinstance(value, Free):
         return units.written(value, dimension)
+    if value.values:
+        return {"values": [units.written(each, dimension) for each in value.values]}
     ends = {"min": value.lower, "max": value.upper, "start": value.start}
     return {key: None if end is None else units.written(end, dimension) for key, end in ends.items()}
 

@@ -31,7 +31,7 @@ from .pose import (
     rotation_from_rpy,
 )
 from .robots import insert_robot_file, model_of_table
-from .schema import Document, ExpectTable, PoseTable, PublishedTable, Range, RotationTable, TaskTable
+from .schema import Document, ExpectTable, Listed, PoseTable, PublishedTable, Range, RotationTable, TaskTable
 from .settings import Expectation, ExpectedValue, Published, Search
 from .source import find_case, inputs_of, named_files, read_text, tables_of
 from .table import case_error
@@ -235,6 +235,7 @@ def _case_of(written: Document, name: str, source: str, folder: str, robot_file:
         displacements=first.displacements,
         further=further,
         over_poses=over_poses,
+        worst_everywhere=written.read_worst_everywhere(),
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
         workspace=written.read_workspace(units),
@@ -287,7 +288,7 @@ def _expectation(written: ExpectTable) -> Expectation:
 
 
 def _parameter_value(
-    key: str, given: float | Range | list[float | Range], units: Units, dimension: Dimension
+    key: str, given: float | Range | Listed | list[float | Range | Listed], units: Units, dimension: Dimension
 ) -> Value | list[Value]:
     """Return the value of a parameter, angles in radians.
 

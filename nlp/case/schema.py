@@ -41,14 +41,28 @@ class Range(Table):
     start: FiniteFloat | None = Field(default=None, description="where the first search begins; the middle if left out")
 
 
+class Listed(Table):
+    """A dimension that has one of a few values, such as those of a catalogue."""
+
+    values: Annotated[list[FiniteFloat], Field(min_length=1)] = Field(
+        description="the values, two or more, of which one is chosen"
+    )
+
+
 def _tag_of_number(value: object) -> str:
     """Return the branch of a union for a number or a range."""
     return "<range>" if isinstance(value, dict | Range) else "<number>"
 
 
 def _tag_of_value(value: object) -> str:
-    """Return the branch of a union for a number, a range or a list of them."""
-    return "<list>" if isinstance(value, list | tuple) else _tag_of_number(value)
+    """Return the branch of a union for a number, a range, values or a list of them."""
+    return "<list>" if isinstance(value, list | tuple) else _tag_of_dimension(value)
+
+
+def _tag_of_dimension(value: object) -> str:
+    """Return the branch of a union for a number, a range or values."""
+    is_listed = isinstance(value, Listed) or (isinstance(value, dict) and "values" in value)
+    return "<values>" if is_listed else _tag_of_number(value)
 
 
 Value = Annotated[
@@ -58,8 +72,15 @@ Numbers = Annotated[
     Annotated[FiniteFloat, Tag("<number>")] | Annotated[list[FiniteFloat], Tag("<list>")],
     Discriminator(lambda value: "<list>" if isinstance(value, list) else "<number>"),
 ]
+DimensionValue = Annotated[
+    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[Listed, Tag("<values>")],
+    Discriminator(_tag_of_dimension),
+]
 VectorOrValue = Annotated[
-    Annotated[FiniteFloat, Tag("<number>")] | Annotated[Range, Tag("<range>")] | Annotated[list[Value], Tag("<list>")],
+    Annotated[FiniteFloat, Tag("<number>")]
+    | Annotated[Range, Tag("<range>")]
+    | Annotated[Listed, Tag("<values>")]
+    | Annotated[list[DimensionValue], Tag("<list>")],
     Discriminator(_tag_of_value),
 ]
 
@@ -90,7 +111,8 @@ class RobotTable(Table):
     file: FileName | None = Field(default=None, description="robot file beside this one, instead of a name")
     definition: dict[str, Any] | None = Field(default=None, description="content of a robot file, instead of a name")
     parameters: dict[str, VectorOrValue] = Field(
-        default_factory=dict, description="a number or { min, max } for each parameter; a list of three for a point"
+        default_factory=dict,
+        description="a number, { min, max } or { values } for each parameter; three for a point",
     )
     characteristic_length: FiniteFloat = Field(
         default=Case.characteristic_length,
@@ -340,6 +362,14 @@ class Document(Table):
             if key not in self.model_fields_set and not (key == "task" and "objective" in self.model_fields_set):
                 raise fault_of(key, "is missing")
         return self
+
+    def read_worst_everywhere(self) -> bool:
+        """Return whether F is its worst over all poses at which limits hold.
+
+        Raises:
+            CaseError: the limits do not hold there.
+        """
+        return False
 
     def read_workspace(self, units: Units) -> Workspace | None:  # noqa: ARG002 - it has none
         """Return the workspace that the document states; None where it states none.

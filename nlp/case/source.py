@@ -38,6 +38,10 @@ def find_case(name: str) -> Path:
         path = _file_of(name)
     except OSError as error:  # such as a name that is too long
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    if path is None and name.endswith(".toml"):
+        stem = Path(name).stem
+        hint = f"; did you mean {stem!r}? this case comes with screwsynth" if stem in shipped_cases() else ""
+        raise InputError(f"{name}: no such file{hint}")
     if path is None:
         beside = Path(f"{name}.toml")
         hint = f"did you mean {beside}?" if name and beside.is_file() else nearest(name, shipped_cases())

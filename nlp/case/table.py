@@ -34,7 +34,7 @@ class Table(BaseModel):
 
 
 #: Parts of a fault's path that stand for branches of a union, or for a key of a table, and are no keys of a file.
-_TAGS = ("<number>", "<range>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "[key]")
+_TAGS = ("<number>", "<range>", "<values>", "<list>", "<pose>", "<poses>", "<word>", "<lists>", "[key]")
 
 
 def fault_of(key: str, fault: str) -> PydanticCustomError:

@@ -116,7 +116,7 @@ class WholeDocument(Document):
     load: list[LoadTable] = Field(default_factory=list, description="loads on the platform")
     motion: MotionTable | None = Field(default=None, description="the platform's fastest motions")
     gravity: GravityTable | None = Field(default=None, description="gravity, for loads that are masses")
-    objective: ObjectiveTable | None = Field(default=None, description="what is optimised instead of F")
+    objective: ObjectiveTable | None = Field(default=None, description="what is optimised, and over which poses")
 
     def read_workspace(self, units: Units) -> Workspace | None:
         """Return the workspace that the document states, over which its limits may hold."""
@@ -142,9 +142,18 @@ class WholeDocument(Document):
         )
         return PathFile(folder=folder, has_limits=has_limits, **given)
 
+    def read_worst_everywhere(self) -> bool:
+        """Return whether F is its worst over all poses at which limits hold."""
+        if self.objective is None or self.objective.over is None:
+            return False
+        over = self.objective.over
+        if self.limits is None or self.limits.over != over:
+            raise CaseError("objective.over", f"needs limits that hold there too: [limits] over = '{over}'", over)
+        return self.objective.minimise is None  # a number of the actuators is that of all these poses by itself
+
     def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
         """Return the tasks, that of a number of the actuators in the place of F of a motion."""
-        if self.objective is None:
+        if self.objective is None or self.objective.minimise is None:
             return list(tasks)
         if not tasks:
             return [Task.minimise(self.objective.minimise)]

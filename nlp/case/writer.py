@@ -80,7 +80,8 @@ def _lines(case: Case) -> Iterator[str]:
     for task in case.tasks:
         if task.is_stated:
             yield from toml_table("[[task]]", _task(task))
-        yield from toml_table("[objective]", {"minimise": task.measure or None})
+        over = case.limits_over if case.worst_everywhere else None
+        yield from toml_table("[objective]", {"minimise": task.measure or None, "over": over})
     yield from toml_table("[combine]", _combination(case))
     yield from _loading(case.loading, units)
     yield from toml_table("[limits]", _limits(case))

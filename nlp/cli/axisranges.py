@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from .options import Outputs, console, write_csv, write_json
+from . import options
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -18,7 +18,7 @@ def show_ranges(
     start: Sequence[float] | None,
     most: str | None,
     time: float | None,
-    files: Outputs,
+    files: options.Outputs,
     report: Callable[[str], None],
 ) -> AxisRangesResult:
     """Write how far each coordinate of a pose can move.
@@ -43,10 +43,10 @@ def show_ranges(
     limit = TIME_LIMIT if time is None else time
     found = axis_ranges(case, pose, most=_largest(most), time_limit=limit, progress=report)
     result = axis_ranges_result(found)
-    write_json(files["json"], result)
-    write_csv(files["csv"], axis_ranges_tables(result), None)
+    options.write_json(files["json"], result)
+    options.write_csv(files["csv"], axis_ranges_tables(result), None)
     if not files.is_piped:
-        show(console(), axis_ranges_summary(case, result))
+        show(options.console(), axis_ranges_summary(case, result))
     return result
 
 

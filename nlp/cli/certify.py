@@ -6,38 +6,26 @@ from typing import Annotated
 
 import typer
 
-from .options import (
-    AllAssemblies,
-    CaseName,
-    Jobs,
-    JsonFile,
-    Outputs,
-    SettingTexts,
-    Time,
-    console,
-    number_option,
-    read_settings,
-    starts_option,
-    write_json,
-)
+from . import options
 
 
 def certify(
-    case: CaseName,
-    settings: SettingTexts = None,
-    gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of the bound.")] = 1e-4,
-    time: Time = None,
+    case: options.CaseName,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    gap: options.OptimumGap = 1e-4,
+    time: options.Time = None,
     above: Annotated[
-        float | None, number_option("--above", "F", "Prove that F is above this value on the whole box.")
+        float | None, options.number("--above", "F", "Prove that F is above this value on the whole box")
     ] = None,
-    proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
-    starts: Annotated[int | None, starts_option("Starting points for the incumbent instead of the case's.")] = None,
-    all_assemblies: AllAssemblies = False,
-    jobs: Jobs = None,
-    json_file: JsonFile = None,
+    proof: options.ProofFile = None,
+    starts: Annotated[int | None, options.starts("Starting points for the incumbent; the case's if left out")] = None,
+    seed: options.Seed = None,
+    all_assemblies: options.AllAssemblies = False,
+    jobs: options.Jobs = None,
+    json_file: options.JsonFile = None,
 ) -> None:
     """Prove a bound of the global optimum over the whole box."""
-    from ..case.reader import read_case
     from ..errors import InputError, one_line
     from ..interruption import Milestone, answer_after
     from ..output.files import write_text
@@ -51,11 +39,11 @@ def certify(
         answer_after(Milestone.START)
         answer_after(Milestone.BOUND)
         CertifyOptions(gap, above, time, jobs)  # a wrong option is reported before a wrong case
-        files = Outputs(json=json_file, proof=proof)
-        loaded, text, inputs = read_case(case, read_settings(settings))
+        files = options.Outputs(json=json_file, proof=proof)
+        loaded, text, inputs = options.read_machine(case, settings, of).file
         files.check(inputs)
         if not files.is_piped:
-            show(console(), unknown_lines(loaded.model, all_assemblies=all_assemblies))
+            show(options.console(), unknown_lines(loaded.model, all_assemblies=all_assemblies))
         certified = certify_with_progress(
             loaded,
             gap=gap,
@@ -63,6 +51,7 @@ def certify(
             time_limit=time,
             jobs=jobs,
             starts=starts,
+            seed=seed,
             all_assemblies=all_assemblies,
             with_proof=proof is not None,
         )
@@ -75,9 +64,9 @@ def certify(
         else:
             # A file of an earlier run is left as it is: it must not be taken for the proof of this one.
             typer.echo(f"--proof {one_line(proof)}: not written, as there is no complete proof", err=True)
-    write_json(json_file, result)
+    options.write_json(json_file, result)
     if not files.is_piped:
         from ..results.summary import certified_summary
 
-        show(console(), certified_summary(loaded, result))
+        show(options.console(), certified_summary(loaded, result))
     raise typer.Exit(0 if certified.is_proved else 1)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonFile, console, write_json
+from . import options
 
 
 def check(
@@ -14,14 +14,15 @@ def check(
         list[str] | None,
         typer.Argument(metavar="[CASE]...", help="Case files or names of shipped cases; all of these if left out."),
     ] = None,
-    json_file: JsonFile = None,
-    junit: Annotated[str | None, typer.Option(metavar="FILE", help="Write JUnit XML for a CI; - is stdout.")] = None,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print the published numbers as a table.")] = False,
+    json_file: options.JsonFile = None,
+    junit: Annotated[str | None, options.file("--junit", "Write JUnit XML for a CI; - is stdout")] = None,
+    markdown: Annotated[bool, options.flag("--markdown", "Print the published numbers as a table")] = False,
+    _time: options.Time = None,
 ) -> None:
     """Compare cases with their expected and published values."""
     from ..case.source import case_inputs, shipped_cases
     from ..errors import InputError
-    from ..interruption import Milestone, answer_after, is_requested
+    from ..interruption import Milestone, answer_after, is_requested, why_stopped
     from ..output.checks import checks_as_junit, checks_as_markdown
     from ..output.files import check_outputs, write_text
     from ..results.checks import checks_of
@@ -33,9 +34,10 @@ def check(
     check_outputs(inputs, {"--json": json_file, "--junit": junit})
     answer_after(Milestone.CASE)
     checks = check_cases(cases)
-    if is_requested():
-        typer.echo(f"interrupted: {len(checks)} of {len(cases or shipped_cases())} cases are checked", err=True)
-    write_json(json_file, checks_of(checks))
+    is_stopped = is_requested()
+    if is_stopped:
+        typer.echo(f"{why_stopped()}: {len(checks)} of {len(cases or shipped_cases())} cases are checked", err=True)
+    options.write_json(json_file, checks_of(checks))
     if junit is not None:
         write_text(junit, checks_as_junit(checks))
     if markdown:
@@ -44,5 +46,5 @@ def check(
         from ..output.terminal import show
         from ..results.checks import checks_summary
 
-        show(console(), checks_summary(checks))
-    raise typer.Exit(0 if all(each.passed for each in checks) else 1)
+        show(options.console(), checks_summary(checks))
+    raise typer.Exit(0 if all(each.passed for each in checks) and not is_stopped else 1)

@@ -8,20 +8,20 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, SettingTexts, read_settings
+from . import options
 
 
 def codegen(
-    case: CaseName,
-    out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
-    settings: SettingTexts = None,
-    measure: Annotated[
-        bool, typer.Option("--measure/--no-measure", help="Compile the C, and write its flash and stack into it.")
-    ] = True,
-    force: Annotated[bool, typer.Option("--force", help="Write over files that screwsynth did not write.")] = False,
+    case: options.CaseName,
+    out: options.Folder,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    no_measure: Annotated[
+        bool, options.flag("--no-measure", "Do not compile the C to write its flash and stack into it")
+    ] = False,
+    force: options.Force = False,
 ) -> None:
     """Write F and its derivatives as C for embedding."""
-    from ..case.reader import read_case
     from ..embedding.codegen import generate_c, size_words
     from ..embedding.ctext import identifier
     from ..errors import one_line
@@ -29,14 +29,14 @@ def codegen(
 
     if not force:
         check_folder(out)
-    loaded, text, inputs = read_case(case, read_settings(settings))
+    loaded, text, inputs = options.read_machine(case, settings, of).file
     files = generate_c(loaded, text)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
     typer.echo(size_words(loaded, files))
     if loaded.limits_over:
         typer.echo(loaded.stated_pose_notice)
-    if measure:
+    if not no_measure:
         files = _measured(files, identifier(loaded.name))
     write_folder(out, files, force=force)
     typer.echo(f"{len(files)} files in {one_line(out)}; make -C {one_line(out)} test compiles and tests them")

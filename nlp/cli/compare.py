@@ -6,21 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import (
-    CaseName,
-    Jobs,
-    JsonFile,
-    Outputs,
-    PageFile,
-    Seed,
-    SettingTexts,
-    Starts,
-    Time,
-    console,
-    number_option,
-    read_settings,
-    write_json,
-)
+from . import options
 from .progress import counting_line
 
 if TYPE_CHECKING:
@@ -28,37 +14,37 @@ if TYPE_CHECKING:
 
 
 def compare(
-    case: CaseName,
+    case: options.CaseName,
     robots: Annotated[
         list[str],
         typer.Argument(metavar="ROBOT...", help="Names of robots, robot files, or 'case' for the case's own robot."),
     ],
-    size: Annotated[float | None, number_option("--size", "LENGTH", "Common size; that of the case's robot.")] = None,
-    no_scale: Annotated[bool, typer.Option("--no-scale", help="Take typical lengths as they are.")] = False,
-    part: Annotated[float, number_option("--range", "PART", "Part by which dimensions are free; 0: fixed.")] = 0.25,
-    certified: Annotated[bool, typer.Option("--certify", help="Prove each optimum too.")] = False,
-    time: Time = None,
-    settings: SettingTexts = None,
-    starts: Starts = None,
-    seed: Seed = None,
-    jobs: Jobs = None,
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write a row for each robot.")] = None,
-    html: PageFile = None,
-    plot: Annotated[
-        str | None, typer.Option("--plot", metavar="FILE", help="Draw the designs in one scale: .png, .svg or .pdf.")
+    size: Annotated[
+        float | None, options.number("--size", "LENGTH", "Common size; that of the case's robot if left out")
     ] = None,
+    no_scale: Annotated[bool, options.flag("--no-scale", "Take typical lengths as they are")] = False,
+    part: Annotated[float, options.number("--part", "PART", "Part by which dimensions are free; 0: fixed")] = 0.25,
+    certified: options.Certify = False,
+    time: Annotated[float | None, options.time("60 for each proof if left out")] = None,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    starts: options.Starts = None,
+    seed: options.Seed = None,
+    jobs: options.Jobs = None,
+    json_file: options.JsonFile = None,
+    csv_file: Annotated[str | None, options.table("a row for each robot")] = None,
+    html: options.PageFile = None,
+    plot: Annotated[str | None, options.plot("Draw the designs in one scale")] = None,
 ) -> None:
     """Compare several robots on the task of a case."""
     from pathlib import Path
 
-    from ..case.reader import read_case
     from ..comparison.compare import compare as compare_robots
     from ..comparison.robots import read_robots
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
-    files = Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
-    read = read_case(case, read_settings(settings))
+    files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
+    read = options.read_machine(case, settings, of).file
     inputs = dict(read.inputs)
     for each in read_robots(robots, read.case):
         if each.file is not None:
@@ -88,20 +74,18 @@ def compare(
     raise typer.Exit(0 if found.ranked and is_proved and not is_stopped else 1)
 
 
-def _write(found: Comparison, files: Outputs) -> None:
+def _write(found: Comparison, files: options.Outputs) -> None:
     """Write a comparison into its files, and onto the terminal where standard output takes no file."""
     from ..comparison.data import comparison_result
-    from ..output.files import write_text
     from ..results.comparison import comparison_csv, comparison_summary
 
     result = comparison_result(found)
-    write_json(files["json"], result)
-    if (csv_file := files["csv"]) is not None:
-        write_text(csv_file, comparison_csv(result))
-    if (html := files["html"]) is not None:
+    options.write_json(files["json"], result)
+    files.write("csv", comparison_csv, result)
+    if files["html"] is not None:
         from ..output.report.comparison import comparison_page
 
-        write_text(html, comparison_page(found, result))
+        files.write("html", comparison_page, found, result)
     if files["plot"] is not None:
         from ..output.pictures.comparisons import comparison_figure
 
@@ -109,4 +93,4 @@ def _write(found: Comparison, files: Outputs) -> None:
     if not files.is_piped:
         from ..output.terminal import show
 
-        show(console(), comparison_summary(result))
+        show(options.console(), comparison_summary(result))

@@ -2,57 +2,49 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
-from .options import (
-    CaseName,
-    CsvFile,
-    CsvTable,
-    JsonFile,
-    Outputs,
-    SettingTexts,
-    check_csv,
-    console,
-    read_settings,
-    write_csv,
-    write_json,
-)
+from . import options
 
 
 def evaluate(
-    case: CaseName,
-    settings: SettingTexts = None,
-    json_file: JsonFile = None,
-    csv_file: CsvFile = None,
-    table: CsvTable = None,
+    case: options.CaseName,
+    settings: options.SettingTexts = None,
+    of: Annotated[
+        str | None, options.text("--of", "RESULT", "Take dimensions and pose from a result that solve --json wrote")
+    ] = None,
+    json_file: options.JsonFile = None,
+    csv_file: options.CsvFile = None,
+    table: options.CsvTable = None,
 ) -> None:
     """Show F, J, rank and rates at one point.
 
     Nothing is optimised. Free numbers are at their starts, or in the middle of their ranges.
     """
-    from ..case.reader import read_case
     from ..evidence import state
     from ..evidence.closing import closed_start
     from ..program.epigraph import with_exact_level
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    given = read_case(case, read_settings(settings))
+    given = options.read_machine(case, settings, of, at_pose=True).file
     loaded = given.case
-    files = Outputs(json=json_file, csv=csv_file)
+    files = options.Outputs(json=json_file, csv=csv_file)
     files.check(given.inputs)
-    check_csv(csv_file, table, loaded, at_point=True)
+    options.check_csv(csv_file, table, loaded, at_point=True)
     nlps = formulate_each(loaded)
     x = with_exact_level(nlps[0], closed_start(nlps[0]))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
-    write_json(json_file, result)
+    options.write_json(json_file, result)
     if csv_file is not None:
         from ..results.summary import evaluation_tables
 
-        write_csv(csv_file, evaluation_tables(loaded, result), table)
+        options.write_csv(csv_file, evaluation_tables(loaded, result), table)
     if not files.is_piped:
         from ..output.terminal import show
         from ..results.summary import evaluation_summary
 
-        show(console(), evaluation_summary(loaded, result))
+        show(options.console(), evaluation_summary(loaded, result))
     raise typer.Exit(1 if result.violated else 0)

@@ -8,24 +8,23 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, Seed, SettingTexts, Starts, read_settings, whole_option
+from . import options
 
 
 def export(
-    case: CaseName,
-    out: Annotated[str, typer.Option(metavar="DIR", help="Folder to write into.")],
-    formats: Annotated[
-        list[str], typer.Option("--format", metavar="NAME", help="mjcf, urdf, csv, dxf or all; may be repeated.")
-    ],
-    settings: SettingTexts = None,
+    case: options.CaseName,
+    out: options.Folder,
+    formats: Annotated[list[str], options.several("--format", "NAME", "mjcf, urdf, csv, dxf or all")],
+    settings: options.SettingTexts = None,
     of: Annotated[
-        str | None, typer.Option("--of", metavar="FILE", help="Result that --json wrote, instead of solving again.")
+        str | None, options.text("--of", "RESULT", "Write the robot of a result of solve --json; nothing is solved")
     ] = None,
-    pose: Annotated[int, whole_option("--pose", "Pose, where the case has several.", 1)] = 1,
-    starts: Starts = None,
-    seed: Seed = None,
-    jobs: Jobs = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over files that screwsynth did not write.")] = False,
+    pose: options.PoseNumber = 1,
+    starts: options.Starts = None,
+    seed: options.Seed = None,
+    jobs: options.Jobs = None,
+    _time: options.Time = None,
+    force: options.Force = False,
 ) -> None:
     """Write the solved robot as MJCF, URDF, CSV or DXF.
 
@@ -41,7 +40,7 @@ def export(
     chosen = check_formats(formats)
     if not force:
         check_folder(out)
-    fixings = read_settings(settings)
+    fixings = options.read_settings(settings)
     loaded, _, inputs = read_case(case, fixings)
     jacobian = None
     if of is not None:

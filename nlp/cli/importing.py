@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
-from .options import console, number_option
+from . import options
+from .usage import Command
 
 
-class SeveralValues(TyperCommand):
-    """A command whose options ``--actuated`` and ``--free`` take every value up to the next option."""
+class SeveralValues(Command):
+    """A command whose options ``--actuated`` and ``--free`` also take every value up to the next option."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - of typer or of click
         """Write the option again before each further value, and read the arguments."""
@@ -32,30 +32,30 @@ class SeveralValues(TyperCommand):
 
 def import_(
     file: Annotated[str, typer.Argument(metavar="FILE", help="A model in MJCF (.xml) or URDF.")],
-    platform: Annotated[str, typer.Option(metavar="BODY", help="Body, link or site that is the platform.")] = "",
-    base: Annotated[str, typer.Option(metavar="BODY", help="Body that is the base; else the fixed root.")] = "",
+    platform: Annotated[str, options.text("--platform", "BODY", "Body, link or site that is the platform")],
+    base: Annotated[str, options.text("--base", "BODY", "Body that is the base; the fixed root if left out")] = "",
     actuated: Annotated[
-        list[str] | None, typer.Option(metavar="JOINT...", help="Driven joints, instead of those of the model.")
+        list[str] | None, options.several("--actuated", "JOINT", "Driven joint, instead of those of the model")
     ] = None,
-    out: Annotated[str | None, typer.Option(metavar="FILE", help="Robot file to write; - is stdout.")] = None,
+    out: Annotated[str | None, options.file("--out", "Robot file to write; - is stdout")] = None,
     close: Annotated[
-        bool, typer.Option("--close", help="Close open loops by Newton's method, if need be from other starts.")
+        bool, options.flag("--close", "Close open loops by Newton's method, if need be from other starts")
     ] = False,
     keyframe: Annotated[
-        str, typer.Option(metavar="NAME", help="Configuration of an MJCF file: one of its keyframes.")
+        str, options.text("--keyframe", "NAME", "Configuration of an MJCF file: one of its keyframes")
     ] = "",
     snap: Annotated[
-        float, number_option("--snap", "LENGTH", "Move axes by up to this, so that they meet or are parallel.")
+        float, options.number("--snap", "LENGTH", "Move axes by up to this, so that they meet or are parallel")
     ] = 0.0,
     loops: Annotated[
-        str | None, typer.Option(metavar="YAML", help="Loops of a URDF, instead of the .yaml file beside it.")
+        str | None, options.file("--loops", "Loops of a URDF, instead of the .yaml file beside it")
     ] = None,
     free: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME...", help="Make a joint's place, JOINT.axis, or a suggestion a dimension."),
+        options.several("--free", "NAME", "Make a joint's place, JOINT.axis, or a suggestion a dimension"),
     ] = None,
-    suggest: Annotated[bool, typer.Option("--suggest", help="List circles and symmetries, for --free.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Write over a file that screwsynth did not write.")] = False,
+    suggest: Annotated[bool, options.flag("--suggest", "List circles and symmetries, for --free")] = False,
+    force: options.Force = False,
 ) -> None:
     """Read a robot with closed loops from MJCF or URDF.
 
@@ -71,8 +71,6 @@ def import_(
     from ..output.terminal import show
     from ..results.text import Line, Tone
 
-    if not platform:
-        raise InputError("--platform: is missing: name the body that is the platform")
     if out is None and not suggest:
         raise InputError("--out: is missing: name the robot file to write, or ask for --suggest")
     inputs = {Path(file): "the model that is read", **({} if loops is None else {Path(loops): "its file of loops"})}
@@ -93,6 +91,6 @@ def import_(
         write_text(out, text)
     if out != "-":
         title = Line(found.mechanism.name, tone=Tone.TITLE)
-        show(console(), [title, *(Line(text, label=label) for label, text in lines)])
+        show(options.console(), [title, *(Line(text, label=label) for label, text in lines)])
         if out is not None:
             typer.echo(f'{one_line(out)} has the robot: [robot] file = "{one_line(Path(out).name)}" in a case reads it')

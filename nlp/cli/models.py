@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Outputs, PlotFile, console
+from . import options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,7 +19,7 @@ def models(
     name: Annotated[
         str | None, typer.Argument(metavar="[NAME]", help="One robot, or a robot file (.toml), in full.")
     ] = None,
-    plot: PlotFile = None,
+    plot: options.PlotFile = None,
 ) -> None:
     """List the robots, or show one in full.
 
@@ -31,17 +31,17 @@ def models(
     from ..output.terminal import show
     from ..results.robotwording import model_words, models_table
 
-    Outputs(plot=plot).check({})
+    options.Outputs(plot=plot).check({})
     if name is None:
         if plot is not None:
             raise InputError(f"--plot {plot}: needs the name of a robot")
-        show(console(), [models_table((each, _description(each)) for each in model_names())])
+        show(options.console(), [models_table((each, _description(each)) for each in model_names())])
         return
     if name.endswith(".toml"):
         _show_file(name, plot)
         return
-    options = model_options(name)
-    needed = [option.name for option in options if option.default is None]
+    found = model_options(name)
+    needed = [option.name for option in found if option.default is None]
     # Without the options that have no default, the robot cannot be built, and has no parameters to show.
     model = None if needed else build_model(name)
     if plot is not None:
@@ -49,38 +49,32 @@ def models(
 
         if model is None:
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
-        draw(_variants(name, model, options), plot)
-    show(console(), model_words(name, model, options))
+        draw(_variants(name, model, found), plot)
+    show(options.console(), model_words(name, model, found))
 
 
 def _show_file(file: str, plot: str | None) -> None:
     """Show the robot of a robot file in full, and draw it into a file."""
     from pathlib import Path
 
-    from ..case.robotfile import model_of_definition, read_definition
-    from ..errors import CaseError, InputError
     from ..output.files import check_outputs
     from ..output.terminal import show
     from ..results.robotwording import model_words
 
     check_outputs({Path(file): "the robot file that is read"}, {"--plot": plot})
-    try:
-        model = model_of_definition(read_definition(file, Path()), file)
-    except CaseError as error:
-        # The key is that of a case that names the file, and there is no case here.
-        raise (InputError(f"{file}: {error.fault}") if error.key == "robot.file" else error) from None
+    model = options.read_robot(file)
     if plot is not None:
         from ..output.pictures.plot import plot as draw
 
         draw(model, plot)
-    show(console(), model_words(model.name, model, ()))
+    show(options.console(), model_words(model.name, model, ()))
 
 
-def _variants(name: str, model: Model, options: Sequence[ModelOption]) -> list[Model]:
+def _variants(name: str, model: Model, found: Sequence[ModelOption]) -> list[Model]:
     """Return the robot with each value of the first option whose values can be listed, or the robot alone."""
     from ..case.robots import build_model
 
-    listed = next((option for option in options if option.choices), None)
+    listed = next((option for option in found if option.choices), None)
     return [model] if listed is None else [build_model(name, {listed.name: value}) for value in listed.choices]
 
 

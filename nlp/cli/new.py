@@ -6,13 +6,15 @@ from typing import Annotated
 
 import typer
 
+from . import options
+
 
 def new(
     model: Annotated[str, typer.Argument(metavar="MODEL", help="Name of a robot, or a robot file (.toml).")],
 ) -> None:
     """Print a commented starter case.
 
-    For example: screwsynth new stewart-gough > my-robot.toml. A case of a robot file belongs in the same folder.
+    A case of a robot file belongs in the same folder.
     """
     from pathlib import Path
 
@@ -22,7 +24,4 @@ def new(
     if not model.endswith(".toml"):
         typer.echo(starter_case(build_model(model)), nl=False)
         return
-    from ..case.robotfile import model_of_definition, read_definition
-
-    built = model_of_definition(read_definition(model, Path()), model)
-    typer.echo(starter_case(built, Path(model).name), nl=False)
+    typer.echo(starter_case(options.read_robot(model), Path(model).name), nl=False)

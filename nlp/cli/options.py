@@ -1,10 +1,13 @@
-"""Arguments and options that several commands share, readers of numbers, and the files that a command writes."""
+"""Arguments and options of the commands, what reads them, and the files that a command writes.
+
+An option that several commands have is defined here, once.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec
 
 import typer
 
@@ -15,8 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.console import Console
 
+    from ...models import Model
     from ..case.case import Case
     from ..case.overrides import Settings
+    from ..case.reader import CaseFile
     from ..results.jsondata import JsonObject
     from ..results.text import TextTable
 
@@ -56,70 +61,91 @@ class WholeNumber:
 
 
 class Number:
-    """Reader of an option that is a number; the command checks whether it is allowed.
+    """Reader of an option that is a number; without a smallest one, the command checks whether it is allowed.
 
     Attributes:
         option: name of the option.
+        least: smallest allowed number, where all below 1 are allowed.
     """
 
-    def __init__(self, option: str) -> None:
-        self.option = option
+    def __init__(self, option: str, least: float | None = None) -> None:
+        self.option, self.least = option, least
         self.__name__ = "NUMBER"
 
     def __call__(self, text: str | float) -> float:
         """Return the number.
 
         Raises:
-            InputError: the text is no number.
+            InputError: the text is no number, or the number is not allowed.
         """
         from ..errors import InputError
 
         try:
-            return float(text)
+            number = float(text)
         except ValueError:
             raise InputError(f"{self.option} {text}: must be a number") from None
+        if self.least is not None and not self.least <= number < 1:
+            raise InputError(f"{self.option} {number:g}: must be at least {self.least:g} and below 1")
+        return number
 
 
-CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
-PlotFile = Annotated[
-    str | None, typer.Option("--plot", metavar="FILE", help="Draw the robot: a .png, .svg or .pdf file.")
-]
-PageFile = Annotated[str | None, typer.Option("--html", metavar="FILE", help="Write a page of HTML.")]
-CurveFile = Annotated[
-    str | None, typer.Option("--plot", metavar="FILE", help="Draw the curve: a .png, .svg or .pdf file.")
-]
-JsonFile = Annotated[str | None, typer.Option("--json", metavar="FILE", help="Write the result as JSON; - is stdout.")]
-CsvFile = Annotated[
-    str | None, typer.Option("--csv", metavar="FILE", help="Write the tables with all digits; - is stdout.")
-]
-CsvTable = Annotated[
-    str | None, typer.Option("--table", metavar="NAME", help="Write this table only, such as design, limbs or limits.")
-]
+# The words of the command line: what several commands have has one name, one form and one sentence of help, to which a
+# command adds its own words. typer's own type of an option is not public.
 
 
-def number_option(name: str, metavar: str, words: str) -> Any:  # noqa: ANN401 - typer's own type is not public
-    """Return an option that is a number, with what the help says of it."""
-    return typer.Option(name, parser=Number(name), metavar=metavar, help=words)
+def text(name: str, metavar: str, words: str) -> Any:  # noqa: ANN401 - as above
+    """Return an option that is a text, with what the help says of it."""
+    return typer.Option(name, metavar=metavar, help=f"{words}.")
 
 
-def whole_option(name: str, words: str, least: int, most: int | None = None) -> Any:  # noqa: ANN401 - as above
-    """Return an option that is a whole number within ends, with what the help says of it."""
-    return typer.Option(name, parser=WholeNumber(name, least, most), metavar="N", help=words)
+def several(name: str, metavar: str, words: str) -> Any:  # noqa: ANN401 - as above
+    """Return an option that is given once for each value: the only form of a list of names."""
+    return typer.Option(name, metavar=metavar, help=f"{words}; may be repeated.")
 
 
-def starts_option(words: str) -> Any:  # noqa: ANN401 - as above
-    """Return the option ``--starts``, with what the help says of it."""
-    return whole_option("--starts", words, 1, 100_000)
+def flag(name: str, words: str) -> Any:  # noqa: ANN401 - as above
+    """Return an option without a value."""
+    return typer.Option(name, help=f"{words}.")
 
 
-def jobs_option(words: str) -> Any:  # noqa: ANN401 - as above
-    """Return the option ``--jobs``, with what the help says of it."""
-    return whole_option("--jobs", words, 1, 256)
+def file(name: str, words: str) -> Any:  # noqa: ANN401 - as above
+    """Return an option that names a file."""
+    return text(name, "FILE", words)
 
 
-Starts = Annotated[int | None, starts_option("Starting points instead of the case's.")]
-Seed = Annotated[int | None, whole_option("--seed", "Seed instead of the case's.", 0)]
-Jobs = Annotated[int | None, jobs_option("Threads; results do not depend on them.")]
+def plot(words: str, name: str = "--plot") -> Any:  # noqa: ANN401 - as above
+    """Return the option of a picture."""
+    return file(name, f"{words}: a .png, .svg or .pdf file")
+
+
+def page(words: str) -> Any:  # noqa: ANN401 - as above
+    """Return the option of a page that a command writes beside its result."""
+    return file("--html", f"Write a page of HTML{words}; - is stdout")
+
+
+def table(words: str) -> Any:  # noqa: ANN401 - as above
+    """Return the option of comma-separated values."""
+    return file("--csv", f"Write {words} as CSV; - is stdout")
+
+
+def number(name: str, metavar: str, words: str, least: float | None = None) -> Any:  # noqa: ANN401 - as above
+    """Return an option that is a number, of at least one and below 1 where a smallest one is given."""
+    return typer.Option(name, parser=Number(name, least), metavar=metavar, help=f"{words}.")
+
+
+def whole(name: str, words: str, least: int, most: int | None = None) -> Any:  # noqa: ANN401 - as above
+    """Return an option that is a whole number within ends."""
+    return typer.Option(name, parser=WholeNumber(name, least, most), metavar="N", help=f"{words}.")
+
+
+def starts(words: str) -> Any:  # noqa: ANN401 - as above
+    """Return the option ``--starts``."""
+    return whole("--starts", words, 1, 100_000)
+
+
+def jobs(words: str) -> Any:  # noqa: ANN401 - as above
+    """Return the option ``--jobs``."""
+    return whole("--jobs", words, 1, 256)
 
 
 def _begin(context: typer.Context, seconds: float | None) -> float | None:
@@ -136,27 +162,41 @@ def _begin(context: typer.Context, seconds: float | None) -> float | None:
     return seconds
 
 
-def time_option(words: str) -> Any:  # noqa: ANN401 - typer's own type is not public
-    """Return the option ``--time``, with what the help says of it."""
+def time(left_out: str, end: str = "shows its results") -> Any:  # noqa: ANN401 - as above
+    """Return the option ``--time``, with the time of a command without it, and what the command does at its end."""
+    words = f"Seconds for the whole command, which then {end}; {left_out}."
     return typer.Option("--time", parser=Number("--time"), metavar="SECONDS", callback=_begin, help=words)
 
 
-Time = Annotated[float | None, time_option("Seconds for the whole command, which then shows its results.")]
+CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
+SettingTexts = Annotated[
+    list[str] | None, several("--set", "NAME=VALUE", "Replace a number of the case: x4=20, p_z=40, axis=0,0,1")
+]
+ResultFile = Annotated[str | None, text("--of", "RESULT", "Take the dimensions from a result that solve --json wrote")]
+Starts = Annotated[int | None, starts("Starting points; the case's if left out")]
+Seed = Annotated[int | None, whole("--seed", "Seed; the case's if left out", 0)]
+Jobs = Annotated[int | None, jobs("Threads; results do not depend on them; all cores if left out")]
+Time = Annotated[float | None, time("no limit if left out")]
+PoseNumber = Annotated[int, whole("--pose", "Pose that is drawn or written, where the case has several", 1)]
+Certify = Annotated[bool, flag("--certify", "Prove every optimum too, as certify does")]
+# A bound of an optimum is one number, and takes 1e-4; a machine has dozens of ranges of numbers, which take 1e-3.
+OptimumGap = Annotated[float, number("--gap", "PART", "Largest relative gap of a proven optimum", 1e-10)]
+RangeGap = Annotated[float, number("--gap", "PART", "Largest relative gap of a number without a limit", 1e-9)]
 AllAssemblies = Annotated[
-    bool,
-    typer.Option("--all-assemblies", help="Cover all working modes of a robot's joints, not home's alone."),
+    bool, flag("--all-assemblies", "Cover all working modes of a robot's joints, not home's alone")
 ]
 LegError = Annotated[
-    float, number_option("--leg-error", "LENGTH", "Largest error of a leg's length: bounds the errors of the pose.")
+    float, number("--leg-error", "LENGTH", "Largest error of a leg's length: bounds the errors of the pose")
 ]
-ResultFile = Annotated[
-    str | None,
-    typer.Option("--of", metavar="RESULT", help="Take the dimensions from a result that solve --json wrote."),
-]
-SettingTexts = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Replace a number of the case: x4=20, p_z=40, axis=0,0,1."),
-]
+ProofFile = Annotated[str | None, file("--proof", "Write the proof, for verify-proof")]
+JsonFile = Annotated[str | None, file("--json", "Write the result as JSON; - is stdout")]
+CsvFile = Annotated[str | None, table("the tables with all digits")]
+CsvTable = Annotated[str | None, text("--table", "NAME", "Write this table only, such as design, limbs or limits")]
+PlotFile = Annotated[str | None, plot("Draw the robot")]
+CurveFile = Annotated[str | None, plot("Draw the curve")]
+PageFile = Annotated[str | None, page("")]
+Folder = Annotated[str, text("--out", "DIR", "Folder to write into")]
+Force = Annotated[bool, flag("--force", "Write over files that screwsynth did not write")]
 
 
 def read_settings(texts: list[str] | None) -> Settings:
@@ -182,16 +222,71 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
     return name, numbers[0] if len(numbers) == 1 else numbers
 
 
+class Machine(NamedTuple):
+    """A case as it was read, and the numbers that replace those of its file."""
+
+    file: CaseFile
+    settings: Settings
+
+
+def read_machine(name: str, texts: list[str] | None, of: str | None, *, at_pose: bool = False) -> Machine:
+    """Read a case with the numbers of ``--set``, and with the dimensions of a result of ``--of``.
+
+    Args:
+        name: of the case.
+        texts: of ``--set``: numbers that replace those of the file, and of the result.
+        of: file of the result; None without one.
+        at_pose: whether a result of this case gives the pose too.
+
+    Raises:
+        InputError: a file cannot be read or holds a fault, or the result is no answer for this robot in these units.
+    """
+    from ..case.reader import read_case
+
+    settings = read_settings(texts)
+    if of is None:
+        return Machine(read_case(name, settings), settings)
+    from ..errors import one_line
+    from ..results.settings import dimensions_of, load_answer, place_of, robot_of, settings_of
+
+    case, result = read_case(name, settings).case, load_answer(of)
+    robot, is_same = robot_of(result, f"--of {of}", case, of_any_case=True), result.head.case == case.name
+    numbers = settings_of(robot, case) if at_pose and is_same else dimensions_of(robot, case)
+    chosen = {**numbers, **place_of(result, case), **settings}
+    if not is_same:
+        typer.echo(f"--of {one_line(of)}: has the dimensions of the case {one_line(result.head.case)!r}", err=True)
+    return Machine(read_case(name, chosen), chosen)
+
+
+def read_robot(file: str) -> Model:
+    """Return the robot of a robot file that stands apart from a case.
+
+    Raises:
+        InputError: the file cannot be read, or holds a fault.
+    """
+    from pathlib import Path
+
+    from ..case.robotfile import model_of_definition, read_definition
+    from ..errors import CaseError, InputError
+
+    try:
+        return model_of_definition(read_definition(file, Path()), file)
+    except CaseError as error:
+        # The key is that of a case that names the file, and there is no case here.
+        raise (InputError(f"{file}: {error.fault}") if error.key == "robot.file" else error) from None
+
+
 #: Options of files for which ``-`` is a name: pictures, and the table of a sweep.
-_PICTURES, _TABLE = ("plot", "picture"), "out"
+_PICTURES, _TABLE = ("plot", "plot_pose"), "out"
 
 
 class Outputs:
     """The files that a command writes; it refuses those that cannot be made, before the work begins.
 
     Args:
-        targets: file by the option that names it, such as ``json``; None for one that is not asked for. All but
-            pictures and the table of a sweep are standard output for ``-``, one of them at most.
+        targets: file by the option that names it, such as ``json``, or ``plot_pose`` for ``--plot-pose``; None for one
+            that is not asked for. All but pictures and the table of a sweep are standard output for ``-``, one of them
+            at most.
 
     Raises:
         InputError: several are standard output, a picture's ending is none, or Matplotlib is not installed.
@@ -231,7 +326,19 @@ class Outputs:
         """
         from ..output.files import check_outputs
 
-        check_outputs(inputs, {f"--{name}": target for name, target in self._targets.items()})
+        check_outputs(inputs, {f"--{name.replace('_', '-')}": target for name, target in self._targets.items()})
+
+    def write(self, name: str, make: Callable[_P, str], *values: _P.args, **options: _P.kwargs) -> None:
+        """Write the text of an option, which a function returns for arguments, where it is asked for.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from ..output.files import write_text
+
+        target = self._targets[name]
+        if target is not None:
+            write_text(target, make(*values, **options))
 
     def draw(self, name: str, make: Callable[_P, Figure], *values: _P.args, **options: _P.kwargs) -> None:
         """Write the picture of an option, of the figure that a function returns for arguments.

@@ -6,22 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import (
-    CaseName,
-    CurveFile,
-    Jobs,
-    JsonFile,
-    Outputs,
-    PageFile,
-    Seed,
-    SettingTexts,
-    Starts,
-    Time,
-    console,
-    read_settings,
-    whole_option,
-    write_json,
-)
+from . import options
 from .progress import counting_line
 
 if TYPE_CHECKING:
@@ -29,32 +14,32 @@ if TYPE_CHECKING:
 
 
 def pareto(
-    case: CaseName,
+    case: options.CaseName,
     goals: Annotated[
         list[str],
-        typer.Option(metavar="GOAL", help="Twice or more: max or min, then F:TASK or limits.KEY, as in 'max F:drive'."),
+        options.several("--goal", "GOAL", "max or min, then F:TASK or limits.KEY, as in 'max F:drive'; 2 to 6 goals"),
     ],
-    points: Annotated[int, whole_option("--points", "Points of the front.", 2, 1000)] = 16,
-    settings: SettingTexts = None,
-    starts: Starts = None,
-    seed: Seed = None,
-    jobs: Jobs = None,
-    _time: Time = None,
-    certify: Annotated[bool, typer.Option("--certify", help="Prove each point's optimum too.")] = False,
-    csv_file: Annotated[str | None, typer.Option("--csv", metavar="FILE", help="Write the front as CSV.")] = None,
-    json_file: JsonFile = None,
-    html: PageFile = None,
-    plot: CurveFile = None,
+    points: Annotated[int, options.whole("--points", "Points of the front", 2, 1000)] = 16,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    starts: options.Starts = None,
+    seed: options.Seed = None,
+    jobs: options.Jobs = None,
+    _time: options.Time = None,
+    certify: options.Certify = False,
+    csv_file: Annotated[str | None, options.table("the front")] = None,
+    json_file: options.JsonFile = None,
+    html: options.PageFile = None,
+    plot: options.CurveFile = None,
 ) -> None:
     """Find the front of two or more goals of a case."""
-    from ..case.reader import read_case
     from ..errors import InputError, UncoveredError
     from ..front.front import pareto as find_front
     from ..front.goals import read_goals
     from ..interruption import Milestone, answer_after, is_requested, why_stopped
 
-    files = Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
-    read = read_case(case, read_settings(settings))
+    files = options.Outputs(json=json_file, csv=csv_file, html=html, plot=plot)
+    read = options.read_machine(case, settings, of).file
     read_goals(goals, read.case)  # before the files are looked at
     files.check(read.inputs)
     answer_after(Milestone.POINT)
@@ -80,20 +65,18 @@ def pareto(
     raise typer.Exit(0 if is_proved and not is_stopped else 1)
 
 
-def _write(found: Front, files: Outputs) -> None:
+def _write(found: Front, files: options.Outputs) -> None:
     """Write a front into its files, and onto the terminal where standard output takes no file."""
     from ..front.data import front_result
-    from ..output.files import write_text
     from ..output.fronttable import front_csv, front_table, front_words
     from ..output.terminal import show
 
-    write_json(files["json"], front_result(found))
-    if (csv_file := files["csv"]) is not None:
-        write_text(csv_file, front_csv(found))
-    if (html := files["html"]) is not None:
+    options.write_json(files["json"], front_result(found))
+    files.write("csv", front_csv, found)
+    if files["html"] is not None:
         from ..output.report.front import front_page
 
-        write_text(html, front_page(found))
+        files.write("html", front_page, found)
     if files["plot"] is not None:
         from ..output.pictures.curves import front_figure
 
@@ -101,4 +84,4 @@ def _write(found: Front, files: Outputs) -> None:
     if not files.is_piped:
         for line in front_words(found):
             typer.echo(line)
-        show(console(), [front_table(found)])
+        show(options.console(), [front_table(found)])

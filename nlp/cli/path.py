@@ -7,18 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import (
-    CaseName,
-    JsonFile,
-    Outputs,
-    ResultFile,
-    SettingTexts,
-    Time,
-    console,
-    number_option,
-    read_settings,
-    write_json,
-)
+from . import options
 from .progress import spinner
 
 if TYPE_CHECKING:
@@ -32,69 +21,53 @@ if TYPE_CHECKING:
 
 
 def path(
-    case: CaseName,
+    case: options.CaseName,
     along: Annotated[
         str | None,
-        typer.Option(
-            "--along", metavar="FILE", help="The path, poses in a .csv file or G-code, in place of the case's own."
-        ),
+        options.file("--along", "The path, poses in a .csv file or G-code, in place of the case's own"),
     ] = None,
     ranges: Annotated[
-        bool, typer.Option("--range", help="How far each coordinate can move from a pose, and each two.")
+        bool, options.flag("--range", "How far each coordinate can move from a pose, and each two")
     ] = False,
     most: Annotated[
-        str | None,
-        typer.Option("--most", metavar="LENGTH,ANGLE", help="Largest motion to each side with --range."),
+        str | None, options.text("--most", "LENGTH,ANGLE", "Largest motion to each side with --range")
     ] = None,
-    settings: SettingTexts = None,
-    of: ResultFile = None,
-    unit: Annotated[
-        str | None, typer.Option("--unit", metavar="mm|in", help="Unit of a program before G20 or G21.")
-    ] = None,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    unit: Annotated[str | None, options.text("--unit", "mm|in", "Unit of a program before G20 or G21")] = None,
     start: Annotated[
         str | None,
-        typer.Option(
-            "--start", metavar="X,Y,Z,A,B,C", help="Where the machine stands: before a program, or the pose of --range."
-        ),
+        options.text("--start", "X,Y,Z,A,B,C", "Where the machine stands: before a program, or the pose of --range"),
     ] = None,
     offset: Annotated[
         list[str] | None,
-        typer.Option("--offset", metavar="G54=X,Y,Z,A,B,C", help="Origin of a program's coordinate system."),
+        options.several("--offset", "G54=X,Y,Z,A,B,C", "Origin of a program's coordinate system"),
     ] = None,
     angles: Annotated[
         str | None,
-        typer.Option("--angles", metavar="rpy|xyz|...", help="Convention of a program's A, B, C; LinuxCNC's is rpy."),
+        options.text("--angles", "rpy|xyz|...", "Convention of a program's A, B, C; LinuxCNC's rpy if left out"),
     ] = None,
     between: Annotated[
         str | None,
-        typer.Option("--between", metavar="angles|slerp", help="Turns between points: linear angles, or one axis."),
+        options.text("--between", "angles|slerp", "Turns between points: linear angles, or one axis"),
     ] = None,
-    gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a number without a limit.")] = 1e-3,
-    time: Time = None,
-    json_file: JsonFile = None,
-    csv_file: Annotated[
-        str | None, typer.Option("--csv", metavar="FILE", help="Write the actuators along the path; - is stdout.")
-    ] = None,
+    gap: options.RangeGap = 1e-3,
+    time: Annotated[float | None, options.time("600 if left out, as programs are long; 120 with --range")] = None,
+    json_file: options.JsonFile = None,
+    csv_file: Annotated[str | None, options.table("the actuators along the path")] = None,
     step: Annotated[
-        float | None, number_option("--step", "LENGTH", "Length of the path between rows, at turns by 1 degree.")
+        float | None, options.number("--step", "LENGTH", "Length of the path between rows, at turns by 1 degree")
     ] = None,
     within: Annotated[
         float | None,
-        number_option("--within", "LENGTH", "Rows so that actuators linear between them stay this near the path."),
+        options.number("--within", "LENGTH", "Rows so that actuators linear between them stay this near the path"),
     ] = None,
-    plot: Annotated[
-        str | None,
-        typer.Option("--plot", metavar="FILE", help="Draw numbers along the path: a .png, .svg or .pdf file."),
-    ] = None,
-    page: Annotated[
-        str | None,
-        typer.Option("--html", metavar="FILE", help="Write a page: verdicts, curves, robot; - is stdout."),
-    ] = None,
+    plot: Annotated[str | None, options.plot("Draw numbers along the path")] = None,
+    html: Annotated[str | None, options.page(": verdicts, curves, robot")] = None,
 ) -> None:
     """Prove regular poses and limits at every point of a path."""
     from pathlib import Path
 
-    from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..path.options import PathOptions
     from ..path.reader import options_of, path_of_case, read_path
@@ -102,36 +75,33 @@ def path(
     from ..results.path import path_result
     from ..results.pathwording import path_summary
     from ..results.workspaceposes import evaluate_command
-    from .paper import read_machine
 
     sampling = _sampling(step, within, is_written=csv_file is not None)
-    if not 1e-9 <= gap < 1:
-        raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
     _refuse_elsewhere(
         {"--along": along, "--unit": unit, "--offset": offset, "--angles": angles, "--between": between}
-        | {"--step": step, "--within": within, "--plot": plot, "--html": page},
+        | {"--step": step, "--within": within, "--plot": plot, "--html": html},
         most,
         ranges=ranges,
     )
     answer_after(Milestone.BOUND)
-    (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
-    files = Outputs(json=json_file, csv=csv_file, plot=plot, html=page)
+    (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
+    files = options.Outputs(json=json_file, csv=csv_file, plot=plot, html=html)
     own = PathOptions() if along is not None or ranges or loaded.path is None else options_of(loaded.path)
-    options = _options(own, unit, start, offset or [], angles, between)
+    choices = _options(own, unit, start, offset or [], angles, between)
     if ranges:
         from .axisranges import show_ranges
 
         files.check(inputs)
         with spinner("the pose") as show:
-            found = show_ranges(loaded, options.start, most, time, files, show)
+            found = show_ranges(loaded, choices.start, most, time, files, show)
         raise typer.Exit(0 if found.proved else 1)
-    if page is not None:
+    if html is not None:
         from ..output.pictures.requirements import check_library
 
         check_library("plotly", "pages with a robot")
     files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
-        programmed = path_of_case(loaded, options) if along is None else read_path(along, loaded.units, options)
+        programmed = path_of_case(loaded, choices) if along is None else read_path(along, loaded.units, choices)
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, sampling=sampling, progress=show)
     result = path_result(judged)
@@ -140,12 +110,12 @@ def path(
         """Return the command that shows a pose."""
         return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
 
-    write_json(json_file, result)
+    options.write_json(json_file, result)
     _write(files, judged, result, text, command)
     if not files.is_piped:
         from ..output.terminal import show as show_on
 
-        show_on(console(), path_summary(judged.case, result, command))
+        show_on(options.console(), path_summary(judged.case, result, command))
     raise typer.Exit(0 if result.proved else 1)
 
 
@@ -163,15 +133,17 @@ def _refuse_elsewhere(along: Mapping[str, object], most: str | None, *, ranges: 
 
 
 def _write(
-    files: Outputs, judged: PathJudgement, result: PathResult, text: str, command: Callable[[WorkspacePose], str]
+    files: options.Outputs,
+    judged: PathJudgement,
+    result: PathResult,
+    text: str,
+    command: Callable[[WorkspacePose], str],
 ) -> None:
     """Write the table of actuators, the picture and the page."""
-    from ..output.files import write_text
-
-    if (target := files["csv"]) is not None and judged.knots is not None:
+    if judged.knots is not None:
         from ..results.pathtable import knots_csv
 
-        write_text(target, knots_csv(judged.case, judged.path, judged.knots))
+        files.write("csv", knots_csv, judged.case, judged.path, judged.knots)
     if files["plot"] is None and files["html"] is None:
         return
     from ..output.pictures.pathpanels import path_picture
@@ -181,8 +153,8 @@ def _write(
 
     picture = path_picture(judged, samples_of(judged), result)
     files.draw("plot", path_figure, picture)
-    if (target := files["html"]) is not None:
-        write_text(target, path_page(picture, text, command))
+    if files["html"] is not None:
+        files.write("html", path_page, picture, text, command)
 
 
 def _sampling(step: float | None, within: float | None, *, is_written: bool) -> Sampling | None:

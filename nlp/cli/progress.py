@@ -67,8 +67,10 @@ class SolveOutcome(NamedTuple):
     is_proved: bool
 
 
-def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) -> SolveOutcome:
-    """Solve a case, and certify it with ``certify``.
+def solve_with_progress(
+    case: Case, jobs: int | None, *, certify: bool = False, gap: float = 1e-4, step: float | None = None
+) -> SolveOutcome:
+    """Solve a case, round its dimensions to multiples of a step, where one is given, and certify it with ``certify``.
 
     Raises:
         CaseError: the case contradicts itself.
@@ -76,8 +78,16 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
     """
     from ..solver.solve import solve
 
+    if step is not None:
+        from ..solver.rounding import round_design
+
+        rounded = round_design(solve_with_progress(case, jobs).solution, step, jobs=jobs)
+        if not (certify and rounded.status.is_answer):
+            return SolveOutcome(rounded, rounded, not certify)
+        certified = certify_with_progress(rounded, jobs=jobs, gap=gap)
+        return SolveOutcome(certified.solution, certified, certified.is_proved)
     if certify:
-        certified = certify_with_progress(case, jobs=jobs)
+        certified = certify_with_progress(case, jobs=jobs, gap=gap)
         return SolveOutcome(certified.solution, certified, certified.is_proved)
     if not sys.stderr.isatty():
         solution = solve(case, jobs=jobs)
@@ -104,7 +114,7 @@ def solve_with_progress(case: Case, jobs: int | None, *, certify: bool = False) 
     return SolveOutcome(solution, solution, True)
 
 
-def certify_with_progress(case: Case, **options: Any) -> Certified:  # noqa: ANN401 - the options of `certify`
+def certify_with_progress(case: Case | Solution, **options: Any) -> Certified:  # noqa: ANN401 - the options of `certify`
     """Certify a case; the options are those of :func:`screwsynth.nlp.certify`.
 
     Raises:

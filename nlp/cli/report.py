@@ -7,34 +7,34 @@ from typing import Annotated
 
 import typer
 
-from .options import CaseName, Jobs, Seed, SettingTexts, Starts, Time, read_settings
+from . import options
 
 
 def report(
-    case: CaseName,
-    out: Annotated[str, typer.Option(metavar="FILE", help="Page to write, such as report.html; - is stdout.")],
-    settings: SettingTexts = None,
-    certify: Annotated[
-        bool, typer.Option("--certify", help="Prove the optimum too, and show its bound over time.")
-    ] = False,
-    starts: Starts = None,
-    seed: Seed = None,
-    jobs: Jobs = None,
-    _time: Time = None,
+    case: options.CaseName,
+    out: Annotated[str, options.file("--out", "Page to write, such as report.html; - is stdout")],
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    certify: options.Certify = False,
+    gap: options.OptimumGap = 1e-4,
+    starts: options.Starts = None,
+    seed: options.Seed = None,
+    jobs: options.Jobs = None,
+    _time: options.Time = None,
 ) -> None:
     """Solve a case and write a page about it.
 
     The page is one file, and opens without a network.
     """
-    from ..case.reader import load_case, read_case
+    from ..case.choices import chosen_settings
+    from ..case.reader import load_case
     from ..errors import UncoveredError, one_line
     from ..interruption import Milestone, answer_after, is_requested
     from ..output.files import check_outputs, write_text
     from ..output.pictures.requirements import check_library
     from .progress import solve_with_progress
 
-    fixed = read_settings(settings)
-    loaded, text, inputs = read_case(case, fixed)
+    (loaded, text, inputs), fixed = options.read_machine(case, settings, of)
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_outputs(inputs, {"--out": out})
     check_library("plotly", "reports")
@@ -48,7 +48,7 @@ def report(
     answer_after(Milestone.START)
     refusal = ""
     try:
-        solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
+        solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify, gap=gap)
     except UncoveredError as error:
         # The answer stands without a proof, and the page says why there is none.
         refusal = str(error)
@@ -56,11 +56,14 @@ def report(
         is_proved = False
     result = result_of(found)
     # The numbers in print are of the case as its file states it.
-    is_checked = loaded.published and not settings and not is_requested()
+    is_checked = loaded.published and not fixed and not is_requested()
     check = check_case(case, {case: result}) if is_checked else None
     page = report_of(text, solution, result, check, refusal)
     if page.is_enclosed:
-        curves = limit_curves(solution, result, lambda name, value: load_case(case, {**fixed, name: value}), jobs)
+        chosen = chosen_settings(loaded, solution.outcomes[0].own.nlp.case)
+        curves = limit_curves(
+            solution, result, lambda name, value: load_case(case, {**fixed, **chosen, name: value}), jobs
+        )
         page = replace(page, curves=curves)
     write_text(out, page_of(page))
     if out != "-":

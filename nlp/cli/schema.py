@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
+from . import options
+
 
 def schema(
-    result: Annotated[bool, typer.Option("--result", help="Print the schema of results, which --json writes.")] = False,
+    result: Annotated[bool, options.flag("--result", "Print the schema of results, which --json writes")] = False,
 ) -> None:
     """Print the JSON Schema of case files.
 

@@ -7,68 +7,57 @@ from typing import Annotated
 
 import typer
 
-from .options import (
-    CaseName,
-    CsvFile,
-    CsvTable,
-    Jobs,
-    JsonFile,
-    Outputs,
-    PlotFile,
-    Seed,
-    SettingTexts,
-    Starts,
-    Time,
-    check_csv,
-    console,
-    read_settings,
-    whole_option,
-    write_csv,
-    write_json,
-)
+from . import options
 
 
 def solve(
-    case: CaseName,
-    settings: SettingTexts = None,
-    starts: Starts = None,
-    seed: Seed = None,
-    jobs: Jobs = None,
-    _time: Time = None,
+    case: options.CaseName,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    starts: options.Starts = None,
+    seed: options.Seed = None,
+    jobs: options.Jobs = None,
+    _time: options.Time = None,
     compiled: Annotated[
-        bool, typer.Option("--compiled", help="Call the objective as compiled C; needs a C compiler.")
+        bool, options.flag("--compiled", "Call the objective as compiled C; needs a C compiler")
     ] = False,
-    json_file: JsonFile = None,
-    csv_file: CsvFile = None,
-    table: CsvTable = None,
-    plot: PlotFile = None,
-    pose: Annotated[int, whole_option("--pose", "Pose that --plot draws, where the case has several.", 1)] = 1,
-    certify: Annotated[
-        bool, typer.Option("--certify", help="Prove the optimum too, to a gap of 1e-4; see certify.")
-    ] = False,
+    json_file: options.JsonFile = None,
+    csv_file: options.CsvFile = None,
+    table: options.CsvTable = None,
+    plot: options.PlotFile = None,
+    pose: options.PoseNumber = 1,
+    step: Annotated[
+        float | None,
+        options.number("--round", "STEP", "Round the free dimensions to multiples: of the length unit, and degrees"),
+    ] = None,
+    certify: options.Certify = False,
+    gap: options.OptimumGap = 1e-4,
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
-    from ..case.reader import read_case
     from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..results.result import result_of
     from .progress import solve_with_progress
 
     answer_after(Milestone.START)
-    given = read_case(case, read_settings(settings))
+    given = options.read_machine(case, settings, of).file
     loaded = replace(given.case, search=given.case.search.but(starts, seed, compiled=compiled))
-    files = Outputs(json=json_file, plot=plot, csv=csv_file)
-    check_csv(csv_file, table, loaded, at_point=False)
+    files = options.Outputs(json=json_file, plot=plot, csv=csv_file)
+    options.check_csv(csv_file, table, loaded, at_point=False)
     files.check(given.inputs)
+    if step is not None:
+        from ..solver.rounding import check_rounding
+
+        check_rounding(loaded, step)
     if pose > loaded.pose_count:
         raise InputError(f"--pose {pose}: the case has {loaded.pose_count} pose{'s' * (loaded.pose_count > 1)}")
-    solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify)
+    solution, found, is_proved = solve_with_progress(loaded, jobs, certify=certify, gap=gap, step=step)
     result = result_of(found)
-    write_json(json_file, result)
+    options.write_json(json_file, result)
     if csv_file is not None:
         from ..results.summary import case_tables
 
-        write_csv(csv_file, case_tables(loaded, result), table)
+        options.write_csv(csv_file, case_tables(loaded, result), table)
     if plot is not None:
         from ..output.pictures.plot import plot as draw
 
@@ -77,5 +66,5 @@ def solve(
         from ..output.terminal import show
         from ..results.summary import case_summary
 
-        show(console(), case_summary(loaded, result))
+        show(options.console(), case_summary(loaded, result))
     raise typer.Exit(0 if solution.status.is_answer and is_proved and solution.keeps_limits else 1)

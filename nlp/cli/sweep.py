@@ -8,19 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import (
-    CaseName,
-    JsonFile,
-    Outputs,
-    PageFile,
-    Seed,
-    SettingTexts,
-    jobs_option,
-    read_settings,
-    starts_option,
-    time_option,
-    write_json,
-)
+from . import options
 from .progress import counting_line
 
 if TYPE_CHECKING:
@@ -29,55 +17,51 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    case: CaseName,
-    out: Annotated[
-        str, typer.Option("--out", metavar="FILE", help="The table: a .parquet or .csv file; a stopped run is resumed.")
-    ],
+    case: options.CaseName,
+    out: Annotated[str, options.file("--out", "The table: a .parquet or .csv file; a stopped run is resumed")],
     over: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=FIRST:LAST:COUNT", help="A number to vary, or NAME=V1,V2,...; several make a grid."),
-    ] = None,
-    points: Annotated[
-        str | None,
-        typer.Option("--points", metavar="FILE", help="A CSV file of points instead, names in its first row."),
-    ] = None,
-    settings: SettingTexts = None,
-    starts: Annotated[int | None, starts_option("Starting points at each point; 8 if left out.")] = None,
-    seed: Seed = None,
-    jobs: Annotated[int | None, jobs_option("Threads, or processes of Ipopt.")] = None,
+        list[str],
+        options.several(
+            "--over",
+            "NAME=FIRST:LAST:COUNT",
+            "A number to vary, or NAME=V1,V2,..., or one CSV file of points, names in its first row",
+        ),
+    ],
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    starts: Annotated[int | None, options.starts("Starting points at each point; 8 if left out")] = None,
+    seed: options.Seed = None,
+    jobs: Annotated[int | None, options.jobs("Threads, or processes of Ipopt; all cores if left out")] = None,
     engine: Annotated[
-        str | None,
-        typer.Option("--engine", metavar="WORD", help="compiled or ipopt; chosen by the case if left out."),
+        str | None, options.text("--engine", "WORD", "compiled or ipopt; chosen by the case if left out")
     ] = None,
     dask: Annotated[
-        str | None,
-        typer.Option("--dask", metavar="ADDRESS", help="Run on a Dask cluster, such as tcp://10.0.0.1:8786."),
+        str | None, options.text("--dask", "ADDRESS", "Run on a Dask cluster, such as tcp://10.0.0.1:8786")
     ] = None,
-    certified: Annotated[bool, typer.Option("--certify", help="Prove the optimum at each point too.")] = False,
-    _time: Annotated[float | None, time_option("Seconds for the whole command; the same command resumes it.")] = None,
-    json_file: JsonFile = None,
-    html: PageFile = None,
-    plot: Annotated[
-        str | None, typer.Option("--plot", metavar="FILE", help="Draw F over one or two numbers: .png, .svg or .pdf.")
-    ] = None,
+    certified: options.Certify = False,
+    _time: Annotated[float | None, options.time("no limit if left out", "goes on when it is called again")] = None,
+    json_file: options.JsonFile = None,
+    html: options.PageFile = None,
+    plot: Annotated[str | None, options.plot("Draw F over one or two numbers")] = None,
 ) -> None:
     """Solve at thousands of values of fixed numbers."""
-    from ..case.reader import read_case
     from ..interruption import say_on_leaving
+    from ..output.files import read_text
     from ..output.sweeptable import check_table, is_written, write_table
     from ..sweeps.engines import EngineKind
-    from ..sweeps.points import CaseSource
+    from ..sweeps.points import CaseSource, grid, points_of_csv
     from ..sweeps.sweep import Sweep, run_sweep
 
     kind = EngineKind.of(engine)
-    chosen = _read_points(over, points)
-    files = Outputs(out=out, json=json_file, html=html, plot=plot)
+    points = _points_file(over)
+    chosen = grid(over) if points is None else points_of_csv(read_text(points), points)
+    files = options.Outputs(out=out, json=json_file, html=html, plot=plot)
     if plot is not None:
         from ..output.pictures.sweeps import check_axes
 
         check_axes(chosen)
     check_table(out)
-    read = read_case(case, read_settings(settings))
+    read = options.read_machine(case, settings, of).file
     inputs = dict(read.inputs)
     if points is not None:
         from pathlib import Path
@@ -110,22 +94,21 @@ def sweep(
             write_table(out, found, journal.rows())
             journal.remove()
     if json_file is not None or html is not None:
-        _write(found, out, json_file, html)
+        _write(found, out, files)
     raise typer.Exit(_show(found, out, files))
 
 
-def _write(found: Sweep, out: str, json_file: str | None, html: str | None) -> None:
+def _write(found: Sweep, out: str, files: options.Outputs) -> None:
     """Write a sweep as JSON and as a page."""
-    from ..output.files import write_text
     from ..output.sweeptable import table_rows
     from ..sweeps.columns import columns_of, sweep_result
 
     case, columns = found.source.case_at(found.points.settings(0)), columns_of(found, table_rows(out, found))
-    write_json(json_file, sweep_result(case, columns))
-    if html is not None:
+    options.write_json(files["json"], sweep_result(case, columns))
+    if files["html"] is not None:
         from ..output.report.sweep import sweep_page
 
-        write_text(html, sweep_page(case, found.points, columns))
+        files.write("html", sweep_page, case, found.points, columns)
 
 
 @contextmanager
@@ -145,22 +128,23 @@ def _named_points(chosen: Points, file: str | None) -> Iterator[None]:
         raise InputError(f"{file}: column {error.key}: {error.fault}") from None
 
 
-def _read_points(over: list[str] | None, file: str | None) -> Points:
-    """Return the points that the options state.
+def _points_file(over: list[str]) -> str | None:
+    """Return the file of points that ``--over`` names; None where it states a grid.
 
     Raises:
-        InputError: there are none, or both options are given.
+        InputError: a range, a list or a file stands beside it.
     """
+    from pathlib import Path
+
     from ..errors import InputError
-    from ..output.files import read_text
-    from ..sweeps.points import grid, points_of_csv
 
-    if bool(over) == (file is not None):
-        raise InputError("a sweep needs points: either --over NAME=FIRST:LAST:COUNT, once or more, or --points FILE")
-    return points_of_csv(read_text(file), file) if file is not None else grid(over or [])
+    file = next((text for text in over if text.endswith(".csv") or Path(text).is_file()), None)
+    if file is not None and len(over) > 1:
+        raise InputError(f"--over {file}: a file of points stands alone, without ranges or lists beside it")
+    return file
 
 
-def _show(found: Sweep, out: str, files: Outputs) -> int:
+def _show(found: Sweep, out: str, files: options.Outputs) -> int:
     """Draw the picture, print a line about the table, and return the exit status."""
     import math
 

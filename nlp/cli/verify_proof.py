@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import AllAssemblies, LegError, ResultFile, SettingTexts, number_option, read_settings
+from . import options
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -20,13 +20,13 @@ def verify_proof(
     case: Annotated[
         str | None, typer.Argument(metavar="[CASE]", help="The case to be proved; that in the proof if left out.")
     ] = None,
-    settings: SettingTexts = None,
-    of: ResultFile = None,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
     above: Annotated[
-        float | None, number_option("--above", "F", "The proof must show that F is above this value.")
+        float | None, options.number("--above", "F", "The proof must show that F is above this value")
     ] = None,
-    all_assemblies: AllAssemblies = False,
-    leg_error: LegError = 0.0,
+    all_assemblies: options.AllAssemblies = False,
+    leg_error: options.LegError = 0.0,
 ) -> None:
     """Check a proof with independent code.
 
@@ -36,16 +36,16 @@ def verify_proof(
     from ..errors import InputError
     from ..output.files import read_text
     from ..proof.checker.proof_file import Statement, read_proof
-    from .paper import read_machine, verify_paper
+    from .paper import verify_paper
 
-    options = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
+    is_given = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
     given = read_proof(read_text(proof), proof)
     foreign = ("--leg-error",) if isinstance(given.premises, Statement) else ("--above", "--all-assemblies")
     for name in foreign:
-        if options[name]:
+        if is_given[name]:
             raise InputError(f"{name}: means nothing for this proof, which another command wrote")
     if case is not None:
-        loaded = read_machine(case, read_settings(settings), of).file.case
+        loaded = options.read_machine(case, settings, of).file.case
     elif settings or of:
         raise InputError(f"{'--set' if settings else '--of'}: needs the CASE that it changes")
     else:

@@ -6,22 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import (
-    CaseName,
-    CsvFile,
-    Jobs,
-    JsonFile,
-    LegError,
-    Outputs,
-    ResultFile,
-    SettingTexts,
-    Time,
-    console,
-    number_option,
-    read_settings,
-    write_csv,
-    write_json,
-)
+from . import options
 from .progress import spinner
 
 if TYPE_CHECKING:
@@ -35,50 +20,39 @@ if TYPE_CHECKING:
 
 
 def workspace(
-    case: CaseName,
-    settings: SettingTexts = None,
-    of: ResultFile = None,
-    of_quantity: Annotated[
-        list[str] | None, typer.Option("--of-quantity", metavar="NAME", help="Bound this measure of the robot too.")
+    case: options.CaseName,
+    settings: options.SettingTexts = None,
+    of: options.ResultFile = None,
+    quantities: Annotated[
+        list[str] | None, options.several("--quantity", "NAME", "Bound this measure of the robot too")
     ] = None,
-    gap: Annotated[float, number_option("--gap", "PART", "Largest relative gap of a bound.")] = 1e-3,
-    time: Time = None,
-    leg_error: LegError = 0.0,
-    scale: Annotated[bool, typer.Option("--scale", help="Find the largest box that is proved, to 1 %.")] = False,
-    proof: Annotated[str | None, typer.Option(metavar="FILE", help="Write the proof, for verify-proof.")] = None,
-    jobs: Jobs = None,
-    json_file: JsonFile = None,
-    csv_file: CsvFile = None,
-    plot: Annotated[
-        str | None,
-        typer.Option("--plot", metavar="FILE", help="Draw slices of the workspace: a .png, .svg or .pdf file."),
-    ] = None,
-    picture: Annotated[
-        str | None,
-        typer.Option("--picture", metavar="FILE", help="Draw the robot at its worst pose: a .png, .svg or .pdf file."),
-    ] = None,
-    page: Annotated[
-        str | None, typer.Option("--html", metavar="FILE", help="Write a page: verdicts, poses, slices; - is stdout.")
-    ] = None,
+    gap: options.RangeGap = 1e-3,
+    time: Annotated[float | None, options.time("60 for the proofs if left out")] = None,
+    leg_error: options.LegError = 0.0,
+    scale: Annotated[bool, options.flag("--scale", "Find the largest box that is proved, to 1 %")] = False,
+    proof: options.ProofFile = None,
+    jobs: options.Jobs = None,
+    json_file: options.JsonFile = None,
+    csv_file: options.CsvFile = None,
+    plot: Annotated[str | None, options.plot("Draw slices of the workspace")] = None,
+    plot_pose: Annotated[str | None, options.plot("Draw the robot at its worst pose", "--plot-pose")] = None,
+    html: Annotated[str | None, options.page(": verdicts, poses, slices")] = None,
 ) -> None:
     """Prove regular poses and limits over a whole workspace."""
-    from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..proof.statement.machine import workspace_of_case
     from ..results.workspace import scale_data, workspace_of
     from ..results.workspaceposes import evaluate_command
-    from .paper import paper_record, read_machine, write_paper
+    from .paper import paper_record, write_paper
 
-    if not 1e-9 <= gap < 1:
-        raise InputError(f"--gap {gap:g}: must be at least 1e-9 and below 1")
     record = paper_record(proof, json_file)
     answer_after(Milestone.BOUND)
-    (loaded, text, inputs), chosen = read_machine(case, read_settings(settings), of)
+    (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
     workspace_of_case(loaded)
-    files = Outputs(json=json_file, csv=csv_file, plot=plot, picture=picture, html=page, proof=proof)
+    files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)
     files.check(inputs)
     slices = _slices(loaded, files)
-    judged = _judge_with_progress(loaded, list(of_quantity or ()), gap, time, leg_error, jobs, record)
+    judged = _judge_with_progress(loaded, quantities or [], gap, time, leg_error, jobs, record)
     largest = None
     if scale:
         from ..proof.workspace.scale import largest_scale
@@ -90,30 +64,30 @@ def workspace(
         """Return the command that shows a pose."""
         return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
 
-    write_json(json_file, result)
+    options.write_json(json_file, result)
     if csv_file is not None:
         from ..results.text import TextTable
         from ..results.workspacewording import workspace_summary
 
-        write_csv(csv_file, [each for each in workspace_summary(loaded, result) if isinstance(each, TextTable)], None)
+        shown = workspace_summary(loaded, result)
+        options.write_csv(csv_file, [each for each in shown if isinstance(each, TextTable)], None)
     if plot is not None:
         from ..output.pictures.workspaces import slices_figure
 
         files.draw("plot", slices_figure, loaded, slices)
-    if picture is not None:
-        files.draw("picture", _worst, loaded, result, picture)
-    if page is not None:
-        from ..output.files import write_text
+    if plot_pose is not None:
+        files.draw("plot_pose", _worst, loaded, result, plot_pose)
+    if html is not None:
         from ..output.report.workspace import WorkspaceReport, workspace_page
 
-        write_text(page, workspace_page(WorkspaceReport(loaded, text, result, slices, command)))
+        files.write("html", workspace_page, WorkspaceReport(loaded, text, result, slices, command))
     if proof is not None:
-        write_paper(proof, judged, record, text, of_quantity or (), leg_error)
+        write_paper(proof, judged, record, text, quantities or (), leg_error)
     if not files.is_piped:
         from ..output.terminal import show
         from ..results.workspacewording import workspace_summary
 
-        show(console(), workspace_summary(loaded, result, command))
+        show(options.console(), workspace_summary(loaded, result, command))
     raise typer.Exit(0 if result.proved else 1)
 
 
@@ -145,7 +119,7 @@ def _judge_with_progress(
         )
 
 
-def _slices(case: Case, files: Outputs) -> tuple[Slice, ...]:
+def _slices(case: Case, files: options.Outputs) -> tuple[Slice, ...]:
     """Return the slices that the files show; a page has none of a robot without slices.
 
     Raises:
@@ -177,5 +151,5 @@ def _worst(case: Case, result: WorkspaceResult, target: str) -> Figure:
 
     worst = worst_claim(result, case.tasks[0].sense)
     if worst is None:
-        raise InputError(f"--picture {target}: no pose of the workspace is known at which a number is reached")
+        raise InputError(f"--plot-pose {target}: no pose of the workspace is known at which a number is reached")
     return figure_of([drawing_at(case, worst)])

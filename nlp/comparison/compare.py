@@ -153,7 +153,7 @@ def _check_numbers(size: float | None, part: float, *, scale: bool) -> None:
     if size is not None and not scale:
         raise InputError("--size: cannot stand beside --no-scale")
     if not 0 <= part < 1:
-        raise InputError(f"--range {part:g}: must be at least 0 and below 1")
+        raise InputError(f"--part {part:g}: must be at least 0 and below 1")
 
 
 def _own_size(case: Case) -> float:
@@ -251,7 +251,7 @@ def _with_judgement(entry: Entry, jobs: int | None) -> Entry:
     if judged is None or asked:
         # An exchange proves the limits alone, and no range of another measure.
         try:
-            design = design_of(entry.placed.case, outcome.own.nlp, outcome.x)
+            design = design_of(entry.placed.case, outcome.own.nlp, entry.solution.x)
             limit = _proof_seconds()
             judged = judge_workspace(design, quantities=asked, time_limit=limit, jobs=jobs, with_objective=False)
         except ScrewsynthError as error:

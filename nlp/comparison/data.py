@@ -158,7 +158,7 @@ def _cautions(found: Comparison) -> list[str]:
         of_all = "one size of all but the case's robot, which keeps its own ranges" if own else "one size"
         lines.append(
             "The designs have different sizes, and F of a rotation grows with the square of the size: see the column "
-            f"size, and --range 0 for {of_all}."
+            f"size, and --part 0 for {of_all}."
         )
     terms = {each.contender.label: driven_wrenches(each.contender) for each in ranked}
     if len(set(terms.values())) > 1:

@@ -94,6 +94,8 @@ def _read(given: str | Path | Model, case: Case) -> Contender:
             return Contender(path.stem, model_of_definition(read_definition(text, Path()), text), file=path.resolve())
         except CaseError as error:
             raise (error if error.source else error.within(text)) from None
+    if text.endswith(".toml"):
+        raise InputError(f"compare: {text}: no such robot file")
     hint = nearest(text, [*names, OWN])
     raise InputError(f"compare: {text or 'an empty name'}: no such robot, and no such robot file; {hint}")
 

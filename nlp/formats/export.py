@@ -17,6 +17,7 @@ from ..evidence.state import evaluate
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from .solved.mechanism_of import Exported, mechanism_of
+from .writing.cutlist import cut_list_csv, drawn_links
 from .writing.mjcf import mjcf_text
 from .writing.plates import Plate, dxf_text, plate_of, plates_csv, required_dxf
 from .writing.readme import readme_text
@@ -155,10 +156,12 @@ def exported_files(exported: Exported, formats: Collection[str]) -> dict[str, st
     if "csv" in chosen:
         files["joints.csv"] = joints_csv(mechanism, exported.joints, units)
         files["links.csv"] = links_csv(mechanism, units)
+        files["cut-list.csv"] = cut_list_csv(mechanism, exported.travels, exported.size, units)
     if "csv" in chosen or "dxf" in chosen:
         plates = tuple(plate_of(mechanism, link, exported.size) for link in (mechanism.base, mechanism.platform))
         files["plates.csv"] = plates_csv(plates, units)
     if "dxf" in chosen:
+        plates += tuple(plate_of(mechanism, link, exported.size) for link in drawn_links(mechanism, exported.size))
         for plate in plates:
             files[f"{plate.name}.dxf"] = dxf_text(plate, units.label(Dimension.LENGTH))
     return {"README.md": readme_text(exported, list(files), plates if "dxf" in chosen else ()), **files}

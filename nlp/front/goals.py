@@ -63,11 +63,11 @@ def read_goals(texts: Sequence[str], case: Case) -> tuple[Goal, ...]:
     goals = tuple(_read_goal(text, case) for text in texts)
     if not 2 <= len(goals) <= MOST:
         verb = "is" if len(goals) == 1 else "are"
-        raise InputError(f"--goals: a front has 2 to {MOST} goals, and {len(goals)} {verb} given")
+        raise InputError(f"--goal: a front has 2 to {MOST} goals, and {len(goals)} {verb} given")
     labels = [goal.label for goal in goals]
     twice = next((label for k, label in enumerate(labels) if label in labels[:k]), None)
     if twice is not None:
-        raise InputError(f"--goals: {twice} is given twice")
+        raise InputError(f"--goal: {twice} is given twice")
     return goals
 
 
@@ -76,18 +76,18 @@ def _read_goal(text: str, case: Case) -> Goal:
     word, _, rest = text.strip().partition(" ")
     label = rest.strip()
     if word not in ("max", "min") or not (label == "F" or label.startswith((_TASK, _LIMIT))):
-        raise InputError(f"--goals {text!r}: must be 'max F:TASK', 'min F:TASK', 'min limits.KEY' or 'max limits.KEY'")
+        raise InputError(f"--goal {text!r}: must be 'max F:TASK', 'min F:TASK', 'min limits.KEY' or 'max limits.KEY'")
     sense = Sense(word)
     if label.startswith(_LIMIT):
         return Goal(sense, label, key=label.removeprefix(_LIMIT))
     if case.tasks[0].measure:
-        raise InputError(f"--goals {text!r}: the case optimises {case.tasks[0].measure} instead of F")
+        raise InputError(f"--goal {text!r}: the case optimises {case.tasks[0].measure} instead of F")
     names = [task.name for task in case.tasks]
     name = label.removeprefix(_TASK) if label != "F" else (names[0] if len(names) == 1 else "")
     if name not in names:
-        raise InputError(f"--goals {text!r}: the case has no such task; {nearest(name, names)}")
+        raise InputError(f"--goal {text!r}: the case has no such task; {nearest(name, names)}")
     if names.count(name) > 1:
-        raise InputError(f"--goals {text!r}: several tasks have this name; tasks: {listing(names)}")
+        raise InputError(f"--goal {text!r}: several tasks have this name; tasks: {listing(names)}")
     return Goal(sense, f"{_TASK}{name}", task=names.index(name))
 
 
@@ -212,10 +212,10 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
         side = int(goal.sense is Sense.MIN)
         keys = sorted({item.constraint.keys[side] for item in layout.constraints} - {""})
         fault = "is no limit of the case that can be a goal in this sense"
-        raise InputError(f"--goals {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
+        raise InputError(f"--goal {goal.sense.value} {goal.label}: {fault}; allowed: {listing(keys)}")
     reading = found[0].constraint.reading
     if any(item.constraint.exact is not None or item.constraint.measure is not None for item in found):
-        raise InputError(f"--goals {goal.label}: is kept by a smooth estimate, and so cannot be a goal")
+        raise InputError(f"--goal {goal.label}: is kept by a smooth estimate, and so cannot be a goal")
     if goal.sense is Sense.MIN:
         least, most = reading.above, min(reading.from_value(item.upper) for item in found)
     else:
@@ -223,7 +223,7 @@ def _range(layout: Layout, goal: Goal) -> tuple[float, float]:
         upper = [reading.from_value(item.upper) for item in found if math.isfinite(item.upper)]
         most = min([most, *upper])
     if not (math.isfinite(least) and math.isfinite(most) and least < most):
-        raise InputError(f"--goals {goal.label}: has no end in this direction; give the limit's other number too")
+        raise InputError(f"--goal {goal.label}: has no end in this direction; give the limit's other number too")
     return least, most
 
 

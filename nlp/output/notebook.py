@@ -11,6 +11,7 @@ from rich.console import Console
 
 from ...models import Dimension, FloatArray, Model, component_names
 from ..case.case import Case
+from ..case.choices import listed_numbers, within_ranges
 from ..case.limits.limits import Limits
 from ..case.pose import HERE, Free, Value
 from ..errors import CaseError, EvaluationError, InputError
@@ -21,6 +22,7 @@ from ..proof.certificate.certificate import Certificate
 from ..results.evidence import certificate_data
 from ..results.point import task_data
 from ..results.result import result_of
+from ..results.robottables import free_words
 from ..results.robotwording import model_words
 from ..results.rounding import number
 from ..results.summary import case_summary
@@ -154,8 +156,9 @@ def _case_words(case: Case) -> Iterable[Line | TextTable]:
 
 def _row(case: Case, name: str, value: Value, dimension: Dimension) -> tuple[str, str, str]:
     units = case.units
-    ends = [value.lower, value.upper] if isinstance(value, Free) else [value]
-    return name, " .. ".join(f"{units.shown(end, dimension):.7g}" for end in ends), units.label(dimension)
+    if isinstance(value, Free):
+        return name, free_words(value, units, dimension, 7), units.label(dimension)
+    return name, f"{units.shown(value, dimension):.7g}", units.label(dimension)
 
 
 def _drawings_at_start(case: Case) -> list[Drawing]:
@@ -165,6 +168,8 @@ def _drawings_at_start(case: Case) -> list[Drawing]:
         EvaluationError: the robot does not exist there.
     """
     # Limits and further poses change nothing in the drawing, and take time.
+    numbers = listed_numbers(case)
+    case = within_ranges(case, numbers, tuple((0, 1) for _ in numbers))
     plain = replace(case, limits=Limits(), displacements=(HERE,), further=(), joint_centre_tolerance=None)
     try:
         nlps = formulate_each(plain)

@@ -70,7 +70,7 @@ def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
     search widens them: :func:`with_wider_level`.
 
     Args:
-        layout: a case with one task and several poses.
+        layout: a case with one task.
         sense: sense of the task.
 
     Raises:
@@ -86,6 +86,22 @@ def formulate_worst_pose(layout: Layout, sense: Sense) -> Nlp:
         form = Form(above_level if sense is Sense.MAX else below_level, (False,))
         epigraph.add(f"F pose {k + 1}", form, robot.F[0], SX(1))
     return epigraph.program(sense)
+
+
+def level_constraint(nlp: Nlp, F: SX, name: str) -> BoundedConstraint | None:
+    """Return the constraint by which the level of a worst pose bounds F at a further pose.
+
+    Args:
+        nlp: the program, of one task; without a level there is no constraint.
+        F: (1, 1) at the pose.
+        name: of the constraint.
+    """
+    epigraph = nlp.program.places.epigraph
+    first = None if epigraph is None else epigraph.constraints[0]
+    if first is None or first.call is None:
+        return None
+    call = replace(first.call, inputs=ca.vertcat(first.call.inputs[:-1], F))
+    return BoundedConstraint(replace(first, name=name, expression=call.value, call=call), 0.0, math.inf)
 
 
 def formulate_worst(case: Case, weights: Sequence[float], best: Sequence[float], ceiling: float) -> Nlp:

@@ -49,6 +49,18 @@ def formulate(case: Case, task: int = 0) -> Nlp:
     return assemble(layout, _weighted_call(layout, [SX(1)]), sense)
 
 
+def formulate_everywhere(case: Case) -> Nlp:
+    """Return the program of the worst F of the stated poses, to which an exchange adds further ones.
+
+    Args:
+        case: a case with one task.
+
+    Raises:
+        CaseError: a limb has zero length at every point of the box, or fixed numbers contradict each other.
+    """
+    return formulate_worst_pose(lay_out(case, case.tasks), case.tasks[0].sense)
+
+
 def formulate_each(case: Case) -> list[Nlp]:
     """Return the programs of all tasks of a case.
 

@@ -42,6 +42,7 @@ from ...models import (
 from ...models.instance import sizes_at
 from ...models.values import dataclass
 from ..case.case import Case
+from ..case.choices import check_no_choice
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
@@ -136,8 +137,9 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         add_pose: adds a stated pose in other coordinates than those above.
 
     Raises:
-        CaseError: an equation among fixed numbers does not hold.
+        CaseError: an equation among fixed numbers does not hold, or a dimension has a few values to choose from.
     """
+    check_no_choice(case)
     table, model = SymbolTable(), case.model
     parameters = [
         table.add_each(case.component_names(item), item.dimension, _component_values(case, item))

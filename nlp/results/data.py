@@ -11,6 +11,7 @@ from ..evidence.optimality import PointKind
 from ..proof.certificate.certificate import CertificateStatus
 from ..solver.status import Status
 from ..system.strictjson import Size
+from .choices import ChoiceData, RoundingData
 from .jsondata import Absent, Inline, JsonObject, Vector
 from .objective import ObjectiveData
 from .parts import (
@@ -170,6 +171,8 @@ class SolveResult(JsonObject):
         certificate: the proven bound; null where none was asked for.
         workspace: proof over the workspace; absent where no limit holds there.
         path: proof along the path; absent where no limit holds there.
+        choice: among listed values of dimensions; absent where the case has none.
+        rounding: of the dimensions; absent where they are not rounded.
         seed: of the starting points.
         versions: of the programs.
         seconds: wall time.
@@ -192,6 +195,8 @@ class SolveResult(JsonObject):
     certificate: CertificateData | None
     workspace: Absent["WorkspaceProofData"]
     path: Absent["PathProofData"]
+    choice: Absent[ChoiceData]
+    rounding: Absent[RoundingData]
     seed: int
     versions: VersionsData
     seconds: float
@@ -280,6 +285,10 @@ class CombinedResult(JsonObject):
         status: of the whole.
         tasks: each task solved by itself.
         combined: the tasks brought together.
+        choice: among listed values of dimensions; absent where the case has none.
+        rounding: of the dimensions; absent where they are not rounded.
+        workspace: proof of the combined design over the workspace; absent where no limit holds there.
+        path: its proof along the path; absent where no limit holds there.
         versions: of the programs.
         seconds: wall time.
     """
@@ -288,6 +297,10 @@ class CombinedResult(JsonObject):
     status: Status
     tasks: tuple[SolveResult, ...]
     combined: CombinedData
+    choice: Absent[ChoiceData]
+    rounding: Absent[RoundingData]
+    workspace: Absent["WorkspaceProofData"]
+    path: Absent["PathProofData"]
     versions: VersionsData
     seconds: float
 

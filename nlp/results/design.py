@@ -110,7 +110,7 @@ def sensitivity_data(nlp: Nlp, x: FloatArray) -> tuple[SensitivityData, ...]:
 def tolerance_data(nlp: Nlp, x: FloatArray) -> ToleranceData | None:
     """Return the loss at an optimum (n,) by inexact joint centres; None without a tolerance, or without rows of it."""
     tolerance = nlp.case.joint_centre_tolerance
-    if tolerance is None or not nlp.case.model.built or nlp.case.tasks[0].measure:
+    if tolerance is None or not nlp.case.model.built or nlp.case.tasks[0].measure or nlp.case.worst_everywhere:
         return None
     lost = tolerance_loss(nlp, x, tolerance)
     return ToleranceData.of(

@@ -96,7 +96,7 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
     return EvaluationResult(
         head=head_data(case),
         F=case_number(case, objective(nlp, x, states[0])),
-        objective=objective_data(case, objective(nlp, x, states[0])),
+        objective=objective_data(case, objective(nlp, x, states[0])) if case.tasks[0].measure else None,
         robot=robot_data(nlp, x, states[0], 0),
         tasks=tuple(
             EvaluatedTaskData(

@@ -11,10 +11,11 @@ from ..case.task import Sense
 from ..evidence.optimality import Evidence
 from ..program.nlp import Nlp
 from ..proof.certificate.certificate import Certificate
+from .choices import ChoiceData, choice_data
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
 from .jsondata import Absent, Inline, JsonObject, vector
-from .objective import ObjectiveData, certified_objective
+from .objective import ObjectiveData, certified_objective, is_over_workspace
 from .parts import HeadData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 
@@ -93,6 +94,7 @@ class CertifiedResult(JsonObject):
         objective: what is optimised instead of F; absent for F.
         point: the best point known, by the names of the program's variables; null where there is none.
         tasks: each task by itself.
+        choice: among listed values of dimensions, at the best combination known; absent where the case has none.
         notice: that the limits are taken at the stated pose alone, where the case has them over its workspace; else
             absent.
         versions: of the programs.
@@ -103,6 +105,7 @@ class CertifiedResult(JsonObject):
     objective: Absent[ObjectiveData]
     point: Mapping[str, float] | None
     tasks: tuple[CertifiedTaskData, ...]
+    choice: Absent[ChoiceData]
     notice: Absent[str]
     versions: VersionsData
 
@@ -121,6 +124,7 @@ def certified_of(certified: "Certified") -> CertifiedResult:
             )
             for task, each in zip(case.tasks, certified.tasks, strict=True)
         ),
-        notice=stated_pose_notice(case),
+        choice=choice_data(certified.solution),
+        notice=None if is_over_workspace(case) else stated_pose_notice(case),
         versions=versions(),
     )

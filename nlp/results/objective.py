@@ -7,6 +7,8 @@ from ...models import frozen_array
 from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_measure
+from ..case.limits.objective import ObjectiveLimit
+from ..case.task import Sense
 from ..evidence.loads import PoseLoads, largest_of
 from ..proof.certificate.certificate import Certificate
 from ..units import objective_unit
@@ -22,17 +24,20 @@ if TYPE_CHECKING:
 
 
 class ObjectiveData(JsonObject):
-    """A number of the actuators that is optimised instead of F.
+    """A number of the actuators that is optimised instead of F, or F's worst value over a workspace or along a path.
 
     Attributes:
-        minimise: its name.
-        value: the largest over loads, actuators and poses; null without an answer.
+        minimise: name of the number of the actuators; absent for F.
+        over: poses of which F is the worst, ``workspace`` or ``path``; absent for a number of the actuators.
+        value: the largest over loads, actuators and poses, or the worst F; proved where limits hold beside the stated
+            poses. Null without an answer, or where nothing is proved.
         unit: of these numbers.
-        bound: that no design within the limits is below; absent where none was asked for.
+        bound: that no design within the limits is beyond; absent where none was asked for.
         gap: distance of the bound from the value.
     """
 
-    minimise: str
+    minimise: Absent[str]
+    over: Absent[str]
     value: float | None
     unit: str
     bound: Absent[float]
@@ -40,7 +45,7 @@ class ObjectiveData(JsonObject):
 
 
 def objective_data(case: Case, value: float | None, certificate: Certificate | None = None) -> ObjectiveData | None:
-    """Return the number of the actuators that a case optimises; None for F.
+    """Return what a case optimises instead of F of its stated poses; None for that.
 
     Args:
         case: the case.
@@ -48,16 +53,17 @@ def objective_data(case: Case, value: float | None, certificate: Certificate | N
         certificate: proven bound of it.
     """
     measure = case.tasks[0].measure
-    if not measure:
+    if not (measure or case.worst_everywhere):
         return None
     bound = None if certificate is None else finite_or_none(case_number(case, certificate.bound))
-    shown = None if value is None else case_number(case, value)
+    shown = None if value is None else finite_or_none(case_number(case, value))
     return ObjectiveData(
-        minimise=measure,
+        minimise=measure or None,
+        over=case.limits_over if case.worst_everywhere else None,
         value=shown,
         unit=unit_of_objective(case),
         bound=bound,
-        gap=None if bound is None or shown is None else shown - bound,
+        gap=None if bound is None or shown is None else case.tasks[0].sense.sign * (bound - shown),
     )
 
 
@@ -68,15 +74,23 @@ def certified_objective(certified: "Certified") -> ObjectiveData | None:
         return None
     value = None if math.isnan(certificate.incumbent) else certificate.incumbent
     proof = solution.workspace or solution.path
-    if proof is not None and value is not None and solution.case.tasks[0].measure:
+    if proof is not None and value is not None and is_over_workspace(solution.case):
         value = over_workspace(solution.case, proof.judgement)
     return objective_data(solution.case, value, certificate)
 
 
+def is_over_workspace(case: Case) -> bool:
+    """Return whether what a case optimises is of all poses at which its limits hold."""
+    return bool(case.limits_over) and (bool(case.tasks[0].measure) or case.worst_everywhere)
+
+
 def over_workspace(case: Case, judged: "Judgement | PathJudgement") -> float:
-    """Return a proven bound, for every pose of a workspace or path, of the number that a case minimises."""
-    start = f"{case.tasks[0].measure}."
-    return max(abs(each.bound) for each in judged.extremes if each.key.startswith(start))
+    """Return a proven bound of what a case optimises over every pose of a workspace or path; NaN without one."""
+    measure = case.tasks[0].measure
+    bounds = [each.bound for each in judged.extremes if each.key.startswith(f"{measure or ObjectiveLimit.key}.")]
+    if measure:
+        return max(map(abs, bounds), default=math.nan)
+    return bounds[0] if bounds else math.nan
 
 
 def case_number(case: Case, value: float) -> float:
@@ -88,12 +102,14 @@ def case_number(case: Case, value: float) -> float:
 
 
 def objective_words(case: Case) -> str:
-    """Return what is optimised instead of F, in words; empty for F."""
+    """Return what is optimised instead of F of the stated poses, in words; empty for that."""
     measure = case.tasks[0].measure
     if not measure:
-        return ""
+        is_least = case.tasks[0].sense is Sense.MAX
+        worst = f"the {'smallest' if is_least else 'largest'} {case.limits_where}, to be as"
+        return f"{worst} {'large' if is_least else 'small'} as possible" if case.worst_everywhere else ""
     over = "actuators" if measure == "actuator_speed" else "actuators and loads"
-    return f"the largest {measure.replace('_', ' ')} over all {over}"
+    return f"the largest {measure.replace('_', ' ')} over all {over}, to be as small as possible"
 
 
 def pose_objective(case: Case, found: PoseLoads) -> float:

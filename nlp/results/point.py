@@ -205,8 +205,8 @@ def _by_owner(case: Case, quantity: Quantity, values: FloatArray) -> ByOwner:
 
 def objective(nlp: Nlp, x: FloatArray, state: RobotState | None) -> float:
     """Return F at a point (n,): the state's F, or the sum, mean or worst over several poses."""
-    measure = nlp.case.tasks[0].measure
-    return nlp.evaluate(x)[0] if state is None or measure or len(nlp.program.robots) > 1 else state.F
+    is_other = bool(nlp.case.tasks[0].measure) or nlp.program.places.epigraph is not None
+    return nlp.evaluate(x)[0] if state is None or is_other or len(nlp.program.robots) > 1 else state.F
 
 
 def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:

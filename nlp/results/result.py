@@ -12,6 +12,7 @@ from ..proof.certificate.certificate import Certificate
 from ..solver.multistart import ProgramSolution
 from ..solver.solution import Combination, Solution, TaskOutcome
 from ..solver.starts import Optimum, StartStatus
+from .choices import ChoiceData, RoundingData, choice_data, rounding_data
 from .data import (
     CaseResult,
     CombinedData,
@@ -26,7 +27,7 @@ from .data import (
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data
 from .jsondata import finite_or_none, vector
-from .objective import case_number, objective_data, over_workspace
+from .objective import case_number, is_over_workspace, objective_data, over_workspace
 from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
@@ -43,6 +44,8 @@ def task_result(
     certificate: Certificate | None = None,
     workspace: WorkspaceProof | None = None,
     path: PathProof | None = None,
+    choice: ChoiceData | None = None,
+    rounding: RoundingData | None = None,
 ) -> SolveResult:
     """Return the whole result of the program of one task.
 
@@ -52,6 +55,8 @@ def task_result(
         certificate: of the same program.
         workspace: proof over the workspace.
         path: proof along the path.
+        choice: among listed values of dimensions.
+        rounding: of the dimensions.
     """
     nlp, x, state = solution.nlp, solution.x, solution.state
     answer = solution.status.is_answer
@@ -59,7 +64,7 @@ def task_result(
     solved = answer and state is not None
     value = objective(nlp, x, state) if solved else math.nan
     proof = workspace or path
-    if solved and proof is not None and nlp.case.tasks[0].measure:
+    if solved and proof is not None and is_over_workspace(nlp.case):
         value = over_workspace(nlp.case, proof.judgement)
     return SolveResult.of(
         solution,
@@ -79,6 +84,8 @@ def task_result(
         certificate=certificate_data(certificate),
         workspace=None if workspace is None else _proof_data(workspace),
         path=None if path is None else _path_data(path),
+        choice=choice,
+        rounding=rounding,
         versions=versions(),
     )
 
@@ -133,7 +140,7 @@ def combined_result(
         head=head_data(solution.case),
         status=solution.status,
         tasks=tuple(
-            task_result(outcome.own, j, certificates[j] if certificates else None)
+            task_result(outcome.exchanged or outcome.own, j, certificates[j] if certificates else None)
             for j, outcome in enumerate(solution.outcomes)
         ),
         combined=CombinedData.of(
@@ -145,6 +152,10 @@ def combined_result(
             starts=None if combined is None else starts_data(combined),
             certificate=certificate_data(combined_certificate),
         ),
+        choice=choice_data(solution),
+        rounding=rounding_data(solution),
+        workspace=None if solution.workspace is None else _proof_data(solution.workspace),
+        path=None if solution.path is None else _path_data(solution.path),
         versions=versions(),
         seconds=solution.seconds,
     )
@@ -185,6 +196,14 @@ def result_of(found: Solution | Certified) -> CaseResult:
     certificates = () if isinstance(found, Solution) else found.tasks
     if solution.combination is None:
         certificate = certificates[0] if certificates else None
-        return task_result(solution.outcomes[0].own, 0, certificate, solution.workspace, solution.path)
+        return task_result(
+            solution.outcomes[0].own,
+            0,
+            certificate,
+            solution.workspace,
+            solution.path,
+            choice_data(solution),
+            rounding_data(solution),
+        )
     combined = None if isinstance(found, Solution) else found.combined
     return combined_result(solution, solution.combination, certificates, combined)

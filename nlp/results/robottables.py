@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6
+#: So many values of a number are shown, else the first two and the last.
+_LISTED = 5
 
 
 class _Place(enum.IntEnum):
@@ -94,25 +96,36 @@ class _Reasons:
         label = self._units.label(dimension)
         if isinstance(given, Free):
             lower, upper = (self._units.shown(end, dimension) for end in (given.lower, given.upper))
-            shown, between = number(value, upper - lower), f"{lower:g} .. {upper:g}"
+            shown, between = number(value, upper - lower), free_words(given, self._units, dimension)
         else:
             lower, upper = value, value
             shown, between = number(value, beside, part=STATED), ""
         side, fixed = self._active.get(name), self._fixed.get(name)
         place, why, felt = _Place.FREE if between else _Place.FIXED, "", 0.0
+        held = "fixed" if not isinstance(given, Free) else "chosen" if given.values else "rounded"
         if side is not None:
             place = _Place.ACTIVE
             cost = settled(side.multiplier, self._F / ((upper - lower) or 1.0))
             why = f"{side.bound}, {cost:.4g} {slope_unit(label)}"
         elif fixed is not None and fixed.derivative is None:
-            why = f"fixed: {fixed.hindrance}"
+            why = f"{held}: {fixed.hindrance}"
         elif fixed is not None and fixed.derivative is not None:
             natural = {Dimension.LENGTH: self._size, Dimension.ANGLE: self._units.shown(1.0, dimension)}
             size = max(abs(value), natural.get(dimension, 1.0))
             slope = settled(fixed.derivative, self._F / size)
-            why = f"fixed, {f'{slope:+.4g}' if slope else '0'} {slope_unit(label)}"
+            why = f"{held}, {f'{slope:+.4g}' if slope else '0'} {slope_unit(label)}"
             felt = abs(slope) * size
         return _Row(place, (name, shown, label, between, *((why,) if self.any else ())), felt)
+
+
+def free_words(value: Free, units: Units, dimension: Dimension, digits: int = 6) -> str:
+    """Return the values that a free number may have: its ends, or the values of which it has one."""
+    if not value.values:
+        return " .. ".join(f"{units.shown(end, dimension):.{digits}g}" for end in (value.lower, value.upper))
+    shown = [f"{units.shown(each, dimension):.{digits}g}" for each in value.values]
+    if len(shown) > _LISTED:
+        return f"{shown[0]}, {shown[1]}, .. {shown[-1]} ({len(shown)} values)"
+    return f"{', '.join(shown[:-1])} or {shown[-1]}"
 
 
 def design_table(

@@ -23,6 +23,7 @@ from .tables import limit_table, limits_title, margin_table, outcome_table, prin
 from .text import Line, TextTable, Tone
 from .wording import (
     certificate_lines,
+    choice_lines,
     combined_lines,
     combined_value_lines,
     evidence_lines,
@@ -53,16 +54,8 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 def _task_summary(case: Case, result: SolveResult) -> Summary:
     """Yield the result of a solve of one task."""
     yield from heading_lines(case, result)
-    if result.workspace is not None:
-        # Few cases have a proof, and what shows it loads the room of proofs.
-        from .workspacewording import proof_digest, proof_lines  # noqa: PLC0415
-
-        yield from proof_lines(result.workspace)
-        yield from proof_digest(case, result.workspace)
-    if result.path is not None:
-        from .pathwording import path_proof_lines  # noqa: PLC0415 - in the same way
-
-        yield from path_proof_lines(case, result.path)
+    yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
+    yield from _proof_summary(case, result)
     if result.robot is not None:
         yield solved_design_table(case, result, result.robot)
         yield from robot_tables(case, result.robot)
@@ -80,6 +73,20 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from certificate_lines(result.certificate)
 
 
+def _proof_summary(case: Case, result: CaseResult) -> Summary:
+    """Yield the proof of a design over a workspace, or along a path."""
+    if result.workspace is not None:
+        # Few cases have a proof, and what shows it loads the room of proofs.
+        from .workspacewording import proof_digest, proof_lines  # noqa: PLC0415
+
+        yield from proof_lines(result.workspace)
+        yield from proof_digest(case, result.workspace)
+    if result.path is not None:
+        from .pathwording import path_proof_lines  # noqa: PLC0415 - in the same way
+
+        yield from path_proof_lines(case, result.path)
+
+
 def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     """Yield the result of a solve of several tasks."""
     combined, point = result.combined, result.combined.method_point
@@ -88,11 +95,13 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
         if own.robot is not None and own.robot.task is not None:
             yield from task_lines(own.robot.task, case.units)
     yield from combined_lines(result)
+    yield from choice_lines(result.choice, result.rounding, is_answer=point is not None)
+    yield from _proof_summary(case, result)
     robot = None if point is None else point.robot
     if robot is not None:
         yield combined_design_table(case, combined, robot)
     if point is not None and point.limits:
-        yield limit_table(point.limits, combined.value or 0.0, limits_title(case))
+        yield limit_table(point.limits, combined.value or 0.0, limits_title(case, result.workspace or result.path))
     yield outcome_table(combined, result.tasks)
     yield from combined_value_lines(combined)
     for task in result.tasks:
@@ -115,6 +124,7 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
     yield from objective_lines(case)
     if result.notice is not None:
         yield Line(result.notice, label="note", tone=Tone.CAUTION)
+    yield from choice_lines(result.choice)
     for task in result.tasks:
         if several:
             yield Line(f"{task.name}, {task.sense.value} F", label="task")

@@ -17,11 +17,14 @@ from .rounding import number, ordered, residual, robot_size, settled, task_F
 from .text import Line, Tone
 
 if TYPE_CHECKING:
+    from .choices import ChoiceData, RoundingData
     from .data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult, StartsData
     from .parts import LimitData, RelaxationData, RobotData, TaskData, ToleranceData, ViolationData
 
 #: So many violated limits, and so many optima, are shown.
 _VIOLATIONS, _OPTIMA = 8, 5
+#: Part of an objective by which rounding changes it by no more than two solves of one program differ.
+_UNCHANGED = 1e-9
 #: An optimum is a set when its points lie apart by more than this part of the ranges.
 SET = 1e-3
 
@@ -98,7 +101,8 @@ def headline(result: SolveResult, case: Case) -> Line:
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several
-    how = "" if several is None else "largest" if measured is not None else several.over_poses.value
+    is_measured = measured is not None and measured.minimise is not None
+    how = "" if several is None else "largest" if is_measured else several.over_poses.value
     over = "" if several is None else f", {how} over {len(several.poses)} poses"
     word, status = "fixed point:", result.status.value
     if result.status is Status.OPTIMAL:
@@ -127,13 +131,21 @@ def heading_lines(case: Case, result: SolveResult) -> Iterator[Line]:
         yield from task_lines(result.robot.task, case.units)
     yield from objective_lines(case)
     yield headline(result, case)
+    if result.objective is not None and result.objective.over is not None and result.F is not None:
+        value, side = result.objective.value, "smaller" if result.sense is Sense.MAX else "larger"
+        words = (
+            f"not bounded over the {result.objective.over}"
+            if value is None
+            else f"at no pose {side} than {number(value)}"
+        )
+        yield Line(words, label="F", tone=Tone.NO_ANSWER if value is None else Tone.ANSWER)
 
 
 def objective_lines(case: Case) -> Iterator[Line]:
     """Yield what F stands for where it is no work rate."""
     words = objective_words(case)
     if words:
-        yield Line(f"{words}, to be as small as possible", label="F is")
+        yield Line(words, label="F is")
 
 
 def evidence_lines(result: SolveResult) -> Iterator[Line]:
@@ -249,6 +261,32 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
     word = "box" if certificate.boxes == 1 else "boxes"
     boxes = f"{certificate.boxes:,} {word}{left} in {certificate.seconds:.2f} s"
     yield Line(f"{boxes}, engine {certificate.engine}", label="search")
+
+
+def choice_lines(
+    choice: ChoiceData | None, rounding: RoundingData | None = None, *, is_answer: bool = True
+) -> Iterator[Line]:
+    """Yield the values that were chosen from lists, how dimensions were rounded, and what these searches found.
+
+    Args:
+        choice: among listed values; None for none.
+        rounding: of the dimensions; None for none.
+        is_answer: whether the solve gave an answer.
+    """
+    tone = Tone.PLAIN if is_answer else Tone.FAULT
+    if choice is not None:
+        chosen = ", ".join(
+            f"{each.name} = {each.value:.7g} {each.unit}".rstrip() for each in choice.numbers if each.value is not None
+        )
+        yield Line(f"{chosen}: {choice.statement}" if is_answer else choice.statement, label="values", tone=tone)
+    if rounding is not None:
+        yield Line(rounding.statement, label="rounded", tone=tone)
+        if rounding.loss is not None:
+            size = settled(rounding.loss, abs(rounding.before), _UNCHANGED)
+            word = "worse" if rounding.loss >= 0 else "better"
+            part = "" if rounding.relative_loss is None else f" ({100 * abs(rounding.relative_loss):.2g} %)"
+            text = f"{word} by {abs(rounding.loss):.3g}{part} than {rounding.before:.7g} before"
+            yield Line(text if size else f"{rounding.before:.7g}, as before", label="objective")
 
 
 def combined_lines(result: CombinedResult) -> Iterator[Line]:

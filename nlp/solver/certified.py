@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
+from ..case.choices import listed_numbers
 from ..case.task import Method, Sense
 from ..errors import InputError, check_seconds
 from ..interruption import is_requested, one_call, reason_of, seconds_left, within
@@ -19,14 +20,20 @@ from ..proof.certificate.branch_and_bound import GAP, CertifyProgress, certify_p
 from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses, has_modes, program_of
 from ..proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
-from ..proof.enclosure.engine import kernel
+from ..proof.enclosure.engine import ENGINE, kernel
 from ..proof.statement.form import power_of
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
+from .certified_choices import prove_choices
+from .choices import solve_choices
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
 from .pose_constraints import with_stated_limits
 from .solution import Answer, Solution
 from .solve import solve, solve_programs
+
+#: Words of a bound for a design that was rounded: only its pose, and what was not rounded, is free.
+_ROUNDED = "with the rounded dimensions"
+_NO_PROOF_OF_CHOICES = "each combination of listed values is a program of its own; give the values with --set"
 
 
 class OptionError(InputError):
@@ -132,7 +139,21 @@ def certify(
     options = CertifyOptions(gap, above, time_limit, jobs)
     case = found.case if isinstance(found, Solution) else found
     with within(time_limit):
-        if case.tasks[0].measure and case.limits_over:
+        if isinstance(found, Solution) and found.rounding is not None:
+            # The rounded numbers are proved as they are, and not what rounding lost.
+            if with_proof:
+                raise OptionError("proof: the rounded numbers are in no case file; give them with --set")
+            rounded = found.outcomes[0].own.nlp.case
+            own = _certify(rounded, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=False)
+            solution = replace(own.solution, case=case, choice=found.choice, rounding=found.rounding)
+            tasks = tuple(replace(each, scope=_ROUNDED) for each in own.tasks)
+            combined = None if own.combined is None else replace(own.combined, scope=_ROUNDED)
+            return replace(own, solution=solution, tasks=tasks, combined=combined)
+        if listed_numbers(case):
+            if with_proof:
+                raise OptionError(f"proof: {_NO_PROOF_OF_CHOICES}")
+            return _certify_choices(found, options, starts, seed, progress, all_assemblies=all_assemblies)
+        if case.limits_over and (case.tasks[0].measure or case.worst_everywhere):
             if with_proof:
                 raise OptionError(
                     f"proof: the poses of the {case.limits_over} from which the bound follows are in no case file"
@@ -214,10 +235,46 @@ def _certify(
     return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
 
 
+def _certify_choices(
+    found: Case | Solution,
+    options: CertifyOptions,
+    starts: int | None,
+    seed: int | None,
+    progress: Callable[[str], CertifyProgress] | None,
+    *,
+    all_assemblies: bool,
+) -> Certified:
+    """Return the best combination of a case's listed numbers, and what is proved over all of them."""
+    case = found.case if isinstance(found, Solution) else found
+    search = case.search.but(starts, seed)
+    at_poses = bool(case.tasks[0].measure and case.limits_over)
+
+    def solve_fixed(one: Case) -> Solution:
+        if at_poses:
+            return solve(one, starts=starts, seed=seed, jobs=options.jobs)
+        return solve_programs(one, formulate_each(one), search, jobs=options.jobs)
+
+    def prove(one: Case, gap: float) -> Certified:
+        own = replace(options, gap=gap, time_limit=None)
+        if at_poses:
+            return _certify_from_poses(solve_fixed(one), own, progress)
+        return _certify(one, own, starts, seed, progress, all_assemblies=all_assemblies, with_proof=False)
+
+    choice = found.choice if isinstance(found, Solution) else None
+    choice = choice or solve_choices(case, solve_fixed).choice
+    if choice is None:
+        raise OptionError("values: the case has none to choose from")
+    best, values, together = prove_choices(case, choice, prove, options.gap, is_each=options.above is not None)
+    chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values))
+    if len(case.tasks) > 1:
+        return replace(best, solution=chosen, combined=together)
+    return replace(best, solution=chosen, tasks=best.tasks if together is None else (together,))
+
+
 def _certify_from_poses(
     solution: Solution, options: CertifyOptions, progress: Callable[[str], CertifyProgress] | None
 ) -> Certified:
-    """Return a bound of a number of the actuators over a workspace: it is that at the poses of the exchange.
+    """Return a bound of what is optimised over a workspace or along a path: it is that at the poses of the exchange.
 
     Limits at these poses are those of the case, which the exchange has tightened.
     """
@@ -259,7 +316,8 @@ def proof_of(certified: Certified, text: str) -> Proof:
 def _complete_tree(writer: TreeRecord | None, certificate: Certificate) -> bytes | None:
     """Return the nodes of a complete proof; None where nothing is proved or recorded."""
     complete = certificate.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
-    return writer.tree() if writer is not None and complete else None
+    # A program whose value follows from the one point there is has no search, and no tree.
+    return writer.tree() if writer is not None and complete and certificate.engine == ENGINE else None
 
 
 def _combined_statement(case: Case, combined: ProgramSolution) -> Statement:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from ...models import FloatArray, axis_angle_from_matrix
 from ..case.case import Case
 from ..case.pose import Free
-from ..interruption import one_call
 from ..path.placing import in_frame, in_world, placed
 from ..path.reader import path_of_case, stated_path
-from ..program.formulation import formulate
+from ..program.nlp import Nlp
 from ..proof.statement.claims import REGULAR
 from ..proof.workspace.path_judge import PathJudgement, judge_path
 from ..proof.workspace.robot.pose_box import PoseNumbers
@@ -20,16 +19,7 @@ from ..proof.workspace.verdict import Outcome
 from .multistart import ProgramSolution
 from .placement import with_place
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
-from .semi_infinite import (
-    GAP,
-    ExchangeProgress,
-    SolveOne,
-    check_one_pose,
-    design_of,
-    exchanged,
-    faults_of_numbers,
-    with_objective,
-)
+from .semi_infinite import GAP, Exchange, Judging, SemiInfinite, design_of, faults_of_numbers, with_objective
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,24 +46,18 @@ class PathProof:
         return self.judgement.is_proved
 
 
-@one_call
-def solve_over_path(
-    case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None
-) -> tuple[ProgramSolution, PathProof | None]:
-    """Return the solution of a case whose limits hold along its path, and the proof; None without an answer.
+def over_path(case: Case, nlp: Nlp) -> SemiInfinite[PathJudgement, PathProof]:
+    """Return a program of a case whose limits hold along its path.
 
     Args:
-        case: a case with one task and one stated pose.
-        solve_one: solves a program.
-        progress: called after each exchange.
+        case: the case.
+        nlp: its program with limits at the stated poses.
 
     Raises:
-        CaseError: the case has several tasks or poses.
-        InputError: the file of the path cannot be read or holds what is not read, the path has angles that are not
-            covered, or the C kernel was not built.
+        InputError: the file of the path cannot be read or holds what is not read, or the path has angles that are not
+            covered.
     """
-    check_one_pose(case)
-    nlp, numbers, frame = with_place(formulate(case), case)
+    nlp, numbers, frame = with_place(nlp, case)
     path = path_of_case(case) if frame is None else stated_path(case)
     if frame is not None and case.path is not None:
         # What is not covered after such a turn is refused before any solve.
@@ -81,22 +65,23 @@ def solve_over_path(
     start = path.poses_at([0], 0.0)
     first = PoseNumbers(start.positions[0], start.rotations[0], *axis_angle_from_matrix(start.rotations[0]))
 
-    def judged(solved: ProgramSolution) -> tuple[Case, PathJudgement, list[BindingPose | None]]:
+    def judge(solved: ProgramSolution) -> Judging[PathJudgement]:
         place = numbers(solved.x)
         along = path if frame is None else placed(path, place.tolist())
         found = judge_path(with_objective(design_of(case, solved.nlp, solved.x), solved.F), along, gap=GAP)
-        faults = _faults(found)
-        if frame is None:
-            return found.case, found, list(faults)
-        return found.case, found, [None if each is None else _moved(each, partial(in_frame, place)) for each in faults]
+        faults = list(_faults(found))
+        found = replace(found, case=replace(found.case, limits=case.limits))  # the level is no limit of the case
+        if frame is not None:
+            faults = [None if each is None else _moved(each, partial(in_frame, place)) for each in faults]
+        return Judging(found.case, found, faults)
 
-    done = exchanged(nlp, PoseConstraints(nlp, case, first, frame), judged, solve_one, progress)
-    if done.judgement is None:
-        return done.found, None
-    place, poses = numbers(done.found.x), done.poses
-    if frame is not None:
-        poses = tuple(_moved(each, partial(in_world, place)) for each in poses)
-    return done.found, PathProof(done.judgement, tuple(place.tolist()), poses, done.history)
+    def proof(done: Exchange[PathJudgement]) -> PathProof:
+        place, poses = numbers(done.found.x), done.poses
+        if frame is not None:
+            poses = tuple(_moved(each, partial(in_world, place)) for each in poses)
+        return PathProof(done.judgement, tuple(place.tolist()), poses, done.history)
+
+    return SemiInfinite(nlp, PoseConstraints(nlp, case, first, frame), judge, proof)
 
 
 def _moved(each: BindingPose, move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]) -> BindingPose:

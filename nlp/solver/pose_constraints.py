@@ -36,8 +36,10 @@ from ..case.case import Case
 from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.joints import JointAngle
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ..case.limits.objective import ObjectiveLimit
 from ..path.path import SymbolicPose
 from ..program.actuators import level_constraints
+from ..program.epigraph import level_constraint
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..proof.statement.machine import workspace_of_case
@@ -55,6 +57,8 @@ _DETERMINANT = 1e-2
 #: The same of J'J, from the stated pose: J'J has no sign that tells the far side of a singular pose, so that the
 #: singular pose moves by little: of each further one more is demanded, up to a largest part.
 _SQUARED, _MORE, _MOST = 1e-4, 4.0, 1e-2
+#: What every design with a proof keeps of reaches and determinants.
+_ABOVE = (0.0, math.inf)
 #: Steps from the middle of the workspace to a pose, along which closed loops are followed.
 _WAY = 16
 #: Half ranges by which a dependent number of the pose may leave its range in a search.
@@ -261,6 +265,9 @@ class PoseConstraints:
         if measure and binding.name.startswith(f"{measure} actuator "):
             posed = PosedRobot(poses[0].model, poses[0].robot, (), where, self._case.loading)
             of_level = tuple(level_constraints(self._nlp, posed.forces, (binding.name,), where))
+        elif self._case.worst_everywhere and binding.name == ObjectiveLimit.key:
+            worst = level_constraint(self._nlp, poses[0].robot.F[0], f"{binding.name}{where}")
+            of_level = () if worst is None else (worst,)
         return _PosedClaim(tuple(poses), found, of_level) if found or of_level else None
 
     def _closed_pose(
@@ -356,7 +363,7 @@ class PoseConstraints:
             numbers = ca.Function("reach", [program.x, program.p], [ca.vertcat(*reaches)])
             # Both rods of a parallelogram reach equally far: one of two equal constraints is enough.
             farthest = int(np.argmin(numbers(x, self._nlp.arguments).full()))
-            yield BoundedConstraint(Constraint(name, reaches[farthest], NUMBER), _REACH, math.inf)
+            yield BoundedConstraint(Constraint(name, reaches[farthest], NUMBER, stated=_ABOVE), _REACH, math.inf)
             return
         items = self._of_stroke(binding.name, poses) if binding.longest is not None else self._at_pose(closed, where)
         yield from (_tightened(item, name) for item in items if item.constraint.name in (binding.name, name))
@@ -369,12 +376,12 @@ class PoseConstraints:
             middle = self._placed(self._middle)
             design = Substitution(self._nlp.program.robot.parameters, SX(0, 1), middle.rotation, middle.position)
             ratio = ca.det(_rows(robot, length)) / ca.det(_rows(self._robot(model, design), length))
-            return BoundedConstraint(Constraint(name, ratio, NUMBER), _DETERMINANT, math.inf)
+            return BoundedConstraint(Constraint(name, ratio, NUMBER, stated=_ABOVE), _DETERMINANT, math.inf)
         one, other = (_rows(each, length) for each in (robot, self._nlp.program.robot))
         least = min(_SQUARED * _MORE**self._singular, _MOST)
         self._singular += 1
         ratio = ca.det(one.T @ one) / ca.det(other.T @ other)
-        return BoundedConstraint(Constraint(name, ratio, NUMBER), least, math.inf)
+        return BoundedConstraint(Constraint(name, ratio, NUMBER, stated=_ABOVE), least, math.inf)
 
     def _at_pose(self, closed: _ClosedPose, where: str) -> Iterator[BoundedConstraint]:
         """Yield the constraints of the case's limits on a machine at a pose, and on its joint centres."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -23,10 +23,11 @@ from ...models.joints.closedform import closed_form
 from ..case.case import Case
 from ..case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from ..case.limits.limits import Limits
-from ..case.task import Sense
+from ..case.limits.objective import ObjectiveLimit
+from ..case.pose import Free
+from ..case.task import Method, Sense
 from ..errors import CaseError
 from ..interruption import is_requested, one_call
-from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.machine import JointErrors, workspace_of_case
@@ -50,10 +51,9 @@ MOST_EXCHANGES = 40
 
 #: Solves a program, from points that come before those that the search samples.
 SolveOne = Callable[[Nlp, Sequence[FloatArray]], ProgramSolution]
-#: Called after each exchange with the number of exchanges, F, and the number of claims that are not proved.
-ExchangeProgress = Callable[[int, float, int], None]
-#: Verdicts on a design.
+#: Verdicts on a design, and the proof that they make at the end of an exchange.
 Judged = TypeVar("Judged")
+Proof = TypeVar("Proof")
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,105 +80,125 @@ class WorkspaceProof:
         return not _faults(self.judgement)
 
 
-@dataclass(frozen=True, eq=False)
-class Exchange(Generic[Judged]):
-    """What the exchange leads to.
+class Judging(NamedTuple, Generic[Judged]):
+    """A design judged at every pose of a set.
+
+    Attributes:
+        design: with the poses for which it is judged as its workspace.
+        judgement: of the design.
+        faults: a pose for each claim that is not proved, None for one that is open without a pose.
+    """
+
+    design: Case
+    judgement: Judged
+    faults: Sequence[BindingPose | None]
+
+
+class Exchange(NamedTuple, Generic[Judged]):
+    """An exchange that led to an answer.
 
     Attributes:
         found: solution of the last program.
-        judgement: of its design; None where it has no answer, as are all others then.
+        judgement: of its design.
         poses: of the constraints, in the order in which they were found.
         history: F, and the number of claims that were not proved, of each design in turn.
         first: judgement of the first design.
     """
 
     found: ProgramSolution
-    judgement: Judged | None
+    judgement: Judged
     poses: tuple[BindingPose, ...]
     history: tuple[tuple[float, int], ...]
-    first: Judged | None
+    first: Judged
 
 
-@one_call
-def solve_over_workspace(
-    case: Case, solve_one: SolveOne, *, progress: ExchangeProgress | None = None
-) -> tuple[ProgramSolution, WorkspaceProof | None]:
-    """Return the solution of a case whose limits hold over its workspace, and the proof; None without an answer.
+class SemiInfinite(NamedTuple, Generic[Judged, Proof]):
+    """A program whose limits hold at every pose of a set.
+
+    Attributes:
+        nlp: the program without constraints from poses.
+        constraints: such constraints, none yet.
+        judge: judges the design of a solution.
+        proof: returns the proof that an exchange ends with.
+    """
+
+    nlp: Nlp
+    constraints: PoseConstraints
+    judge: Callable[[ProgramSolution], Judging[Judged]]
+    proof: Callable[[Exchange[Judged]], Proof]
+
+
+def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite[Judgement, WorkspaceProof]:
+    """Return a program of a case whose limits hold over its workspace.
 
     Args:
-        case: a case with one task and one stated pose.
-        solve_one: solves a program.
-        progress: called after each exchange.
-
-    Raises:
-        CaseError: the case has several tasks or poses.
-        InputError: the C kernel was not built.
+        case: the case.
+        nlp: its program with limits at the stated poses.
     """
-    check_one_pose(case)
-    nlp = formulate(case)
 
-    def judged(solved: ProgramSolution) -> tuple[Case, Judgement, list[BindingPose | None]]:
+    def judge(solved: ProgramSolution) -> Judging[Judgement]:
         design = design_of(case, solved.nlp, solved.x)
         found = _judged(with_objective(design, solved.F))
-        return design, found, _faults(found)
+        # The level is no limit of the case.
+        return Judging(design, replace(found, case=design), _faults(found))
 
-    done = exchanged(nlp, PoseConstraints(nlp, case), judged, solve_one, progress)
-    if done.judgement is None or done.first is None:
-        return done.found, None
-    return done.found, WorkspaceProof(done.judgement, done.poses, done.history, done.first)
+    def proof(done: Exchange[Judgement]) -> WorkspaceProof:
+        return WorkspaceProof(done.judgement, done.poses, done.history, done.first)
+
+    return SemiInfinite(nlp, PoseConstraints(nlp, case), judge, proof)
 
 
-def check_one_pose(case: Case) -> None:
-    """Refuse a case whose limits hold beside its poses and that has several tasks or poses, and a missing C kernel.
+def check_exchange(case: Case) -> None:
+    """Refuse a case whose limits hold beside its poses and that no exchange can solve, and a missing C kernel.
 
     Raises:
-        CaseError: the case has several tasks or poses.
+        CaseError: the case averages its tasks, or combines them along a path with a free place.
         InputError: the C kernel was not built.
     """
-    if len(case.tasks) > 1 or case.pose_count > 1:
-        raise CaseError("limits.over", "needs a case with one task and one stated pose", case.limits_over, case.source)
+    if len(case.tasks) > 1 and case.method is Method.AVERAGE:
+        fault = f"must be 'weighted-sum' or 'worst-case' where limits hold {case.limits_where}: an average keeps none"
+        raise CaseError("combine.method", fault, case.method.value, case.source)
+    if len(case.tasks) > 1 and case.path is not None and any(isinstance(each, Free) for each in case.path.place):
+        raise CaseError("path.place", "must be fixed where several tasks are combined", source=case.source)
     kernel()  # before any solve where it is missing
 
 
+@one_call
 def exchanged(
-    nlp: Nlp,
-    constraints: PoseConstraints,
-    judge: Callable[[ProgramSolution], tuple[Case, Judged, list[BindingPose | None]]],
-    solve_one: SolveOne,
-    progress: ExchangeProgress | None,
-) -> Exchange[Judged]:
-    """Return what the exchange of poses leads to.
+    problem: SemiInfinite[Judged, Proof], solve_one: SolveOne, first: Sequence[FloatArray] = ()
+) -> tuple[ProgramSolution, Proof | None]:
+    """Return the solution of a program whose limits hold at every pose of a set, and the proof; None without an answer.
 
     Args:
-        nlp: the program without constraints from poses.
-        constraints: such constraints, none yet.
-        judge: returns the design of a solution, with the poses for which it is judged as its workspace; the judgement;
-            and a pose for each claim that is not proved, None for one that is open without a pose.
+        problem: the program.
         solve_one: solves a program.
-        progress: called after each exchange.
+        first: points (n,) of the program to start from.
     """
-    binding, history = list[BindingPose](), list[tuple[float, int]]()
-    first: Judged | None = None
-    found = solve_one(nlp, ())
+    nlp, constraints = problem.nlp, problem.constraints
+    binding, history, judgements = list[BindingPose](), list[tuple[float, int]](), list[Judged]()
+    found = solve_one(nlp, first)
     while found.status.is_answer:
-        design, judged, faults = judge(found)
-        first = judged if first is None else first
+        design, judged, faults = problem.judge(found)
+        judgements.append(judged)
         history.append((found.F, len(faults)))
-        if progress is not None:
-            progress(len(history), found.F, len(faults))
         fresh = [each for each in faults if each is not None and not any(map(each.is_same, binding))]
         fresh = constraints.added(design, fresh, found.x)
         if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
-            return Exchange(found, judged, tuple(binding), tuple(history), first)
+            done = Exchange(found, judged, tuple(binding), tuple(history), judgements[0])
+            return found, problem.proof(done)
         binding += fresh
         nlp = constraints.program
         found = solve_one(nlp, [np.concatenate([found.x, nlp.start[len(found.x) :]])])
-    return Exchange(found, None, (), (), None)
+    return found, None
 
 
 def with_objective(design: Case, level: float) -> Case:
-    """Return a design with a limit on the numbers of its actuators that are minimised: the level and a little more."""
-    measure = design.tasks[0].measure
+    """Return a design with a limit on what is optimised over all poses: the level and a little more."""
+    measure, sense = design.tasks[0].measure, design.tasks[0].sense
+    if design.worst_everywhere:
+        allowed = level - sense.sign * LEVEL_ROOM * abs(level)
+        worst = ObjectiveLimit(min=allowed) if sense is Sense.MAX else ObjectiveLimit(max=allowed)
+        return replace(design, limits=Limits(*design.limits, worst))
     kinds = {each.key: each for each in (ActuatorForce, ActuatorSpeed, ActuatorPower)}
     if not measure:
         return design

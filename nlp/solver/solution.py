@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...models import FloatArray
+from ...models import Dimension, FloatArray
 from ...models.shown import Shown
 from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.case import Case
+from ..case.choices import Ranges
 from ..case.task import Method, Task
 from ..errors import EvaluationError
 from ..evidence.optimality import Evidence
@@ -98,6 +99,8 @@ class TaskOutcome:
         evidence: evidence at the solution's point for this task alone; None when nothing is free.
         loss: difference by which F is worse than the task's own optimum; negative where the combined search found a
             better optimum, and 0 for a case with one task.
+        exchanged: of several tasks with limits over a workspace or along a path, the solution of the task's own program
+            with the poses of the exchange as constraints, which ``own`` is without; else None.
     """
 
     task: Task
@@ -108,6 +111,7 @@ class TaskOutcome:
     F: float
     evidence: Evidence | None
     loss: float
+    exchanged: ProgramSolution | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +135,70 @@ class Combination:
     combined: ProgramSolution | None
 
 
+class ChoicePart(NamedTuple):
+    """A part of the combinations of a case's listed numbers.
+
+    Attributes:
+        ranges: for each number, the place of its first value, and that behind the last one.
+        cost: objective, the smaller the better, of the combination or with the numbers free between the ends of their
+            values; None without an answer.
+    """
+
+    ranges: Ranges
+    cost: float | None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The search over the combinations of a case's listed numbers.
+
+    Attributes:
+        combinations: number of all.
+        solved: number of those solved.
+        relaxed: number of parts that were solved with the numbers free between the ends of their values.
+        is_complete: whether every combination is solved, or left out as it is in a part that is no better.
+        parts: that hold all combinations together.
+        chosen: the combination of the solution.
+    """
+
+    combinations: int
+    solved: int
+    relaxed: int
+    is_complete: bool
+    parts: tuple[ChoicePart, ...]
+    chosen: Ranges
+
+
+class RoundedNumber(NamedTuple):
+    """A dimension that was rounded: name, dimension, value before, and value after, NaN where there is no robot."""
+
+    name: str
+    dimension: Dimension
+    before: float
+    value: float
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """The rounding of a solution's dimensions.
+
+    Attributes:
+        step: whose multiples the numbers are, in the case's unit of length, and degrees for angles.
+        before: objective before, the smaller the better.
+        after: the same of the rounded design; infinite without an answer.
+        farther: number of multiples on each side, beside the nearest ones, that were searched.
+        numbers: that were rounded.
+        choice: the search over the multiples; None where each number has only one.
+    """
+
+    step: float
+    before: float
+    after: float
+    farther: int
+    numbers: tuple[RoundedNumber, ...]
+    choice: Choice | None
+
+
 @dataclass(frozen=True, eq=False)
 class Solution(Whole, Shown, Answer):
     """The answer to a case.
@@ -150,6 +218,8 @@ class Solution(Whole, Shown, Answer):
         workspace: proof that the design keeps its limits over the workspace; None where no limit holds there, or the
             program has no answer.
         path: proof that it keeps its limits along the path; None in the same cases.
+        choice: how values of its listed numbers were chosen, which the programs have fixed; None without such numbers.
+        rounding: how its dimensions were rounded, which the programs have fixed; None where they were not.
     """
 
     case: Case
@@ -160,6 +230,8 @@ class Solution(Whole, Shown, Answer):
     seconds: float
     workspace: WorkspaceProof | None = None
     path: PathProof | None = None
+    choice: Choice | None = None
+    rounding: Rounding | None = None
 
     def __repr__(self) -> str:
         if self.combination is None:

@@ -6,12 +6,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from ...models import FloatArray
 from ..case.case import Case
+from ..case.choices import listed_numbers
 from ..case.settings import Search
 from ..errors import CaseError
-from ..program.formulation import formulate_each
+from ..program.formulation import formulate_each, formulate_everywhere
 from ..program.nlp import Nlp
 from ..program.pairs import with_shared_pairs
 from .compromise import combine, solution_of_one_task
@@ -20,6 +22,11 @@ from .ipopt import ipopt
 from .multistart import ProgramSolution, solve_program
 from .solution import Solution
 from .status import Phase, PhaseProgress, no_phase
+
+if TYPE_CHECKING:
+    from .semi_infinite import SemiInfinite
+
+    Everywhere: TypeAlias = Callable[[Case, Nlp], SemiInfinite[Any, Any]]
 
 #: Called after each start with the task or method that is being solved, the number of starts done, the number of all,
 #: and the best objective so far.
@@ -39,6 +46,8 @@ def solve(
 ) -> Solution:
     """Solve a case: its task, or each of several and then all of them by the method that the case names.
 
+    Of dimensions that have a few values, the best combination is taken: see :mod:`.choices`.
+
     Args:
         case: the case.
         starts: number of starting points instead of the case's.
@@ -55,27 +64,33 @@ def solve(
             workspace or along a path, which needs a proof, and the C kernel was not built; or the path cannot be read.
     """
     began = time.perf_counter()
+    if listed_numbers(case):
+        from .choices import solve_choices  # noqa: PLC0415 - few cases have listed numbers
+
+        solve_fixed = partial(
+            solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled, progress=progress, solver=solver, phase=phase
+        )
+        return replace(solve_choices(case, solve_fixed), seconds=time.perf_counter() - began)
     search = case.search.but(starts, seed, compiled=compiled)
     phase(Phase.FORMULATING, 0, len(case.tasks))
+    everywhere = None
     if case.limits_over:
         # Other solves start without workspaces.
-        from .over_path import solve_over_path  # noqa: PLC0415
-        from .semi_infinite import solve_over_workspace  # noqa: PLC0415
+        from .over_path import over_path  # noqa: PLC0415
+        from .semi_infinite import check_exchange, over_workspace  # noqa: PLC0415
 
-        after_start = None if progress is None else partial(progress, case.tasks[0].name)
-
-        def solve_one(nlp: Nlp, first: Sequence[FloatArray]) -> ProgramSolution:
-            return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
-
-        if case.limits_over == "path":
-            own, along = solve_over_path(case, solve_one)
-            solution = replace(solution_of_one_task(case, own), path=along)
-        else:
-            own, proof = solve_over_workspace(case, solve_one)
-            solution = replace(solution_of_one_task(case, own), workspace=proof)
-    else:
-        nlps = formulate_each(case)
-        solution = solve_programs(case, nlps, search, jobs=jobs, progress=progress, solver=solver, phase=phase)
+        check_exchange(case)
+        everywhere = over_path if case.limits_over == "path" else over_workspace
+    solution = solve_programs(
+        case,
+        [formulate_everywhere(case)] if case.worst_everywhere else formulate_each(case),
+        search,
+        jobs=jobs,
+        progress=progress,
+        solver=solver,
+        phase=phase,
+        everywhere=everywhere,
+    )
     return replace(solution, seconds=time.perf_counter() - began)
 
 
@@ -88,6 +103,7 @@ def solve_programs(
     progress: SolveProgress | None = None,
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
+    everywhere: Everywhere | None = None,
 ) -> Solution:
     """Solve a case whose programs, one for each task, are formulated already.
 
@@ -99,6 +115,8 @@ def solve_programs(
         progress: as for :func:`solve`.
         solver: as for :func:`solve`.
         phase: as for :func:`solve`.
+        everywhere: returns a program whose limits hold over a workspace or along a path, from one of the case with
+            limits at the stated poses; None for none.
 
     Raises:
         CaseError: the case has several tasks and nothing free.
@@ -110,12 +128,56 @@ def solve_programs(
         after_start = None if progress is None else partial(progress, name)
         return solve_program(nlp, search, first=first, jobs=jobs, progress=after_start, solver=solver, phase=phase)
 
+    proof: dict[str, Any] = {}
+
+    def solve_everywhere(case: Case, name: str, nlp: Nlp, first: Sequence[FloatArray] = ()) -> ProgramSolution:
+        if everywhere is None:
+            return solve_one(name, nlp, first)
+        from .semi_infinite import exchanged  # noqa: PLC0415 - see solve
+
+        found, proof[case.limits_over] = exchanged(everywhere(case, nlp), partial(solve_one, name), first)
+        return found
+
     if len(nlps) > 1 and nlps[0].is_fixed:
         raise CaseError("robot", "has nothing free, so that several tasks cannot be combined", source=case.source)
-    own = [solve_one(task.name, nlp) for nlp, task in zip(nlps, case.tasks, strict=True)]
-    if len(nlps) > 1:
-        pairs = [place for solution in own for place in solution.nlp.pairs]
-        nlps = with_shared_pairs(nlps, pairs)
-        polish = partial(solve_program, search=replace(search, starts=1), jobs=1, solver=solver)
-        return replace(combine(case, nlps, own, solve_one, polish), seconds=time.perf_counter() - began)
-    return solution_of_one_task(case, own[0])
+    if len(nlps) == 1:
+        found = solve_everywhere(case, case.tasks[0].name, nlps[0])
+        return replace(solution_of_one_task(case, found), **proof)
+    own: list[ProgramSolution] = []
+    notices: list[str] = []
+    for nlp, task in zip(nlps, case.tasks, strict=True):
+        own.append(solve_everywhere(replace(case, tasks=(task,)), task.name, nlp))
+        if any(each is not None and not each.is_proved for each in proof.values()):
+            notices.append(f"the optimum of {task.name!r} by itself is not proved {case.limits_where}")
+    nlps = with_shared_pairs(nlps, [place for solution in own for place in solution.nlp.pairs])
+    polish = partial(solve_program, search=replace(search, starts=1), jobs=1, solver=solver)
+    solve_combined = partial(solve_everywhere, case)
+    if everywhere is None:
+        solution = combine(case, nlps, own, solve_combined, polish)
+    else:
+        stated = [_at_stated_poses(solution, nlp) for solution, nlp in zip(own, nlps, strict=True)]
+        solution = _with_exchanged(combine(case, nlps, stated, solve_combined, polish), own, notices)
+    return replace(solution, seconds=time.perf_counter() - began, **proof)
+
+
+def _at_stated_poses(found: ProgramSolution, nlp: Nlp) -> ProgramSolution:
+    """Return a solution with poses of an exchange as constraints as one of the program without them."""
+    starts = tuple(replace(each, x=each.x[: nlp.n]) for each in found.starts)
+    optima = tuple(replace(each, x=each.x[: nlp.n], nlp=nlp) for each in found.optima)
+    return replace(found, nlp=nlp, x=found.x[: nlp.n], starts=starts, optima=optima)
+
+
+def _with_exchanged(solution: Solution, own: Sequence[ProgramSolution], notices: Sequence[str]) -> Solution:
+    """Return a solution of several tasks with each task's own program as the exchange left it, and further notices.
+
+    Evidence about the combined point for one task alone is left out: it would be that of a program without the poses.
+    """
+    combination = solution.combination
+    return replace(
+        solution,
+        outcomes=tuple(
+            replace(outcome, exchanged=found, evidence=None)
+            for outcome, found in zip(solution.outcomes, own, strict=True)
+        ),
+        combination=combination and replace(combination, notices=(*combination.notices, *notices)),
+    )

@@ -143,7 +143,14 @@ def _read_axis(text: str) -> tuple[str, FloatArray]:
     if (first == last) != (count == 1):
         fault = "FIRST and LAST differ, so that COUNT must be 2 or more" if count == 1 else "FIRST and LAST must differ"
         raise InputError(f"--over {text}: {fault}; one value alone is NAME=VALUE")
-    return name, np.linspace(first, last, count)
+    if count == 1:
+        return name, np.array([first])
+    # Both ends, and round numbers between them, are exact.
+    steps = np.arange(count)
+    with np.errstate(over="ignore"):  # a number that is too large is refused by the case
+        along = (first * (count - 1 - steps) + last * steps) / (count - 1)
+    along[0], along[-1] = first, last
+    return name, along
 
 
 def _check_names(names: Sequence[str], source: str) -> None:

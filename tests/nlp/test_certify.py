@@ -16,7 +16,7 @@ from numpy_engine import bounding, first_pass, quadratic_models, tangent_bounds
 from numpy_engine.bounding import NumpyEngine
 
 from screwsynth.models import stewart_gough
-from screwsynth.nlp import Case, Free, Rotation, Solution, Task, formulate, load_case, solve
+from screwsynth.nlp import Case, Free, Rotation, Sense, Solution, Task, certify, formulate, load_case, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
@@ -289,6 +289,27 @@ def test_a_case_with_nothing_free_is_its_own_bound() -> None:
     assert found.status is CertificateStatus.PROVED
     assert found.boxes == 0
     assert found.bound == found.incumbent
+
+
+def test_the_worst_of_several_poses_of_a_case_with_nothing_free_is_its_own_bound() -> None:
+    tables = shipped_tables("hexapod-linuxcnc")
+    for table in ("limits", "workspace", "tolerance"):
+        tables.pop(table, None)
+    moved = [[0, 0, 0], [0, 0, 1], [1, 0, 1]]
+    alone = []
+    for translation in moved:
+        tables["pose"]["displacements"] = [{"translation": translation}]
+        alone.append(solve(case_from(tables)).F)
+    tables["pose"]["displacements"] = [{"translation": translation} for translation in moved]
+    tables["combine"] = {"over_poses": "worst"}
+    certified = certify(case_from(tables), with_proof=True)
+    certificate = certified.tasks[0]
+    worst = min(alone) if certificate.nlp.sense is Sense.MAX else max(alone)
+    assert certified.is_proved
+    assert certified.tree is None  # there is no search
+    assert (certificate.bound, certificate.gap) == (pytest.approx(worst, rel=1e-12), 0)
+    tables["limits"] = {"leg_length": {"max": 1}}
+    assert certify(case_from(tables)).tasks[0].status is CertificateStatus.INFEASIBLE
 
 
 def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() -> None:

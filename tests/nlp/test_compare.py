@@ -85,7 +85,7 @@ def circle(radius: float, half: float) -> np.ndarray:
 def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) -> None:
     files = {name: tmp_path / f"out.{name}" for name in ("json", "csv", "html")}
     options = [word for name, file in files.items() for word in (f"--{name}", str(file))]
-    out = output_of(cli("compare", path, "delta", "6-sps", "case", "--range", "0", "--starts", "1", *options))
+    out = output_of(cli("compare", path, "delta", "6-sps", "case", "--part", "0", "--starts", "1", *options))
     result = json.loads(files["json"].read_text())
     Draft202012Validator(result_schema()).validate(result)
     assert type(load_result(files["json"])).__name__ == "ComparisonResult"
@@ -178,11 +178,11 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
         (("6-ups", str(robot)), "mine.toml: name"),
         (("6-ups", "delta", "--size", "-1"), "--size -1: must be positive and finite"),
         (("6-ups", "delta", "--size", "100", "--no-scale"), "--size: cannot stand beside --no-scale"),
-        (("6-ups", "delta", "--range", "1"), "--range 1: must be at least 0 and below 1"),
+        (("6-ups", "delta", "--part", "1"), "--part 1: must be at least 0 and below 1"),
         (("6-ups", "delta", "--time", "0"), "--time 0: must be positive"),
         (("6-ups", "delta", "--json", str(taken)), "is no folder"),
         (("6-ups", "delta", "--json", "-", "--csv", "-"), "standard output can take one of"),
-        (("delta", "3-puu", "--range", "0", "--starts", "1"), "task tilt: no robot of the comparison has the freedom"),
+        (("delta", "3-puu", "--part", "0", "--starts", "1"), "task tilt: no robot of the comparison has the freedom"),
     ):
         refusal_of(cli("compare", path, *arguments), words)
     with pytest.raises(InputError, match="is given twice"):
@@ -213,5 +213,5 @@ def test_robots_that_keep_more_limits_come_first_and_what_others_lack_is_said(cl
     answered = [each for each in result["robots"] if each["name"] != "6-ups"]
     units = {each["name"]: {rate["unit"] for rate in each["tasks"][0]["rates"]} for each in answered}
     assert units == {"case": {"in/rad"}, "6-pus": {"in/rad"}, "delta": {"rad/rad"}}
-    # The case's robot keeps its ranges with --range 0 too.
-    assert any("--range 0 for one size of all but the case's robot" in each for each in result["sentences"])
+    # The case's robot keeps its ranges with --part 0 too.
+    assert any("--part 0 for one size of all but the case's robot" in each for each in result["sentences"])

@@ -517,7 +517,7 @@ def test_the_workspace_command_proves_limits_of_legs_on_paper(cli: Run, tmp_path
     text = text.replace("{ min = 18, max = 22 }]", "20]").replace("max = 27", "max = 34")
     box = "[workspace]\nposition = [0, { min = -0.5, max = 0.5 }, { min = 19, max = 20 }]\n"
     path, proof = saved(tmp_path / "legs.toml", text + box), tmp_path / "legs.proof"
-    out = output_of(cli("workspace", str(path), "--proof", str(proof), "--of-quantity", "leg_length"))
+    out = output_of(cli("workspace", str(path), "--proof", str(proof), "--quantity", "leg_length"))
     assert "actuator.dead_length" in out
     assert output_of(cli("verify-proof", str(proof), str(path)))
     saved(path, (text + box).replace("leg_clearance = { min = 2 }", "leg_clearance = { min = 2.5 }"))

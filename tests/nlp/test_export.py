@@ -262,7 +262,7 @@ def test_tables_hold_the_joints_in_every_frame() -> None:
     found = exported("tricept", 1)
     units = found.case.units
     files = exported_files(found, ["csv"])
-    assert list(files) == ["README.md", "joints.csv", "links.csv", "plates.csv"]
+    assert list(files) == ["README.md", "joints.csv", "links.csv", "cut-list.csv", "plates.csv"]
     frames = {}
     for row in rows_of(files["links.csv"]):
         origin = np.array([float(row[f"{c} [{units.length}]"]) for c in "xyz"])

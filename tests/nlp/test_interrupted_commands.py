@@ -63,7 +63,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         "out.csv",
     ),
     "pareto": (
-        *("small.toml", "--goals", "max F", "--goals", "min limits.leg_length.max", "--points", "4", "--starts", "1"),
+        *("small.toml", "--goal", "max F", "--goal", "min limits.leg_length.max", "--points", "4", "--starts", "1"),
         *("--json", "out.json", "--csv", "out.csv"),
     ),
     "compare": ("small.toml", "case", "delta", "--starts", "1", "--json", "out.json", "--csv", "out.csv"),

@@ -105,7 +105,7 @@ OPTIONS = {
     "solve": (),
     "certify": (),
     "check": (),
-    "tradeoff": (*OVER, "--page", "page.html"),
+    "tradeoff": (*OVER, "--html", "page.html"),
     "sweep": (*OVER, "--engine", "ipopt", "--jobs", "2", "--out", "out.csv"),
 }
 

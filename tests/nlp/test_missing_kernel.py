@@ -42,9 +42,9 @@ def without_kernel(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
         (
             "pareto",
             "paper-4.2",
-            "--goals",
+            "--goal",
             f"max F:{PUSH}",
-            "--goals",
+            "--goal",
             f"min F:{TURN}",
             "--certify",
             "--csv",

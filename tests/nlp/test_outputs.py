@@ -20,7 +20,7 @@ COMMANDS = [
     ("check", "CASE", "--json", "OUT"),
     ("check", "CASE", "--junit", "OUT"),
     ("report", "CASE", "--starts", "1", "--out", "OUT"),
-    ("pareto", "CASE", "--goals", "max F", "--goals", "min limits.x", "--csv", "OUT"),
+    ("pareto", "CASE", "--goal", "max F", "--goal", "min limits.x", "--csv", "OUT"),
     ("compare", "CASE", "6-ups", "delta", "--csv", "OUT"),
 ]
 
@@ -89,7 +89,7 @@ OVER = ("--over", "x1=11:12:2")
         ("solve", "CASE", "--csv", "OUT"),
         ("solve", "CASE", "--plot", "OUT"),
         ("evaluate", "CASE", "--csv", "OUT"),
-        *(("tradeoff", "CASE", *OVER, option, "OUT") for option in ("--json", "--csv", "--page", "--plot")),
+        *(("tradeoff", "CASE", *OVER, option, "OUT") for option in ("--json", "--csv", "--html", "--plot")),
     ],
     ids=" ".join,
 )

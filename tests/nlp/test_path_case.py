@@ -22,6 +22,7 @@ from screwsynth.nlp import (
     load_case,
     load_result,
     read_path,
+    round_design,
     solve,
 )
 from screwsynth.nlp.case.source import find_case
@@ -280,6 +281,28 @@ def test_a_free_turn_that_is_not_covered_is_refused_before_a_solve(tmp_path: Pat
     tables["path"]["place"] = {"yaw": {"min": -5, "max": 175}}
     with pytest.raises(CaseError, match=r"path.place.yaw.max = 175.0: must be between"):
         case_from(tables)
+
+
+def test_values_and_round_numbers_keep_limits_along_a_path(tmp_path: Path) -> None:
+    tables = design_along(tmp_path)
+    case = case_from(tables)
+    path = path_of_case(case)
+    k, s = np.repeat(np.arange(len(path)), 201), np.tile(np.linspace(0, 1, 201), len(path))
+    radius = np.arange(15.0, 35.0)
+    lengths = legs_along(radius, *path.poses_at(k, s)).reshape(len(radius), -1)
+    kept = radius[(lengths.min(axis=1) >= 25) & (lengths.max(axis=1) <= 40)]
+    # The narrowest base has the largest F; the whole number below that of the best design breaks a limit.
+    before = solve(case)
+    rounded = round_design(before, 1)
+    (own,), (now,) = (each.path.judgement.case.components("x1") for each in (before, rounded) if each.path is not None)
+    assert isinstance(own, float)
+    assert now == kept[0] == math.ceil(own)
+    assert rounded.keeps_limits
+    tables["robot"]["parameters"]["x1"] = {"values": [kept[2], kept[0] - 1, kept[1]]}
+    chosen = solve(case_from(tables))
+    assert chosen.path is not None
+    assert chosen.path.is_proved
+    assert chosen.path.judgement.case.components("x1") == (kept[1],)
 
 
 def test_the_place_of_a_path_and_the_design_are_the_best_of_a_grid(cli: Run, tmp_path: Path) -> None:

@@ -830,7 +830,7 @@ def limb_lines(view: dict[str, Any]) -> list[dict[str, Any]]:
 def test_wide_tables_of_a_curve_say_that_they_scroll(browser: Any, tmp_path: Path, cli: Run) -> None:
     curve = tmp_path / "curve.html"
     over = ("--over", "limits.leg_length.max=60:70:2", "--starts", "1")
-    assert cli("tradeoff", "paper-4.1-helical", *over, "--page", str(curve))[0] == 0
+    assert cli("tradeoff", "paper-4.1-helical", *over, "--html", str(curve))[0] == 0
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size_of_window(420))
     browser.get(curve.as_uri())
     check_hints(browser)

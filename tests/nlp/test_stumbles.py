@@ -54,7 +54,7 @@ def test_numbers_that_can_be_set_are_all_named(cli: Run) -> None:
 
 def test_a_wrong_column_is_that_of_the_file_of_points(cli: Run, tmp_path: Path) -> None:
     points = saved(tmp_path / "points.csv", "x1,nope\n20,3\n")
-    status, _, err = cli("sweep", "paper-4.1-helical", "--points", str(points), "--out", str(tmp_path / "out.csv"))
+    status, _, err = cli("sweep", "paper-4.1-helical", "--over", str(points), "--out", str(tmp_path / "out.csv"))
     assert status == 2
     assert err.startswith(f"screwsynth: {points}: column nope: cannot be set")
 

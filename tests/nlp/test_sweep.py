@@ -116,7 +116,7 @@ def test_points_of_a_file_and_parquet(tmp_path: Path, cli: Run) -> None:
     # The limit on the rotation is a bound of the program; the axis of the last point is none.
     points.write_text("task.axis_x,task.axis_y,task.axis_z,p_x.max\n2,2,1,10\n0,0,1,9\n1,0,0,5\n0,0,0,7\n0,1,1,8\n")
     code, said, err = cli(
-        "sweep", CASE, "--points", str(points), "--starts", "2", "--engine", "ipopt", "--jobs", "1", "--out", str(out)
+        "sweep", CASE, "--over", str(points), "--starts", "2", "--engine", "ipopt", "--jobs", "1", "--out", str(out)
     )
     assert (code, err) == (0, ""), err
     found = pq.read_table(out).to_pydict()
@@ -204,10 +204,10 @@ def test_joints_are_no_design() -> None:
         (("--over", "x1=-4:2:3"), "robot.parameters.x1 = -4.0: must be at least 0"),
         (("--over", "x1=1:2:9999", "--over", "x2=1:2:9999"), "and at most 10,000,000 are allowed"),
         (("--over", "x1=1,2", "--over", "x1=3,4"), "x1 is given twice"),
-        (("--points", "EMPTY"), "has 0 points"),
-        (("--points", "SHORT"), "point 2 has 1 values, and must have 2"),
-        (("--over", "x1=1,2", "--points", "EMPTY"), "either --over NAME=FIRST:LAST:COUNT, once or more, or --points"),
-        ((), "a sweep needs points"),
+        (("--over", "EMPTY"), "has 0 points"),
+        (("--over", "SHORT"), "point 2 has 1 values, and must have 2"),
+        (("--over", "x1=1,2", "--over", "EMPTY"), "a file of points stands alone, without ranges or lists beside it"),
+        ((), "--over: is missing: NAME=FIRST:LAST:COUNT, a number to vary"),
         (("--over", "x1=1,2", "--engine", "fast"), "--engine fast: must be compiled or ipopt"),
         (("--over", "x1=10,12", "--starts", "17", "--engine", "compiled"), "has 16 starting points, and 17 are wanted"),
         (("--over", "x1=1,2", "--over", "x2=1,2", "--over", "x3=1,2", "--plot", "p.png"), "3 numbers change on a grid"),

@@ -165,7 +165,7 @@ def test_a_solve_shows_what_it_has_when_the_time_is_over(clock: Clock, cli: Run)
 def test_a_time_that_is_not_positive_is_refused(command: str, cli: Run) -> None:
     more = {
         "tradeoff": ("--over", "x1=10:14:3"),
-        "pareto": ("--goals", "max F:x"),
+        "pareto": ("--goal", "max F:x"),
         "compare": ("6-ups",),
         "sweep": ("--over", "x1=10:14:3", "--out", "table.csv"),
         "report": ("--out", "page.html"),

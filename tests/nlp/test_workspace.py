@@ -398,11 +398,6 @@ def test_limits_over_a_workspace_end_with_a_proof() -> None:
     [
         ("[workspace]", "[workspaces]", "workspaces: no such key"),
         ('over = "workspace"', 'over = "everything"', "limits.over"),
-        (
-            "[pose]\nposition = [0, 0, 20]",
-            "[[pose]]\nposition = [0, 0, 20]\n[[pose]]\nposition = [0, 0, 21]",
-            "limits.over",
-        ),
     ],
 )
 def test_limits_over_a_workspace_need_one(old: str, new: str, message: str) -> None:
@@ -578,7 +573,7 @@ def test_robots_with_other_rows_are_proved_and_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("option", [["--gap", "2"], ["--time", "0"], ["--leg-error", "-1"], ["--of-quantity", "mass"]])
+@pytest.mark.parametrize("option", [["--gap", "2"], ["--time", "0"], ["--leg-error", "-1"], ["--quantity", "mass"]])
 def test_wrong_options_are_refused_in_a_sentence(machine: Path, option: list[str]) -> None:
     run = CliRunner().invoke(app, ["workspace", str(machine), *option])
     assert isinstance(run.exception, InputError)

@@ -588,7 +588,7 @@ def test_a_page_says_where_the_worst_pose_is_that_of_another_machine(
     output_of(cli("workspace", str(case), "--gap", "0.1", "--html", str(page)))
     words = "the worst pose is that of a machine within the tolerance, not of the design"
     assert f"No picture: {words}." in page.read_text(encoding="utf-8")
-    refusal_of(cli("workspace", str(case), "--gap", "0.1", "--picture", str(drawn)), words)
+    refusal_of(cli("workspace", str(case), "--gap", "0.1", "--plot-pose", str(drawn)), words)
     assert not drawn.exists()
 
 

@@ -160,7 +160,7 @@ def refuted(limited: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[st
     """Output, result and files of a machine with refuted claims."""
     folder = tmp_path_factory.mktemp("judged")
     files = [str(folder / name) for name in ("result.json", "page.html", "worst.svg")]
-    flags = [part for pair in zip(("--json", "--html", "--picture"), files, strict=True) for part in pair]
+    flags = [part for pair in zip(("--json", "--html", "--plot-pose"), files, strict=True) for part in pair]
     numbers = ["x3=6", "limits.leg_clearance.min=6", "limits.base_joint_angle.max=8", "limits.actuator.stroke_max=5"]
     flags += [part for each in numbers for part in ("--set", each)]
     run = CliRunner().invoke(app, ["workspace", str(limited), "--gap", "0.05", "--time", "2", *flags])
@@ -279,7 +279,7 @@ def test_the_shipped_hexapod_is_proved(cli: Run) -> None:
             ["--html", "-", "--json", "-"],
             "standard output can take one of --json -, --csv -, --html - and --proof - only",
         ),
-        (["--picture", "a.txt"], "a.txt"),
+        (["--plot-pose", "a.txt"], "a.txt"),
         (["--html", "nowhere/page.html"], "nowhere/page.html"),
     ],
 )

@@ -7,6 +7,7 @@ counted from the exported pose. Other limits (cones, strokes, clearances, rates)
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -21,7 +22,7 @@ from ...evidence.state import RobotState, evaluate
 from ...program.nlp import Nlp
 from .given import GivenRobot, given_mechanism, tables_of
 from .legs import PosedLeg, axes_of, check_legs, leg_mechanism
-from .words import ExportedJoint, RobotMechanism
+from .words import ExportedJoint, RobotMechanism, Travel
 
 #: A slide with one side of a range has this many times the robot's size as the other: no loop of the robot is as long.
 _FAR = 100.0
@@ -34,10 +35,12 @@ class Exported(RobotMechanism):
     Attributes:
         case: the case.
         pose: number of the pose, from 1.
+        travels: of the slides whose lengths or coordinates are known.
     """
 
     case: Case
     pose: int
+    travels: tuple[Travel, ...] = ()
 
 
 def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
@@ -65,14 +68,19 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
         check_legs(model)
         found = leg_mechanism(model.name, legs, state.rotation, state.position)
     labelled = {joint.label: joint for joint in known}
-    spans, joints = {leg.name: leg.platform - leg.base for leg in legs}, []
+    spans, joints, travels = {leg.name: leg.platform - leg.base for leg in legs}, [], []
+    at_poses = [_values_at(nlp, x, k) for k in range(nlp.case.pose_count)]
     for joint, words in zip(found.mechanism.joints, found.joints, strict=True):
         own = labelled.get(words.label)
-        span = spans.get(words.actuator if own is None else own.limb)
-        length = None if span is None or not joint.actuated else _signed_length(found.mechanism, joint, span)
-        joints.append(replace(joint, range=_joint_range(nlp.case, joint, words, own, length, found.size)))
+        leg = words.actuator if own is None else own.limb
+        length = _signed_length(found.mechanism, joint, spans[leg]) if leg in spans and joint.actuated else None
+        limits = _limits_of_joint(nlp.case, joint, words, own, length)
+        joints.append(replace(joint, range=_range_of(joint, words, limits, found.size)))
+        key = (words.label, words.part) if length is None else (leg, "length")
+        if joint.kind == "P" and all(key in each for each in at_poses):
+            travels.append(_travel(joint.name, length, [each[key] for each in at_poses], pose, limits))
     mechanism = replace(found.mechanism, joints=tuple(joints))
-    return Exported(mechanism, found.joints, found.size, found.notes, nlp.case, pose)
+    return Exported(mechanism, found.joints, found.size, found.notes, nlp.case, pose, tuple(travels))
 
 
 def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:
@@ -87,12 +95,44 @@ def _coordinates(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], fl
     return {(label, each.part): value for (label, each), value in pairs if np.isfinite(value)}
 
 
-def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLeg]:
-    """Return the legs at a pose, with the axes of upper universal joints from the drawing."""
-    model, legs = nlp.program.model, nlp.program.robots[pose].legs
+def _values_at(nlp: Nlp, x: FloatArray, pose: int) -> dict[tuple[str, str], float]:
+    """Return coordinates from home by label and part of the joint, and lengths of legs by limb and the word length."""
+    legs, span = nlp.program.robots[pose].legs, _ends_of_legs(nlp, x, pose)[1]
+    lengths = {(leg.name, "length"): float(np.linalg.norm(span[:, k])) for k, leg in enumerate(legs)}
+    return {**_coordinates(nlp, x, pose), **lengths}
+
+
+def _ends_of_legs(nlp: Nlp, x: FloatArray, pose: int) -> tuple[FloatArray, FloatArray]:
+    """Return the base joints (3, k) of the legs at a pose, and the vectors (3, k) to their platform joints."""
+    legs = nlp.program.robots[pose].legs
     ends = [ca.horzcat(ca.SX(3, 0), *[getattr(leg, each) for leg in legs]) for each in ("base", "span")]
     function = ca.Function("legs", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in ends])
     base, span = (each.full() for each in function(x, nlp.arguments))
+    return base, span
+
+
+def _travel(
+    joint: str, length: float | None, values: Sequence[float], pose: int, limits: tuple[float, float]
+) -> Travel:
+    """Return the travel of a slide.
+
+    Args:
+        joint: name of the slide.
+        length: of the leg that it drives at the exported pose, negative where it shortens it; None for another slide.
+        values: its length or its coordinate from home at every pose.
+        pose: number of the exported pose, from 1.
+        limits: smallest and largest coordinate from the exported pose, infinite without a limit.
+    """
+    at, (lower, upper) = values[pose - 1], limits
+    ends = (at - upper, at - lower) if length is not None and length < 0 else (at + lower, at + upper)
+    least, most = (None if math.isinf(end) else end for end in ends)
+    return Travel(joint, length is not None, at, (min(values), max(values)), (least, most))
+
+
+def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLeg]:
+    """Return the legs at a pose, with the axes of upper universal joints from the drawing."""
+    model, legs = nlp.program.model, nlp.program.robots[pose].legs
+    base, span = _ends_of_legs(nlp, x, pose)
     vectors = [each.vector for each in model.scene.directions]
     directions = ca.Function(
         "directions",
@@ -115,15 +155,10 @@ def _signed_length(mechanism: Mechanism, slide: MechanismJoint, span: FloatArray
     return float(np.linalg.norm(span)) * (1 if is_longer else -1)
 
 
-def _joint_range(
-    case: Case,
-    joint: MechanismJoint,
-    words: ExportedJoint,
-    given: LimbJoint | None,
-    length: float | None,
-    size: float,
-) -> tuple[float, float] | None:
-    """Return the smallest and the largest coordinate of a joint from the exported pose; None without a limit.
+def _limits_of_joint(
+    case: Case, joint: MechanismJoint, words: ExportedJoint, given: LimbJoint | None, length: float | None
+) -> tuple[float, float]:
+    """Return the smallest and the largest coordinate of a joint from the exported pose, infinite without a limit.
 
     Args:
         case: with its limits.
@@ -131,10 +166,10 @@ def _joint_range(
         words: the same in the words of the case.
         given: the joint of the robot file that it is part of; None for a leg.
         length: of the leg that it drives at that pose, negative where it shortens it; None for another joint.
-        size: length of the order of the robot's own.
     """
+    lower, upper, lever, value = -math.inf, math.inf, words.lever or 1.0, words.coordinate or 0.0
     if not case.limits or joint.kind in ("S", "weld") or words.follows:
-        return None
+        return lower, upper
     # The classes of limits need pydantic, which a case without limits does not load.
     from ...case.limits.interval import QuantityLimit  # noqa: PLC0415
     from ...case.limits.joint_motion import JointMotion  # noqa: PLC0415
@@ -142,7 +177,6 @@ def _joint_range(
 
     is_slide = joint.kind == "P"
     measure = "actuator_angle" if words.lever is None and not is_slide else "actuator_length"
-    lower, upper, lever, value = -math.inf, math.inf, words.lever or 1.0, words.coordinate or 0.0
     for limit in case.limits:
         at = None
         if isinstance(limit, LegLength) and is_slide:
@@ -156,9 +190,24 @@ def _joint_range(
             if isinstance(limit, LegLength) and at < 0:
                 ends = -ends[1], -ends[0]
             lower, upper = max(lower, ends[0] / lever - at), min(upper, ends[1] / lever - at)
-    if math.isinf(lower) and math.isinf(upper):
+    return lower, upper
+
+
+def _range_of(
+    joint: MechanismJoint, words: ExportedJoint, limits: tuple[float, float], size: float
+) -> tuple[float, float] | None:
+    """Return limits as formats have them, with two sides; None without a limit.
+
+    Args:
+        joint: the joint.
+        words: the same in the words of the case.
+        limits: smallest and largest coordinate from the exported pose, infinite without a limit.
+        size: length of the order of the robot's own.
+    """
+    if math.isinf(limits[0]) and math.isinf(limits[1]):
         return None
-    # Formats have ranges with two sides; a limit of an angle counts within half a turn from home.
+    # A limit of an angle counts within half a turn from home.
+    is_slide = joint.kind == "P"
     far = _FAR * size if is_slide else math.pi
-    middle = 0.0 if is_slide else -value
-    return max(lower, middle - far), min(upper, middle + far)
+    middle = 0.0 if is_slide else -(words.coordinate or 0.0)
+    return max(limits[0], middle - far), min(limits[1], middle + far)

@@ -45,6 +45,25 @@ class ExportedJoint:
     follows: bool = False
 
 
+@dataclass(frozen=True)
+class Travel:
+    """The travel of a slide over the poses of a case.
+
+    Attributes:
+        joint: name of the slide.
+        is_leg: whether its numbers are lengths of a straight leg, and not its coordinate from home.
+        value: at the exported pose, length.
+        used: smallest and largest value over all poses of the case.
+        allowed: smallest and largest value within the limits of the case; None for a side without one.
+    """
+
+    joint: str
+    is_leg: bool
+    value: float
+    used: tuple[float, float]
+    allowed: tuple[float | None, float | None]
+
+
 @dataclass(frozen=True, eq=False)
 class RobotMechanism:
     """A robot as a mechanism at a pose.

@@ -26,10 +26,13 @@ _FILES: Mapping[str, str] = {
         common frame, with the keys of github.com/Gepetto/example-parallel-robots.""",
     "joints.csv": "Centre and axis of every joint in the frames of base, platform, and the two links of the joint.",
     "links.csv": "Frame of every link in the frame of the base.",
+    "cut-list.csv": """Distances of joint centres on every link between base and platform, equal links once, and
+        lengths of legs and ways of slides from home: at this pose, over all poses, and within the limits.""",
     "plates.csv": "Joint centres of base and platform in the plane of their plate, and their distances from it.",
     "base.dxf": "Outline and joint centres of the base, in its plane.",
     "platform.dxf": "Outline and joint centres of the platform, in its plane.",
 }
+_LINK = "Outline and joint centres of this link, in the plane of its joint centres."
 _UNITS = """Lengths are in {length} everywhere; nothing is converted. MJCF and URDF have angles in radians; tables have
     them in {angle}."""
 _FRAMES = """The base's frame is the world's of the case. The platform's frame is that of the case, at this pose. The
@@ -40,6 +43,8 @@ _COORDINATES = """A joint's coordinate is the motion of its outer link relative 
 _PLACEHOLDERS = """Masses, inertias, gains, efforts, speeds and shapes are placeholders, and there is no gravity. Limits
     other than ranges of a joint (cones, strokes, clearances, rates) are not exported."""
 _WIDTH = 120
+#: The links whose joint centres are in plates.csv.
+_ENDS = ("base", "platform")
 
 
 def readme_text(exported: Exported, files: Iterable[str], plates: Sequence[Plate]) -> str:
@@ -58,7 +63,7 @@ def readme_text(exported: Exported, files: Iterable[str], plates: Sequence[Plate
         f"# {one_line(case.model.name)} from the case {one_line(case.name)}{pose}",
         _paragraph(f"Written by {versions}."),
         "## Files",
-        "\n".join(_paragraph(f"- `{name}`: {_FILES[name]}", "  ") for name in files),
+        "\n".join(_paragraph(f"- `{name}`: {_FILES.get(name, _LINK)}", "  ") for name in files),
         "## Units",
         _paragraph(_UNITS.format(length=length, angle=angle)),
         "## Frames",
@@ -98,5 +103,5 @@ def _offsets(plate: Plate, unit: str) -> str:
     largest = float(np.abs(plate.offsets).max())
     return (
         f"The joint centres of the {plate.name} are not in one plane. Its drawing shows them projected; they are up to"
-        f" {largest:.6g} {unit} away from it, see plates.csv."
+        f" {largest:.6g} {unit} away from it, see {'plates.csv' if plate.name in _ENDS else 'joints.csv'}."
     )

@@ -6,16 +6,30 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ...case.case import Case
+from ...errors import EvaluationError
 from ...results.objective import objective_label
 from ...results.tradeoff import (
+    TradeoffPointData,
     TradeoffResult,
     over_words,
     throughout_words,
     tradeoff_table,
     tradeoff_words,
 )
+from ...solver.tradeoff import Tradeoff, TradeoffPoint
+from ..pictures.solutions import drawings_of
 from .charts import Curve, Spot, line_chart
-from .markup import Markup, answer_box, html_table, join_markup, paragraphs, tag, whole_page
+from .designs import Design, bend_lines, bends, design_figures, free_numbers
+from .markup import (
+    Markup,
+    answer_box,
+    contents_and_body,
+    html_table,
+    join_markup,
+    paragraphs,
+    tag,
+    whole_page,
+)
 
 
 def tradeoff_figures(case: Case, results: Sequence[TradeoffResult], here: Mapping[str, float] | None = None) -> Markup:
@@ -41,29 +55,65 @@ def tradeoff_rows(result: TradeoffResult) -> Markup:
     return join_markup([html_table(tradeoff_table(result), over_words(result)), below])
 
 
-def tradeoff_page(case: Case, result: TradeoffResult) -> str:
+def tradeoff_page(found: Tradeoff, result: TradeoffResult) -> str:
     """Return a whole page about a trade-off, which opens without a network.
 
-    Its script only says which tables scroll: all words, charts and tables stand there without it.
+    Its script only says which tables scroll: all words, charts, pictures and tables stand there without it.
+
+    Args:
+        found: the trade-off.
+        result: the same as a result.
     """
+    case = found.points[0].solution.case
     title = case.title or case.name
     solved = [point for point in result.points if point.status.is_answer]
     answer = f"{len(solved)} of {len(result.points)} values have an answer"
-    body = join_markup(
-        [
-            tag("h2", "F against the number"),
-            paragraphs(["Each point is a solve of its own, with everything that is free chosen anew."]),
-            tradeoff_figures(case, [result]),
-            paragraphs(f"{line}." for line in tradeoff_words(result)),
-            tradeoff_rows(result),
-        ]
-    )
+    designs = [
+        _design(result, row, point)
+        for row, point in zip(result.points, found.points, strict=False)
+        if row.status.is_answer
+    ]
+    sections = [
+        (
+            "curve",
+            "F against the number",
+            join_markup(
+                [
+                    paragraphs(["Each point is a solve of its own, with everything that is free chosen anew."]),
+                    tag("div", tradeoff_figures(case, [result]), class_="wide"),
+                    paragraphs(f"{line}." for line in tradeoff_words(result)),
+                ]
+            ),
+        ),
+        ("active", "Where the curve bends", bend_lines(designs)),
+        ("designs", "The design at each value", design_figures(designs)),
+        ("values", "Every value", tradeoff_rows(result)),
+    ]
+    contents, body = contents_and_body(sections)
     return whole_page(
         f"{title} - trade-off",
         f"{case.name}, robot {case.model.name}: {over_words(result)}",
         answer_box([answer], is_answer=bool(solved)),
-        tag("section", body),
+        body,
         heading=title,
+        contents=contents,
+    )
+
+
+def _design(result: TradeoffResult, row: TradeoffPointData, point: TradeoffPoint) -> Design:
+    """Return the design at a value that has an answer."""
+    outcome = point.solution.outcomes[0]
+    try:
+        drawing = drawings_of(point.solution)[0]
+    except EvaluationError:
+        drawing = None
+    F = "" if row.F is None else f"F = {row.F:.6g}"
+    return Design(
+        f"{result.over} = {row.value:.5g} {result.unit}".rstrip(),
+        F or ", ".join(f"F of {name} = {each:.6g}" for name, each in zip(result.tasks, row.tasks, strict=True) if each),
+        free_numbers(outcome.own.nlp, outcome.x),
+        tuple(each.removeprefix("limits.") for each in row.active),
+        drawing,
     )
 
 
@@ -80,6 +130,9 @@ def _chart(case: Case, result: TradeoffResult, task: int, here: float | None) ->
         missing = len(values) - len(solved)
         if missing:
             words += f" {missing} of {len(values)} values have no answer."
+    middles = _bend_values(result)
+    if middles:
+        words += " Vertical lines: other bounds and limits become active there."
     chart = line_chart(
         [Curve(values, F, "curve")],
         [
@@ -88,5 +141,13 @@ def _chart(case: Case, result: TradeoffResult, task: int, here: float | None) ->
         ],
         words=words,
         labels=(f"{result.over}, {result.unit}" if result.unit else result.over, objective_label(case)),
+        bounds=middles,
     )
     return tag("figure", chart, tag("figcaption", words))
+
+
+def _bend_values(result: TradeoffResult) -> list[float]:
+    """Return the middles between neighbouring values with an answer at which other bounds and limits are active."""
+    solved = [point for point in result.points if point.status.is_answer]
+    found = bends([frozenset(point.active) for point in solved])
+    return [(solved[k - 1].value + solved[k].value) / 2 for k in found]

@@ -8,8 +8,6 @@ import numpy as np
 
 from ...results.jsondata import json_data
 from ...results.pathwording import checked_claims, fault_words, first_refuted, path_summary, verdict_words
-from ...results.tables import origin_table
-from ...results.text import Line
 from ...results.workspace import WorkspacePose
 from ...results.workspacewording import pose_words
 from ..pictures.figures import picture as picture_file
@@ -27,7 +25,6 @@ from .markup import (
     Markup,
     answer_box,
     contents_and_body,
-    html_table,
     image_source,
     join_markup,
     packed_plotly,
@@ -38,6 +35,7 @@ from .markup import (
     whole_page,
 )
 from .pathview import MOST_MARGIN, PathView, path_view, thinned
+from .verdicts import origin, refuting_place, shown_verdicts
 
 #: Points of a curve of the page.
 _POINTS = 600
@@ -61,7 +59,7 @@ def path_page(picture: PathPicture, text: str, command: Callable[[WorkspacePose]
         ("robot", "The robot along the path", join_markup([_robot(picture, view), _curves(picture)])),
         ("verdicts", "Verdicts", _verdicts(picture)),
         ("refuted", "Places that refute a claim", _refuted(picture, command)),
-        ("origin", "Case text and versions", _origin(picture, text)),
+        ("origin", "Case text and versions", origin(result.versions, text)),
     ]
     contents, body = contents_and_body(sections)
     words = verdict_words(result)
@@ -85,16 +83,11 @@ def path_page(picture: PathPicture, text: str, command: Callable[[WorkspacePose]
 
 def _verdicts(picture: PathPicture) -> Markup:
     """Return the lines and tables that the terminal shows, without the title."""
-    _, *items = path_summary(picture.judged.case, picture.result)
-    parts = [
-        paragraphs([each]) if isinstance(each, Line) else html_table(each, each.title, id=f"path-{each.name}")
-        for each in items
-    ]
     words = (
         "Each proved claim holds at every point of every segment, and not only at samples. A proven bound is not "
         "passed by any point; the value reached is met in the line, and at the pose, named beside it."
     )
-    return join_markup([*parts, tag("p", words)])
+    return shown_verdicts(path_summary(picture.judged.case, picture.result), "path", words)
 
 
 def _robot(picture: PathPicture, view: PathView | None) -> Markup:
@@ -232,25 +225,7 @@ def _refuted(picture: PathPicture, command: Callable[[WorkspacePose], str]) -> M
     """Return each refuted claim with its first known fault and the command that shows it; empty without one."""
     case = picture.judged.case
     return join_markup(
-        part
+        refuting_place(fault_words(claim, claim.fault), pose_words(case, claim.fault.pose), command(claim.fault.pose))
         for claim in checked_claims(picture.result)
         if claim.fault is not None
-        for part in (
-            tag("h3", fault_words(claim, claim.fault)),
-            tag("p", f"At {pose_words(case, claim.fault.pose)}."),
-            tag(
-                "pre",
-                tag("code", command(claim.fault.pose)),
-                tabindex="0",
-                aria_label="Command",
-                class_="command",
-            ),
-        )
     )
-
-
-def _origin(picture: PathPicture, text: str) -> Markup:
-    """Return versions, and the text of the case."""
-    table = html_table(origin_table(picture.result.versions), "What the numbers depend on", id="versions")
-    shown = tag("pre", tag("code", text, id="case-text"), tabindex="0", aria_label="Case text")
-    return join_markup([table, tag("h3", "Case file"), shown])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ...case.case import Case
+from ...case.choices import listed_numbers
 from ...case.pose import sizes_of_turn
 from ...evidence.optimality import CURVED
 from ...results.checks import published_table
@@ -19,6 +20,7 @@ from ...results.tables import active_table, limit_table, limits_title, margin_ta
 from ...results.text import Line
 from ...results.wording import (
     certificate_lines,
+    choice_lines,
     costliest_words,
     counted,
     evidence_lines,
@@ -105,7 +107,7 @@ def certificate_section(report: Report) -> Markup:
 def workspace_section(report: Report) -> Markup:
     """Return the proof of the design over its workspace; empty where no limit holds there."""
     result = report.result
-    if isinstance(result, CombinedResult) or result.workspace is None:
+    if result.workspace is None:
         return Markup("")
     tables = (
         html_table(each, each.title, id=f"workspace-{each.name}")
@@ -117,7 +119,7 @@ def workspace_section(report: Report) -> Markup:
 def path_section(report: Report) -> Markup:
     """Return the proof of the design along its path; empty where no limit holds there."""
     result = report.result
-    if isinstance(result, CombinedResult) or result.path is None:
+    if result.path is None:
         return Markup("")
     lines = (each for each in path_proof_lines(report.case, result.path) if isinstance(each, Line))
     tables = claims_table(report.case, [each for each in result.path.claims if each.limit is not None])
@@ -196,7 +198,8 @@ def _objective_lines(case: Case) -> Iterator[str]:
     """Yield what is optimised: F of each task, or a number of the actuators."""
     measured = objective_words(case)
     if measured:
-        yield f"F is {measured}, to be as small as possible."
+        yield f"F is {measured}."
+    if case.tasks[0].measure:
         return
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
@@ -228,6 +231,9 @@ def _case(report: Report) -> Markup:
         internal.add(program.places.epigraph.level)
     free = () if first.nlp.is_fixed else enumerate(program.variables)
     names = [variable.name for k, variable in free if k not in internal]
+    chosen = [each.name for each in listed_numbers(case)]
+    if chosen:
+        lines.append(f"One of a few values is chosen for each of: {', '.join(chosen)}.")
     if names:
         plural = "numbers are" if len(names) > 1 else "number is"
         lines.append(f"{len(names)} {plural} free: {', '.join(names)}. Everything else is fixed.")
@@ -254,13 +260,14 @@ def _result(report: Report) -> Markup:
     if isinstance(result, CombinedResult):
         return _combined_result(report, result)
     sentences = [f"It would be {relaxation_words(row)}." for row in result.relaxation or ()]
-    return join_markup([*_task_tables(report.case, result, "design"), paragraphs(sentences)])
+    chosen = paragraphs(choice_lines(result.choice, result.rounding, is_answer=report.is_answer))
+    return join_markup([chosen, *_task_tables(report.case, result, "design"), paragraphs(sentences)])
 
 
 def _combined_result(report: Report, result: CombinedResult) -> Markup:
     """Return the design at the combined point, then each task by itself."""
     case, combined = report.case, result.combined
-    parts: list[Markup] = []
+    parts = [paragraphs(choice_lines(result.choice, result.rounding, is_answer=report.is_answer))]
     robot = result.robot
     if robot is not None:
         words = "The combined robot" if report.is_answer else "What was reached; this is no answer"
@@ -306,8 +313,7 @@ def _limits(report: Report) -> Markup:
     if not limits:
         return Markup("")
     caption = "Margin and cost of each limit"
-    proof = report.result.workspace or report.result.path if isinstance(report.result, SolveResult) else None
-    held = limits_title(report.case, proof)
+    held = limits_title(report.case, report.result.workspace or report.result.path)
     caption += f": {held}" if held else ""
     robot = report.result.robot
     size = 0.0 if robot is None else size_of_F(robot, report.result.F or 0.0)

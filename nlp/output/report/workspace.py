@@ -9,11 +9,11 @@ from ...case.case import Case
 from ...errors import EvaluationError
 from ...proof.workspace.slices.slices import Slice
 from ...results.jsondata import json_data
-from ...results.tables import origin_table
-from ...results.text import Line
+from ...results.rounding import number
+from ...results.text import TextTable
 from ...results.workspace import WorkspacePose, WorkspaceResult
-from ...results.workspaceposes import PosedClaim, refuted_claims, worst_claim
-from ...results.workspacewording import pose_words, verdict_words, workspace_summary
+from ...results.workspaceposes import refuted_claims, worst_claim
+from ...results.workspacewording import machine_lines, pose_words, verdict_words, workspace_summary
 from ..pictures.figures import picture
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
 from .markup import (
@@ -27,6 +27,7 @@ from .markup import (
     tag,
     whole_page,
 )
+from .verdicts import origin, refuting_place, shown_command, shown_verdicts
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +54,11 @@ def workspace_page(report: WorkspaceReport) -> str:
     case, result = report.case, report.result
     title = case.title or case.name
     sections = [
+        ("robot", "The machine", join_markup([_robot(report), _dimensions(report)])),
         ("verdicts", "Verdicts", _verdicts(report)),
-        ("robot", "The robot at its worst pose", _robot(report)),
         ("slices", "Slices of the workspace", _slices(report)),
         ("refuted", "Poses that refute a claim", _refuted(report)),
-        ("origin", "Case text and versions", _origin(report)),
+        ("origin", "Case text and versions", origin(result.versions, report.text)),
     ]
     contents, body = contents_and_body(sections)
     words = verdict_words(result)
@@ -75,29 +76,33 @@ def workspace_page(report: WorkspaceReport) -> str:
 
 def _verdicts(report: WorkspaceReport) -> Markup:
     """Return the lines and tables that the terminal shows, without the title."""
-    _, *items = workspace_summary(report.case, report.result)
-    parts = [
-        paragraphs([each]) if isinstance(each, Line) else html_table(each, each.title, id=f"workspace-{each.name}")
-        for each in items
-    ]
     words = (
         "Each proved claim holds at every pose of the workspace, and not only at samples. A proven bound is not passed "
         "by any pose; the value reached is met at the pose named beside it."
     )
-    return join_markup([*parts, tag("p", words)])
+    return shown_verdicts(workspace_summary(report.case, report.result), "workspace", words)
 
 
 def _refuted(report: WorkspaceReport) -> Markup:
     """Return each refuted claim with its pose and the command that shows it; empty without one."""
     return join_markup(
-        part
+        refuting_place(claim.words, pose_words(report.case, claim.pose), report.command(claim.pose))
         for claim in refuted_claims(report.result)
-        for part in (
-            tag("h3", claim.words),
-            tag("p", f"At {pose_words(report.case, claim.pose)}."),
-            _see(report, claim),
-        )
     )
+
+
+def _dimensions(report: WorkspaceReport) -> Markup:
+    """Return the dimensions of the machine, and the tolerance of its joint centres."""
+    case = report.case
+    rows = []
+    for item in case.model.parameters:
+        shown = report.result.parameters[item.name]
+        values = shown if isinstance(shown, tuple) else (shown,)
+        largest, unit = max(map(abs, values)), case.units.label(item.dimension)
+        names = case.component_names(item)
+        rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
+    table = html_table(TextTable(("", "value", "unit"), tuple(rows), "dimensions"), "Its dimensions", id="dimensions")
+    return join_markup([table, paragraphs(machine_lines(case, report.result.joint_centre))])
 
 
 def _robot(report: WorkspaceReport) -> Markup:
@@ -111,12 +116,8 @@ def _robot(report: WorkspaceReport) -> Markup:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
     image = tag("img", src=image_source(content), alt=f"The robot at {at}: {worst.words}", class_="posed")
-    return join_markup([tag("figure", image, tag("figcaption", f"{worst.words}, at {at}.")), _see(report, worst)])
-
-
-def _see(report: WorkspaceReport, claim: PosedClaim) -> Markup:
-    """Return the command that shows a claim's pose."""
-    return tag("pre", tag("code", report.command(claim.pose)), tabindex="0", aria_label="Command", class_="command")
+    figure = tag("figure", image, tag("figcaption", f"The machine at its worst pose, {at}: {worst.words}."))
+    return join_markup([figure, shown_command(report.command(worst.pose))])
 
 
 def _slices(report: WorkspaceReport) -> Markup:
@@ -150,10 +151,3 @@ def _slices(report: WorkspaceReport) -> Markup:
 def _swatch(kind: Kind) -> Markup:
     """Return a small box of a kind's colour."""
     return tag("span", class_="swatch hatched" if kind.hatch else "swatch", style=f"--fill: {kind.colour}")
-
-
-def _origin(report: WorkspaceReport) -> Markup:
-    """Return versions, and the text of the case."""
-    table = html_table(origin_table(report.result.versions), "What the numbers depend on", id="versions")
-    text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case text")
-    return join_markup([table, tag("h3", "Case file"), text])

@@ -19,6 +19,7 @@ from ...case.task import Sense
 from ...evidence.kkt import FEASIBLE, linearise
 from ...evidence.state import ZERO_F
 from ...interruption import one_search, reason_of, reason_to_stop
+from ...program.epigraph import with_exact_level
 from ...program.nlp import Nlp
 from ..boxes.incumbent import Incumbent, IncumbentError
 from ..boxes.limbs.independent import IndependentSearch
@@ -87,7 +88,10 @@ def certify_program(
         if nlp.n == 0:
             return _certify_point(nlp, above, effort.seconds)
         kernel()  # before any work where it is missing
-        search = _Search(standard_form(nlp), gap, above, effort, jobs, progress)
+        form = standard_form(nlp)
+        if form.n == 0:  # the level of a worst case alone, which follows from the one point there is
+            return _certify_point(nlp, above, effort.seconds)
+        search = _Search(form, gap, above, effort, jobs, progress)
         try:
             search.incumbent.start(x, claimed)
         except IncumbentError as error:
@@ -96,11 +100,13 @@ def certify_program(
 
 
 def _certify_point(nlp: Nlp, above: float | None, seconds: float) -> Certificate:
-    """Return the certificate of a program without variables: its value at the one point is the bound."""
-    x = frozen_array(nlp.start, (0,))
+    """Return the certificate of a program without variables of the case: its value at the one point is the bound."""
+    x = frozen_array(with_exact_level(nlp, nlp.start), (nlp.n,))
     F, violation = nlp.evaluate(x)[0], linearise(nlp, x).violation
     status, reason = CertificateStatus.PROVED, ""
-    if not violation <= FEASIBLE:
+    if not ((nlp.lower <= x) & (x <= nlp.upper)).all():  # ends of a level are estimates, and no limits of the case
+        status, reason = CertificateStatus.INCOMPLETE, "the level of the worst case is beyond its estimated ends"
+    elif not violation <= FEASIBLE:
         status = CertificateStatus.INFEASIBLE
     elif not math.isfinite(F):
         status, reason = CertificateStatus.INCOMPLETE, "F has no finite value at the one point there is"

@@ -51,6 +51,8 @@ class Certificate(Whole, Shown):
         reason: for stopping before every box was closed, or for refusing the claim; else empty.
         history: (seconds, bound, incumbent) during the search, finite numbers only.
         in_other_mode: whether the incumbent is in another working mode than home's.
+        scope: dimensions that the bound holds for, as words such as ``with the rounded dimensions``; empty where the
+            box has them all.
     """
 
     status: CertificateStatus
@@ -69,6 +71,7 @@ class Certificate(Whole, Shown):
     reason: str
     history: tuple[tuple[float, float, float], ...]
     in_other_mode: bool = False
+    scope: str = ""
 
     def __repr__(self) -> str:
         return f"<Certificate of {self.nlp.case.name!r}: {self.statement}>"
@@ -105,8 +108,9 @@ class Certificate(Whole, Shown):
 
     @property
     def _mode(self) -> str:
-        """The set that the statement is about, where it is a part of the box, as words at the end of a clause."""
-        return " in home's working mode" if self.nlp.in_home_mode else ""
+        """The set that the statement is about, where it is not the box itself, as words at the end of a clause."""
+        scope = f" {self.scope}" if self.scope else ""
+        return f"{scope} in home's working mode" if self.nlp.in_home_mode else scope
 
     @property
     def _bound_statement(self) -> str:

@@ -198,7 +198,7 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
         if name == LegLength.key and layout.robots[0].legs:
             continue  # among the claims already
         if name not in known:
-            raise InputError(f"--of-quantity {name}: no measure of this robot; {nearest(name, known)}")
+            raise InputError(f"--quantity {name}: no measure of this robot; {nearest(name, known)}")
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
         for i, owner in enumerate(quantity.owners):
             for sense in (Sense.MIN, Sense.MAX):

@@ -41,6 +41,7 @@ def at_one_pose(case: Case, position: Sequence[Value], rotation: Rotation) -> Ca
         rotation=rotation,
         displacements=(HERE,),
         further=(),
+        worst_everywhere=False,
         workspace=None,
         joint_centre_tolerance=None,
     )

@@ -1,5 +1,4 @@
 (() => {
-  const byId = (id) => document.getElementById(id);
   const data = JSON.parse(byId("data").textContent);
   // Where nothing resists a motion, what is left of its rates is rounding: it is shown as none.
   for (const frame of data.views.flatMap((each) => each.frames)) {
@@ -271,27 +270,17 @@
     map();
   }
 
-  // The library is half of a second's work: it waits until words and tables are painted.
-  requestAnimationFrame(() => setTimeout(async () => {
-    try {
-      const library = document.createElement("script");
-      library.textContent = await unpacked(byId("plotly").textContent);
-      document.head.append(library);
-      if (view && !hasWebGL()) throw new Error("no WebGL");
-      if (view) {
-        byId("view").textContent = "";
-        layout = newLayout();
-        await draw();
-        byId("view").on("plotly_relayout", keep);
-      }
-    } catch {
-      layout = null;
-      document.documentElement.classList.add("flat");
+  afterPaint(async () => {
+    if (view && !hasWebGL()) throw new Error("no WebGL");
+    if (view) {
+      byId("view").textContent = "";
+      layout = newLayout();
+      await draw();
+      byId("view").on("plotly_relayout", keep);
     }
-    if (byId("pair")) {
-      byId("map").textContent = "";
-      map();
-    }
-    document.documentElement.dataset.drawn = "yes";
-  }, 0));
+  }, () => { layout = null; }, () => {
+    if (!byId("pair")) return;
+    byId("map").textContent = "";
+    map();
+  });
 })();

@@ -1,5 +1,4 @@
 (() => {
-  const byId = (id) => document.getElementById(id);
   const view = JSON.parse(byId("data").textContent).view, RED = "#a3250f", NONE = "#68747f", BEYOND = -2, MOST = 6;
   document.documentElement.classList.add("scripted");
   // Colours of margins, from 0 to the largest that has a colour of its own.
@@ -123,21 +122,11 @@
   }));
   tell();
 
-  // The library is half of a second's work: it waits until words and tables are painted.
-  requestAnimationFrame(() => setTimeout(async () => {
-    try {
-      const library = document.createElement("script");
-      library.textContent = await unpacked(byId("plotly").textContent);
-      document.head.append(library);
-      if (!hasWebGL()) throw new Error("no WebGL");
-      byId("view").textContent = "";
-      layout = sceneLayout(view.ranges, view.unit, camera());
-      await draw();
-      byId("view").on("plotly_relayout", (change) => { if (change["scene.camera"]) layout.scene.camera = change["scene.camera"]; keep(); });
-    } catch {
-      layout = null;
-      document.documentElement.classList.add("flat");
-    }
-    document.documentElement.dataset.drawn = "yes";
-  }, 0));
+  afterPaint(async () => {
+    if (!hasWebGL()) throw new Error("no WebGL");
+    byId("view").textContent = "";
+    layout = sceneLayout(view.ranges, view.unit, camera());
+    await draw();
+    byId("view").on("plotly_relayout", (change) => { if (change["scene.camera"]) layout.scene.camera = change["scene.camera"]; keep(); });
+  }, () => { layout = null; });
 })();

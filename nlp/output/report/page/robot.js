@@ -71,3 +71,18 @@ const turnedCamera = (from, key) => {
   if (key === "out") distance *= 1.2;
   return { ...from, eye: { x: center.x + distance * Math.cos(up) * Math.cos(round), y: center.y + distance * Math.cos(up) * Math.sin(round), z: center.z + distance * Math.sin(up) } };
 };
+
+// Plotly is half of a second's work: it waits until words and tables are painted. Without it or WebGL a page is flat.
+const afterPaint = (draw, giveUp, end = () => {}) => requestAnimationFrame(() => setTimeout(async () => {
+  try {
+    const library = document.createElement("script");
+    library.textContent = await unpacked(byId("plotly").textContent);
+    document.head.append(library);
+    await draw();
+  } catch {
+    giveUp();
+    document.documentElement.classList.add("flat");
+  }
+  end();
+  document.documentElement.dataset.drawn = "yes";
+}, 0));

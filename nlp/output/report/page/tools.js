@@ -27,6 +27,7 @@ const fittedCamera = (ranges, eye, frame) => {
 };
 
 // Text of a case must not become markup in a hover label, which knows some tags.
+const byId = (id) => document.getElementById(id);
 const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 const shown = (value, digits = 6, signed = false) => {
   const text = String(Number(value.toPrecision(digits)));

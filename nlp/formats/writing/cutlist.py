@@ -1,0 +1,110 @@
+"""A mechanism as a list for the saw: distances of joint centres on each link, and strokes of slides; equal parts once.
+
+Base and platform are plates, whose joint centres are in tables and drawings of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from ....models import Dimension
+from ....models.mechanism import Mechanism
+from ...system.csvtext import csv_text
+from ...units import Units
+from ..solved.words import Travel
+from .numbers import number
+from .shapes import joint_centres
+
+#: Lengths that differ by less than this part of the robot's size are one.
+_SAME = 1e-9
+
+
+class _Row(NamedTuple):
+    """A row of the list without its number of parts: item, name of the part, ends, and lengths, None for an empty one.
+
+    Rows with the same item, ends' kinds and lengths are of equal parts.
+    """
+
+    item: str
+    part: str
+    ends: tuple[str, str]
+    kinds: str
+    lengths: tuple[float | None, ...]
+
+
+def drawn_links(mechanism: Mechanism, size: float) -> tuple[str, ...]:
+    """Return the links between base and platform that have an extent: joint centres at two places or more."""
+    ends = (mechanism.base, mechanism.platform)
+    names = (link.name for link in mechanism.links if link.name not in ends)
+    return tuple(name for name in names if len(joint_centres(mechanism, name, size)) > 1)
+
+
+def cut_list_csv(mechanism: Mechanism, travels: Iterable[Travel], size: float, units: Units) -> str:
+    """Return distances of joint centres on links, and lengths and strokes of slides.
+
+    Args:
+        mechanism: the mechanism.
+        travels: of its slides.
+        size: the robot's.
+        units: of the table.
+    """
+    parts = [_distances(mechanism, name, size) for name in drawn_links(mechanism, size)]
+    parts += [[_stroke(each)] for each in travels]
+    unit = units.label(Dimension.LENGTH)
+    head = ["item", "parts", "quantity", "from joint", "to joint"]
+    columns = ("length", "smallest used", "largest used", "stroke used", "smallest allowed", "largest allowed")
+    head += [f"{name} [{unit}]" for name in (*columns, "stroke allowed")]
+    rows = []
+    for equal in _grouped(parts, size):
+        names = list(dict.fromkeys(part[0].part for part in equal))
+        for row in equal[0]:
+            lengths = ["" if each is None else number(each) for each in row.lengths]
+            rows.append([row.item, " ".join(names), str(len(names)), *row.ends, *lengths])
+    return csv_text(head, rows)
+
+
+def _distances(mechanism: Mechanism, link: str, size: float) -> list[_Row]:
+    """Return the distance of every two joint centres of a link."""
+    kinds = {joint.name: joint.kind for joint in mechanism.joints}
+    rows = []
+    for (one, at_one), (other, at_other) in combinations(joint_centres(mechanism, link, size), 2):
+        words = " ".join(kinds[name] for name in (*at_one, *at_other))
+        apart = float(np.linalg.norm(other - one))
+        rows.append(_Row("link", link, (" ".join(at_one), " ".join(at_other)), words, (apart, *[None] * 6)))
+    return rows
+
+
+def _stroke(travel: Travel) -> _Row:
+    """Return the row of a slide: its length or way at the pose, over all poses, and as its limits allow it."""
+    least, most = travel.allowed
+    is_held = least is not None and most is not None
+    lengths = (
+        travel.value,
+        *travel.used,
+        travel.used[1] - travel.used[0],
+        least,
+        most,
+        most - least if is_held and least is not None and most is not None else None,
+    )
+    return _Row("length of a leg" if travel.is_leg else "way from home", travel.joint, ("", ""), "", lengths)
+
+
+def _grouped(parts: Sequence[Sequence[_Row]], size: float) -> list[list[Sequence[_Row]]]:
+    """Return parts together that are equal, in the order of the first of each."""
+    groups: list[list[Sequence[_Row]]] = []
+    for part in parts:
+        same = next((group for group in groups if _are_equal(group[0], part, size)), None)
+        groups.append([part]) if same is None else same.append(part)
+    return groups
+
+
+def _are_equal(one: Sequence[_Row], other: Sequence[_Row], size: float) -> bool:
+    """Return whether two parts have the same joints at the same distances, in the same order."""
+    if [(row.item, row.kinds) for row in one] != [(row.item, row.kinds) for row in other]:
+        return False
+    pairs = [pair for a, b in zip(one, other, strict=True) for pair in zip(a.lengths, b.lengths, strict=True)]
+    return all((a is None and b is None) if a is None or b is None else abs(a - b) <= _SAME * size for a, b in pairs)

@@ -1,0 +1,52 @@
+"""Small pictures of several designs of one robot, without words: one view and one scale, so that they compare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .drawing import Drawing
+from .figures import picture_of
+from .painting import Panel
+from .view import View, clearest_view
+
+#: Width and height of a picture, inches.
+_SIZE = (2.9, 2.6)
+
+
+def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:
+    """Return an SVG picture of each design of one robot, in order, all with the first one's view and one scale.
+
+    A picture has the robot and the axis of its task; its limbs have the colours of their rates.
+    """
+    view = clearest_view(drawings[0])
+    plain = [replace(each, free=(), reference=None, forces=None) for each in drawings]
+    frames = np.array([_limits(each, view) for each in plain])
+    low, high = frames[:, 0].min(axis=0), frames[:, 1].max(axis=0)
+    return [picture_of(".svg", _small, each, view, low, high) for each in plain]
+
+
+def _painted(drawing: Drawing, view: View) -> Figure:
+    """Return the robot on axes that fill a figure, which it fits."""
+    figure = Figure(figsize=_SIZE, facecolor="white")
+    Panel(figure.add_axes((0, 0, 1, 1)), view, drawing).paint()
+    return figure
+
+
+def _limits(drawing: Drawing, view: View) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the lower left and the upper right corner on paper of what a picture shows, in the case's unit."""
+    (axes,) = _painted(drawing, view).axes
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    return (left, bottom), (right, top)
+
+
+def _small(drawing: Drawing, view: View, low: Sequence[float], high: Sequence[float]) -> Figure:
+    """Return a picture whose axes have these corners."""
+    figure = _painted(drawing, view)
+    (axes,) = figure.axes
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    return figure

@@ -1,0 +1,43 @@
+"""What the pages of verdicts share: the terminal's lines and tables, a place that refutes a claim, the origin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ...results.parts import VersionsData
+from ...results.tables import origin_table
+from ...results.text import Line, TextTable
+from .markup import Markup, html_table, join_markup, paragraphs, tag
+
+
+def shown_verdicts(items: Iterable[Line | TextTable], key: str, words: str) -> Markup:
+    """Return what the terminal shows without its title, and a sentence about it.
+
+    Args:
+        items: lines and tables of the terminal; the first is the title.
+        key: identifier of the page, before that of each table.
+        words: the sentence.
+    """
+    _, *rest = items
+    parts = [
+        paragraphs([each]) if isinstance(each, Line) else html_table(each, each.title, id=f"{key}-{each.name}")
+        for each in rest
+    ]
+    return join_markup([*parts, tag("p", words)])
+
+
+def refuting_place(claim: str, pose: str, command: str) -> Markup:
+    """Return a refuted claim with the pose that refutes it, and the command that shows the pose."""
+    return join_markup([tag("h3", claim), tag("p", f"At {pose}."), shown_command(command)])
+
+
+def shown_command(command: str) -> Markup:
+    """Return a command as text to copy."""
+    return tag("pre", tag("code", command), tabindex="0", aria_label="Command", class_="command")
+
+
+def origin(versions: VersionsData, text: str) -> Markup:
+    """Return versions, and the text of the case."""
+    table = html_table(origin_table(versions), "What the numbers depend on", id="versions")
+    shown = tag("pre", tag("code", text, id="case-text"), tabindex="0", aria_label="Case text")
+    return join_markup([table, tag("h3", "Case file"), shown])

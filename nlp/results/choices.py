@@ -1,0 +1,172 @@
+"""Values that were chosen: of listed numbers, and of rounded dimensions; what their search found, in words."""
+
+import math
+from typing import TYPE_CHECKING
+
+from ...models import Dimension
+from ..case.case import Case
+from ..case.choices import chosen_settings, listed_numbers
+from .jsondata import Absent, JsonObject, Vector
+from .objective import case_number
+
+if TYPE_CHECKING:
+    from ..solver.solution import Choice, Rounding, Solution
+
+
+#: Part of itself by which a number may differ from its rounded one that was round before.
+_SAME = 1e-9
+
+
+class ChosenData(JsonObject):
+    """A number whose value was chosen.
+
+    Attributes:
+        name: of the number.
+        value: that was chosen.
+        unit: of its numbers.
+        values: of which one was chosen; absent for a rounded number.
+        before: value before it was rounded; else absent.
+    """
+
+    name: str
+    value: float | None
+    unit: str
+    values: Absent[Vector]
+    before: Absent[float]
+
+
+class ChoiceData(JsonObject):
+    """The choice among listed values.
+
+    Attributes:
+        numbers: that have listed values.
+        combinations: number of all combinations.
+        solved: number of those that were solved.
+        complete: whether the others are left out as no better design was found between the ends of their values.
+        statement: the same in words.
+    """
+
+    numbers: tuple[ChosenData, ...]
+    combinations: int
+    solved: int
+    complete: bool
+    statement: str
+
+
+class RoundingData(JsonObject):
+    """The rounding of the dimensions.
+
+    Attributes:
+        step: whose multiples the numbers are, in the unit of length, and degrees for angles.
+        numbers: that were rounded.
+        before: objective before.
+        loss: how much worse it is now; null without an answer.
+        relative_loss: loss as a part of the objective before; null where that is 0, and without an answer.
+        combinations: number of combinations of the multiples that were searched.
+        solved: number of those that were solved.
+        complete: as of a choice.
+        statement: in words.
+    """
+
+    step: float
+    numbers: tuple[ChosenData, ...]
+    before: float
+    loss: float | None
+    relative_loss: float | None
+    combinations: int
+    solved: int
+    complete: bool
+    statement: str
+
+
+def choice_data(solution: "Solution") -> ChoiceData | None:
+    """Return the choice among the listed values of a solution's case; None without any."""
+    case, choice = solution.case, solution.choice
+    if choice is None:
+        return None
+    chosen = chosen_settings(case, solution.outcomes[0].own.nlp.case)
+    numbers = tuple(
+        ChosenData(
+            name=each.name,
+            value=chosen[each.name],
+            unit=case.units.label(each.dimension),
+            values=tuple(case.units.shown(one, each.dimension) for one in each.values),
+            before=None,
+        )
+        for each in listed_numbers(case)
+    )
+    return ChoiceData.of(
+        choice,
+        numbers=numbers,
+        complete=choice.is_complete,
+        statement=_statement(choice, _starts(solution), is_answer=solution.status.is_answer),
+    )
+
+
+def _starts(solution: "Solution") -> int:
+    """Return the number of starts of each solve; 0 where nothing else was free."""
+    return len(solution.outcomes[0].own.starts)
+
+
+def _statement(choice: "Choice", starts: int, *, is_answer: bool) -> str:
+    """Return what a search over combinations found."""
+    count = f"{choice.combinations:,} combinations of values"
+    how = f"solved from {starts} starts" if starts else "solved"
+    if choice.solved == choice.combinations:
+        searched = f"{count}, each {how}"
+        return f"the best of {searched}" if is_answer else f"none of {searched}, gave an answer"
+    if not choice.is_complete:
+        some = f"{choice.solved:,} of {count}, {how}"
+        return f"the best of {some}; the others are not all searched" if is_answer else f"no answer in {some}"
+    # The solves of ranges began from as many starts.
+    ranges = f"{choice.solved:,} {how}, and the others left out by solves of {choice.relaxed:,} ranges of values"
+    return f"the best of {count}: {ranges}" if is_answer else f"no answer in {count}: {ranges}"
+
+
+def rounding_data(solution: "Solution") -> RoundingData | None:
+    """Return the rounding of a solution's dimensions; None without one."""
+    case, rounding = solution.case, solution.rounding
+    if rounding is None:
+        return None
+    units, is_answer = case.units, solution.status.is_answer
+    numbers = tuple(
+        ChosenData(
+            name=each.name,
+            value=None if math.isnan(each.value) else units.shown(each.value, each.dimension),
+            unit=units.label(each.dimension),
+            values=None,
+            before=units.shown(each.before, each.dimension),
+        )
+        for each in rounding.numbers
+    )
+    decided = solution.decided_by
+    sign = 1.0 if decided is None else decided.nlp.sign
+    before = case_number(case, sign * rounding.before)
+    loss = case_number(case, rounding.after - rounding.before) if is_answer else None
+    choice = rounding.choice
+    return RoundingData(
+        step=rounding.step,
+        numbers=numbers,
+        before=before,
+        loss=loss,
+        relative_loss=None if loss is None or not before else loss / abs(before),
+        combinations=1 if choice is None else choice.combinations,
+        solved=1 if choice is None else choice.solved,
+        complete=choice is None or choice.is_complete,
+        statement=_rounding_statement(case, rounding, _starts(solution), is_answer=is_answer),
+    )
+
+
+def _rounding_statement(case: Case, rounding: "Rounding", starts: int, *, is_answer: bool) -> str:
+    """Return what rounding found, in words."""
+    kinds = {each.dimension for each in rounding.numbers}
+    names = [f"{rounding.step:g} {case.units.length}"] if Dimension.LENGTH in kinds else []
+    names += [f"{rounding.step:g} deg"] if Dimension.ANGLE in kinds else []
+    what = f"to multiples of {' and '.join(names)}"
+    if not is_answer:
+        return f"{what}: no multiples within {rounding.farther + 1} steps were found that keep all limits"
+    if all(abs(each.value - each.before) <= _SAME * abs(each.value) for each in rounding.numbers):
+        return f"{what}: the numbers were round already"
+    if rounding.choice is None:
+        return f"{what}: each number has one of them near it within its bounds"
+    return f"{what}: {_statement(rounding.choice, starts, is_answer=True)}"

@@ -1,0 +1,203 @@
+"""Dimensions that have one of a few values: a search over their combinations, each of which is solved as a case.
+
+A few combinations are solved one by one. More are searched by branch and bound: a part of them is solved with the
+numbers free between the ends of their values, and is left out where that is no better than the best combination. Every
+solve is local, from the case's starting points, so that this is no proof: :mod:`.certified_choices` proves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..case.case import Case
+from ..case.choices import ListedNumber, Ranges, all_values, listed_numbers, within_ranges
+from ..interruption import is_requested
+from .solution import Choice, ChoicePart, Solution
+from .status import Status
+
+#: So many combinations are all solved: bounds of parts would need about as many solves.
+_FEW = 16
+#: Part of the objective by which a part of the combinations must be better than the best one to be searched: two solves
+#: of one program differ by less.
+_BETTER = 1e-9
+
+
+def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: float = math.inf) -> Solution:
+    """Solve a case for the best combination of values of its listed numbers.
+
+    Args:
+        case: the case.
+        solve_fixed: solves a case without listed numbers.
+        most: number of solves after which the search ends, with the best combination found.
+
+    Returns:
+        The solution of the best combination, with the case given; without an answer where no combination has one.
+    """
+    return _Search(case, solve_fixed, most).run()
+
+
+def cost_of(solution: Solution) -> float:
+    """Return the objective of a solution, the smaller the better; infinite without an answer."""
+    if not solution.status.is_answer:
+        return math.inf
+    combination, decided = solution.combination, solution.decided_by
+    value = solution.outcomes[0].own.F if combination is None else combination.value
+    return math.inf if value is None or decided is None else decided.nlp.sign * value
+
+
+class _Part:
+    """A part of the combinations that is open: ranges of values, and its solve with the numbers free between them."""
+
+    def __init__(self, ranges: Ranges, relaxed: Solution) -> None:
+        self.ranges, self.relaxed = ranges, relaxed
+        # Without an answer, nothing is known.
+        self.bound = cost_of(relaxed) if relaxed.status.is_answer else -math.inf
+
+    @property
+    def open_numbers(self) -> int:
+        """Number of the numbers that have several values."""
+        return sum(behind - first > 1 for first, behind in self.ranges)
+
+
+class _Search:
+    """The search over the combinations of a case; the arguments are those of :func:`solve_choices`."""
+
+    def __init__(self, case: Case, solve_fixed: Callable[[Case], Solution], most: float) -> None:
+        self._case, self._solve, self._most = case, solve_fixed, most
+        self._numbers = listed_numbers(case)
+        self._solved: dict[Ranges, Solution] = {}
+        self._relaxed = 0
+        self._costs: dict[Ranges, float] = {}
+        self._closed: list[Ranges] = []
+        self._best: Solution | None = None
+        self._chosen: Ranges = ()
+
+    def run(self) -> Solution:
+        """Search all combinations, or as many as the time and the number of solves allow."""
+        everything = all_values(self._numbers)
+        count = math.prod(len(each.values) for each in self._numbers)
+        open_parts = self._solve_all(everything) if count <= _FEW else self._bisect(everything)
+        best = self._best
+        if best is None:
+            # No combination has an answer; one of those solved says why, with the limits that would have to move.
+            self._chosen = next(iter(self._solved), next(combinations_of(everything)))
+            best = self._solve_combination(self._chosen)
+        parts = tuple(ChoicePart(ranges, self._costs.get(ranges)) for ranges in [*self._closed, *open_parts])
+        if open_parts and is_requested() and best.status.is_answer:
+            best = _interrupted(best)
+        choice = Choice(count, len(self._solved), self._relaxed, not open_parts, parts, self._chosen)
+        return replace(best, case=self._case, choice=choice)
+
+    def _solve_all(self, everything: Ranges) -> list[Ranges]:
+        """Solve every combination; return those that are not solved."""
+        left = list(combinations_of(everything))
+        while left and not is_requested():
+            self._solve_combination(left[0])
+            self._closed.append(left.pop(0))
+        return left
+
+    def _bisect(self, everything: Ranges) -> list[Ranges]:
+        """Divide the combinations until all are solved or left out; return the parts that are neither."""
+        root = self._relax(everything)
+        # Rounding is a first answer, which leaves out much.
+        self._solve_combination(self._nearest(root))
+        parts = [root]
+        while parts and not is_requested() and len(self._solved) + self._relaxed < self._most:
+            # Without an answer, those parts first that are nearest to a combination.
+            is_first = self._best is None
+            part = min(parts, key=lambda each: (each.open_numbers if is_first else 0, each.bound))
+            parts.remove(part)
+            if self._is_no_better(part):
+                self._closed.append(part.ranges)
+                continue
+            for ranges in self._divided(part):
+                if all(behind - first == 1 for first, behind in ranges):
+                    self._solve_combination(ranges)
+                    self._closed.append(ranges)
+                    continue
+                child = self._relax(ranges)
+                if child.relaxed.status is Status.INFEASIBLE:
+                    self._closed.append(ranges)
+                else:
+                    parts.append(child)
+        return [each.ranges for each in parts]
+
+    def _is_no_better(self, part: _Part) -> bool:
+        """Return whether a part holds no combination that is known to be better than the best one."""
+        best = math.inf if self._best is None else cost_of(self._best)
+        return math.isfinite(best) and part.bound >= best - _BETTER * abs(best)
+
+    def _relax(self, ranges: Ranges) -> _Part:
+        """Solve a case with the listed numbers free between the ends of their values."""
+        self._relaxed += 1
+        return _Part(ranges, self._solve_within(ranges))
+
+    def _solve_combination(self, ranges: Ranges) -> Solution:
+        """Solve a combination once, and keep it where it is the best so far."""
+        if ranges not in self._solved:
+            found = self._solved[ranges] = self._solve_within(ranges)
+            # A limit over a workspace or along a path that stays without proof is not kept.
+            is_possible = found.keeps_limits and math.isfinite(cost_of(found))
+            if is_possible and (self._best is None or cost_of(found) < cost_of(self._best)):
+                self._best, self._chosen = found, ranges
+        return self._solved[ranges]
+
+    def _solve_within(self, ranges: Ranges) -> Solution:
+        """Solve a case with the listed numbers within ranges, and note its objective."""
+        found = self._solve(within_ranges(self._case, self._numbers, ranges))
+        if math.isfinite(cost_of(found)):
+            self._costs[ranges] = cost_of(found)
+        return found
+
+    def _nearest(self, part: _Part) -> Ranges:
+        """Return the combination nearest to the numbers of a part's solve."""
+        ranges = []
+        for number, (first, behind) in zip(self._numbers, part.ranges, strict=True):
+            at = _value_of(part.relaxed, number)
+            places = range(first, behind)
+            place = min(places, key=lambda k, at=at, number=number: abs(number.values[k] - at))  # type: ignore[misc]
+            ranges.append((place, place + 1))
+        return tuple(ranges)
+
+    def _divided(self, part: _Part) -> tuple[Ranges, Ranges]:
+        """Return the two halves of a part: cut where the solve is farthest from a value beside those values' width."""
+        farthest, cut = -1.0, (0, 1)
+        for k, (number, (first, behind)) in enumerate(zip(self._numbers, part.ranges, strict=True)):
+            if behind - first > 1:
+                values, at = np.array(number.values[first:behind]), _value_of(part.relaxed, number)
+                place = int(np.clip(np.searchsorted(values, at, side="right"), 1, behind - first - 1))
+                apart = float(np.min(np.abs(values - at)) / (values[-1] - values[0]))
+                if apart > farthest:
+                    farthest, cut = apart, (k, first + place)
+        k, middle = cut
+        first, behind = part.ranges[k]
+        low, high = ((*part.ranges[:k], each, *part.ranges[k + 1 :]) for each in ((first, middle), (middle, behind)))
+        return low, high
+
+
+def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
+    """Yield every combination within ranges, the last number's values first."""
+    counts = [behind - first for first, behind in ranges]
+    for index in np.ndindex(*counts):
+        yield tuple((first + k, first + k + 1) for (first, _), k in zip(ranges, index, strict=True))
+
+
+def _value_of(solution: Solution, number: ListedNumber) -> float:
+    """Return the value of a listed number at a solution's point: the middle of its values where the robot has none."""
+    state = solution.outcomes[0].state
+    if state is None:
+        return (number.values[0] + number.values[-1]) / 2
+    return float(np.ravel(state.parameters[number.parameter])[number.component])
+
+
+def _interrupted(best: Solution) -> Solution:
+    """Return the best combination so far as a solution that is no answer: the others are not searched."""
+    outcomes = best.outcomes
+    if best.combination is None:
+        (outcome,) = outcomes
+        outcomes = (replace(outcome, own=replace(outcome.own, status=Status.INTERRUPTED)),)
+    return replace(best, status=Status.INTERRUPTED, outcomes=outcomes)

@@ -1,0 +1,169 @@
+"""A design in round numbers: of the multiples of a step near each free dimension, those with the best objective.
+
+Free lengths and angles of the robot are rounded, lengths to multiples in the case's unit and angles in degrees. Plain
+numbers, such as ratios, and directions stay free, as does the pose: they are solved again, with the rounded dimensions
+fixed. The multiples below and above each number are a search over listed values (:mod:`.choices`); where none of their
+combinations keeps the limits, the next ones on both sides join them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from decimal import Decimal
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import Dimension
+from ..case.case import Case
+from ..case.choices import listed_numbers, within_ranges
+from ..case.pose import Free, Value
+from ..case.task import Method
+from ..errors import InputError
+from .choices import cost_of, solve_choices
+from .solution import RoundedNumber, Rounding, Solution
+from .solve import solve
+from .status import Status
+
+#: So many multiples farther on each side than the nearest ones are tried.
+_FARTHEST = 3
+#: So many solves are made for each distance: with many dimensions not every combination can be searched.
+_MOST = 200
+#: Distance from a multiple, in steps, that is rounding error.
+_EXACT = 1e-9
+#: Largest number of steps in a number: beyond it, multiples are not exact.
+_STEPS = 1e12
+
+
+class _Place(NamedTuple):
+    """A dimension that is rounded: parameter, component, name, dimension, its bounds, and its value at the solution."""
+
+    parameter: str
+    component: int
+    name: str
+    dimension: Dimension
+    bounds: Free
+    value: float
+
+
+def round_design(
+    solution: Solution,
+    step: float,
+    *,
+    starts: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    compiled: bool = False,
+) -> Solution:
+    """Return a solution with the free lengths and angles of its robot rounded, and everything else solved again.
+
+    Args:
+        solution: the answer to a case; one without an answer is returned as it is.
+        step: whose multiples the numbers become: in the case's unit of length, and degrees for angles.
+        starts: number of starting points of each solve instead of the case's.
+        seed: seed instead of the case's.
+        jobs: number of threads; the result does not depend on it.
+        compiled: whether Ipopt calls the objective as compiled C.
+
+    Returns:
+        The best combination of round numbers found, judged like any solution; without an answer where none of those
+        tried keeps the limits.
+
+    Raises:
+        InputError: the step is not positive and finite, nothing is to be rounded, a range holds no multiple, or tasks
+            are combined by their average.
+    """
+    case, option = solution.case, f"--round {step:g}"
+    check_rounding(case, step)
+    if not solution.status.is_answer:
+        return solution
+    chosen = case if solution.choice is None else within_ranges(case, listed_numbers(case), solution.choice.chosen)
+    places = list(_places(chosen, solution))
+    solve_fixed = partial(solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled)
+    found, farther = solution, 0
+    for farther in range(_FARTHEST + 1):
+        listed = {(each.parameter, each.component): _multiples(each, step, farther, case, option) for each in places}
+        parameters = {
+            item.name: [listed.get((item.name, k), value) for k, value in enumerate(chosen.components(item.name))]
+            for item in case.model.parameters
+        }
+        near = replace(chosen, parameters=parameters)
+        found = solve_choices(near, solve_fixed, _MOST) if listed_numbers(near) else solve_fixed(near)
+        if found.status.is_answer or found.status is Status.INTERRUPTED:
+            break
+    state = found.outcomes[0].state
+    numbers = tuple(
+        RoundedNumber(
+            each.name,
+            each.dimension,
+            each.value,
+            math.nan if state is None else float(np.ravel(state.parameters[each.parameter])[each.component]),
+        )
+        for each in places
+    )
+    rounding = Rounding(step, cost_of(solution), cost_of(found), farther, numbers, found.choice)
+    return replace(found, case=case, choice=solution.choice, rounding=rounding)
+
+
+def check_rounding(case: Case, step: float) -> None:
+    """Refuse a step, or a case, with which rounding has no meaning; errors are those of :func:`round_design`."""
+    option = f"--round {step:g}"
+    if not 0 < step < math.inf:
+        raise InputError(f"{option}: must be positive and finite")
+    if len(case.tasks) > 1 and case.method is Method.AVERAGE:
+        raise InputError(
+            f"{option}: combine.method must be weighted-sum or worst-case: an average has no best rounding"
+        )
+    values = [
+        (item.dimension, value)
+        for item in case.model.parameters
+        if not item.is_direction
+        for value in case.components(item.name)
+    ]
+    if not any(_is_rounded(dimension, value) for dimension, value in values):
+        raise InputError(f"{option}: the case has no free length or angle of the robot to round")
+
+
+def _is_rounded(dimension: Dimension, value: Value) -> bool:
+    """Return whether a number is rounded: a free length or angle that has no listed values."""
+    return isinstance(value, Free) and not value.values and dimension in (Dimension.LENGTH, Dimension.ANGLE)
+
+
+def _places(case: Case, solution: Solution) -> Iterator[_Place]:
+    """Yield the dimensions that are rounded, with their values at a solution."""
+    state = solution.outcomes[0].state
+    for item in case.model.parameters:
+        for k, value in enumerate(case.components(item.name)):
+            if not item.is_direction and _is_rounded(item.dimension, value) and isinstance(value, Free):
+                at = value.first if state is None else float(np.ravel(state.parameters[item.name])[k])
+                yield _Place(item.name, k, case.component_names(item)[k], item.dimension, value, at)
+
+
+def _multiples(place: _Place, step: float, farther: int, case: Case, option: str) -> Value:
+    """Return the multiples of a step about a number: the nearest ones, and so many farther on each side.
+
+    Raises:
+        InputError: there is none within the number's bounds.
+    """
+    is_angle = place.dimension is Dimension.ANGLE
+    ends = (place.bounds.lower, place.bounds.upper, place.value)
+    lower, upper, at = (math.degrees(each) if is_angle else each for each in ends)
+    if max(abs(lower), abs(upper)) > _STEPS * step:
+        raise InputError(f"{option}: is too small beside robot.parameters.{place.name}")
+    low, high = math.ceil(lower / step - _EXACT), math.floor(upper / step + _EXACT)
+    if low > high:
+        unit = "deg" if is_angle else case.units.label(place.dimension)
+        fault = f"robot.parameters.{place.name} has no multiple of it between {lower:g} and {upper:g} {unit}"
+        raise InputError(f"{option}: {fault}")
+    first = min(max(math.floor(at / step + _EXACT), low), high)
+    last = min(max(math.ceil(at / step - _EXACT), low), high)
+    # Decimals of a multiple are those of the step: 3 times 0.1 is 0.3.
+    shown = [float(k * Decimal(repr(step))) for k in range(max(first - farther, low), min(last + farther, high) + 1)]
+    # A bound in degrees differs from the same multiple by rounding.
+    inside = [
+        min(max(math.radians(each) if is_angle else each, place.bounds.lower), place.bounds.upper) for each in shown
+    ]
+    return inside[0] if len(inside) == 1 else Free.among(inside)
