@@ -71,6 +71,8 @@ def import_(
     from ..output.terminal import show
     from ..results.text import Line, Tone
 
+    if not platform:
+        raise InputError("--platform: needs a value, BODY")
     if out is None and not suggest:
         raise InputError("--out: is missing: name the robot file to write, or ask for --suggest")
     inputs = {Path(file): "the model that is read", **({} if loops is None else {Path(loops): "its file of loops"})}

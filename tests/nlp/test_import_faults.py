@@ -29,7 +29,7 @@ FAULTS: list[tuple[str, str | bytes, tuple[str, ...], str]] = [
     # Platform, base and actuators.
     ("m.xml", HEAD, (), "--platform: is missing: BODY, body, link or site that is the platform"),
     ("m.xml", HEAD, ("--platform", "haed"), "--platform haed: no such body or frame; did you mean 'head'?"),
-    ("m.xml", HEAD, ("--platform", ""), "--platform: is missing"),
+    ("m.xml", HEAD, ("--platform", ""), "--platform: needs a value, BODY"),
     ("m.xml", HEAD, (*BODY, "--base", "tors"), "--base tors: no such body; did you mean 'torso'?"),
     ("m.xml", HEAD, ("--platform", "torso"), "--platform torso: is rigidly joined to the base world"),
     ("m.xml", ARM, ("--platform", "hand"), "--platform hand: is at the end of an open chain of 2 joints from the base world; a parallel robot has two or more"),
