@@ -215,6 +215,11 @@ class Case(Whole, Shown):
         return {"": "", "workspace": "over the workspace", "path": "along the path"}[self.limits_over]
 
     @property
+    def is_optimised_everywhere(self) -> bool:
+        """Whether what is optimised is the worst of all poses at which limits hold, beside the stated ones."""
+        return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)
+
+    @property
     def stated_pose_notice(self) -> str:
         """Sentence about what takes the limits at the stated pose although they hold elsewhere too; else empty."""
         taken = "the limits and F" if self.worst_everywhere else "the limits"

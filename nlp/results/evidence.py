@@ -15,7 +15,7 @@ from .choices import ChoiceData, choice_data
 from .data import ActiveData, CertificateData, OptimalityData
 from .design import unit_of_side
 from .jsondata import Absent, Inline, JsonObject, vector
-from .objective import ObjectiveData, certified_objective, is_over_workspace
+from .objective import ObjectiveData, certified_objective
 from .parts import HeadData, VersionsData
 from .point import head_data, stated_pose_notice, versions
 
@@ -125,6 +125,6 @@ def certified_of(certified: "Certified") -> CertifiedResult:
             for task, each in zip(case.tasks, certified.tasks, strict=True)
         ),
         choice=choice_data(certified.solution),
-        notice=None if is_over_workspace(case) else stated_pose_notice(case),
+        notice=None if case.is_optimised_everywhere else stated_pose_notice(case),
         versions=versions(),
     )

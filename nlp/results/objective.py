@@ -74,14 +74,9 @@ def certified_objective(certified: "Certified") -> ObjectiveData | None:
         return None
     value = None if math.isnan(certificate.incumbent) else certificate.incumbent
     proof = solution.workspace or solution.path
-    if proof is not None and value is not None and is_over_workspace(solution.case):
+    if proof is not None and value is not None and solution.case.is_optimised_everywhere:
         value = over_workspace(solution.case, proof.judgement)
     return objective_data(solution.case, value, certificate)
-
-
-def is_over_workspace(case: Case) -> bool:
-    """Return whether what a case optimises is of all poses at which its limits hold."""
-    return bool(case.limits_over) and (bool(case.tasks[0].measure) or case.worst_everywhere)
 
 
 def over_workspace(case: Case, judged: "Judgement | PathJudgement") -> float:

@@ -27,7 +27,7 @@ from .data import (
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data
 from .jsondata import finite_or_none, vector
-from .objective import case_number, is_over_workspace, objective_data, over_workspace
+from .objective import case_number, objective_data, over_workspace
 from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def task_result(
     solved = answer and state is not None
     value = objective(nlp, x, state) if solved else math.nan
     proof = workspace or path
-    if solved and proof is not None and is_over_workspace(nlp.case):
+    if solved and proof is not None and nlp.case.is_optimised_everywhere:
         value = over_workspace(nlp.case, proof.judgement)
     return SolveResult.of(
         solution,

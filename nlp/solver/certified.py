@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from ...models.shown import Shown
 from ...models.whole import Whole
@@ -33,7 +34,6 @@ from .solve import solve, solve_programs
 
 #: Words of a bound for a design that was rounded: only its pose, and what was not rounded, is free.
 _ROUNDED = "with the rounded dimensions"
-_NO_PROOF_OF_CHOICES = "each combination of listed values is a program of its own; give the values with --set"
 
 
 class OptionError(InputError):
@@ -138,29 +138,59 @@ def certify(
     """
     options = CertifyOptions(gap, above, time_limit, jobs)
     case = found.case if isinstance(found, Solution) else found
+    is_rounded = isinstance(found, Solution) and found.rounding is not None
+    if with_proof:
+        _check_writable(case, is_rounded=is_rounded)
+    prove = partial(
+        _certify_one, starts=starts, seed=seed, progress=progress, all_assemblies=all_assemblies, with_proof=with_proof
+    )
     with within(time_limit):
-        if isinstance(found, Solution) and found.rounding is not None:
+        if isinstance(found, Solution) and is_rounded:
             # The rounded numbers are proved as they are, and not what rounding lost.
-            if with_proof:
-                raise OptionError("proof: the rounded numbers are in no case file; give them with --set")
-            rounded = found.outcomes[0].own.nlp.case
-            own = _certify(rounded, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=False)
+            own = prove(replace(found, case=found.outcomes[0].own.nlp.case, choice=None, rounding=None), options)
             solution = replace(own.solution, case=case, choice=found.choice, rounding=found.rounding)
             tasks = tuple(replace(each, scope=_ROUNDED) for each in own.tasks)
             combined = None if own.combined is None else replace(own.combined, scope=_ROUNDED)
             return replace(own, solution=solution, tasks=tasks, combined=combined)
         if listed_numbers(case):
-            if with_proof:
-                raise OptionError(f"proof: {_NO_PROOF_OF_CHOICES}")
-            return _certify_choices(found, options, starts, seed, progress, all_assemblies=all_assemblies)
-        if case.limits_over and (case.tasks[0].measure or case.worst_everywhere):
-            if with_proof:
-                raise OptionError(
-                    f"proof: the poses of the {case.limits_over} from which the bound follows are in no case file"
-                )
-            solution = found if isinstance(found, Solution) else solve(case, starts=starts, seed=seed, jobs=jobs)
-            return _certify_from_poses(solution, options, progress)
-        return _certify(found, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=with_proof)
+            return _certify_choices(found, options, starts, seed, prove)
+        return prove(found, options)
+
+
+def _check_writable(case: Case, *, is_rounded: bool) -> None:
+    """Refuse the proof of a program that no case file states.
+
+    Raises:
+        OptionError: there is none.
+    """
+    if is_rounded:
+        raise OptionError("proof: the rounded numbers are in no case file; give them with --set")
+    if listed_numbers(case):
+        raise OptionError(
+            "proof: each combination of listed values is a program of its own; give the values with --set"
+        )
+    if case.is_optimised_everywhere:
+        raise OptionError(
+            f"proof: the poses of the {case.limits_over} from which the bound follows are in no case file"
+        )
+
+
+def _certify_one(
+    found: Case | Solution,
+    options: CertifyOptions,
+    starts: int | None,
+    seed: int | None,
+    progress: Callable[[str], CertifyProgress] | None,
+    *,
+    all_assemblies: bool,
+    with_proof: bool,
+) -> Certified:
+    """Return what is proved of a case without listed numbers; the rest is as for :func:`certify`."""
+    case = found.case if isinstance(found, Solution) else found
+    if case.is_optimised_everywhere:
+        solution = found if isinstance(found, Solution) else solve(case, starts=starts, seed=seed, jobs=options.jobs)
+        return _certify_from_poses(solution, options, progress)
+    return _certify(found, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=with_proof)
 
 
 def _certify(
@@ -240,31 +270,28 @@ def _certify_choices(
     options: CertifyOptions,
     starts: int | None,
     seed: int | None,
-    progress: Callable[[str], CertifyProgress] | None,
-    *,
-    all_assemblies: bool,
+    prove: Callable[[Case, CertifyOptions], Certified],
 ) -> Certified:
     """Return the best combination of a case's listed numbers, and what is proved over all of them."""
     case = found.case if isinstance(found, Solution) else found
     search = case.search.but(starts, seed)
-    at_poses = bool(case.tasks[0].measure and case.limits_over)
 
     def solve_fixed(one: Case) -> Solution:
-        if at_poses:
+        if case.is_optimised_everywhere:
             return solve(one, starts=starts, seed=seed, jobs=options.jobs)
         return solve_programs(one, formulate_each(one), search, jobs=options.jobs)
-
-    def prove(one: Case, gap: float) -> Certified:
-        own = replace(options, gap=gap, time_limit=None)
-        if at_poses:
-            return _certify_from_poses(solve_fixed(one), own, progress)
-        return _certify(one, own, starts, seed, progress, all_assemblies=all_assemblies, with_proof=False)
 
     choice = found.choice if isinstance(found, Solution) else None
     choice = choice or solve_choices(case, solve_fixed).choice
     if choice is None:
         raise OptionError("values: the case has none to choose from")
-    best, values, together = prove_choices(case, choice, prove, options.gap, is_each=options.above is not None)
+    best, values, together = prove_choices(
+        case,
+        choice,
+        lambda one, gap: prove(one, replace(options, gap=gap, time_limit=None)),
+        options.gap,
+        is_each=options.above is not None,
+    )
     chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values))
     if len(case.tasks) > 1:
         return replace(best, solution=chosen, combined=together)

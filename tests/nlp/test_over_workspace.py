@@ -18,7 +18,7 @@ import pytest
 from builders import Array, Run, case_from, refusal_of, saved, shipped_tables, turn_about
 from measures import circle_joints
 
-from screwsynth.nlp import Case, CaseError, certify, json_data, load_case, load_result, solve
+from screwsynth.nlp import Case, CaseError, certify, json_data, load_case, load_result, round_design, solve
 from screwsynth.nlp.case.toml import toml_document
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.result import result_of
@@ -259,3 +259,19 @@ def test_what_cannot_be_combined_over_a_workspace_is_refused(cli: Run, tmp_path:
     over = str(saved(tmp_path / "over.toml", toml_document(tables_of([TILT], **worst))))
     refusal_of(cli("certify", over, "--proof", str(tmp_path / "x.proof")), "proof")
     assert load_case(over).at_stated_poses().worst_everywhere is False
+
+
+def test_listed_and_round_numbers_are_chosen_and_bounded_by_the_worst_f_over_a_workspace() -> None:
+    """The bound is of the largest F along a line, and not of that at the stated pose alone."""
+    line = [(np.array([0.0, 0, z]), 0.0) for z in np.linspace(17, 23, 61)]
+    worst = rates_squared(RADII, line, "tilt").max(axis=1)
+    tables = tables_of([TILT | {"sense": "min"}], objective={"over": "workspace"})
+    tables["workspace"] = {"position": [0, 0, {"min": 17, "max": 23}]}
+    tables["robot"]["parameters"]["x1"] = {"values": [23, 25, 27]}
+    certified = certify(case_from(tables), gap=1e-3)
+    assert certified.is_proved
+    assert pytest.approx(np.interp([23, 25, 27], RADII, worst).min(), rel=2e-3) == certified.solution.F
+    tables["robot"]["parameters"]["x1"] = {"min": 22.5, "max": 27}
+    certified = certify(round_design(solve(case_from(tables)), 2), gap=1e-3)
+    assert certified.is_proved
+    assert pytest.approx(np.interp([24, 26], RADII, worst).min(), rel=2e-3) == certified.solution.F
