@@ -142,7 +142,7 @@ def certify(
     if with_proof:
         _check_writable(case, is_rounded=is_rounded)
     prove = partial(
-        _certify_one, starts=starts, seed=seed, progress=progress, all_assemblies=all_assemblies, with_proof=with_proof
+        _certify, starts=starts, seed=seed, progress=progress, all_assemblies=all_assemblies, with_proof=with_proof
     )
     with within(time_limit):
         if isinstance(found, Solution) and is_rounded:
@@ -175,24 +175,6 @@ def _check_writable(case: Case, *, is_rounded: bool) -> None:
         )
 
 
-def _certify_one(
-    found: Case | Solution,
-    options: CertifyOptions,
-    starts: int | None,
-    seed: int | None,
-    progress: Callable[[str], CertifyProgress] | None,
-    *,
-    all_assemblies: bool,
-    with_proof: bool,
-) -> Certified:
-    """Return what is proved of a case without listed numbers; the rest is as for :func:`certify`."""
-    case = found.case if isinstance(found, Solution) else found
-    if case.is_optimised_everywhere:
-        solution = found if isinstance(found, Solution) else solve(case, starts=starts, seed=seed, jobs=options.jobs)
-        return _certify_from_poses(solution, options, progress)
-    return _certify(found, options, starts, seed, progress, all_assemblies=all_assemblies, with_proof=with_proof)
-
-
 def _certify(
     found: Case | Solution,
     options: CertifyOptions,
@@ -203,10 +185,12 @@ def _certify(
     all_assemblies: bool,
     with_proof: bool,
 ) -> Certified:
-    """Return what is proved within the time left; the rest is as for :func:`certify`."""
+    """Return what is proved of a case without listed numbers within the time left; the rest is as for :func:`certify`."""
     above, jobs = options.above, options.jobs
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
+    if case.is_optimised_everywhere:
+        return _certify_from_poses(given or solve(case, starts=starts, seed=seed, jobs=jobs), options, progress)
     several = len(case.tasks) > 1
     if above is not None:
         try:
