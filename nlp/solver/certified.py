@@ -185,7 +185,7 @@ def _certify(
     all_assemblies: bool,
     with_proof: bool,
 ) -> Certified:
-    """Return what is proved of a case without listed numbers within the time left; the rest is as for :func:`certify`."""
+    """Return what is proved of a case without listed numbers in the time left; the rest is as for :func:`certify`."""
     above, jobs = options.above, options.jobs
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
