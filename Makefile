@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick check docs site figures bench dist clean
+.PHONY: help demo test quick check lint types more-types docs site figures bench dist clean
 
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -34,12 +34,18 @@ build/typing/screwsynth:
 	mkdir -p $@
 	ln -sfn ../../../models ../../../nlp ../../../cases $@
 
-check: $(VENV)/ready build/typing/screwsynth ## check formatting, lint, types and import contracts
+check: lint types more-types ## check formatting, lint, types and import contracts; with --jobs 2 at once
+
+lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/basedpyright --level error
 	$(BIN)/lint-imports
+
+types: $(VENV)/ready build/typing/screwsynth
+	$(BIN)/mypy
+
+more-types: $(VENV)/ready build/typing/screwsynth
+	$(BIN)/basedpyright --level error
 
 docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/gallery.py
