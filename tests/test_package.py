@@ -124,10 +124,18 @@ def test_a_solve_loads_neither_robots_nor_tables_nor_proofs_that_its_case_has_no
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
-def test_the_citation_is_of_this_version() -> None:
-    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f"\nversion: {version('screwsynth')}\n" in text
-    assert "\nlicense: MIT\n" in text
+def test_the_version_is_one_everywhere_and_its_date_too() -> None:
+    citation, recipe, changes = (
+        (ROOT / name).read_text(encoding="utf-8")
+        for name in ("CITATION.cff", "packaging/conda/recipe.yaml", "CHANGELOG.md")
+    )
+    assert printed("--version").split() == ["screwsynth", version("screwsynth")]
+    assert f"\nversion: {version('screwsynth')}\n" in citation
+    assert f'\n  version: "{version("screwsynth")}"\n' in recipe
+    assert "\nlicense: MIT\n" in citation
+    (date,) = re.findall(r"^date-released: (\d{4}-\d\d-\d\d)$", citation, flags=re.MULTILINE)
+    headings = re.findall(r"^## (.*)$", changes, flags=re.MULTILINE)
+    assert headings[:2] == ["Unreleased", f"{version('screwsynth')}, {date}"]
 
 
 def test_the_targets_that_contributors_are_told_are_those_of_make() -> None:

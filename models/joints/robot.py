@@ -10,6 +10,7 @@ import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
+from ..fileversions import VERSION_KEY
 from ..limbjoints import LimbJoint, LimbLink
 from ..model import Model
 from ..parts import (
@@ -72,6 +73,7 @@ def robot(
     points: Mapping[str, VectorExpression] | None = None,
     joint: Sequence[Mapping[str, object]] | None = None,
     coupling: Sequence[Mapping[str, object]] | None = None,
+    schema: int = 1,
 ) -> Model:
     """Return a robot that is given joint by joint, at home; the arguments are the keys of a robot file.
 
@@ -92,6 +94,7 @@ def robot(
         joint: its joints, each a mapping with ``name``, ``type``, ``between`` (two links, the base's side first) and
             the keys of a limb's joint; a joint of type ``"weld"`` has no other.
         coupling: linear relations of joints' coordinates, each a mapping with ``factors`` by joint.
+        schema: version of these keys.
 
     Raises:
         RobotError: a key or value is not allowed, or the robot cannot be assembled near home.
@@ -112,7 +115,7 @@ def robot(
         "coupling": coupling,
     }
     definition = {key: plain(value) for key, value in tables.items() if value is not None and value != ""}
-    at_home = home_of(read_robot(definition))
+    at_home = home_of(read_robot({VERSION_KEY: schema, **definition}))
     return model_of_home(at_home, sampled_dimensions(at_home), definition)
 
 

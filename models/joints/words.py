@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from ..fileversions import ROBOT_FILES, VERSION_KEY
 from ..parts import Dimension
 from .forms import (
     NAME,
@@ -39,7 +40,7 @@ _JOINT_KEYS: Mapping[str, tuple[str, ...]] = {
     "Pa": ("axis", "to", "actuated"),
 }
 #: Keys of every robot file beside those of its limbs, or of its links and joints.
-_HEAD_KEYS = ("name", "description", "length_unit", "home", "dimensions", "derived")
+_HEAD_KEYS = (VERSION_KEY, "name", "description", "length_unit", "home", "dimensions", "derived")
 #: Most limbs of a robot, with all copies.
 MOST_LIMBS = 24
 #: Most joints from base to platform, and most branches of a limb: no limb of a known robot has more than half of them.
@@ -156,6 +157,8 @@ def read_robot(tables: Mapping[str, object]) -> RobotWords:
     Raises:
         RobotError: a key is unknown or missing, or a value has a form that is not allowed.
     """
+    if fault := ROBOT_FILES.fault(tables.get(VERSION_KEY, 1)):
+        raise RobotError(f"{VERSION_KEY} = {tables[VERSION_KEY]!r}", fault)
     given = [key for key in GRAPH_KEYS if tables.get(key) is not None]
     if given and tables.get("limb") is not None:
         raise RobotError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")

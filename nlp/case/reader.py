@@ -11,7 +11,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from ...models import Dimension, FloatArray, unit_vector
+from ...models.fileversions import CASE_FILES
 from ..errors import CaseError
+from ..system.reading import check_version
 from ..units import Units
 from .case import Case
 from .checks import check_direction
@@ -156,6 +158,7 @@ def case_from_tables(
     """
     origins = TableOrigins()
     try:
+        check_version(CASE_FILES, tables)
         origins = insert_rows(tables, folder or Path())
         robot_file = insert_robot_file(tables, folder or Path())
         written = _parse(tables)
@@ -185,7 +188,7 @@ def _parse(tables: dict[str, Any]) -> Document:
 
 def _kind_of(tables: dict[str, Any]) -> type[Document]:
     """Return the schema of a document: with the tables of limits, workspace and loads where it states one of them."""
-    if tables.keys() <= Document.model_fields.keys() - {"limits", "workspace"}:
+    if tables.keys() <= {*Document.allowed_keys()} - {"limits", "workspace"}:
         return Document
     from .wholeschema import WholeDocument  # noqa: PLC0415 - a case without them starts without their tables
 

@@ -15,10 +15,11 @@ from pydantic import Discriminator, Field, FiniteFloat, StringConstraints, Tag, 
 from pydantic_core import ErrorDetails
 
 from ...models import Model, ModelError, robot
+from ...models.fileversions import ROBOT_FILES, VERSION_KEY
 from ...models.joints import RobotError
 from ...models.joints.words import GRAPH_KEYS, MOST_LIMBS, NESTED_BRANCH
 from ..errors import CaseError, InputError
-from ..system.reading import read_limited
+from ..system.reading import check_version, read_limited
 from .table import Table, Vector, case_error
 
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
@@ -112,8 +113,9 @@ class CouplingTable(Table):
 
 
 class HeadTable(Table):
-    """The part of every robot file: name, home and dimensions."""
+    """The part of every robot file: version, name, home and dimensions."""
 
+    schema_: Literal[1] = Field(default=1, alias=VERSION_KEY, description="version of the keys of this file")
     name: Name = Field(description="its name")
     description: str = Field(default="", description="one sentence")
     length_unit: str = Field(default="", description="unit of the typical lengths, such as m; empty for proportions")
@@ -176,6 +178,7 @@ def check_form(tables: dict[str, Any]) -> None:
     Raises:
         CaseError: the first fault, with limb and joint in words.
     """
+    check_version(ROBOT_FILES, tables)
     given = [key for key in GRAPH_KEYS if key in tables]
     if given and "limb" in tables:
         raise CaseError(given[0], "cannot stand beside limb: give the robot by limbs, or by links and joints")

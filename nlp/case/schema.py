@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, StringConstraints, Tag, model_validator
 
+from ...models.fileversions import VERSION_KEY
 from ..errors import listing
 from ..units import Units
 from .case import Case
@@ -337,6 +338,7 @@ class Document(Table):
         },
     )
 
+    schema_: Literal[1] = Field(default=1, alias=VERSION_KEY, description="version of the keys of this file")
     title: str = Field(default=Case.title, description="one line for people")
     # Defaults are constructed without validators, which are built when a document is first read.
     units: UnitsTable = UnitsTable.model_construct()

@@ -19,14 +19,19 @@ class Table(BaseModel):
     # Validators are built when a document is first read, once for the whole tree of tables.
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
 
+    @classmethod
+    def allowed_keys(cls) -> tuple[str, ...]:
+        """Return the keys that the table may have."""
+        return tuple(field.alias or name for name, field in cls.model_fields.items())
+
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_keys(cls, table: object) -> object:
         """Return the table unchanged, or refuse its first unknown key."""
         if isinstance(table, dict) and cls.model_config.get("extra") == "forbid":
             for key in table:
-                if key not in cls.model_fields:
-                    allowed = nearest(str(key), cls.model_fields)
+                if key not in cls.allowed_keys():
+                    allowed = nearest(str(key), cls.allowed_keys())
                     raise PydanticCustomError(
                         "unknown_key", "{fault}", {"key": key, "fault": f"no such key; {allowed}"}
                     )

@@ -9,7 +9,7 @@ from typing import Any, cast
 import typer
 from typer.core import TyperCommand
 
-#: Earlier names of options by command, which work and stand in no help; an empty one says nothing any more.
+#: Earlier names of options by command, which work, are told of, and stand in no help; an empty one has no effect.
 EARLIER = {
     "report": {"--html": "--out"},
     "tradeoff": {"--page": "--html"},
@@ -19,6 +19,8 @@ EARLIER = {
     "workspace": {"--of-quantity": "--quantity", "--picture": "--plot-pose"},
     "codegen": {"--measure": ""},
 }
+#: The first version that may be without these names: see docs/versions.md.
+_UNTIL = "0.3"
 #: Every fault that typer finds in a command line, or click where typer stands on it.
 _Fault = cast("type[Exception]", typer.BadParameter.__mro__[1])
 
@@ -27,7 +29,7 @@ class Command(TyperCommand):
     """A command that takes its options by their earlier names too."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - of typer or of click
-        """Write the options by their names, and read the arguments.
+        """Write the options by their names, telling of earlier ones, and read the arguments.
 
         Raises:
             InputError: an option or an argument is missing, or is not one of the command.
@@ -36,6 +38,9 @@ class Command(TyperCommand):
         end = args.index("--") if "--" in args else len(args)
         parts = [word.partition("=") for word in args[:end]]
         named = [names.get(name, name) + equals + value for name, equals, value in parts if names.get(name) != ""]
+        for name in dict.fromkeys(name for name, _, _ in parts if name in names):
+            fault = f"is an earlier name of {names[name]}, and" if names[name] else "has no effect any more, and"
+            typer.echo(f"screwsynth: {self.name} {name}: {fault} works until {_UNTIL}", err=True)
         with faults_in_sentences(self.name or "", self.params):
             return super().parse_args(ctx, [*named, *args[end:]])
 

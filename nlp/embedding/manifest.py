@@ -15,10 +15,11 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from ...models.fileversions import GENERATED_C, VERSION_KEY
 from .. import __version__
 from ..errors import InputError
 from ..program.nlp import Nlp
-from ..system.reading import read_limited
+from ..system.reading import check_version, read_limited
 from ..system.strictjson import json_tree, value_of
 from ..units import objective_unit, rate_unit, twist_units
 from .ctext import NO_BOUND
@@ -123,8 +124,6 @@ def number_columns(nlp: Nlp, limits: Sequence[RunTimeLimit], prefix: str) -> Num
 
 #: Name of the manifest in the folder.
 MANIFEST = "manifest.json"
-#: Version of the manifest's keys and of the functions for many problems; another one is refused.
-FORMAT = 2
 #: A status in the header: its name, and a comment that says what it means.
 _STATUS = re.compile(r"^    SCREWSYNTH_(\w+)(?: = 0)?,? +/\* (.*) \*/$", flags=re.MULTILINE)
 
@@ -136,7 +135,7 @@ def manifest_text(nlp: Nlp, columns: NumberColumns, names: Mapping[str, str], fi
     statuses = _STATUS.findall(header[header.index("typedef enum") : header.index("} screwsynth_status;")])
     numbers = columns._asdict()
     manifest = {
-        "format": FORMAT,
+        VERSION_KEY: GENERATED_C.newest,
         "screwsynth": __version__,
         "casadi": names["casadi"],
         "name": case.name,
@@ -251,9 +250,8 @@ def read_manifest(folder: Path) -> Manifest:
         raise InputError(f"{folder}: is no folder that `screwsynth codegen` wrote: {error}") from None
     try:
         data = value_of(Mapping[str, object], json_tree(text))
-        if data["format"] == FORMAT:
-            return _manifest(data, folder)
-        fault = f": format = {data['format']!r} is not the format {FORMAT} of this version: generate the folder again"
+        check_version(GENERATED_C, {VERSION_KEY: data[VERSION_KEY]}, f"{folder}: {MANIFEST}")
+        return _manifest(data, folder)
     except OSError as error:
         raise InputError(f"{folder}: {error.filename} cannot be read: {error.strerror or error}") from None
     except (ValueError, KeyError) as error:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from .jsondata import JsonObject, Vector
-from .parts import SCHEMA
+from .parts import SCHEMA, SchemaVersion
 from .regression import CaseCheck, PublishedCheck, decimals_of
 from .text import Line, TextTable, Tone
 
@@ -80,12 +80,12 @@ class ChecksResult(JsonObject):
     """Result of checking cases.
 
     Attributes:
-        schema: version of the format.
+        schema: version of the result's keys.
         passed: whether everything holds.
         cases: checks of each case.
     """
 
-    schema: int
+    schema: SchemaVersion
     passed: bool
     cases: tuple[CaseCheckData, ...]
 

@@ -11,7 +11,7 @@ from ..system.csvtext import csv_text
 from ..system.strictjson import Size
 from .data import CertificateData
 from .jsondata import Absent, JsonObject
-from .parts import UnitsData, VersionsData
+from .parts import SchemaVersion, UnitsData, VersionsData
 from .rounding import number
 from .text import Line, TextTable, Tone
 
@@ -151,7 +151,7 @@ class ComparisonResult(JsonObject):
     """Result of a comparison of robots.
 
     Attributes:
-        schema: version of the format.
+        schema: version of the result's keys.
         case: name of the case.
         title: of the case.
         units: of every number.
@@ -165,7 +165,7 @@ class ComparisonResult(JsonObject):
         seconds: wall time.
     """
 
-    schema: int
+    schema: SchemaVersion
     case: str
     title: str
     units: UnitsData

@@ -4,7 +4,7 @@ Numbers are in the case's units. Nothing is ever NaN or infinite, but an infinit
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Final, Literal, TypeAlias
 
 from ..case.pose import OverPoses
 from ..case.task import Sense
@@ -13,8 +13,9 @@ from .jointdata import JointsData, MotionData
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, Vector6
 from .loaddata import LoadingData
 
-#: Version of the format.
-SCHEMA = 1
+#: Version of a result, the newest of :data:`screwsynth.models.fileversions.RESULT_FILES`.
+SchemaVersion: TypeAlias = Literal[1]
+SCHEMA: Final = 1
 
 #: A side of a limit: from below, from above, or both at once.
 Bound: TypeAlias = Literal["min", "max", "equal"]
@@ -40,14 +41,14 @@ class HeadData(JsonObject):
     """The case that a result is about.
 
     Attributes:
-        schema: version of the format.
+        schema: version of the result's keys.
         case: name of the case, its file's.
         title: title of the case.
         model: name of the robot.
         units: of every number.
     """
 
-    schema: int
+    schema: SchemaVersion
     case: str
     title: str
     model: str

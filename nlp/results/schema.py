@@ -10,8 +10,9 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, Union, get_args, get_origin
 
+from ...models.fileversions import RESULT_FILES, VERSION_KEY
 from ..errors import InputError, listing
-from ..system.reading import read_limited
+from ..system.reading import check_version, read_limited
 from ..system.strictjson import Size, WrongValueError, below, json_tree, value_of
 from .checks import ChecksResult
 from .comparison import ComparisonResult
@@ -20,7 +21,6 @@ from .evaluation import EvaluationResult
 from .evidence import CertifiedResult
 from .explorations import FrontResult, SweepResult
 from .jsondata import JsonObject, JsonValue, Mark, kinds_of
-from .parts import SCHEMA
 from .path import PathResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
@@ -203,7 +203,7 @@ def load_result(file: str | Path) -> Result:
         The typed value; :func:`~.jsondata.json_data` makes the same JSON of it again.
 
     Raises:
-        InputError: the file cannot be read, or holds no result of this version of the format.
+        InputError: the file cannot be read, holds no result, or one of a version that is not read.
     """
     try:
         tables = json_tree(read_limited(file, _LARGEST))
@@ -220,8 +220,10 @@ def result_from_json(tables: object, source: str) -> Result:
         source: name of the document, for messages.
 
     Raises:
-        InputError: it is no result of this version of the format.
+        InputError: it is no result, or one of a version that is not read.
     """
+    if isinstance(tables, dict):
+        check_version(RESULT_FILES, tables, source)
     try:
         return _result(tables)
     except WrongValueError as error:
@@ -236,8 +238,8 @@ def _result(tables: object) -> Result:
     """
     if not isinstance(tables, dict):
         raise WrongValueError("", "must be an object")
-    if tables.get("schema") != SCHEMA:
-        raise WrongValueError("schema", f"must be {SCHEMA}, the version of the format, got {tables.get('schema')!r}")
+    if VERSION_KEY not in tables:
+        raise WrongValueError(VERSION_KEY, "is missing")
     required = {kind: set(_keys(kind, required=True)) for kind in RESULTS}
     # The kinds have different keys; the one that misses least is the one that was meant.
     kind = min(RESULTS, key=lambda each: (len(required[each] - tables.keys()), -len(required[each])))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
-from ..errors import InputError
+from ...models.fileversions import VERSION_KEY, FileVersions
+from ..errors import CaseError, InputError
 
 
 def read_limited(source: str | Path, largest: int, *, is_regular: bool = False) -> bytes:
@@ -39,3 +41,18 @@ def text_of_bytes(content: bytes) -> str:
         UnicodeDecodeError: it is no such text.
     """
     return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def check_version(kind: FileVersions, tables: Mapping[str, object], source: str | None = None) -> None:
+    """Refuse a file of a version that is not read; one that states none is of version 1.
+
+    Args:
+        kind: of the file.
+        tables: the file's content.
+        source: name of the file, for the message.
+
+    Raises:
+        CaseError: the version is another one.
+    """
+    if fault := kind.fault(tables.get(VERSION_KEY, 1)):
+        raise CaseError(VERSION_KEY, fault, tables[VERSION_KEY], source)

@@ -175,11 +175,11 @@ def test_other_folders_are_refused_in_a_sentence(folder: Path, tmp_path: Path, m
 
     refused("is no folder", tmp_path / "nowhere")
     refused("is no folder", tmp_path)
-    for text in ("", "[]", "{}", '{"format": 2}', json.dumps(manifest | {"variables": [1]})):
+    for text in ("", "[]", "{}", '{"schema": 1}', json.dumps(manifest | {"variables": [1]})):
         (copy / "manifest.json").write_text(text, encoding="utf-8")
         refused("is not as")
-    (copy / "manifest.json").write_text(json.dumps(manifest | {"format": 99}), encoding="utf-8")
-    refused("format = 99 is not the format 2 of this version")
+    (copy / "manifest.json").write_text(json.dumps(manifest | {"schema": 99}), encoding="utf-8")
+    refused("schema = 99: this screwsynth reads folders of generated C of schema 1")
     (copy / "manifest.json").write_text(json.dumps(manifest | {"sources": ["../x.c"]}), encoding="utf-8")
     refused("is not as")
     (copy / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")

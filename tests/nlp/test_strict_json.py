@@ -139,7 +139,7 @@ PLATFORM = {
     "solve": {"starts": 1},
 }
 MANIFEST = {
-    "format": 2,
+    "schema": 1,
     "name": "n",
     "prefix": "n",
     "variables": [{"name": "p_z", "unit": "m", "lower": 0.0, "upper": 1.0, "start": 0.5}],

@@ -30,15 +30,14 @@ import zlib
 from dataclasses import asdict, dataclass
 from typing import Final, Literal
 
+from ....models.fileversions import PROOF_FILES
 from ...case.pose import ends_of
 from ...case.workspace import Workspace
-from ...errors import InputError
+from ...errors import CaseError, InputError
+from ...system.reading import check_version
 from ...system.strictjson import json_tree, object_of
 
 _FORMAT: Final = "screwsynth-proof"
-_VERSION = 6
-#: Formats of earlier versions.
-_EARLIER = ("screwsynth-workspace-proof",)
 #: Largest tree in bytes: the proofs of docs/certificate.md have a few million.
 _LARGEST_TREE = 2**28
 #: Name of the only claim of a proof about a program.
@@ -146,7 +145,9 @@ class Proof:
         """Return the JSON text."""
         about: Literal["program", "workspace"] = "program" if isinstance(self.premises, Statement) else "workspace"
         claims, lemmas = (tuple(map(_table_of, some)) for some in (self.claims, self.lemmas))
-        file = _File(_FORMAT, _VERSION, self.name, self.case, about, self.premises, claims, lemmas, self.unproved)
+        file = _File(
+            _FORMAT, PROOF_FILES.newest, self.name, self.case, about, self.premises, claims, lemmas, self.unproved
+        )
         return json.dumps(asdict(file), indent=1, allow_nan=False) + "\n"
 
 
@@ -175,7 +176,7 @@ class _File:
     """A proof as its file has it."""
 
     format: Literal["screwsynth-proof"]
-    version: int
+    schema: int
     name: str
     case: str
     about: Literal["program", "workspace"]
@@ -199,14 +200,12 @@ def read_proof(text: str, source: str) -> Proof:
         source: its name, for messages.
 
     Raises:
-        ProofError: the text is no proof of this version, a value is not allowed, or a tree is damaged.
+        ProofError: the text is no proof of a version that is read, a value is not allowed, or a tree is damaged.
     """
     try:
         table = json_tree(text)
-        if isinstance(table, dict) and (
-            table.get("format") in _EARLIER or (table.get("format") == _FORMAT and table.get("version") != _VERSION)
-        ):
-            raise ProofError(f"{source}: is no proof of this version, {_VERSION}: write it again")
+        if isinstance(table, dict) and table.get("format") == _FORMAT:
+            check_version(PROOF_FILES, table, source)
         found = object_of(_File, table)
         is_program = found.about == "program"
         kind: type[Statement] | type[Premises] = Statement if is_program else Premises
@@ -214,6 +213,8 @@ def read_proof(text: str, source: str) -> Proof:
         reasons = [each.reason for each in found.claims]
         if is_program and (reasons != ["program"] or found.lemmas or found.not_on_paper):
             raise ValueError("a proof about a program has one claim")
+    except CaseError as error:
+        raise ProofError(str(error)) from None
     except ValueError as error:
         raise ProofError(f"{source}: is no proof as certify and workspace write it: {error}") from None
     claims, lemmas = (tuple(_claim_of(each, source) for each in some) for some in (found.claims, found.lemmas))
