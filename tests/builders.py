@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from screwsynth.models import Model, robot_function
 from screwsynth.nlp import Case, case_from_tables, shipped_cases
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 
 DOCS = Path(__file__).parents[1] / "docs"
 Array = NDArray[np.float64]

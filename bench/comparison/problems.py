@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from screwsynth.nlp import Case, Nlp, build_model, formulate, load_case
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.program.pairs import with_all_pairs
 
 SHIPPED = (

@@ -22,7 +22,7 @@ from screwsynth.models import Model, Substitution, robot, stewart_gough
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Nlp, Status, formulate, judge_workspace, margins_of, result_of, solve
 from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.formats.solved.mechanism_of import mechanism_of
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof

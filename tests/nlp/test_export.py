@@ -30,7 +30,7 @@ from screwsynth.nlp import (
     formulate,
     load_case,
 )
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of

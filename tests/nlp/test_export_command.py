@@ -12,7 +12,7 @@ from mujoco_trees import Tree
 
 from screwsynth.models import robot, robot_function
 from screwsynth.nlp import Case, InputError, Task, export_robot, formulate, load_case, solve
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 
 
 def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Path, cli: Run) -> None:

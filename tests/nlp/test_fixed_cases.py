@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from screwsynth.models import Model, robot_function
 from screwsynth.nlp import Case, Free, Rotation, Status, Task, formulate, json_data, result_of, solve
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.assembly import assembly_over_poses
 from screwsynth.nlp.evidence.kkt import close_equations

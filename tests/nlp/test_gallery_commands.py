@@ -30,7 +30,7 @@ from screwsynth.nlp import (
     sensitivities,
     solve,
 )
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.evidence.state import loops_are_closed

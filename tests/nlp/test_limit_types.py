@@ -86,7 +86,7 @@ from screwsynth.models import stewart_gough
 from screwsynth.nlp import CaseError, Status, case_from_tables, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.platform_height import PlatformHeight
 from screwsynth.nlp.case.wholeschema import WholeDocument
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 
 starter = tomllib.loads(starter_case(stewart_gough()))
 

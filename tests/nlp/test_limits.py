@@ -41,7 +41,7 @@ from screwsynth.nlp import (
 from screwsynth.nlp.case.limits.clearance import squared_distance
 from screwsynth.nlp.case.limits.singular_values import largest_eigenvalue, smallest_eigenvalue
 from screwsynth.nlp.case.settings import Search
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.solver.compromise import solution_of_one_task
 from screwsynth.nlp.solver.multistart import solve_program

@@ -13,7 +13,7 @@ import screwsynth.models
 from screwsynth.models import model_names, robot, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import CaseError, Search, Status, evaluate, formulate, load_case, load_result, solve
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
 from screwsynth.nlp.evidence.state import loops_are_closed
