@@ -33,8 +33,9 @@ from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 
-#: Half range of a starter's free numbers, as a part of their typical values.
-SPREAD = 0.25
+#: Half ranges of a free dimension, as a part of its typical value, and of the position, as a part of the robot's size.
+#: Limits hold a design within the second.
+_SPREAD, _REACH = 0.25, 0.3
 #: Half range of a rotation, and of one that follows from the position, radians.
 TURN, FOLLOWING_TURN = math.radians(20), math.radians(60)
 #: Number of poses, home among them, at which the task must be possible, and their seed.
@@ -108,9 +109,11 @@ def starter_values(parameter: Parameter) -> tuple[float, ...]:
     return parameter.starter or parameter.typical
 
 
-def parameter_width(parameter: Parameter) -> float:
-    """Return the half range of a free parameter."""
-    return round_number(SPREAD * max(abs(value) for value in starter_values(parameter)) or 1.0)
+def free_widths(parameter: Parameter) -> tuple[float, ...]:
+    """Return the half range of each component of a free parameter: a point stays in the planes in which it lies."""
+    values = starter_values(parameter)
+    width = round_number(_SPREAD * max(abs(value) for value in values) or 1.0)
+    return tuple(width if value or len(values) == 1 else 0.0 for value in values)
 
 
 def read_home(model: Model, size: float) -> Home:
@@ -120,7 +123,7 @@ def read_home(model: Model, size: float) -> Home:
         model: the robot.
         size: length of the order of the robot's.
     """
-    reach = round_number(SPREAD * size)
+    reach = round_number(_REACH * size)
     every, any_axis = (True, True, True), Turning(3)
     places = _places(_program(model, every, any_axis, reach))
     moves, turning = _pose_numbers(places, size)
@@ -150,8 +153,11 @@ def _program(
     parameters: dict[str, tuple[Value, ...]] = {item.name: starter_values(item) for item in model.parameters}
     if free is not None:
         item = model.parameters[free]
-        width = parameter_width(item)
-        ranges = [(max(value - width, item.lower), min(value + width, item.upper), value) for value in starter_values(item)]
+        values, widths = starter_values(item), free_widths(item)
+        ranges = [
+            (max(value - width, item.lower), min(value + width, item.upper), value)
+            for value, width in zip(values, widths, strict=True)
+        ]
         parameters[item.name] = tuple(Free(*each) if each[0] < each[1] else each[2] for each in ranges)
     position = [
         Free(value - reach, value + reach, value) if is_free else value

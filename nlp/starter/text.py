@@ -14,7 +14,7 @@ from ...models import Dimension, FloatArray, Model, Parameter, Screw, WrenchKind
 from ..case.settings import Search
 from ..case.toml import option_text, plain_value, toml_key, toml_text
 from ..units import Units
-from .home import TURN, Home, parameter_width, read_home, round_number, starter_values
+from .home import TURN, Home, free_widths, read_home, round_number, starter_values
 
 _UNITS = Units("cm", "deg")
 
@@ -27,7 +27,9 @@ _CONES = 6
 #: Largest condition number, as a multiple of home's.
 _CONDITION = 1.5
 #: Half range of a position in the workspace, as a part of that of the pose, and of a rotation, degrees.
-_BOX, _BOX_TURN = 0.3, 5
+_BOX, _BOX_TURN = 0.2, 5
+#: Longest text with which comments of other lines are aligned.
+_WIDTH = 50
 
 
 def starter_case(model: Model, robot_file: str | None = None) -> str:
@@ -69,12 +71,22 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         _commented(f"starts = {search.starts}", "starting points; more find the best of several optima more surely"),
         f"seed = {search.seed}",
     ]
-    return "\n".join(lines) + "\n"
+    return "\n".join(_aligned(lines)) + "\n"
 
 
 def _commented(text: str, comment: str) -> str:
-    """Return a line with a comment behind it."""
-    return f"{text.ljust(29)} # {comment}"
+    """Return a line with a comment behind it, which a tabulator separates."""
+    return f"{text}\t# {comment}"
+
+
+def _aligned(lines: Sequence[str]) -> list[str]:
+    """Return lines whose comments begin in one column in each table; tables have empty lines between them."""
+    found: list[str] = []
+    for is_empty, table in itertools.groupby(lines, lambda line: not line):
+        rows = [line.split("\t") for line in table]
+        width = max([len(text) for text, *comment in rows if comment and len(text) <= _WIDTH], default=0)
+        found += [""] * len(rows) if is_empty else ["   ".join([text.ljust(width) if comment else text, *comment]) for text, *comment in rows]
+    return found
 
 
 def _robot_lines(model: Model, robot_file: str | None, arm: float) -> list[str]:
@@ -104,10 +116,10 @@ def _pose_lines(model: Model, home: Home) -> list[str]:
     if turning.count == 3:
         lines.append(_commented(f"rotation = {{ {angle} }}", f"about any axis, by at most {degrees} deg"))
     if turning.count == 1:
-        lines.append(f"rotation = {{ axis = {_vector(turning.axis)}, {angle} }}")
+        lines.append(_commented(f"rotation = {{ axis = {_vector(turning.axis)}, {angle} }}", "about this axis alone"))
     if home.freedoms == 6:
         other = f"# rotation = {{ axis = [0, 0, 1], {angle} }}"
-        lines += [f"{other}   # about this axis only; left out: no rotation"]
+        lines.append(_commented(other, "about this axis only; left out: no rotation"))
     count = sum(home.moves) + turning.count
     if count > home.freedoms:
         lines.append(f"# {home.freedoms} of these numbers are independent; the others follow from the closed loops.")
@@ -146,6 +158,8 @@ def _task_lines(model: Model, home: Home) -> list[str]:
 def _limit_lines(model: Model, home: Home, arm: float) -> list[str]:
     """Return lines of limits that the robot keeps at home."""
     lines = [*_actuator_lines(model, home), *_joint_lines(model, home)]
+    if "base_joint_angle" in home.state.quantities:
+        return lines  # cones keep legs apart from a singularity, and are sooner proved
     condition = _condition(home.state.jacobian, home.state.position, arm)
     if math.isfinite(condition):
         largest = float(f"{_CONDITION * condition:.2g}")
@@ -185,8 +199,11 @@ def _joint_lines(model: Model, home: Home) -> list[str]:
     """Return limits on the cones of passive joints."""
     angles = home.state.quantities.get("base_joint_angle")
     if angles is not None:
-        cone = max(45, 5 * math.ceil((math.degrees(float(angles.max())) + 15) / 5))
-        return [_commented(f"base_joint_angle = {cone}", "half angle of each joint's cone about the base's normal")]
+        cone = max(_CONE, 5 * math.ceil((math.degrees(float(angles.max())) + 10) / 5))
+        return [
+            _commented(f"{plate}_joint_angle = {cone}", f"half angle of each joint's cone about the {plate}'s normal")
+            for plate in ("base", "platform")
+        ]
     balls = [joint for joint in model.joints if joint.type == "S" and joint.cone is not None]
     keys = list(dict.fromkeys(joint.name or joint.label for joint in balls))
     if len(keys) > _CONES:
@@ -264,9 +281,12 @@ def _units_of(model: Model) -> Units:
 def _parameter_line(parameter: Parameter, units: Units, *, is_free: bool) -> str:
     """Return the line of a parameter, free about its value in a starter or fixed there."""
     values = [units.shown(value, parameter.dimension) for value in starter_values(parameter)]
-    width = units.shown(parameter_width(parameter), parameter.dimension)
+    widths = [units.shown(each, parameter.dimension) if is_free else 0.0 for each in free_widths(parameter)]
     domain = [units.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
-    texts = [_free_number(value, width, domain) if is_free else _number(value) for value in values]
+    texts = [
+        _free_number(value, width, domain) if width else _number(value)
+        for value, width in zip(values, widths, strict=True)
+    ]
     text = texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
     unit = units.label(parameter.dimension) or "a plain number"
     return _commented(f"{parameter.name} = {text}", f"{parameter.description}, {unit}")
