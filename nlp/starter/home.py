@@ -42,6 +42,8 @@ TURN, FOLLOWING_TURN = math.radians(20), math.radians(60)
 _POSES, _SEED = 7, 0
 #: Components of unit twists, and parts of F, that are smaller are rounding: loops are closed to 1e-10.
 _ZERO = 1e-6
+#: Forces below this part of a unit have no arm that counts.
+_FORCE = 0.1
 #: Mantissas of numbers that people state.
 _ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 _AXES = (2, 0, 1)
@@ -71,7 +73,10 @@ class Home(NamedTuple):
 
     Attributes:
         state: the robot at home.
-        freedoms: of its platform there.
+        arm: root mean square arm of the forces about the platform's origin, length; 1 where they have none. It is the
+            characteristic length, and divides moments in the condition number.
+        condition: condition number of J at home, or least one around it where home is singular; infinite for none.
+        freedoms: of its platform there, or around it where home is singular.
         moves: whether each component of the position (3,) is free.
         turning: rotations of the pose.
         reach: half range of the free components of the position, length.
@@ -81,6 +86,8 @@ class Home(NamedTuple):
     """
 
     state: RobotState
+    arm: float
+    condition: float
     freedoms: int
     moves: tuple[bool, ...]
     turning: Turning
@@ -136,18 +143,19 @@ def read_home(model: Model, size: float) -> Home:
         free_pose = _program(model, moves, turning, reach)
         places = _places(free_pose)
         possible = _common_twists(places, size)
-    freedoms = len(_twists(places[0], size))
+    freedoms = len(_regular_twists(places, size)[0])
     motion, is_flat = None, False
-    if freedoms < 6:
+    if 0 < len(possible) < 6:
         motion, is_flat = _motion(possible, places, size)
     free = _free_parameter(model, moves, turning, reach, size, motion)
-    nlp = free_pose
-    state = evaluate(nlp, _home_point(nlp))
-    return Home(state, freedoms, moves, turning, reach, free, motion, is_flat)
+    state, arm = evaluate(free_pose, _home_point(free_pose)), _arm(places[0])
+    near = _places(_program(model, moves, turning, reach, length=arm))
+    condition = min(_condition(each, arm) for each in (near if state.is_singular else near[:1]))
+    return Home(state, arm, condition, freedoms, moves, turning, reach, free, motion, is_flat)
 
 
 def _program(
-    model: Model, moves: tuple[bool, ...], turning: Turning, reach: float, free: int | None = None
+    model: Model, moves: tuple[bool, ...], turning: Turning, reach: float, free: int | None = None, length: float = 1.0
 ) -> Nlp:
     """Return the program of a robot with some numbers of its pose free, and a parameter."""
     parameters: dict[str, tuple[Value, ...]] = {item.name: starter_values(item) for item in model.parameters}
@@ -167,8 +175,9 @@ def _program(
     if turning.count:
         axis = None if turning.count == 3 else turning.axis
         rotation = Rotation(axis, Free(-turning.largest, turning.largest, 0.0))
-    task = Task.screw(Sense.MAX, axis=(0, 0, 1), pitch=math.inf)
-    return formulate(Case(model=model, parameters=parameters, position=position, rotation=rotation, tasks=[task]))
+    tasks = [Task.screw(Sense.MAX, axis=(0, 0, 1), pitch=math.inf)]
+    case = Case(model, parameters, position, tasks, rotation, characteristic_length=length)
+    return formulate(case)
 
 
 def _home_point(nlp: Nlp) -> FloatArray:
@@ -202,6 +211,22 @@ def _scaled(rows: FloatArray, centre: FloatArray, size: float) -> FloatArray:
     return np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / size])
 
 
+def _arm(place: _Place) -> float:
+    """Return the root mean square arm of the forces of a place about the platform's origin, 1 for none."""
+    rows = _scaled(place.rows, place.position, 1.0)
+    sizes = np.linalg.norm(rows[:, :3], axis=1)
+    forces = sizes > _FORCE
+    arms = np.linalg.norm(rows[forces, 3:], axis=1) / sizes[forces]
+    arm = math.sqrt(float(np.mean(arms**2))) if len(arms) else 0.0
+    return float(f"{arm:.2g}") if arm > _ZERO else 1.0
+
+
+def _condition(place: _Place, arm: float) -> float:
+    """Return the condition number of J at a place, with moments divided by an arm; infinite where J is singular."""
+    values = np.linalg.svd(_scaled(place.rows, place.position, arm), compute_uv=False)
+    return float(values[0] / values[-1]) if values[-1] > _ZERO * values[0] else math.inf
+
+
 def _null_space(rows: FloatArray) -> FloatArray:
     """Return an orthonormal basis (f, 6) of the twists, velocity first, in which scaled wrenches do no work."""
     if not len(rows):
@@ -215,6 +240,13 @@ def _twists(place: _Place, size: float) -> FloatArray:
     return _null_space(_scaled(place.constraints, place.position, size))
 
 
+def _regular_twists(places: list[_Place], size: float) -> list[FloatArray]:
+    """Return the twists (f, 6) of each place, of those alone that have fewest: at a singularity there are more."""
+    every = [_twists(place, size) for place in places]
+    least = min(map(len, every))
+    return [each for each in every if len(each) == least]
+
+
 def _common_twists(places: list[_Place], size: float) -> FloatArray:
     """Return the twists (f, 6) that are possible at all places; the velocity is that of the point at home's origin."""
     centre = places[0].position
@@ -223,12 +255,12 @@ def _common_twists(places: list[_Place], size: float) -> FloatArray:
 
 def _pose_numbers(places: list[_Place], size: float) -> tuple[tuple[bool, ...], Turning]:
     """Return which numbers of the pose the robot can change at some place."""
-    every = [_twists(place, size) for place in places]
+    every = _regular_twists(places, size)
     moves = _moves(every)
     _, values, right = np.linalg.svd(np.vstack([each[:, 3:] for each in every]))
     rank = int(np.count_nonzero(values > _ZERO))
-    home = every[0]
-    follows = rank > 0 and rank_of(np.linalg.svd(home[:, :3], compute_uv=False), 1.0) == len(home)
+    first = every[0]
+    follows = rank > 0 and rank_of(np.linalg.svd(first[:, :3], compute_uv=False), 1.0) == len(first)
     if rank == 1:
         axis = right[0] * np.sign(right[0][np.argmax(np.abs(right[0]))])
         x, y, z = (round(float(each), 9) + 0.0 for each in axis)
@@ -291,20 +323,21 @@ def _free_parameter(
     model: Model, moves: tuple[bool, ...], turning: Turning, reach: float, size: float, motion: Screw | None
 ) -> int | None:
     """Return the first dimension on which F depends, and with any value of which the motion is possible."""
+    twist = np.zeros(6)
+    if motion is not None:
+        omega, velocity = np.split(screw_from_axis(motion.axis, motion.point, motion.pitch), 2)
+        twist = np.concatenate([velocity, omega])
     for index, item in enumerate(model.parameters):
         nlp = _program(model, moves, turning, reach, index)
-        places = _places(nlp)
-        if motion is not None:
-            twist = screw_from_axis(motion.axis, motion.point, motion.pitch)
-            work = [np.abs(each.constraints @ np.concatenate([twist[3:], twist[:3]])).max(initial=0.0) for each in places]
-            if max(work) > _ZERO * (1 + size):
-                continue
+        work = max(float(np.abs(each.constraints @ twist).max(initial=0.0)) for each in _places(nlp))
+        if work > _ZERO * (1 + size):
+            continue
         home = _home_point(nlp)
         other = home.copy()
         own = [k for k, each in enumerate(nlp.program.variables) if each.name.removeprefix("robot.") in item.components]
         other[own] = nlp.upper[own]
-        pair = [_place(nlp, home), _place(nlp, close_near(nlp, home, other))]
-        if any(not np.allclose(_gram(pair[0], size), _gram(each, size), atol=_ZERO) for each in pair[1:]):
+        one, two = (_gram(_place(nlp, x), size) for x in (home, close_near(nlp, home, other)))
+        if not np.allclose(one, two, atol=_ZERO):
             return index
     return None
 

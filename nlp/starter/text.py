@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, Model, Parameter, Screw, WrenchKind
+from ...models import Dimension, FloatArray, Model, Parameter, Screw
 from ..case.settings import Search
 from ..case.toml import option_text, plain_value, toml_key, toml_text
 from ..units import Units
@@ -44,7 +44,6 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
     search, units = Search(), _units_of(model)
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     home = read_home(model, math.hypot(*model.home) or max(lengths, default=0.0) or _size(model) or 1 / 0.25)
-    arm = _arm(home.state.jacobian, home.state.position)
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -52,7 +51,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         _commented(f"length = {json.dumps(units.length, ensure_ascii=False)}", "a label, carried to every output"),
         _commented(f'angle = "{units.angle}"', 'or "rad"'),
         "",
-        *_robot_lines(model, robot_file, arm),
+        *_robot_lines(model, robot_file, home.arm),
         "",
         "# A number is fixed; { min = a, max = b } is free between its bounds, with an optional start.",
         "[robot.parameters]",
@@ -63,9 +62,9 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         *_task_lines(model, home),
         "",
         _commented("[limits]", "of a buildable design; see the documentation for all"),
-        *_limit_lines(model, home, arm),
+        *_limit_lines(model, home),
         "",
-        *_workspace_lines(model, home, units),
+        *(f"# {line}" for line in _workspace_lines(model, home, units)),
         "",
         "[solve]",
         _commented(f"starts = {search.starts}", "starting points; more find the best of several optima more surely"),
@@ -82,10 +81,11 @@ def _commented(text: str, comment: str) -> str:
 def _aligned(lines: Sequence[str]) -> list[str]:
     """Return lines whose comments begin in one column in each table; tables have empty lines between them."""
     found: list[str] = []
-    for is_empty, table in itertools.groupby(lines, lambda line: not line):
+    for _, table in itertools.groupby(lines, bool):
         rows = [line.split("\t") for line in table]
         width = max([len(text) for text, *comment in rows if comment and len(text) <= _WIDTH], default=0)
-        found += [""] * len(rows) if is_empty else ["   ".join([text.ljust(width) if comment else text, *comment]) for text, *comment in rows]
+        for text, *comment in rows:
+            found.append("   ".join([text.ljust(width), *comment]) if comment else text)
     return found
 
 
@@ -155,16 +155,19 @@ def _task_lines(model: Model, home: Home) -> list[str]:
     ]
 
 
-def _limit_lines(model: Model, home: Home, arm: float) -> list[str]:
+def _limit_lines(model: Model, home: Home) -> list[str]:
     """Return lines of limits that the robot keeps at home."""
     lines = [*_actuator_lines(model, home), *_joint_lines(model, home)]
-    if "base_joint_angle" in home.state.quantities:
+    is_singular = home.state.is_singular
+    if "base_joint_angle" in home.state.quantities and not is_singular:
         return lines  # cones keep legs apart from a singularity, and are sooner proved
-    condition = _condition(home.state.jacobian, home.state.position, arm)
-    if math.isfinite(condition):
-        largest = float(f"{_CONDITION * condition:.2g}")
-        table = f"condition_number = {{ max = {largest:g}, length = {arm:g} }}"
-        lines.append(_commented(table, f"of J, moments divided by this length; {float(f'{condition:.2g}'):g} at home"))
+    if math.isfinite(home.condition):
+        largest = float(f"{_CONDITION * home.condition:.2g}")
+        place = "near home, which is singular" if is_singular else "at home"
+        table = f"condition_number = {{ max = {largest:g}, length = {home.arm:g} }}"
+        lines.append(
+            _commented(table, f"of J, moments divided by this length; {float(f'{home.condition:.2g}'):g} {place}")
+        )
     return lines
 
 
@@ -184,7 +187,7 @@ def _actuator_lines(model: Model, home: Home) -> list[str]:
     values = np.array([value for item in model.parameters for value in starter_values(item)])
     base, platform = (each.full() for each in ca.Function("ends", [model.symbols], ends).call([values]))
     lengths = np.linalg.norm(platform + model.home - base, axis=1)
-    low, high = (float(f"{part * length:.2g}") for part, length in zip(_LEG, (lengths.min(), lengths.max()), strict=True))
+    low, high = (float(f"{each:.2g}") for each in (_LEG[0] * lengths.min(), _LEG[1] * lengths.max()))
     # Legs that share a joint have no clearance.
     pairs = itertools.combinations(range(len(base)), 2)
     apart = min((math.dist(plate[i], plate[j]) for i, j in pairs for plate in (base, platform)), default=0.0)
@@ -213,7 +216,9 @@ def _joint_lines(model: Model, home: Home) -> list[str]:
 
 
 def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
-    """Return a box of poses about home as comments."""
+    """Return a box of poses about home as comments; nothing where the robot has one pose."""
+    if not (any(home.moves) or home.turning.count):
+        return []
     half = round_number(_BOX * home.reach)
     position = [
         _free_number(value, half) if is_free else f"{value:.10g}"
@@ -234,29 +239,8 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         item = model.parameters[home.free]
         value = [_number(units.shown(each, item.dimension)) for each in starter_values(item)]
         fixed = f" --set {item.name}={','.join(value)}"
-    lines = [
-        _commented("[workspace]", f"for screwsynth workspace{fixed}: is the machine good at all these poses?"),
-        f"position = [{', '.join(position)}]",
-        *rotation,
-    ]
-    return [f"# {line}" for line in lines]
-
-
-def _arm(jacobian: FloatArray, position: FloatArray) -> float:
-    """Return the root mean square arm of a robot's forces about the platform's origin, or 1 where all have none."""
-    moments = jacobian[:, 3:] - np.cross(position, jacobian[:, :3])
-    sizes = np.linalg.norm(jacobian[:, :3], axis=1)
-    forces = sizes > 0.1
-    arms = np.linalg.norm(moments[forces], axis=1) / sizes[forces]
-    arm = math.sqrt(float(np.mean(arms**2))) if len(arms) else 0.0
-    return float(f"{arm:.2g}") if arm > 1e-6 else 1.0
-
-
-def _condition(jacobian: FloatArray, position: FloatArray, arm: float) -> float:
-    """Return the condition number of J at home, with couples multiplied and moments divided by a length."""
-    moments = jacobian[:, 3:] - np.cross(position, jacobian[:, :3])
-    values = np.linalg.svd(np.hstack([jacobian[:, :3], moments / arm]), compute_uv=False)
-    return float(values[0] / values[-1]) if values[-1] > 1e-6 * values[0] else math.inf
+    question = f"for screwsynth workspace{fixed}: is the machine good at all these poses?"
+    return [_commented("[workspace]", question), f"position = [{', '.join(position)}]", *rotation]
 
 
 def _size(model: Model) -> float:

@@ -8,10 +8,10 @@ from builders import Run, output_of, saved
 
 from screwsynth.nlp import InputError, load_case
 from screwsynth.nlp.case.robotfile import model_of_definition, read_definition
-from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.output.files import check_origin
 from screwsynth.nlp.output.pictures.sweeps import sweep_figure
 from screwsynth.nlp.output.sweeptable import TablePoint
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.sweeps.points import grid
 
 HEAD = Path(__file__).parents[2] / "cases" / "robots" / "reachy-mini-head.toml"
