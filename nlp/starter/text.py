@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Parameter, Screw
+from ..case.limits.clearance import squared_distance
 from ..case.settings import Search
 from ..case.toml import option_text, plain_value, toml_key, toml_text
 from ..units import Units
@@ -188,9 +189,10 @@ def _actuator_lines(model: Model, home: Home) -> list[str]:
     base, platform = (each.full() for each in ca.Function("ends", [model.symbols], ends).call([values]))
     lengths = np.linalg.norm(platform + model.home - base, axis=1)
     low, high = (float(f"{each:.2g}") for each in (_LEG[0] * lengths.min(), _LEG[1] * lengths.max()))
-    # Legs that share a joint have no clearance.
-    pairs = itertools.combinations(range(len(base)), 2)
-    apart = min((math.dist(plate[i], plate[j]) for i, j in pairs for plate in (base, platform)), default=0.0)
+    # Legs that share a joint, or cross, have no clearance.
+    segments = [(ca.SX(start), ca.SX(end - start)) for start, end in zip(base, platform + model.home, strict=True)]
+    squares = [float(ca.evalf(squared_distance(*one, *two))) for one, two in itertools.combinations(segments, 2)]
+    apart = math.sqrt(min(squares, default=0.0))
     clearance = float(f"{0.02 * lengths.max():.1g}")
     return [
         _commented(f"leg_length = {{ min = {low:g}, max = {high:g} }}", "between joint centres"),
