@@ -53,12 +53,12 @@ class Turning(NamedTuple):
     """Rotations of a starter's pose.
 
     Attributes:
-        count: number of free numbers: 0, 1 about the axis, or 3 about any axis.
+        numbers: how many of them are free: 0, 1 about the axis, or 3 about any axis.
         axis: (3,) unit axis in the world; z where it does not count.
         follows: whether the rotation follows from the position by closed loops.
     """
 
-    count: int
+    numbers: int
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     follows: bool = False
 
@@ -172,8 +172,8 @@ def _program(
         for value, is_free in zip(model.home, moves, strict=True)
     ]
     rotation = Rotation()
-    if turning.count:
-        axis = None if turning.count == 3 else turning.axis
+    if turning.numbers:
+        axis = None if turning.numbers == 3 else turning.axis
         rotation = Rotation(axis, Free(-turning.largest, turning.largest, 0.0))
     tasks = [Task.screw(Sense.MAX, axis=(0, 0, 1), pitch=math.inf)]
     case = Case(model, parameters, position, tasks, rotation, characteristic_length=length)

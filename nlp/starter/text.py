@@ -114,14 +114,14 @@ def _pose_lines(model: Model, home: Home) -> list[str]:
     ]
     degrees = round(math.degrees(turning.largest))
     angle = f"angle = {{ min = {-degrees}, max = {degrees} }}"
-    if turning.count == 3:
+    if turning.numbers == 3:
         lines.append(_commented(f"rotation = {{ {angle} }}", f"about any axis, by at most {degrees} deg"))
-    if turning.count == 1:
+    if turning.numbers == 1:
         lines.append(_commented(f"rotation = {{ axis = {_vector(turning.axis)}, {angle} }}", "about this axis alone"))
     if home.freedoms == 6:
         other = f"# rotation = {{ axis = [0, 0, 1], {angle} }}"
         lines.append(_commented(other, "about this axis only; left out: no rotation"))
-    count = sum(home.moves) + turning.count
+    count = sum(home.moves) + turning.numbers
     if count > home.freedoms:
         lines.append(f"# {home.freedoms} of these numbers are independent; the others follow from the closed loops.")
     return lines
@@ -219,7 +219,7 @@ def _joint_lines(model: Model, home: Home) -> list[str]:
 
 def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
     """Return a box of poses about home as comments; nothing where the robot has one pose."""
-    if not (any(home.moves) or home.turning.count):
+    if not (any(home.moves) or home.turning.numbers):
         return []
     half = round_number(_BOX * home.reach)
     position = [
@@ -233,8 +233,8 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
         0: [],
         1: [f"rotation = {{ axis = {_vector(turning.axis)}, angle = {angle} }}"],
         3: [f"rotation = {{ angle = {angle} }}"],
-    }[turning.count]
-    if turning.count == 3 and home.freedoms < 6:
+    }[turning.numbers]
+    if turning.numbers == 3 and home.freedoms < 6:
         rotation = [f"rotation = {{ roll = {angle}, pitch = {angle}, yaw = {angle} }}"]
     fixed = ""
     if home.free is not None:

@@ -62,7 +62,7 @@ def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_pat
     text = starter_case(robot_function("hexapod")())
     path, out = saved(tmp_path / "case.toml", text), tmp_path / "robot"
     words = ("export", str(path), "--format", "mjcf", "--out", str(out))
-    status, _, wrong = cli(*words, "--starts", "2", "--set", "limits.leg_length.max=1")
+    status, _, wrong = cli(*words, "--starts", "2", "--set=limits.leg_length.min=0.5", "--set=limits.leg_length.max=1")
     assert status == 1
     assert "the solve is infeasible: nothing is exported" in wrong
     assert not out.exists()
