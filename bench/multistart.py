@@ -25,12 +25,12 @@ from scipy.optimize import minimize
 from screwsynth.models.catalog import robot_function
 from screwsynth.nlp import Case, Nlp, load_case
 from screwsynth.nlp.case.reader import case_from_tables
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.closing import close_near, closed_start
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.program.pairs import with_all_pairs
 from screwsynth.nlp.program.sampling import starting_points
 from screwsynth.nlp.solver.solve import solve_programs
+from screwsynth.nlp.starter.text import starter_case
 
 CASES = (
     *("paper-4.1-helical", "paper-4.2", "paper-4.3", "paper-4.4-max", "paper-4.4-min", "hexapod-machining"),

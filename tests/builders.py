@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from screwsynth.models import Model, robot_function
+from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.nlp import Case, case_from_tables, shipped_cases
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 
 DOCS = Path(__file__).parents[1] / "docs"
 Array = NDArray[np.float64]
@@ -48,12 +48,37 @@ def case_from(given: str | Mapping[str, Any], name: str = "case") -> Case:
 
 
 def starter_tables(robot: str | Model) -> dict[str, Any]:
-    """The tables of the case that ``new`` begins with."""
-    return tomllib.loads(starter_case(robot_function(robot)() if isinstance(robot, str) else robot))
+    """The tables that tests begin with: a starter with its whole pose free, a motion of any kind, and no limits.
+
+    Numbers are free within a quarter of their size, and couples count by unit lengths. The starter itself is in
+    test_starters.py.
+    """
+    model = robot_function(robot)() if isinstance(robot, str) else robot
+    tables = tomllib.loads(starter_case(model))
+    del tables["limits"]
+    if "characteristic_length" in tables["robot"]:
+        tables["robot"]["characteristic_length"] = 1.0
+    own = tables["robot"]["parameters"]
+    for k, item in enumerate(model.parameters):
+        scale = math.degrees(1) if item.dimension is Dimension.ANGLE else 1.0
+        values = [scale * value for value in item.starter or item.typical]
+        width = 0.25 * max(map(abs, values)) if k == 0 else 0.0
+        ends = [(max(v - width, scale * item.lower), min(v + width, scale * item.upper)) for v in values]
+        found = [{"min": low, "max": high} if width else v for v, (low, high) in zip(values, ends, strict=True)]
+        own[item.name] = found if len(found) > 1 else found[0]
+    lengths = [abs(v) for item in model.parameters if item.dimension is Dimension.LENGTH for v in item.typical]
+    reach = 0.25 * (math.hypot(*model.home) or max(lengths))
+    tables["pose"] = {
+        "position": [{"min": v - reach, "max": v + reach} for v in model.home],
+        "rotation": {"angle": {"min": -20, "max": 20}},
+    }
+    motion = {"axis": [0, 1, 2], "point": [0, 0, model.home[2]], "pitch": 2}
+    tables["task"] = [{"name": "my task", "sense": "max", **motion}]
+    return tables
 
 
 def starter(name: str) -> Case:
-    """The case that ``new`` begins with, of a robot by its name."""
+    """The case that tests begin with, of a robot by its name."""
     return case_from(starter_tables(name), name)
 
 

@@ -18,7 +18,7 @@ import screwsynth.cases
 import screwsynth.models
 import screwsynth.nlp
 from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from screwsynth.nlp import Case, Nlp, build_model, formulate, load_case
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.program.pairs import with_all_pairs
+from screwsynth.nlp.starter.text import starter_case
 
 SHIPPED = (
     "paper-4.1-helical",

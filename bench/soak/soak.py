@@ -23,7 +23,7 @@ from ticks import FORMULAS, OK, Robot, next_tick, soak, solved
 
 from screwsynth.models import robot_function
 from screwsynth.nlp import case_from_tables, generate_c, load_case, load_compiled, shipped_cases
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 
 WORST = ("camera-mount", "flight-simulator")
 TRACKS = 200

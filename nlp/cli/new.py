@@ -19,7 +19,7 @@ def new(
     from pathlib import Path
 
     from ..case.robots import build_model
-    from ..case.starter import starter_case
+    from ..starter.text import starter_case
 
     if not model.endswith(".toml"):
         typer.echo(starter_case(build_model(model)), nl=False)

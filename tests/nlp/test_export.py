@@ -30,7 +30,6 @@ from screwsynth.nlp import (
     formulate,
     load_case,
 )
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of
@@ -42,6 +41,7 @@ from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
 from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.formats.writing.urdf import urdf_of
+from screwsynth.nlp.starter.text import starter_case
 
 ROBOTS = (*EACH_KIND, *SHIPPED)
 #: One of each kind of limb and of closing, for tests that build the robot again.

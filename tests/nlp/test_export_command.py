@@ -12,7 +12,7 @@ from mujoco_trees import Tree
 
 from screwsynth.models import robot, robot_function
 from screwsynth.nlp import Case, InputError, Task, export_robot, formulate, load_case, solve
-from screwsynth.nlp.case.starter import starter_case
+from screwsynth.nlp.starter.text import starter_case
 
 
 def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Path, cli: Run) -> None:
@@ -60,9 +60,9 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
 
 def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_path: Path, cli: Run) -> None:
     text = starter_case(robot_function("hexapod")())
-    path, out = saved(tmp_path / "case.toml", text + "\n[limits]\nleg_length = { max = 1 }\n"), tmp_path / "robot"
+    path, out = saved(tmp_path / "case.toml", text), tmp_path / "robot"
     words = ("export", str(path), "--format", "mjcf", "--out", str(out))
-    status, _, wrong = cli(*words, "--starts", "2")
+    status, _, wrong = cli(*words, "--starts", "2", "--set=limits.leg_length.min=0.5", "--set=limits.leg_length.max=1")
     assert status == 1
     assert "the solve is infeasible: nothing is exported" in wrong
     assert not out.exists()

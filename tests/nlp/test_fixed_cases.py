@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import starter
 from typer.testing import CliRunner
 
 from screwsynth.models import Model, robot_function
 from screwsynth.nlp import Case, Free, Rotation, Status, Task, formulate, json_data, result_of, solve
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.evidence.assembly import assembly_over_poses
 from screwsynth.nlp.evidence.kkt import close_equations
@@ -116,8 +115,7 @@ def test_planar_limbs_bent_the_other_way_are_found_too() -> None:
 
 
 def test_every_distinct_optimum_says_its_working_mode() -> None:
-    text = starter_case(robot_function("6-rus")())
-    solution = solve(case_from(text, "6-rus"), starts=16)
+    solution = solve(starter("6-rus"), starts=16)
     own = solution.outcomes[0].own
     brief = [found.assembly.brief for found in own.optima if found.assembly is not None]
     assert len(brief) == len(own.optima) > 1

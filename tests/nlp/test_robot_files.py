@@ -13,10 +13,10 @@ import screwsynth.models
 from screwsynth.models import model_names, robot, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import CaseError, Search, Status, evaluate, formulate, load_case, load_result, solve
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
 from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.starter.text import starter_case
 
 SHIPPED = Path(screwsynth.models.__file__).parent / "robots"
 RPS, DELTA = ((SHIPPED / f"{name}.toml").read_text(encoding="utf-8") for name in ("3-rps", "delta"))
@@ -158,5 +158,5 @@ def test_the_gallery_is_found_by_name_and_each_robot_has_a_starter() -> None:
         model = robot_function(name)()
         assert model.name == name
         assert model.generic.jacobian == 6
-        # The starter of each is solved in test_tables.py.
+        # The starter of each is solved in test_starters.py.
         assert f'model = "{name}"' in starter_case(model)

@@ -14,9 +14,9 @@ from screwsynth.models import Dimension, robot, robot_function
 from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import Case, Free, JointMotion, Limits, Task, evaluate, formulate
 from screwsynth.nlp.case.robotfile import check_form
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of
+from screwsynth.nlp.starter.text import starter_case
 
 METRES = {"3-puu", "6-rss", "6-sps", "delta", "delta-parallelogram", "five-bar"}
 

@@ -8,10 +8,10 @@ from builders import Run, output_of, saved
 
 from screwsynth.nlp import InputError, load_case
 from screwsynth.nlp.case.robotfile import model_of_definition, read_definition
-from screwsynth.nlp.case.starter import starter_case
 from screwsynth.nlp.output.files import check_origin
 from screwsynth.nlp.output.pictures.sweeps import sweep_figure
 from screwsynth.nlp.output.sweeptable import TablePoint
+from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.sweeps.points import grid
 
 HEAD = Path(__file__).parents[2] / "cases" / "robots" / "reachy-mini-head.toml"
@@ -65,8 +65,8 @@ def test_a_starter_follows_the_size_of_a_robot_without_dimensions(tmp_path: Path
     assert not model.parameters
     path = saved(tmp_path / "case.toml", starter_case(model, "large.toml"))
     z = load_case(str(path)).position[2]
-    # A quarter of the distance of the joints on the base from its origin, sqrt(60^2 + 40^2).
-    assert z.upper == pytest.approx(0.25 * (60**2 + 40**2) ** 0.5, rel=1e-4)  # type: ignore[union-attr]
+    # 0.3 times the distance of the joints on the base from its origin, sqrt(60^2 + 40^2) = 72.1, as a round number.
+    assert z.upper == 20  # type: ignore[union-attr]
 
 
 def test_a_point_shows_F_with_its_unit_and_nothing_at_rounding_level(cli: Run) -> None:  # noqa: N802 - the objective
