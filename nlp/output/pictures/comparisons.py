@@ -17,12 +17,10 @@ from .canvas import INK, MUTED
 from .drawing import Drawing, drawing_of
 from .fonts import legible
 from .painting import Panel
-from .view import View
+from .view import clearest_view
 
 #: Width, height and heading of a panel, in inches; panels in a row.
 _WIDTH, _HEIGHT, _HEADING, _ACROSS = 4.2, 4.2, 0.65, 3
-#: The eye of all panels: a view that suits one robot would hide that another is of the same size.
-_VIEW = View(-60.0)
 #: Part of a panel's width that the bar of the scale may have.
 _BAR = 0.4
 
@@ -56,13 +54,15 @@ def comparison_figure(found: Comparison) -> Figure:
     width, height = across * _WIDTH, down * row + 0.5
     figure = Figure(figsize=(width, height), facecolor="white")
     FigureCanvasAgg(figure)
+    # One eye for all panels: another view for each would hide which of two robots is the larger one.
+    view = clearest_view(*(_plain(drawing) for _, drawing in drawings))
     panels: list[Axes] = []
     for k, (entry, drawing) in enumerate(drawings):
         left, top = k % across * _WIDTH, height - k // across * row
         axes = figure.add_axes((left / width, (top - row) / height, _WIDTH / width, _HEIGHT / height))
         # The start of the search and the free motions of one robot say nothing about another.
         # Words, which a picture of one robot has, would hide these smaller ones.
-        Panel(axes, _VIEW, _plain(drawing)).paint()
+        Panel(axes, view, _plain(drawing)).paint()
         panels.append(axes)
         _write_heading(figure, (left + 0.15) / width, (top - 0.12) / height, entry)
     half = max(_half_width(axes) for axes in panels)

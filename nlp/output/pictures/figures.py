@@ -53,7 +53,7 @@ def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = Non
     Args:
         drawings: one robot, or the same robot with several tasks, which stand side by side.
         ending: ``.png``, ``.svg`` or ``.pdf``.
-        view: the projection; the clearest for the first drawing when left out.
+        view: the projection; the clearest for all drawings when left out.
     """
     return picture_of(ending, figure_of, drawings, view=view)
 
@@ -84,7 +84,7 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
     Every artist that shows a part of the robot carries its name as ``gid``: ``limb 1``, ``couple 1``, ``axis``,
     ``path``, ``velocity A1``, ``start limb 1``, ``mark x1``, ``joint B1``.
     """
-    view = view or clearest_view(drawings[0])
+    view = view or clearest_view(*drawings)
     across = len(drawings) if len(drawings) <= _ACROSS else 2
     side = _SIDE if drawings[0].rows else 0.2
     room = _BOTTOM + (_SYMBOLS if any(each.model.scene.joints for each in drawings) else 0.0)

@@ -49,6 +49,11 @@ def rate_colour_map() -> LinearSegmentedColormap:
     return LinearSegmentedColormap.from_list("rates", RATE_COLOURS)
 
 
+def _end_on(colour: str) -> Line2D:
+    """Return the mark of a legend for an axis that is seen from its end."""
+    return Line2D([], [], linestyle="none", marker="o", markersize=8, markeredgecolor=colour, markerfacecolor="white")
+
+
 class Panel:
     """One robot on one pair of axes.
 
@@ -209,7 +214,7 @@ class Panel:
     def _paint_frame(self, name: str, origin: FloatArray, rotation: FloatArray) -> None:
         """Paint the axes of the world frame, ``O``, or of the platform frame, ``P``."""
         length = _FRAME * self.drawing.size
-        at = 6 if name == "O" else 46
+        at = 9.5 if name == "O" else 46
         for letter, axis in zip("xyz", rotation.T, strict=True):
             end = origin + length * axis
             self._canvas.arrow(origin, end, f"frame {name} {letter}", INK, 1.1, at)
@@ -220,20 +225,22 @@ class Panel:
         """Paint a twist's axis in bold with the path that shows its pitch; a free motion dashed and without a path."""
         colour, width = (FREE, 2.0) if free else (INK, 3.6)
         name = "free axis" if free else "axis"
-        if math.isinf(motion.pitch):
+        is_point = self._canvas.is_end_on(*motion.line)
+        if math.isinf(motion.pitch) or is_point:
             self._canvas.arrow(motion.line[0], motion.line[1], name, colour, width, 47)
         else:
             dashes = (0, (3, 2)) if free else "solid"
             self._canvas.line(motion.line, name, color=colour, linewidth=width, zorder=8, linestyle=dashes)
-            if not free and len(motion.path) > 2:
-                self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
-                self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
+        if not free and len(motion.path) > 2:
+            self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
+            self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
         if free:
             if not any(text.startswith("motion that") for _, text in self.legend):
-                handle = Line2D([], [], color=FREE, linewidth=2, linestyle=(0, (3, 2)))
+                handle = _end_on(FREE) if is_point else Line2D([], [], color=FREE, linewidth=2, linestyle=(0, (3, 2)))
                 self.legend.append((handle, "motion that nothing resists"))
             return
-        self.legend.append((Line2D([], [], color=INK, linewidth=3.6), f"task: {self._words(motion)}"))
+        handle = _end_on(INK) if is_point else Line2D([], [], color=INK, linewidth=3.6)
+        self.legend.append((handle, f"task: {self._words(motion)}"))
 
     def _words(self, motion: Motion) -> str:
         """Return the legend's text of the task."""
