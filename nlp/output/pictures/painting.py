@@ -35,7 +35,7 @@ _WIDTHS = {LinkKind.BAR: 7.0, LinkKind.ROD: 4.4}
 _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
 #: Places on a limb, in parts of its length, that its label may point to.
-_ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72)
+_ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72, 0.1, 0.84)
 #: The same for the arrow of a length.
 _ALONG_ARROW = (0.5, 0.35, 0.7)
 #: Radius of an angle's arc, in parts of its first ray.
@@ -47,6 +47,11 @@ _NOISE = 1e-9
 def rate_colour_map() -> LinearSegmentedColormap:
     """Return Matplotlib's colour map of rates, from the fastest shortening to the fastest lengthening."""
     return LinearSegmentedColormap.from_list("rates", RATE_COLOURS)
+
+
+def largest_rate(drawing: Drawing) -> float:
+    """Return the largest rate of a drawing; 0 where F is 0, so that the rates are rounding error, without shares."""
+    return max((abs(row.rate) for row in drawing.rows if not math.isnan(row.share)), default=0.0)
 
 
 def _end_on(colour: str) -> Line2D:
@@ -61,6 +66,7 @@ class Panel:
         axes: empty.
         view: the projection.
         drawing: the robot.
+        largest: rate at the ends of the colour scale; the largest of the robot when left out.
 
     Attributes:
         largest: rate at the ends of the colour scale, positive.
@@ -68,11 +74,9 @@ class Panel:
         symbols: the same for the symbols of joints.
     """
 
-    def __init__(self, axes: Axes, view: View, drawing: Drawing) -> None:
+    def __init__(self, axes: Axes, view: View, drawing: Drawing, largest: float | None = None) -> None:
         self.drawing = drawing
-        # Where F is 0 there are no shares, and the rates are rounding error.
-        sizes = [abs(row.rate) for row in drawing.rows if not math.isnan(row.share)]
-        self.largest = max(sizes, default=0.0) or 1.0
+        self.largest = largest or largest_rate(drawing) or 1.0
         self.legend: list[tuple[Artist, str]] = []
         self.symbols: list[tuple[Handles, str]] = []
         self._canvas = Canvas(axes, view, np.mean(drawing.posture.points, axis=0))
