@@ -91,17 +91,19 @@ class Canvas:
         if self.is_end_on(start, end):
             size, is_near = 5.0 + 2.4 * width, self.view.depth(end) > self.view.depth(start)
             style: dict[str, Any] = {"markeredgecolor": colour, "zorder": zorder}
-            self.marker(start, name, markersize=size, markerfacecolor="white", markeredgewidth=0.6 + 0.3 * width, **style)
+            self.marker(
+                start, name, markersize=size, markerfacecolor="white", markeredgewidth=0.6 + 0.3 * width, **style
+            )
             inner = 0.3 * size if is_near else 0.6 * size
-            self.marker(start, f"{name} head", "o" if is_near else "x", markersize=inner, markerfacecolor=colour, **style)
+            self.marker(
+                start, f"{name} head", "o" if is_near else "x", markersize=inner, markerfacecolor=colour, **style
+            )
             self.keep_free(np.array([start, end]))
             return
         if has_two_heads:
             self.arrow(start, start + 0.86 * (end - start), f"{name} second head", colour, width, zorder)
         a, b = self.view.project(start), self.view.project(end)
-        style = {
-            "arrowstyle": f"-|>,head_width={0.12 + 0.09 * width:.3f},head_length={0.3 + 0.14 * width:.3f}"
-        }
+        style = {"arrowstyle": f"-|>,head_width={0.12 + 0.09 * width:.3f},head_length={0.3 + 0.14 * width:.3f}"}
         style |= {"color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0}
         self._axes.annotate("", tuple(b), tuple(a), arrowprops=style, zorder=zorder, gid=name, annotation_clip=False)
         self.keep_free(np.array([start, end]))

@@ -101,8 +101,8 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
         panel = Panel(axes, view, drawing)
         panel.paint()
         if drawing.rows:
-            place = ((left + _WIDTH + 0.1) / width, (bottom + 0.22 * row_height) / height)
-            bar = add_colour_bar(figure, (*place, 0.16 / width, 0.5 * row_height / height), drawing, panel.largest)
+            corner = (left + _WIDTH + 0.1) / width, (bottom + 0.22 * row_height) / height
+            bar = add_colour_bar(figure, (*corner, 0.16 / width, 0.5 * row_height / height), drawing, panel.largest)
             bar.ax.hlines([row.rate for row in drawing.rows], 0, 1, color=INK, linewidth=1.0, gid="rates")
         panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
         low = bottom + 0.02 * (_HEIGHT + _TOP + _BOTTOM)

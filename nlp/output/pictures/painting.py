@@ -235,7 +235,7 @@ class Panel:
         else:
             dashes = (0, (3, 2)) if free else "solid"
             self._canvas.line(motion.line, name, color=colour, linewidth=width, zorder=8, linestyle=dashes)
-        if not free and len(motion.path) > 2:
+        if not free and motion.has_path:
             self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
             self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
         if free:
@@ -253,7 +253,8 @@ class Panel:
             return f"{motion.name} (translation)"
         if abs(motion.pitch) < _NOISE * self.drawing.size:
             return f"{motion.name} (rotation, path in purple)"
-        return f"{motion.name} (screw of pitch {motion.pitch:.5g} {unit}, path in purple)"
+        path = ", path in purple" if motion.has_path else ""
+        return f"{motion.name} (screw of pitch {motion.pitch:.5g} {unit}{path})"
 
     def _paint_couples(self) -> None:
         """Paint couples as arrows with two heads, at the points that join their limbs to the platform.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -10,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ....models import FloatArray
 from ...case.case import Case
@@ -24,8 +26,8 @@ from ..sweeptable import TablePoint
 from .canvas import INK, MUTED, draw_edges
 from .fonts import legible
 
-#: Width and height of the picture without its legend, and height of a line of the legend, inches; letters in a line, and lines of
-#: one entry at most.
+#: Width and height of the picture without its legend, and height of a line of the legend, inches; most letters of a
+#: line, and most lines of an entry.
 _SIZE, _LINE, _WIDE, _LINES = (7.2, 5.0), 0.155, 112, 4
 #: So many sets of active limits are numbered, those with the most points; others are outlined only.
 _NUMBERED = 12
@@ -49,53 +51,64 @@ def check_axes(points: Points) -> None:
         raise InputError(f"--plot: draws F over one or two numbers of --over, and {fault}")
 
 
-def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Figure:
+def sweep_legend(found: Sequence[TablePoint]) -> list[str]:
+    """Return what the lines in a picture are, and the active limits of each of its numbers, a sentence each."""
+    has_gaps = not all(np.isfinite(each.F) for each in found)
+    names = [name for name, _ in _counted(found)]
+    lines = ["Lines: the active limits change. Empty: no answer." if has_gaps else "Lines: the active limits change."]
+    sets = [name.split("; ") if name else [] for name in names[:_NUMBERED]]
+    everywhere = [side for side in sets[0] if all(side in each for each in sets)] if len(names) > 1 else []
+    lines += [f"Active at every number: {_grouped(everywhere)}"] if everywhere else []
+    also, other = ("also ", "other ") if everywhere else ("", "")
+    for k, each in enumerate(sets, start=1):
+        rest = [side for side in each if side not in everywhere]
+        lines.append(f"{k}: {also}{_grouped(rest)}" if rest else f"{k}: no {other}limit is active")
+    if len(names) > _NUMBERED:
+        lines.append(f"Without a number: {len(names) - _NUMBERED} further sets of active limits")
+    return lines
+
+
+def _counted(found: Sequence[TablePoint]) -> list[tuple[str, int]]:
+    """Return the sets of active limits with the number of their points, those of most points first."""
+    return Counter(sorted(each.active for each in found if np.isfinite(each.F))).most_common()
+
+
+def sweep_figure(
+    case: Case, points: Points, found: Sequence[TablePoint], *, legend: Sequence[str] | None = None
+) -> Figure:
     """Return F over one or two numbers as a Matplotlib figure.
 
     Args:
         case: the case, for the title and the unit of F.
         points: a grid over one or two numbers.
         found: objective and active sides at each point.
+        legend: sentences below the picture; those of :func:`sweep_legend` when left out.
     """
     changing = [(name, axis) for name, axis in zip(points.names, points.axes, strict=True) if len(axis) > 1]
     shape = tuple(len(axis) for _, axis in changing)
     F = np.array([each.F for each in found]).reshape(shape)
-    names = sorted({each.active for each in found if np.isfinite(each.F)})
+    names = [name for name, _ in _counted(found)]
     sets = np.array([names.index(each.active) if np.isfinite(each.F) else -1 for each in found]).reshape(shape)
-    # The sets of most points have the first numbers.
-    order = sorted(range(len(names)), key=lambda k: -int(np.count_nonzero(sets == k)))
-    legend = _legend([names[k] for k in order], has_gaps=bool(np.isnan(F).any()))
-    size = (_SIZE[0], _SIZE[1] + _LINE * len(legend))
+    lines = [
+        line
+        for text in (sweep_legend(found) if legend is None else legend)
+        for line in textwrap.wrap(text, _WIDE, max_lines=_LINES, placeholder=" …", subsequent_indent="    ")
+    ]
+    size = (_SIZE[0], _SIZE[1] + _LINE * len(lines))
     figure = Figure(figsize=size, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     if len(changing) == 1:
-        _draw_curve(axes, changing[0][1], F, sets, order, objective_label(case))
+        _draw_curve(axes, changing[0][1], F, sets, objective_label(case))
     else:
-        _draw_map(figure, axes, [axis for _, axis in changing], F, sets, order, objective_label(case))
+        _draw_map(figure, axes, [axis for _, axis in changing], F, sets, objective_label(case))
         axes.set_ylabel(_label(case, changing[1][0]), color=INK, parse_math=False)
     axes.set_xlabel(_label(case, changing[0][0]), color=INK, parse_math=False)
     draw_edges(axes)
     title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
-    figure.supxlabel(legible("\n".join(legend)), fontsize=8.5, color=INK, x=0.01, ha="left", parse_math=False)
+    if lines:
+        figure.supxlabel(legible("\n".join(lines)), fontsize=8.5, color=INK, x=0.01, ha="left", parse_math=False)
     return figure
-
-
-def _legend(names: Sequence[str], *, has_gaps: bool) -> list[str]:
-    """Return the lines below a picture: what the lines in it are, and the active limits of each number."""
-    lines = ["Lines: the active limits change. Empty: no answer." if has_gaps else "Lines: the active limits change."]
-    sets = [name.split("; ") if name else [] for name in names[:_NUMBERED]]
-    everywhere = [side for side in sets[0] if all(side in each for each in sets)] if len(names) > 1 else []
-    texts = [f"Active at every number: {_grouped(everywhere)}"] if everywhere else []
-    also = "also " if everywhere else ""
-    for k, each in enumerate(sets, start=1):
-        rest = [side for side in each if side not in everywhere]
-        texts.append(f"{k}: {also}{_grouped(rest)}" if rest else f"{k}: no {'other ' if everywhere else ''}limit is active")
-    for text in texts:
-        lines += textwrap.wrap(text, _WIDE, max_lines=_LINES, placeholder=" …", subsequent_indent="    ")
-    if len(names) > _NUMBERED:
-        lines.append(f"Without a number: {len(names) - _NUMBERED} further sets of active limits")
-    return lines
 
 
 def _grouped(sides: Sequence[str]) -> str:
@@ -117,7 +130,7 @@ def _label(case: Case, name: str) -> str:
     return legible(f"{name}, {unit}" if unit else name)
 
 
-def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: FloatArray, order: Sequence[int], label: str) -> None:
+def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: NDArray[np.intp], label: str) -> None:
     """Draw F over one number, with a line between neighbours whose active sets differ, and the numbers of these."""
     by_x = np.argsort(x)
     x, F, sets = x[by_x], F[by_x], sets[by_x]
@@ -130,7 +143,7 @@ def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: FloatArray, orde
     spans = [(first, last) for first, last in pairwise([0, *changes.tolist(), len(x)]) if sets[first] >= 0]
     rows: list[list[float]] = [[] for _ in _ROWS]
     for first, last in sorted(spans, key=lambda span: span[0] - span[1]):
-        at, number = float(x[first] + x[last - 1]) / 2, order.index(int(sets[first]))
+        at, number = float(x[first] + x[last - 1]) / 2, int(sets[first])
         for row, places in zip(_ROWS, rows, strict=True):
             if number < _NUMBERED and all(abs(at - other) >= _ROOM[0] * (x[-1] - x[0]) for other in places):
                 places.append(at)
@@ -147,8 +160,7 @@ def _draw_map(
     axes: Axes,
     at: Sequence[FloatArray],
     F: FloatArray,
-    sets: FloatArray,
-    order: Sequence[int],
+    sets: NDArray[np.intp],
     label: str,
 ) -> None:
     """Draw F over two numbers in colours, one cell a point, with lines around cells of the same active sets."""
@@ -158,7 +170,7 @@ def _draw_map(
     mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(F.T), cmap="viridis", gid="F")
     bar = figure.colorbar(mesh, ax=axes)
     bar.set_label(label, color=INK, parse_math=False)
-    bar.formatter.set_useOffset(False)
+    bar.ax.ticklabel_format(useOffset=False)
     lines = [[(x[i + 1], y[j]), (x[i + 1], y[j + 1])] for i, j in zip(*np.nonzero(np.diff(sets, axis=0)), strict=True)]
     lines += [[(x[i], y[j + 1]), (x[i + 1], y[j + 1])] for i, j in zip(*np.nonzero(np.diff(sets, axis=1)), strict=True)]
     # Dark with a light edge, which is seen on every colour.
@@ -167,13 +179,13 @@ def _draw_map(
     middles = np.stack(np.meshgrid((x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2, indexing="ij"), axis=-1)
     room = np.array(_ROOM) * [np.ptp(x), np.ptp(y)]
     places: list[FloatArray] = []
-    for region in _regions(sets, order[:_NUMBERED]):
+    for region in _regions(sets):
         # The cell that lies deepest within the region, and where a number stands already the next one.
         for cell in region:
             place = middles[tuple(cell)]
             if all((np.abs(place - other) >= room).any() for other in places):
                 places.append(place)
-                _write_number(axes, order.index(int(sets[tuple(cell)])), *place)
+                _write_number(axes, int(sets[tuple(cell)]), *place)
                 break
     axes.set_xticks(*_ticks(at[0]))
     axes.set_yticks(*_ticks(at[1]))
@@ -187,15 +199,16 @@ def _write_number(axes: Axes, place: int, x: float, y: float, *, is_on_top: bool
     axes.text(x, y, str(place + 1), transform=where, bbox=disc, zorder=10, **style)  # type: ignore[arg-type]
 
 
-def _regions(sets: FloatArray, shown: Sequence[int]) -> list[FloatArray]:
+def _regions(sets: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     """Return the cells (k, 2) of each region that has a number, those deepest within it first.
 
+    Of each set of active limits that is numbered the largest region has a number, and further ones that are large.
+
     Args:
-        sets: (n, m) the set of active limits of each cell.
-        shown: the sets that have a number; of each its largest region has one, and further ones that are large.
+        sets: (n, m) the set of active limits of each cell, by its place; -1 for none.
     """
-    found: list[FloatArray] = []
-    for index in shown:
+    found: list[NDArray[np.intp]] = []
+    for index in range(min(int(sets.max()) + 1, _NUMBERED)):
         left, parts = sets == index, []
         while left.any():
             part = np.zeros_like(left)
@@ -209,13 +222,13 @@ def _regions(sets: FloatArray, shown: Sequence[int]) -> list[FloatArray]:
     return found
 
 
-def _spread(part: FloatArray) -> FloatArray:
+def _spread(part: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return a region (n, m) with its neighbours on four sides."""
     wide = np.pad(part, 1)
     return wide[1:-1, 1:-1] | wide[:-2, 1:-1] | wide[2:, 1:-1] | wide[1:-1, :-2] | wide[1:-1, 2:]
 
 
-def _inwards(part: FloatArray) -> FloatArray:
+def _inwards(part: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return the cells (k, 2) of a region (n, m), those farthest from its edge first."""
     depth, inner = np.zeros(part.shape), part
     while inner.any():

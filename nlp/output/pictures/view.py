@@ -61,12 +61,12 @@ class View:
         return np.asarray(points @ self.axes[2])
 
 
-def clearest_view(*drawings: Drawing, elevation: float = _ELEVATION) -> View:
+def clearest_view(*drawings: Drawing, elevation: float = _ELEVATION, width: float = _LEAST_WIDTH) -> View:
     """Return one view of drawings in which limbs stand farthest apart on paper and every motion can be seen.
 
-    A robot that moves in the plane of x and y is seen from above, x to the right; one in an upright plane from the side.
+    A robot that moves in the plane of x and y is seen from above, x to the right; in an upright plane, from its side.
     Others are seen from the elevation stated, or from higher where an axis would be seen from its end, or a path from
-    its edge.
+    its edge: narrower than a part of its own width.
     """
     planes = [_face_on(drawing) for drawing in drawings]
     if planes[0] is not None and all(view == planes[0] for view in planes):
@@ -75,10 +75,10 @@ def clearest_view(*drawings: Drawing, elevation: float = _ELEVATION) -> View:
 
     def score(view: View) -> float:
         clear = sum(_clearness(view, drawing) for drawing in drawings) / len(drawings)
-        return clear - _HIDDEN * _hidden(view, motions)
+        return clear - _HIDDEN * _hidden(view, motions, width)
 
     tried = [[View(float(azimuth), elevation + more) for azimuth in _AZIMUTHS] for more in _HIGHER]
-    low = next((views for views in tried if any(_hidden(view, motions) == 0 for view in views)), None)
+    low = next((views for views in tried if any(_hidden(view, motions, width) == 0 for view in views)), None)
     return max(low or [view for views in tried for view in views], key=score)
 
 
@@ -108,14 +108,14 @@ def _face_on(drawing: Drawing) -> View | None:
     return View(math.degrees(math.atan2(y, x)), 0.0)
 
 
-def _hidden(view: View, motions: Sequence[Motion]) -> float:
-    """Return by how much axes of motions are too short on paper, and their paths too narrow; 0 where all can be seen."""
+def _hidden(view: View, motions: Sequence[Motion], width: float) -> float:
+    """Return by how much axes of motions are too short on paper, and their paths too narrow; 0 where all are seen."""
     missing = 0.0
     for motion in motions:
         missing += max(0.0, _LEAST_LENGTH - float(np.linalg.norm(view.project(motion.axis))))
-        if len(motion.path):
+        if motion.has_path:
             # A circle about the axis is as wide on paper as the axis points towards the eye.
-            missing += max(0.0, _LEAST_WIDTH - abs(float(view.depth(motion.axis))))
+            missing += max(0.0, width - abs(float(view.depth(motion.axis))))
     return missing
 
 

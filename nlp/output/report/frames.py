@@ -134,6 +134,8 @@ _DIGITS = 11
 _ROUNDING = 1e-9
 #: First elevation of the eye, degrees, and its largest: from right above, the page's camera would have no upwards.
 _ELEVATION, _HIGHEST = 26.0, 89.0
+#: Least part of the width of a motion's path that is seen from afar: in perspective, away from the middle, it is less.
+_WIDTH = 0.43
 
 
 class PointData(TypedDict):
@@ -312,7 +314,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
 
 def first_eye(drawing: Drawing) -> list[float]:
     """Return the direction (3,) to the eye of the first view of a page."""
-    view = clearest_view(drawing, elevation=_ELEVATION)
+    view = clearest_view(drawing, elevation=_ELEVATION, width=_WIDTH)
     return [float(each) for each in View(view.azimuth, min(view.elevation, _HIGHEST)).axes[2]]
 
 
