@@ -4,5 +4,6 @@ The modules import each other in this order: ``posture`` (the robot as numbers a
 ``loads`` (arrows of forces), ``drawing`` (the robot with its task), ``solutions`` (drawings of a solution), ``view``;
 then, with Matplotlib, ``labels``, ``canvas``, ``joints`` (symbols), ``painting`` and ``figures``, and the pictures of
 numbers (``curves``, ``sweeps``, ``workspaces``, and ``paths`` after ``pathpanels``, its content), ``designs`` and
-``comparisons`` of several robots; at last ``plot``, which is public. ``style``, ``requirements`` and ``fonts`` stand alone.
+``comparisons`` of several robots; at last ``plot``, which is public. ``style``, ``requirements`` and ``fonts`` stand
+alone.
 """
