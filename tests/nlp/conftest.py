@@ -9,10 +9,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -299,3 +300,28 @@ def embed(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Embedded]:
 def embedded(embed: Callable[..., Embedded]) -> Callable[[str], Embedded]:
     """The C of a shipped case, made once."""
     return cache(lambda name: embed(load_case(name), "-O2" if name in OPTIMISED else "-O1"))
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Chromium without a window, drawing 3-D in software."""
+    chromium, driver = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")
+    if not (chromium.exists() and driver.exists()):
+        pytest.skip("Debian's chromium and chromium-driver are not installed")
+    webdriver = pytest.importorskip("selenium.webdriver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = str(chromium)
+    switches = ["headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-dev-shm-usage"]
+    switches += ["disable-background-networking", "disable-component-update", "disable-sync", "window-size=1280,1000"]
+    switches += ["use-gl=angle", "use-angle=swiftshader", "enable-unsafe-swiftshader"]
+    switches += [f"user-data-dir={tmp_path_factory.mktemp('chromium')}"]
+    for switch in switches:
+        options.add_argument(f"--{switch}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    service = webdriver.chrome.service.Service(str(driver))
+    chrome = webdriver.Chrome(options=options, service=service)
+    # A busy machine is waited for.
+    chrome.set_page_load_timeout(600)
+    chrome.set_script_timeout(600)
+    yield chrome
+    chrome.quit()

@@ -25,9 +25,11 @@ from screwsynth.nlp import (
     build_model,
     compare,
     evaluate,
+    load_case,
     load_result,
 )
 from screwsynth.nlp.comparison.robots import placed, read_robots
+from screwsynth.nlp.output.pictures.comparisons import comparison_drawings, comparison_figure, comparison_pictures
 from screwsynth.nlp.results.schema import result_schema
 
 # The twist is about an axis far from the origin, so that a frame that is moved wrongly shows.
@@ -110,6 +112,32 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
     assert [float(row["value"]) for row in rows] == [each["value"] for each in result["robots"]]
     assert "no freedom" in out
     assert files["html"].read_text().count("<h3>") == 3
+
+
+def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
+    found = compare(load_case(path), ["6-sps", "case"], part=0, starts=1)
+    figure = comparison_figure(found)
+    words = [text.get_text() for text in figure.texts]
+    for entry in found.entries:
+        assert f"F = {entry.value:.5g} (mm/rad)², size {entry.final_size:.4g} mm" in words
+    panels = [axes for axes in figure.axes if any(line.get_gid() == "axis" for line in axes.lines)]
+    assert len(panels) == 2
+    # A length is as long on paper in both panels, and as long as the bar says.
+    (bar,) = [line for line in figure.artists + figure.lines if line.get_gid() == "scale"]
+    shown = next(float(text.split(" mm, in all panels")[0]) for text in words if "in all panels" in text)
+    long = np.ptp(bar.get_xdata()) * figure.bbox.width
+    for axes in panels:
+        ends = axes.transData.transform([[0, 0], [shown, 0]])
+        assert ends[1, 0] - ends[0, 0] == pytest.approx(long, rel=1e-9)
+    # The fastest limb of all has the colour at an end of the scale, and the legend says what is drawn.
+    rates = np.abs(np.concatenate([[row.rate for row in each.rows] for _, each in comparison_drawings(found)]))
+    (scale,) = [axes for axes in figure.axes if axes.get_xlabel() == "rate of each limb, mm/rad"]
+    assert scale.get_xlim() == pytest.approx((-rates.max(), rates.max()))
+    legend = {text.get_text() for each in figure.legends for text in each.get_texts()}
+    assert any(text.startswith("task: tilt (screw of pitch 3 mm") for text in legend)
+    assert {"spherical (S)", "filled: actuated"} <= legend
+    # On a page each robot has a picture of its own, and the legend one.
+    assert len(comparison_pictures(found)) == 3
 
 
 def test_dimensions_ranges_and_certificates() -> None:

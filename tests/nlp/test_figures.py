@@ -1,5 +1,6 @@
 """Pictures: what is drawn stands where the model says, in true proportion, and files come whole or not at all."""
 
+import itertools
 import math
 import re
 import struct
@@ -131,6 +132,15 @@ def distance(point: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
     return float(abs(x * v - y * u) / np.hypot(x, y))
 
 
+def cross(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two straight lines have a point in common, by Cramer's rule."""
+    (a, b), (c, d) = one, other
+    matrix = np.column_stack([b - a, c - d])
+    determinant = np.linalg.det(matrix)
+    parts = np.linalg.solve(matrix, c - a) if determinant else np.array([2.0, 2.0])
+    return bool((parts >= 0).all() and (parts <= 1).all())
+
+
 def assert_labels_are_clear(robots: list[Drawing]) -> Figure:
     """Every limb has one label, on no other limb and within the picture, with a line that ends on its own limb."""
     figure = figure_of(robots)
@@ -145,6 +155,15 @@ def assert_labels_are_clear(robots: list[Drawing]) -> Figure:
         assert set(limbs) == {link.limb for _, _, link in robot.links if link.limb}
         leaders = {str(line.get_gid()): axes.transData.transform(line.get_xydata()) for line in axes.lines}
         drawn = [line for name, line in leaders.items() if re.match(r"leader (?!edge$|dot$)", name)]
+        # No leader line crosses another one, or goes through a word that is not its own.
+        for one, other in itertools.combinations(drawn, 2):
+            assert not cross(one, other)
+        boxes = [text.get_window_extent().extents for text in axes.texts if text.get_text()]
+        for a, b in drawn:
+            hit = [box for box in boxes if crosses_box(a, b, tuple(box))]
+            assert all(crosses_box(b, b, tuple(box + 4 * np.array([-1, -1, 1, 1]))) for box in hit)
+        for one, other in itertools.combinations(boxes, 2):
+            assert (np.minimum(one[2:], other[2:]) <= np.maximum(one[:2], other[:2])).any()
         # A line that passes the dot of another one might name either place.
         for k, (dot, _) in enumerate(drawn):
             near = (*(dot - 3 * per_point), *(dot + 3 * per_point))
@@ -189,7 +208,7 @@ def test_limbs_are_drawn_between_their_joints_in_the_view_with_clear_labels(name
         assert np.max(np.abs(dict(lines)["axis"][[0, -1]] - view.project(robot.motion.line))) <= 1e-9 * robot.size
 
 
-@pytest.mark.parametrize("name", [*DRAWN_BY_HAND, "3-rps", "delta", "planar-3-rrr"])
+@pytest.mark.parametrize("name", model_names())
 def test_labels_of_robots_stand_on_no_other_limb(name: str) -> None:
     options = [each for each in model_options(name) if each.choices]
     variants = [{option.name: choice} for option in options for choice in option.choices or ()] or [{}]
@@ -202,6 +221,42 @@ def test_labels_of_robots_stand_on_no_other_limb(name: str) -> None:
             if text.get_text() in names:
                 box = text.get_window_extent().extents
                 assert not [k for loop in edges for k in range(len(loop) - 1) if crosses_box(loop[k], loop[k + 1], box)]
+
+
+@pytest.mark.parametrize("name", PICTURED)
+def test_no_motion_is_seen_from_its_end_and_no_path_from_its_edge(name: str) -> None:
+    robot = drawing(name)
+    axes = figure_of([robot]).axes[0]
+    for motion in (robot.motion, *robot.free):
+        if motion is not None:
+            view = clearest_view(robot)
+            assert np.linalg.norm(view.project(motion.axis)) >= 0.5
+    # A circle would be a line from its edge; the turns of a helix are seen from everywhere else.
+    is_circle = robot.motion is not None and robot.motion.pitch == 0
+    for line in (line for line in axes.lines if line.get_gid() == "path" and is_circle):
+        flat = np.asarray(line.get_xydata())
+        spread = np.linalg.svd(flat - flat.mean(axis=0), compute_uv=False)
+        assert spread[1] >= 0.2 * spread[0]
+
+
+@pytest.mark.parametrize("name", ["five-bar", "planar-3-prr", "planar-3-rpr", "planar-3-rrr"])
+def test_a_planar_robot_is_seen_from_above(name: str) -> None:
+    robot = drawing_of_model(build_model(name))
+    np.testing.assert_allclose(clearest_view(robot).project(np.eye(3)), [[1, 0], [0, 1], [0, 0]], atol=1e-12)
+    # The same robot in an upright plane: x to the right, z up.
+    turned = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    joints = tuple(each @ turned.T for each in robot.posture.joints)
+    upright = replace(robot, posture=replace(robot.posture, joints=joints))
+    np.testing.assert_allclose(clearest_view(upright).project(np.eye(3)), [[1, 0], [0, 0], [0, 1]], atol=1e-12)
+    # The axis that points to the eye is a circle with a dot.
+    marks = {line.get_gid() for line in figure_of([robot]).axes[0].lines}
+    assert {"frame O z", "frame O z head"} <= marks
+    assert "frame O x" not in marks
+
+
+@pytest.mark.parametrize("name", ["delta", "orthoglide", "3-prs", "spherical-3-rrr"])
+def test_a_robot_that_moves_in_space_is_not_seen_from_above(name: str) -> None:
+    assert clearest_view(drawing_of_model(build_model(name))).elevation < 50
 
 
 @pytest.mark.parametrize("name", ["paper-4.1-helical", "paper-4.4-max", "hexapod-machining"])

@@ -511,31 +511,6 @@ def test_output_is_checked_before_the_solve(cli: Run, monkeypatch: pytest.Monkey
     refusal_of(cli("report", "paper-4.1-helical", "--out", str(tmp_path / "none" / "page.html")), "none")
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """Chromium without a window, drawing 3-D in software."""
-    chromium, driver = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")
-    if not (chromium.exists() and driver.exists()):
-        pytest.skip("Debian's chromium and chromium-driver are not installed")
-    webdriver = pytest.importorskip("selenium.webdriver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = str(chromium)
-    switches = ["headless=new", "no-sandbox", "disable-gpu", "disable-quic", "no-first-run", "disable-dev-shm-usage"]
-    switches += ["disable-background-networking", "disable-component-update", "disable-sync", "window-size=1280,1000"]
-    switches += ["use-gl=angle", "use-angle=swiftshader", "enable-unsafe-swiftshader"]
-    switches += [f"user-data-dir={tmp_path_factory.mktemp('chromium')}"]
-    for switch in switches:
-        options.add_argument(f"--{switch}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    service = webdriver.chrome.service.Service(str(driver))
-    chrome = webdriver.Chrome(options=options, service=service)
-    # A busy machine is waited for.
-    chrome.set_page_load_timeout(600)
-    chrome.set_script_timeout(600)
-    yield chrome
-    chrome.quit()
-
-
 @pytest.fixture
 def opened(browser: Any, page_file: Callable[..., Path]) -> Iterator[Callable[..., Any]]:
     """A page opened from disk in the window's own width or another one, its picture drawn."""

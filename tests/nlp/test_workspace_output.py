@@ -23,7 +23,7 @@ from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.output.pictures.workspaces import slices_legend
+from screwsynth.nlp.output.pictures.workspaces import drawing_at, slices_legend
 from screwsynth.nlp.proof.statement.machine import legs_of
 from screwsynth.nlp.proof.workspace.ranks.krawczyk import Coordinates, no_relation
 from screwsynth.nlp.proof.workspace.ranks.loop_boxes import LoopBoxes
@@ -250,7 +250,7 @@ class Reader(HTMLParser):
         self.words += data
 
 
-def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceResult, Path]) -> None:
+def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceResult, Path], limited: Path) -> None:
     _, result, folder = refuted
     text = (folder / "page.html").read_text(encoding="utf-8")
     page = Reader(text)
@@ -264,6 +264,11 @@ def test_the_page_has_verdicts_poses_and_slices(refuted: tuple[str, WorkspaceRes
     worst = worst_claim(result, Sense.MAX)
     assert worst.words in page.words
     assert 'id="limb 1+"' in (folder / "worst.svg").read_text(encoding="utf-8")
+    # The picture says its pose.
+    headline = drawing_at(load_case(limited, {"x3": 6}), worst).headline
+    assert headline.startswith(f"refuted: {worst.words}; shown at ")
+    said = [float(each) for each in re.findall(r"-?[\d.]+(?:e-?\d+)?", headline.partition("shown at ")[2])]
+    assert said[:3] == pytest.approx(list(worst.pose.position), rel=1e-4, abs=1e-4)
 
 
 def test_the_shipped_hexapod_is_proved(cli: Run) -> None:

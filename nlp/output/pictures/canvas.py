@@ -21,6 +21,8 @@ INK, MUTED, FAINT, RED = "#17212b", "#55616c", "#b9c1c9", "#a3250f"
 Colour: TypeAlias = str | tuple[float, float, float, float]
 #: Room around everything drawn, in parts of the larger side.
 _MARGIN = 0.07
+#: An arrow that is shorter on paper, in parts of its length, is seen from its end.
+_END_ON = 0.02
 
 
 class Canvas:
@@ -82,16 +84,34 @@ class Canvas:
         *,
         has_two_heads: bool = False,
     ) -> None:
-        """Draw an arrow between two points (3,), with two heads for a moment; towards the eye it is only its head."""
+        """Draw an arrow between two points (3,), with two heads for a moment.
+
+        From its end it is a circle, with a dot where it points towards the eye, and a cross where it points away.
+        """
+        if self.is_end_on(start, end):
+            size, is_near = 5.0 + 2.4 * width, self.view.depth(end) > self.view.depth(start)
+            style: dict[str, Any] = {"markeredgecolor": colour, "zorder": zorder}
+            self.marker(
+                start, name, markersize=size, markerfacecolor="white", markeredgewidth=0.6 + 0.3 * width, **style
+            )
+            inner = 0.3 * size if is_near else 0.6 * size
+            self.marker(
+                start, f"{name} head", "o" if is_near else "x", markersize=inner, markerfacecolor=colour, **style
+            )
+            self.keep_free(np.array([start, end]))
+            return
         if has_two_heads:
             self.arrow(start, start + 0.86 * (end - start), f"{name} second head", colour, width, zorder)
         a, b = self.view.project(start), self.view.project(end)
-        style: dict[str, Any] = {
-            "arrowstyle": f"-|>,head_width={0.12 + 0.09 * width:.3f},head_length={0.3 + 0.14 * width:.3f}"
-        }
+        style = {"arrowstyle": f"-|>,head_width={0.12 + 0.09 * width:.3f},head_length={0.3 + 0.14 * width:.3f}"}
         style |= {"color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0}
         self._axes.annotate("", tuple(b), tuple(a), arrowprops=style, zorder=zorder, gid=name, annotation_clip=False)
         self.keep_free(np.array([start, end]))
+
+    def is_end_on(self, start: FloatArray, end: FloatArray) -> bool:
+        """Return whether an arrow between two points (3,) is seen from its end."""
+        way = end - start
+        return bool(np.linalg.norm(self.view.project(way)) <= _END_ON * np.linalg.norm(way))
 
     def label(
         self,

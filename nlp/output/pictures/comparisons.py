@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from ....models import Dimension
 from ...comparison.compare import Comparison
 from ...comparison.entry import Entry
 from ...errors import EvaluationError
+from ...results.objective import unit_of_objective
 from .canvas import INK, MUTED
 from .drawing import Drawing, drawing_of
+from .figures import add_colour_bar, add_legend, picture_of
 from .fonts import legible
-from .painting import Panel
-from .view import View
+from .joints import Handles
+from .painting import Panel, largest_rate
+from .view import View, clearest_view
 
 #: Width, height and heading of a panel, in inches; panels in a row.
 _WIDTH, _HEIGHT, _HEADING, _ACROSS = 4.2, 4.2, 0.65, 3
-#: The eye of all panels: a view that suits one robot would hide that another is of the same size.
-_VIEW = View(-60.0)
+_ROW = _HEIGHT + _HEADING
+#: Least width, and heights of the title and of scales and legend, inches.
+_LEAST, _TITLE, _FOOT = 6.6, 0.4, 1.65
 #: Part of a panel's width that the bar of the scale may have.
 _BAR = 0.4
 
@@ -41,55 +49,137 @@ def comparison_drawings(found: Comparison) -> list[tuple[Entry, Drawing]]:
     return drawings
 
 
+class _Pair(NamedTuple):
+    """A robot of a comparison, and its drawing without words."""
+
+    entry: Entry
+    drawing: Drawing
+
+
+class _Scale(NamedTuple):
+    """What all panels have in common: the eye, the rate at the ends of the colours, and half of a panel's width."""
+
+    view: View
+    largest: float
+    half: float
+
+
 def comparison_figure(found: Comparison) -> Figure:
     """Return the robots of a comparison at their designs, all in one scale, with a bar that states it.
 
     Raises:
         EvaluationError: no robot has an answer that exists.
     """
-    drawings = comparison_drawings(found)
-    if not drawings:
-        raise EvaluationError(f"{found.case.source or found.case.name}: no robot has a design to draw")
-    across = min(len(drawings), _ACROSS)
-    down = -(-len(drawings) // across)
-    row = _HEIGHT + _HEADING
-    width, height = across * _WIDTH, down * row + 0.5
-    figure = Figure(figsize=(width, height), facecolor="white")
-    FigureCanvasAgg(figure)
-    panels: list[Axes] = []
-    for k, (entry, drawing) in enumerate(drawings):
-        left, top = k % across * _WIDTH, height - k // across * row
-        axes = figure.add_axes((left / width, (top - row) / height, _WIDTH / width, _HEIGHT / height))
-        # The start of the search and the free motions of one robot say nothing about another.
-        # Words, which a picture of one robot has, would hide these smaller ones.
-        Panel(axes, _VIEW, _plain(drawing)).paint()
-        panels.append(axes)
-        _write_heading(figure, (left + 0.15) / width, (top - 0.12) / height, entry)
-    half = max(_half_width(axes) for axes in panels)
-    for axes in panels:
-        for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
-            middle = float(np.mean(get()))
-            put(middle - half, middle + half)
-    _draw_scale(figure, found, half, width, height)
+    pairs = _pairs(found)
+    across = min(len(pairs), _ACROSS)
+    width, height = max(across * _WIDTH, _LEAST), -(-len(pairs) // across) * _ROW + _TITLE + _FOOT
+    figure = _empty(width, height)
+    scale = _scale_of(pairs)
+    for k, pair in enumerate(pairs):
+        _draw_panel(figure, k % across * _WIDTH, height - _TITLE - k // across * _ROW, found, pair, scale)
+    case = found.case
+    title = "".join(textwrap.wrap(legible(case.title or case.name), int(width / 0.11), max_lines=1, placeholder=" …"))
+    figure.text(0.15 / width, 1 - 0.15 / height, title, fontsize=12, color=INK, va="top", parse_math=False)
+    _draw_length(figure, _FOOT - 0.28, found, scale)
+    _draw_legend(figure, pairs, scale)
     return figure
 
 
+def comparison_pictures(found: Comparison) -> list[bytes]:
+    """Return an SVG picture of each robot, with the bar of the scale, and at last one of their common legend.
+
+    Raises:
+        EvaluationError: no robot has an answer that exists.
+    """
+    pairs = _pairs(found)
+    scale = _scale_of(pairs)
+
+    def panel(pair: _Pair) -> Figure:
+        figure = _empty(_WIDTH, _ROW + 0.3)
+        _draw_panel(figure, 0.0, _ROW + 0.3, found, pair, scale)
+        _draw_length(figure, 0.15, found, scale)
+        return figure
+
+    def legend() -> Figure:
+        figure = _empty(_LEAST, _FOOT)
+        _draw_legend(figure, pairs, scale, 0.15 / _LEAST)
+        return figure
+
+    return [*(picture_of(".svg", panel, pair) for pair in pairs), picture_of(".svg", legend)]
+
+
+def _pairs(found: Comparison) -> list[_Pair]:
+    """Return the robots that have a design to draw.
+
+    Raises:
+        EvaluationError: there is none.
+    """
+    pairs = [_Pair(entry, _plain(drawing)) for entry, drawing in comparison_drawings(found)]
+    if not pairs:
+        raise EvaluationError(f"{found.case.source or found.case.name}: no robot has a design to draw")
+    return pairs
+
+
+def _empty(width: float, height: float) -> Figure:
+    """Return an empty figure; width and height are in inches."""
+    figure = Figure(figsize=(width, height), facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _scale_of(pairs: Sequence[_Pair]) -> _Scale:
+    """Return one eye, one scale of colours and one of lengths, which show which of two robots is larger or faster."""
+    drawings = [pair.drawing for pair in pairs]
+    view, half = clearest_view(*drawings), 0.0
+    for drawing in drawings:
+        axes = _empty(_WIDTH, _HEIGHT).add_axes((0, 0, 1, 1))
+        Panel(axes, view, drawing).paint()
+        half = max(half, float(np.ptp(axes.get_xlim())) / 2, float(np.ptp(axes.get_ylim())) / 2)
+    return _Scale(view, max(map(largest_rate, drawings)) or 1.0, half)
+
+
+def _draw_panel(figure: Figure, left: float, top: float, found: Comparison, pair: _Pair, scale: _Scale) -> None:
+    """Draw a robot below its name; the place of the upper left corner is in inches."""
+    width, height = figure.get_size_inches()
+    axes = figure.add_axes((left / width, (top - _ROW) / height, _WIDTH / width, _HEIGHT / height))
+    Panel(axes, scale.view, pair.drawing, scale.largest).paint()
+    for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
+        middle = float(np.mean(get()))
+        put(middle - scale.half, middle + scale.half)
+    _write_heading(figure, (left + 0.15) / width, (top - 0.12) / height, found, pair.entry)
+
+
+def _draw_legend(figure: Figure, pairs: Sequence[_Pair], scale: _Scale, left: float = 0.48) -> None:
+    """Draw the scale of the rates, from a part of the width on, and the legend of all panels at a figure's bottom."""
+    width, height = figure.get_size_inches()
+    entries: dict[str, Artist | Handles] = {}
+    symbols: dict[str, Artist | Handles] = {}
+    for pair in pairs:
+        panel = Panel(_empty(_WIDTH, _HEIGHT).add_axes((0, 0, 1, 1)), scale.view, pair.drawing)
+        panel.paint()
+        # The fastest corner is another one in each panel.
+        entries |= {text.split(" (fastest")[0]: handle for handle, text in panel.legend}
+        symbols |= {text: handle for handle, text in panel.symbols}
+    if pairs[0].drawing.rows:
+        place = (left, (_FOOT - 0.35) / height, 0.5, 0.14 / height)
+        add_colour_bar(figure, place, pairs[0].drawing, scale.largest, "horizontal")
+    columns = max(1, min(len(symbols), int(width / 1.5)))
+    add_legend(figure, 0.15 / width, 0.5 / height, [(handle, text) for text, handle in entries.items()])
+    add_legend(figure, 0.15 / width, 0.1 / height, [(handle, text) for text, handle in symbols.items()], columns)
+
+
 def _plain(drawing: Drawing) -> Drawing:
-    """Return a drawing without its start and its free motions."""
-    return replace(drawing, reference=None, free=())
+    """Return a drawing without its start, free motions and forces, whose scales are those of one robot."""
+    return replace(drawing, reference=None, free=(), forces=None)
 
 
-def _half_width(axes: Axes) -> float:
-    """Return half of the larger side of what a panel shows, length."""
-    return max(float(np.ptp(axes.get_xlim())), float(np.ptp(axes.get_ylim()))) / 2
-
-
-def _write_heading(figure: Figure, left: float, top: float, entry: Entry) -> None:
-    """Write the name of a robot and its F above its panel."""
-    value = entry.value
-    words = (
-        "no common value" if value is None else f"F = {value:.5g}" if len(entry.tasks) == 1 else f"value {value:.5g}"
-    )
+def _write_heading(figure: Figure, left: float, top: float, found: Comparison, entry: Entry) -> None:
+    """Write the name of a robot, its F and its size above its panel."""
+    value, units = entry.value, found.case.units
+    name, unit = ("F", unit_of_objective(found.case)) if len(entry.tasks) == 1 else ("value", "")
+    words = "no common value" if value is None else f"{name} = {value:.5g} {unit}".rstrip()
+    if entry.final_size is not None:
+        words += f", size {entry.final_size:.4g} {units.length}"
     if entry.can_move is False:
         words += ", cannot make the motion"
     heading = f"{legible(entry.contender.label)}"
@@ -97,17 +187,14 @@ def _write_heading(figure: Figure, left: float, top: float, entry: Entry) -> Non
     figure.text(left, top - 0.24 / figure.get_figheight(), words, fontsize=9.5, color=MUTED, va="top", parse_math=False)
 
 
-def _draw_scale(figure: Figure, found: Comparison, half: float, width: float, height: float) -> None:
-    """Draw a bar whose length is a round number of the case's unit, for all panels."""
-    longest = 2 * half * _BAR
+def _draw_length(figure: Figure, bottom: float, found: Comparison, scale: _Scale) -> None:
+    """Draw a bar whose length is a round number of the case's unit, for all panels; its place is in inches."""
+    longest = 2 * scale.half * _BAR
     power = 10.0 ** np.floor(np.log10(longest))
     length = max(step * power for step in (1, 2, 5) if step * power <= longest)
-    part = length / (2 * half) * _WIDTH / width
-    axes = figure.add_axes((0, 0, 1, 0.5 / height))
-    axes.set_axis_off()
-    axes.set_xlim(0, 1)
-    axes.set_ylim(0, 1)
-    left = 0.15 / width
-    axes.plot([left, left + part], [0.45, 0.45], color=INK, linewidth=2.0, solid_capstyle="butt", gid="scale")
+    width, height = figure.get_size_inches()
+    left, part, at = 0.15 / width, length / (2 * scale.half) * _WIDTH / width, bottom / height
+    bar = Line2D([left, left + part], [at, at], color=INK, linewidth=2.0, solid_capstyle="butt", gid="scale")
+    figure.add_artist(bar)
     text = f"{found.case.units.text(float(length), Dimension.LENGTH)}, in all panels"
-    axes.text(left + part + 0.1 / width, 0.45, text, fontsize=9, color=MUTED, va="center", parse_math=False)
+    figure.text(left + part + 0.1 / width, at, text, fontsize=9, color=MUTED, va="center", parse_math=False)

@@ -18,11 +18,11 @@ _SIZE = (2.9, 2.6)
 
 
 def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:
-    """Return an SVG picture of each design of one robot, in order, all with the first one's view and one scale.
+    """Return an SVG picture of each design of one robot, in order, all from one view and in one scale.
 
     A picture has the robot and the axis of its task; its limbs have the colours of their rates.
     """
-    view = clearest_view(drawings[0])
+    view = clearest_view(*drawings)
     plain = [replace(each, free=(), reference=None, forces=None) for each in drawings]
     frames = np.array([_limits(each, view) for each in plain])
     low, high = frames[:, 0].min(axis=0), frames[:, 1].max(axis=0)

@@ -85,6 +85,11 @@ class Motion:
     line: FloatArray
     path: FloatArray
 
+    @property
+    def has_path(self) -> bool:
+        """Whether a path is drawn: that of a large pitch is as good as straight."""
+        return len(self.path) > 2
+
 
 @dataclass(frozen=True, eq=False)
 class Drawing:

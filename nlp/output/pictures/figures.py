@@ -5,12 +5,13 @@ from __future__ import annotations
 import io
 import textwrap
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, ParamSpec
+from typing import Any, Literal, NamedTuple, ParamSpec
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -53,7 +54,7 @@ def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = Non
     Args:
         drawings: one robot, or the same robot with several tasks, which stand side by side.
         ending: ``.png``, ``.svg`` or ``.pdf``.
-        view: the projection; the clearest for the first drawing when left out.
+        view: the projection; the clearest for all drawings when left out.
     """
     return picture_of(ending, figure_of, drawings, view=view)
 
@@ -84,7 +85,7 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
     Every artist that shows a part of the robot carries its name as ``gid``: ``limb 1``, ``couple 1``, ``axis``,
     ``path``, ``velocity A1``, ``start limb 1``, ``mark x1``, ``joint B1``.
     """
-    view = view or clearest_view(drawings[0])
+    view = view or clearest_view(*drawings)
     across = len(drawings) if len(drawings) <= _ACROSS else 2
     side = _SIDE if drawings[0].rows else 0.2
     room = _BOTTOM + (_SYMBOLS if any(each.model.scene.joints for each in drawings) else 0.0)
@@ -100,13 +101,14 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
         panel = Panel(axes, view, drawing)
         panel.paint()
         if drawing.rows:
-            bar = ((left + _WIDTH + 0.1) / width, (bottom + 0.22 * row_height) / height)
-            _add_colour_bar(figure, *bar, 0.16 / width, 0.5 * row_height / height, drawing, panel.largest)
+            corner = (left + _WIDTH + 0.1) / width, (bottom + 0.22 * row_height) / height
+            bar = add_colour_bar(figure, (*corner, 0.16 / width, 0.5 * row_height / height), drawing, panel.largest)
+            bar.ax.hlines([row.rate for row in drawing.rows], 0, 1, color=INK, linewidth=1.0, gid="rates")
         panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
         low = bottom + 0.02 * (_HEIGHT + _TOP + _BOTTOM)
         if panel.symbols:
-            _add_legend(figure, (left + 0.25) / width, low / height, panel.symbols, len(panel.symbols))
-        _add_legend(figure, (left + 0.25) / width, (low + room - _BOTTOM) / height, panel.legend)
+            add_legend(figure, (left + 0.25) / width, low / height, panel.symbols, len(panel.symbols))
+        add_legend(figure, (left + 0.25) / width, (low + room - _BOTTOM) / height, panel.legend)
         _write_heading(figure, (left + 0.25) / width, top / height, height, drawing)
     return figure
 
@@ -148,22 +150,24 @@ def _write_heading(figure: Figure, left: float, top: float, height: float, drawi
         top -= (1.35 * size / 72 * len(lines)) / height
 
 
-def _add_colour_bar(
-    figure: Figure, left: float, bottom: float, width: float, height: float, drawing: Drawing, largest: float
-) -> None:
-    """Draw the scale of the rates with a mark for each limb; place and size are in parts of the figure."""
-    axes = figure.add_axes((left, bottom, width, height))
+def add_colour_bar(
+    figure: Figure,
+    place: tuple[float, float, float, float],
+    drawing: Drawing,
+    largest: float,
+    orientation: Literal["vertical", "horizontal"] = "vertical",
+) -> Colorbar:
+    """Draw the scale of the rates; the place, left, bottom, width and height, is in parts of the figure."""
     scale = ScalarMappable(Normalize(-largest, largest), rate_colour_map())
-    bar = figure.colorbar(scale, cax=axes)
+    bar = figure.colorbar(scale, cax=figure.add_axes(place), orientation=orientation)
     unit = rate_unit(drawing.motion.twist, drawing.case.units) if drawing.motion and drawing.case else ""
     bar.set_label(legible(f"{rate_word(drawing.model)} of each limb, {unit}"), color=INK, fontsize=9, parse_math=False)
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.outline.set_edgecolor(MUTED)
-    rates = [row.rate for row in drawing.rows]
-    bar.ax.hlines(rates, 0, 1, color=INK, linewidth=1.0, gid="rates")
+    return bar
 
 
-def _add_legend(
+def add_legend(
     figure: Figure, left: float, bottom: float, entries: Sequence[tuple[Artist | Handles, str]], columns: int = 1
 ) -> None:
     """Write a legend of handles and texts; the place is in parts of the figure."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -80,7 +81,7 @@ _ROOM, _HALF_LIMB = 2.0, 4.0
 #: Costs of covering another word, of covering a line that is kept free, and of a point of distance.
 _OVERLAP, _COVERED, _FAR = 50.0, 12.0, 0.12
 #: A word on a limb that is not its own is wrong, and a leader line across one misleads.
-_ON_OTHER_LIMB, _LEADER_CROSSES = 400.0, 6.0
+_ON_OTHER_LIMB, _LEADER_CROSSES = 400.0, 14.0
 #: A leader line that ends where another limb is too, or passes the dot of another one, might mean that one.
 _AMBIGUOUS = 30.0
 #: A leader line that passes a joint, so near in points, seems to name it.
@@ -93,6 +94,8 @@ _LEADER_ALONG, _LEADER_PARTS = 2.0, (0.4, 0.6, 0.8, 1.0)
 _LED = 4.0
 #: So far from its place, in points, every word has a leader line.
 _ASTRAY = 15.0
+#: Words whose cost is as large are placed again when all others stand, so often.
+_CROWDED, _ROUNDS = 10.0, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +138,27 @@ class Obstacles:
     owners: tuple[str, ...]
 
 
+class _Placed(NamedTuple):
+    """A word at its place, in pixels.
+
+    Attributes:
+        middle: (2,) of its box.
+        half: (2,) half of the size of its box.
+        leader: (4,) ends of its leader line, from the place that it names; None without one.
+        cost: of the place.
+    """
+
+    middle: FloatArray
+    half: FloatArray
+    leader: FloatArray | None
+    cost: float
+
+    @property
+    def box(self) -> FloatArray:
+        """Its left, bottom, right and top, (4,)."""
+        return np.concatenate([self.middle - self.half, self.middle + self.half])
+
+
 @dataclass(frozen=True, eq=False)
 class _Sheet:
     """What is already on the paper, in pixels.
@@ -143,17 +167,23 @@ class _Sheet:
         segments: (k, 4) lines.
         owners: (k,) limb of each line; empty for none.
         frame: left, bottom, right and top of the axes.
-        taken: boxes of the words already placed.
-        leaders: (k, 4) leader lines already placed.
+        taken: boxes of the words already placed, (4,) each.
+        leaders: leader lines already placed, (4,) each.
         per_point: pixels of a point.
     """
 
     segments: FloatArray
     owners: FloatArray
     frame: tuple[float, float, float, float]
-    taken: list[tuple[float, float, float, float]]
-    leaders: list[tuple[float, float, float, float]]
+    taken: list[FloatArray]
+    leaders: list[FloatArray]
     per_point: float
+
+    def put(self, placed: _Placed) -> None:
+        """Put a word with its leader line on the paper."""
+        self.taken.append(placed.box)
+        if placed.leader is not None:
+            self.leaders.append(placed.leader)
 
 
 def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], obstacles: Obstacles) -> list[Text]:
@@ -175,35 +205,49 @@ def place_labels(axes: Axes, renderer: RendererAgg, labels: Sequence[Label], obs
         [],
         float(axes.figure.dpi) / 72,
     )
+    texts = [_text_of(axes, label) for label in labels]
+    extents = [text.get_window_extent(renderer) for text in texts]
+    halves = [np.array([each.width, each.height]) / 2 + _ROOM for each in extents]
+    found: list[_Placed] = []
+    for label, half in zip(labels, halves, strict=True):
+        found.append(_best_place(label, half, axes.transData.transform(label.at), sheet))
+        sheet.put(found[-1])
+    for _ in range(_ROUNDS):
+        # Words that came later may be in the way of earlier ones, which take the best place that is left.
+        crowded = [k for k, each in enumerate(found) if each.cost >= _CROWDED]
+        before = [found[k].cost for k in crowded]
+        for k in crowded:
+            without = replace(sheet, taken=[], leaders=[])
+            for each in (*found[:k], *found[k + 1 :]):
+                without.put(each)
+            found[k] = _best_place(labels[k], halves[k], axes.transData.transform(labels[k].at), without)
+        if [found[k].cost for k in crowded] == before:
+            break
     back = axes.transData.inverted()
-    texts = []
-    for label in labels:
-        text = axes.text(
-            float(label.at[0, 0]),
-            float(label.at[0, 1]),
-            legible(label.text),
-            color=label.color,
-            fontsize=label.size,
-            fontweight="bold" if label.bold else "normal",
-            ha="center",
-            va="center",
-            multialignment="center",
-            parse_math=False,
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
-            zorder=100,
-            gid=label.name or None,
-        )
-        extent = text.get_window_extent(renderer)
-        half = np.array([extent.width, extent.height]) / 2 + _ROOM
-        place, start = _best_place(label, half, axes.transData.transform(label.at), sheet)
-        text.set_position(tuple(back.transform(place)))
-        sheet.taken.append((*(place - half), *(place + half)))
-        end = _edge_towards(place, half, start)
-        if _is_led(label, start, end, sheet):
-            sheet.leaders.append((*start, *end))
-            _draw_leader(axes, back.transform(np.array([start, end])), label)
-        texts.append(text)
+    for label, text, placed in zip(labels, texts, found, strict=True):
+        text.set_position(tuple(back.transform(placed.middle)))
+        if placed.leader is not None:
+            _draw_leader(axes, back.transform(placed.leader.reshape(2, 2)), label)
     return texts
+
+
+def _text_of(axes: Axes, label: Label) -> Text:
+    """Return a word on the axes, not yet at its place."""
+    return axes.text(
+        float(label.at[0, 0]),
+        float(label.at[0, 1]),
+        legible(label.text),
+        color=label.color,
+        fontsize=label.size,
+        fontweight="bold" if label.bold else "normal",
+        ha="center",
+        va="center",
+        multialignment="center",
+        parse_math=False,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        zorder=100,
+        gid=label.name or None,
+    )
 
 
 def _draw_leader(axes: Axes, line: FloatArray, label: Label) -> None:
@@ -239,16 +283,16 @@ def _edge_towards(place: FloatArray, half: FloatArray, target: FloatArray) -> Fl
     return np.asarray(place + min(float(part), 1.0) * way)
 
 
-def _best_place(label: Label, half: FloatArray, places: FloatArray, sheet: _Sheet) -> tuple[FloatArray, FloatArray]:
-    """Return the middle (2,) of a word where its cost is least, and the place (2,) that it names there, in pixels.
+def _best_place(label: Label, half: FloatArray, places: FloatArray, sheet: _Sheet) -> _Placed:
+    """Return where the cost of a word is least.
 
     Args:
         label: the word.
         half: (2,) half of the size of its box.
-        places: (k, 2) places to choose from.
+        places: (k, 2) places to choose from, in pixels.
         sheet: what is already on the paper.
     """
-    best, at, least = places[0], places[0], math.inf
+    best = _Placed(places[0], half, None, math.inf)
     distances = (*_DISTANCES, *_LED_DISTANCES) if label.is_led else _DISTANCES
     for place in places:
         for distance in distances:
@@ -259,14 +303,15 @@ def _best_place(label: Label, half: FloatArray, places: FloatArray, sheet: _Shee
                 reach = min(half / np.maximum(np.abs(direction), 1e-9))
                 middle = place + direction * (distance * sheet.per_point + reach)
                 cost = _FAR * distance - 2.0 * float(direction @ label.away)
-                if cost < least:
+                if cost < best.cost:
                     cost += _cost(label, middle, half, sheet)
                 edge = _edge_towards(middle, half, place)
-                if cost < least and _is_led(label, place, edge, sheet):
+                is_led = _is_led(label, place, edge, sheet)
+                if cost < best.cost and is_led:
                     cost += _leader_cost(label, place, edge, sheet)
-                if cost < least:
-                    best, at, least = middle, place, cost
-    return best, at
+                if cost < best.cost:
+                    best = _Placed(middle, half, np.array([*place, *edge]) if is_led else None, cost)
+    return best
 
 
 def _cost(label: Label, middle: FloatArray, half: FloatArray, sheet: _Sheet) -> float:
@@ -319,5 +364,5 @@ def _leader_cost(label: Label, start: FloatArray, end: FloatArray, sheet: _Sheet
         beside = (*(on_way - room / 2), *(on_way + room / 2))
         cost += _LEADER_ALONG * int(np.count_nonzero(segments_in_box(sheet.segments, beside)))
     for other in sheet.taken:
-        cost += _OVERLAP * int(np.count_nonzero(segments_in_box(leader[None, :], other)))
+        cost += _OVERLAP * int(np.count_nonzero(segments_in_box(leader[None, :], tuple(other))))
     return cost

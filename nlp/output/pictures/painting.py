@@ -35,7 +35,7 @@ _WIDTHS = {LinkKind.BAR: 7.0, LinkKind.ROD: 4.4}
 _ARROW, _FRAME, _COUPLE = 0.42, 0.24, 0.24
 _JOINT_AXIS = 0.2
 #: Places on a limb, in parts of its length, that its label may point to.
-_ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72)
+_ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72, 0.1, 0.84)
 #: The same for the arrow of a length.
 _ALONG_ARROW = (0.5, 0.35, 0.7)
 #: Radius of an angle's arc, in parts of its first ray.
@@ -49,6 +49,16 @@ def rate_colour_map() -> LinearSegmentedColormap:
     return LinearSegmentedColormap.from_list("rates", RATE_COLOURS)
 
 
+def largest_rate(drawing: Drawing) -> float:
+    """Return the largest rate of a drawing; 0 where F is 0, so that the rates are rounding error, without shares."""
+    return max((abs(row.rate) for row in drawing.rows if not math.isnan(row.share)), default=0.0)
+
+
+def _end_on(colour: str) -> Line2D:
+    """Return the mark of a legend for an axis that is seen from its end."""
+    return Line2D([], [], linestyle="none", marker="o", markersize=8, markeredgecolor=colour, markerfacecolor="white")
+
+
 class Panel:
     """One robot on one pair of axes.
 
@@ -56,6 +66,7 @@ class Panel:
         axes: empty.
         view: the projection.
         drawing: the robot.
+        largest: rate at the ends of the colour scale; the largest of the robot when left out.
 
     Attributes:
         largest: rate at the ends of the colour scale, positive.
@@ -63,11 +74,9 @@ class Panel:
         symbols: the same for the symbols of joints.
     """
 
-    def __init__(self, axes: Axes, view: View, drawing: Drawing) -> None:
+    def __init__(self, axes: Axes, view: View, drawing: Drawing, largest: float | None = None) -> None:
         self.drawing = drawing
-        # Where F is 0 there are no shares, and the rates are rounding error.
-        sizes = [abs(row.rate) for row in drawing.rows if not math.isnan(row.share)]
-        self.largest = max(sizes, default=0.0) or 1.0
+        self.largest = largest or largest_rate(drawing) or 1.0
         self.legend: list[tuple[Artist, str]] = []
         self.symbols: list[tuple[Handles, str]] = []
         self._canvas = Canvas(axes, view, np.mean(drawing.posture.points, axis=0))
@@ -209,7 +218,7 @@ class Panel:
     def _paint_frame(self, name: str, origin: FloatArray, rotation: FloatArray) -> None:
         """Paint the axes of the world frame, ``O``, or of the platform frame, ``P``."""
         length = _FRAME * self.drawing.size
-        at = 6 if name == "O" else 46
+        at = 9.5 if name == "O" else 46
         for letter, axis in zip("xyz", rotation.T, strict=True):
             end = origin + length * axis
             self._canvas.arrow(origin, end, f"frame {name} {letter}", INK, 1.1, at)
@@ -220,20 +229,22 @@ class Panel:
         """Paint a twist's axis in bold with the path that shows its pitch; a free motion dashed and without a path."""
         colour, width = (FREE, 2.0) if free else (INK, 3.6)
         name = "free axis" if free else "axis"
-        if math.isinf(motion.pitch):
+        is_point = self._canvas.is_end_on(*motion.line)
+        if math.isinf(motion.pitch) or is_point:
             self._canvas.arrow(motion.line[0], motion.line[1], name, colour, width, 47)
         else:
             dashes = (0, (3, 2)) if free else "solid"
             self._canvas.line(motion.line, name, color=colour, linewidth=width, zorder=8, linestyle=dashes)
-            if not free and len(motion.path) > 2:
-                self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
-                self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
+        if not free and motion.has_path:
+            self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
+            self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
         if free:
             if not any(text.startswith("motion that") for _, text in self.legend):
-                handle = Line2D([], [], color=FREE, linewidth=2, linestyle=(0, (3, 2)))
+                handle = _end_on(FREE) if is_point else Line2D([], [], color=FREE, linewidth=2, linestyle=(0, (3, 2)))
                 self.legend.append((handle, "motion that nothing resists"))
             return
-        self.legend.append((Line2D([], [], color=INK, linewidth=3.6), f"task: {self._words(motion)}"))
+        handle = _end_on(INK) if is_point else Line2D([], [], color=INK, linewidth=3.6)
+        self.legend.append((handle, f"task: {self._words(motion)}"))
 
     def _words(self, motion: Motion) -> str:
         """Return the legend's text of the task."""
@@ -242,7 +253,8 @@ class Panel:
             return f"{motion.name} (translation)"
         if abs(motion.pitch) < _NOISE * self.drawing.size:
             return f"{motion.name} (rotation, path in purple)"
-        return f"{motion.name} (screw of pitch {motion.pitch:.5g} {unit}, path in purple)"
+        path = ", path in purple" if motion.has_path else ""
+        return f"{motion.name} (screw of pitch {motion.pitch:.5g} {unit}{path})"
 
     def _paint_couples(self) -> None:
         """Paint couples as arrows with two heads, at the points that join their limbs to the platform.

@@ -1,14 +1,17 @@
-"""F* of a sweep over one or two numbers, with the regions of equal active limits outlined."""
+"""F* of a sweep over one or two numbers, with the regions of equal active limits outlined and numbered."""
 
 from __future__ import annotations
 
 import textwrap
+from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ....models import FloatArray
 from ...case.case import Case
@@ -23,10 +26,17 @@ from ..sweeptable import TablePoint
 from .canvas import INK, MUTED, draw_edges
 from .fonts import legible
 
-_SIZE = (7.2, 5.0)
-#: Names of at most as many regions are written, each of at least this part of the points; others are outlined only.
-_NAMED = 12
-_LARGE = 0.04
+#: Width and height of the picture without its legend, and height of a line of the legend, inches; most letters of a
+#: line, and most lines of an entry.
+_SIZE, _LINE, _WIDE, _LINES = (7.2, 5.0), 0.155, 112, 4
+#: So many sets of active limits are numbered, those with the most points; others are outlined only.
+_NUMBERED = 12
+#: A further region of the same limits has its number too where it has this part of the points.
+_LARGE = 0.02
+#: Heights of numbers above a curve, in parts of that of the axes.
+_ROWS = (0.95, 0.88)
+#: Room around a number, in parts of the width and of the height of the axes, and least distance of two ticks.
+_ROOM, _APART = (0.045, 0.06), 0.115
 
 
 def check_axes(points: Points) -> None:
@@ -41,37 +51,73 @@ def check_axes(points: Points) -> None:
         raise InputError(f"--plot: draws F over one or two numbers of --over, and {fault}")
 
 
-def sweep_figure(case: Case, points: Points, found: Sequence[TablePoint]) -> Figure:
+def sweep_legend(found: Sequence[TablePoint]) -> list[str]:
+    """Return what the lines in a picture are, and the active limits of each of its numbers, a sentence each."""
+    has_gaps = not all(np.isfinite(each.F) for each in found)
+    names = [name for name, _ in _counted(found)]
+    lines = ["Lines: the active limits change. Empty: no answer." if has_gaps else "Lines: the active limits change."]
+    sets = [name.split("; ") if name else [] for name in names[:_NUMBERED]]
+    everywhere = [side for side in sets[0] if all(side in each for each in sets)] if len(names) > 1 else []
+    lines += [f"Active at every number: {_grouped(everywhere)}"] if everywhere else []
+    also, other = ("also ", "other ") if everywhere else ("", "")
+    for k, each in enumerate(sets, start=1):
+        rest = [side for side in each if side not in everywhere]
+        lines.append(f"{k}: {also}{_grouped(rest)}" if rest else f"{k}: no {other}limit is active")
+    if len(names) > _NUMBERED:
+        lines.append(f"Without a number: {len(names) - _NUMBERED} further sets of active limits")
+    return lines
+
+
+def _counted(found: Sequence[TablePoint]) -> list[tuple[str, int]]:
+    """Return the sets of active limits with the number of their points, those of most points first."""
+    return Counter(sorted(each.active for each in found if np.isfinite(each.F))).most_common()
+
+
+def sweep_figure(
+    case: Case, points: Points, found: Sequence[TablePoint], *, legend: Sequence[str] | None = None
+) -> Figure:
     """Return F over one or two numbers as a Matplotlib figure.
 
     Args:
         case: the case, for the title and the unit of F.
         points: a grid over one or two numbers.
         found: objective and active sides at each point.
+        legend: sentences below the picture; those of :func:`sweep_legend` when left out.
     """
-    figure = Figure(figsize=_SIZE, facecolor="white", layout="constrained")
-    axes = figure.add_subplot()
     changing = [(name, axis) for name, axis in zip(points.names, points.axes, strict=True) if len(axis) > 1]
     shape = tuple(len(axis) for _, axis in changing)
     F = np.array([each.F for each in found]).reshape(shape)
-    names = sorted({each.active for each in found if np.isfinite(each.F)})
+    names = [name for name, _ in _counted(found)]
     sets = np.array([names.index(each.active) if np.isfinite(each.F) else -1 for each in found]).reshape(shape)
+    lines = [
+        line
+        for text in (sweep_legend(found) if legend is None else legend)
+        for line in textwrap.wrap(text, _WIDE, max_lines=_LINES, placeholder=" …", subsequent_indent="    ")
+    ]
+    size = (_SIZE[0], _SIZE[1] + _LINE * len(lines))
+    figure = Figure(figsize=size, facecolor="white", layout="constrained")
+    axes = figure.add_subplot()
     if len(changing) == 1:
-        _draw_curve(axes, changing[0][1], F, sets, names, objective_label(case))
+        _draw_curve(axes, changing[0][1], F, sets, objective_label(case))
     else:
-        _draw_map(figure, axes, [axis for _, axis in changing], F, sets, names, objective_label(case))
+        _draw_map(figure, axes, [axis for _, axis in changing], F, sets, objective_label(case))
         axes.set_ylabel(_label(case, changing[1][0]), color=INK, parse_math=False)
     axes.set_xlabel(_label(case, changing[0][0]), color=INK, parse_math=False)
     draw_edges(axes)
     title = "\n".join(textwrap.wrap(case.title or case.name, 70, max_lines=2, placeholder=" …"))
     axes.set_title(title, loc="left", fontsize=11, fontweight="bold", color=INK, parse_math=False)
-    note = (
-        "Lines: the active limits change. Empty: no answer."
-        if np.isnan(F).any()
-        else "Lines: the active limits change."
-    )
-    figure.supxlabel(note, fontsize=8.5, color=MUTED, x=0.01, ha="left")
+    if lines:
+        figure.supxlabel(legible("\n".join(lines)), fontsize=8.5, color=INK, x=0.01, ha="left", parse_math=False)
     return figure
+
+
+def _grouped(sides: Sequence[str]) -> str:
+    """Return sides in words, those of one limit together: ``leg_length max (limb 1, limb 2)``."""
+    groups: dict[str, list[str]] = {}
+    for side in sides:
+        key, *parts, end = side.split(" ")
+        groups.setdefault(f"{key} {end}", []).extend([" ".join(parts)] if parts else [])
+    return ", ".join(f"{key} ({', '.join(parts)})" if parts else key for key, parts in groups.items())
 
 
 def _label(case: Case, name: str) -> str:
@@ -84,32 +130,29 @@ def _label(case: Case, name: str) -> str:
     return legible(f"{name}, {unit}" if unit else name)
 
 
-def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: FloatArray, names: Sequence[str], label: str) -> None:
-    """Draw F over one number, with a line between neighbours whose active sets differ."""
+def _draw_curve(axes: Axes, x: FloatArray, F: FloatArray, sets: NDArray[np.intp], label: str) -> None:
+    """Draw F over one number, with a line between neighbours whose active sets differ, and the numbers of these."""
+    by_x = np.argsort(x)
+    x, F, sets = x[by_x], F[by_x], sets[by_x]
     axes.plot(x, F, color="#08519c", linewidth=1.4, marker="o", markersize=3 if len(x) <= 100 else 0, gid="F")
-    ends = np.flatnonzero(np.diff(sets))
-    for k in ends:
-        axes.axvline((x[k] + x[k + 1]) / 2, color=MUTED, linewidth=0.8, gid="region")
-    starts = [0, *(ends + 1).tolist()]
-    for first, last in zip(starts, [*(ends + 1).tolist(), len(x)], strict=True):
-        if len(starts) <= _NAMED and last - first >= _LARGE * len(x) and sets[first] >= 0:
-            middle = (x[first] + x[last - 1]) / 2
-            text = names[int(sets[first])].replace("; ", "\n") or "none active"
-            place = axes.get_xaxis_transform()
-            axes.text(
-                middle,
-                0.02,
-                text,
-                transform=place,
-                fontsize=7.5,
-                color=MUTED,
-                ha="center",
-                va="bottom",
-                parse_math=False,
-            )
+    changes = np.flatnonzero(np.diff(sets)) + 1
+    for k in changes:
+        axes.axvline((x[k - 1] + x[k]) / 2, color=MUTED, linewidth=0.8, gid="region")
+    # Numbers stand above the curve.
+    axes.margins(y=0.2)
+    spans = [(first, last) for first, last in pairwise([0, *changes.tolist(), len(x)]) if sets[first] >= 0]
+    rows: list[list[float]] = [[] for _ in _ROWS]
+    for first, last in sorted(spans, key=lambda span: span[0] - span[1]):
+        at, number = float(x[first] + x[last - 1]) / 2, int(sets[first])
+        for row, places in zip(_ROWS, rows, strict=True):
+            if number < _NUMBERED and all(abs(at - other) >= _ROOM[0] * (x[-1] - x[0]) for other in places):
+                places.append(at)
+                _write_number(axes, number, at, row, is_on_top=True)
+                break
     axes.set_ylabel(label, color=INK, parse_math=False)
     axes.grid(color="#e3e6e8", linewidth=0.7)
     axes.ticklabel_format(useOffset=False)
+    axes.set_xticks(*_ticks(x))
 
 
 def _draw_map(
@@ -117,29 +160,93 @@ def _draw_map(
     axes: Axes,
     at: Sequence[FloatArray],
     F: FloatArray,
-    sets: FloatArray,
-    names: Sequence[str],
+    sets: NDArray[np.intp],
     label: str,
 ) -> None:
-    """Draw F over two numbers in colours, one cell a point, with a line between cells whose active sets differ."""
-    orders = [np.argsort(axis) for axis in at]
-    F, sets = F[np.ix_(*orders)], sets[np.ix_(*orders)]
-    x, y = (_edges(axis[order]) for axis, order in zip(at, orders, strict=True))
+    """Draw F over two numbers in colours, one cell a point, with lines around cells of the same active sets."""
+    sorting = [np.argsort(axis) for axis in at]
+    F, sets = F[np.ix_(*sorting)], sets[np.ix_(*sorting)]
+    x, y = (_edges(axis[by_value]) for axis, by_value in zip(at, sorting, strict=True))
     mesh = axes.pcolormesh(x, y, np.ma.masked_invalid(F.T), cmap="viridis", gid="F")
     bar = figure.colorbar(mesh, ax=axes)
     bar.set_label(label, color=INK, parse_math=False)
+    bar.ax.ticklabel_format(useOffset=False)
     lines = [[(x[i + 1], y[j]), (x[i + 1], y[j + 1])] for i, j in zip(*np.nonzero(np.diff(sets, axis=0)), strict=True)]
     lines += [[(x[i], y[j + 1]), (x[i + 1], y[j + 1])] for i, j in zip(*np.nonzero(np.diff(sets, axis=1)), strict=True)]
-    axes.add_collection(LineCollection(lines, colors="white", linewidths=1.2, gid="region"))
-    for k, name in enumerate(names):
-        i, j = np.nonzero(sets == k)
-        if len(names) > _NAMED or len(i) < _LARGE * sets.size:
-            continue
-        nearest = int(np.argmin((i - np.median(i)) ** 2 + (j - np.median(j)) ** 2))
-        i, j = i[nearest], j[nearest]
-        text = name.replace("; ", "\n") or "none active"
-        place = (x[i] + x[i + 1]) / 2, (y[j] + y[j + 1]) / 2
-        axes.text(*place, text, fontsize=7, color="white", ha="center", va="center", parse_math=False)
+    # Dark with a light edge, which is seen on every colour.
+    axes.add_collection(LineCollection(lines, colors="white", linewidths=2.8, capstyle="projecting", gid="region edge"))
+    axes.add_collection(LineCollection(lines, colors=INK, linewidths=1.2, capstyle="projecting", gid="region"))
+    middles = np.stack(np.meshgrid((x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2, indexing="ij"), axis=-1)
+    room = np.array(_ROOM) * [np.ptp(x), np.ptp(y)]
+    places: list[FloatArray] = []
+    for region in _regions(sets):
+        # The cell that lies deepest within the region, and where a number stands already the next one.
+        for cell in region:
+            place = middles[tuple(cell)]
+            if all((np.abs(place - other) >= room).any() for other in places):
+                places.append(place)
+                _write_number(axes, int(sets[tuple(cell)]), *place)
+                break
+    axes.set_xticks(*_ticks(at[0]))
+    axes.set_yticks(*_ticks(at[1]))
+
+
+def _write_number(axes: Axes, place: int, x: float, y: float, *, is_on_top: bool = False) -> None:
+    """Write the number of a region on a white disc; ``y`` is a part of the height of the axes where it is on top."""
+    disc = {"boxstyle": "circle,pad=0.22", "facecolor": "white", "edgecolor": INK, "linewidth": 0.8}
+    where = axes.get_xaxis_transform() if is_on_top else axes.transData
+    style = {"fontsize": 8, "color": INK, "ha": "center", "va": "center", "gid": "number"}
+    axes.text(x, y, str(place + 1), transform=where, bbox=disc, zorder=10, **style)  # type: ignore[arg-type]
+
+
+def _regions(sets: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Return the cells (k, 2) of each region that has a number, those deepest within it first.
+
+    Of each set of active limits that is numbered the largest region has a number, and further ones that are large.
+
+    Args:
+        sets: (n, m) the set of active limits of each cell, by its place; -1 for none.
+    """
+    found: list[NDArray[np.intp]] = []
+    for index in range(min(int(sets.max()) + 1, _NUMBERED)):
+        left, parts = sets == index, []
+        while left.any():
+            part = np.zeros_like(left)
+            part[tuple(np.argwhere(left)[0])] = True
+            while (grown := _spread(part) & left).sum() > part.sum():
+                part = grown
+            left &= ~part
+            parts.append(part)
+        parts.sort(key=lambda part: -int(part.sum()))
+        found += [_inwards(part) for k, part in enumerate(parts) if k == 0 or part.sum() >= _LARGE * sets.size]
+    return found
+
+
+def _spread(part: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a region (n, m) with its neighbours on four sides."""
+    wide = np.pad(part, 1)
+    return wide[1:-1, 1:-1] | wide[:-2, 1:-1] | wide[2:, 1:-1] | wide[1:-1, :-2] | wide[1:-1, 2:]
+
+
+def _inwards(part: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the cells (k, 2) of a region (n, m), those farthest from its edge first."""
+    depth, inner = np.zeros(part.shape), part
+    while inner.any():
+        depth += inner
+        inner = ~_spread(~np.pad(inner, 1))[1:-1, 1:-1]
+    cells = np.argwhere(part)
+    # Of cells that are equally deep the one nearest to the middle of them.
+    deepest = cells[depth[tuple(cells.T)] == depth.max()].mean(axis=0)
+    return cells[np.lexsort([np.linalg.norm(cells - deepest, axis=1), -depth[tuple(cells.T)]])]
+
+
+def _ticks(values: FloatArray) -> tuple[list[float], list[str]]:
+    """Return those of the swept values that have a tick, which do not stand too close, and their texts."""
+    ticks: list[float] = []
+    for value in sorted(values.tolist()):
+        if not ticks or value - ticks[-1] >= _APART * (np.max(values) - np.min(values)):
+            ticks.append(value)
+    return ticks, [f"{value:.5g}" for value in ticks]
 
 
 def _edges(values: FloatArray) -> FloatArray:

@@ -8,14 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....models import FloatArray, LinkKind
-from .drawing import Drawing
+from ....models import FloatArray, JointKind, LinkKind
+from .drawing import Drawing, Motion
 
-#: Azimuths that are tried for a view, and its elevation, in degrees.
+#: Azimuths that are tried for a view, its elevation, and what is added to it where motions cannot be seen, in degrees.
 _AZIMUTHS = range(-170, 190, 10)
-_ELEVATION = 18.0
-#: A robot given joint by joint that is lower than this part of its size is seen from above, x to the right.
-_FLAT = 0.1
+_ELEVATION, _HIGHER = 18.0, (0.0, 14.0, 28.0)
+#: Least part of the length of a motion's axis, and of the width of its path, that a view shows.
+_LEAST_LENGTH, _LEAST_WIDTH = 0.5, 0.3
+#: Score of a motion that is not seen at all, beside which that of limbs that stand apart is small.
+_HIDDEN = 10.0
+#: Directions that differ by less are parallel.
+_PARALLEL = 1e-6
 #: Part of the axis z, in parts of the robot's size, that limbs should not cover.
 _SHOWN_Z = 0.12
 #: Places on a link, in parts of its length, whose distances on paper are compared.
@@ -57,15 +61,62 @@ class View:
         return np.asarray(points @ self.axes[2])
 
 
-#: The view of a flat robot.
-_FROM_ABOVE = View(-90.0, 62.0)
+def clearest_view(*drawings: Drawing, elevation: float = _ELEVATION, width: float = _LEAST_WIDTH) -> View:
+    """Return one view of drawings in which limbs stand farthest apart on paper and every motion can be seen.
+
+    A robot that moves in the plane of x and y is seen from above, x to the right; in an upright plane, from its side.
+    Others are seen from the elevation stated, or from higher where an axis would be seen from its end, or a path from
+    its edge: narrower than a part of its own width.
+    """
+    planes = [_face_on(drawing) for drawing in drawings]
+    if planes[0] is not None and all(view == planes[0] for view in planes):
+        return planes[0]
+    motions = [motion for each in drawings for motion in (each.motion, *each.free) if motion is not None]
+
+    def score(view: View) -> float:
+        clear = sum(_clearness(view, drawing) for drawing in drawings) / len(drawings)
+        return clear - _HIDDEN * _hidden(view, motions, width)
+
+    tried = [[View(float(azimuth), elevation + more) for azimuth in _AZIMUTHS] for more in _HIGHER]
+    low = next((views for views in tried if any(_hidden(view, motions, width) == 0 for view in views)), None)
+    return max(low or [view for views in tried for view in views], key=score)
 
 
-def clearest_view(drawing: Drawing) -> View:
-    """Return the view in which limbs stand farthest apart on paper and the task's axis is least foreshortened."""
-    if drawing.model.scene.joints and np.ptp(drawing.posture.points, axis=0)[2] < _FLAT * drawing.size:
-        return _FROM_ABOVE
-    return max((View(float(azimuth)) for azimuth in _AZIMUTHS), key=lambda view: _clearness(view, drawing))
+def _face_on(drawing: Drawing) -> View | None:
+    """Return the view at right angles to the plane that a robot moves in; None for a robot that moves in space.
+
+    All hinges of a planar robot are parallel, and its slides are at right angles to them.
+    """
+    turning: list[FloatArray] = []
+    sliding: list[FloatArray] = []
+    for joint, (_, *axes) in zip(drawing.model.scene.joints, drawing.posture.joints, strict=True):
+        if joint.kind not in (JointKind.REVOLUTE, JointKind.PARALLELOGRAM, JointKind.PRISMATIC) or not axes:
+            return None
+        (sliding if joint.kind is JointKind.PRISMATIC else turning).extend(axes)
+    if not turning:
+        return None
+    normal = turning[0]
+    apart = [float(np.linalg.norm(np.cross(normal, each))) for each in turning]
+    if max([*apart, *(abs(float(normal @ each)) for each in sliding)]) > _PARALLEL:
+        return None
+    if abs(normal[2]) > 1 - _PARALLEL:
+        return View(-90.0, 90.0)
+    if abs(normal[2]) > _PARALLEL:
+        return None
+    # Of both sides of an upright plane the one from which x points to the right.
+    x, y = normal[:2] if normal[1] < -_PARALLEL or (normal[1] <= _PARALLEL and normal[0] > 0) else -normal[:2]
+    return View(math.degrees(math.atan2(y, x)), 0.0)
+
+
+def _hidden(view: View, motions: Sequence[Motion], width: float) -> float:
+    """Return by how much axes of motions are too short on paper, and their paths too narrow; 0 where all are seen."""
+    missing = 0.0
+    for motion in motions:
+        missing += max(0.0, _LEAST_LENGTH - float(np.linalg.norm(view.project(motion.axis))))
+        if motion.has_path:
+            # A circle about the axis is as wide on paper as the axis points towards the eye.
+            missing += max(0.0, width - abs(float(view.depth(motion.axis))))
+    return missing
 
 
 def _clearness(view: View, drawing: Drawing) -> float:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from ...comparison.compare import Comparison
 from ...results.comparison import ComparedRobotData, ComparisonResult, comparison_table
 from ...results.text import TextTable
-from ..pictures.comparisons import comparison_drawings, comparison_figure
-from ..pictures.figures import picture_of
-from .markup import Markup, answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
+from ..pictures.comparisons import comparison_drawings, comparison_pictures
+from .markup import Markup, answer_box, html_table, image_source, join_markup, paragraphs, tag, whole_page
 
 
 def comparison_page(found: Comparison, result: ComparisonResult) -> str:
@@ -21,7 +20,8 @@ def comparison_page(found: Comparison, result: ComparisonResult) -> str:
     ranked = [each for each in result.robots if each.part == "ranked"]
     words = f"{len(ranked)} of {len(result.robots)} robots can be compared"
     if ranked and ranked[0].value is not None:
-        words = f"{ranked[0].name} has the best value, {ranked[0].value:.7g}; {words}"
+        unit = ranked[0].tasks[0].unit if len(ranked[0].tasks) == 1 else ""
+        words = f"{ranked[0].name} has the best value, {f'{ranked[0].value:.7g} {unit}'.rstrip()}; {words}"
     names = ", ".join(each.name for each in result.robots)
     return whole_page(
         f"{title} - comparison",
@@ -38,11 +38,11 @@ def _body(found: Comparison, result: ComparisonResult) -> Markup:
         html_table(comparison_table(result), "robots, the best first"),
     ]
     if comparison_drawings(found):
-        picture = picture_figure(
-            picture_of(".svg", comparison_figure, found),
-            "Each robot at its design, all in one scale; colours are rates of the limbs.",
-        )
-        parts += [tag("h2", "Designs"), picture]
+        *robots, legend = map(image_source, comparison_pictures(found))
+        words = "Each robot at its design, all from one side, in one scale and with one scale of the colours."
+        images = (tag("img", src=source, alt="A robot at its design; the table has its numbers.") for source in robots)
+        shown = [tag("div", *images, class_="designs"), tag("img", src=legend, alt="Colours are rates of the limbs.")]
+        parts += [tag("h2", "Designs"), tag("figure", *shown, tag("figcaption", words))]
     for robot in result.robots:
         parts += [tag("h3", robot.name), paragraphs([f"{robot.description}.", *robot.sentences])]
         if robot.dimensions:

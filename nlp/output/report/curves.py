@@ -80,12 +80,16 @@ def tradeoff_page(found: Tradeoff, result: TradeoffResult) -> str:
             join_markup(
                 [
                     paragraphs(["Each point is a solve of its own, with everything that is free chosen anew."]),
-                    tag("div", tradeoff_figures(case, [result]), class_="wide"),
+                    tag(
+                        "div",
+                        tag("div", tradeoff_figures(case, [result]), class_="wide"),
+                        bend_lines(designs, "Where the curve bends"),
+                        class_="beside",
+                    ),
                     paragraphs(f"{line}." for line in tradeoff_words(result)),
                 ]
             ),
         ),
-        ("active", "Where the curve bends", bend_lines(designs)),
         ("designs", "The design at each value", design_figures(designs)),
         ("values", "Every value", tradeoff_rows(result)),
     ]

@@ -74,15 +74,17 @@ def changed_words(before: Sequence[str], after: Sequence[str]) -> str:
     return "; ".join(parts)
 
 
-def bend_lines(designs: Sequence[Design]) -> Markup:
-    """Return a sentence for each pair of neighbours between which other bounds and limits become active."""
+def bend_lines(designs: Sequence[Design], heading: str) -> Markup:
+    """Return, below a heading, a sentence for each two neighbours between which other limits become active."""
     found = bends([frozenset(each.active) for each in designs])
     lines = [
         f"Between {designs[k - 1].name} and {designs[k].name}: "
         f"{changed_words(designs[k - 1].active, designs[k].active)}."
         for k in found
     ]
-    return tag("ul", *(tag("li", line) for line in lines), id="bends") if lines else Markup("")
+    if not lines:
+        return Markup("")
+    return tag("div", tag("h3", heading), tag("ul", *(tag("li", line) for line in lines), id="bends"))
 
 
 def design_figures(designs: Sequence[Design]) -> Markup:

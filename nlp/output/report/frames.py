@@ -132,8 +132,10 @@ _WAY = 0.3
 _DIGITS = 11
 #: Rounding error of a rate, in parts of the terms that it sums.
 _ROUNDING = 1e-9
-#: First elevation of the eye, degrees.
-ELEVATION = 26.0
+#: First elevation of the eye, degrees, and its largest: from right above, the page's camera would have no upwards.
+_ELEVATION, _HIGHEST = 26.0, 89.0
+#: Least part of the width of a motion's path that is seen from afar: in perspective, away from the middle, it is less.
+_WIDTH = 0.43
 
 
 class PointData(TypedDict):
@@ -299,7 +301,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "forces_words": _forces_words(drawing.forces),
         "reference": None if drawing.reference is None else drawing.reference.points.tolist(),
         "colours": list(RATE_COLOURS),
-        "eye": View(clearest_view(drawing).azimuth, ELEVATION).axes[2].tolist(),
+        "eye": first_eye(drawing),
         "zero": zero,
         "frames": [
             _frame_data(drawing, t, posture, rates, units)
@@ -308,6 +310,12 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
             for k, (t, posture) in enumerate(postures)
         ],
     }
+
+
+def first_eye(drawing: Drawing) -> list[float]:
+    """Return the direction (3,) to the eye of the first view of a page."""
+    view = clearest_view(drawing, elevation=_ELEVATION, width=_WIDTH)
+    return [float(each) for each in View(view.azimuth, min(view.elevation, _HIGHEST)).axes[2]]
 
 
 def _force_data(drawing: Drawing, forces: DrawnForces | None) -> list[ForceData]:

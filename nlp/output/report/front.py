@@ -42,12 +42,16 @@ def front_page(front: Front) -> str:
             join_markup(
                 [
                     paragraphs([rule, *(f"{line}." for line in words[1:])]),
-                    tag("div", picture_figure(picture_of(".svg", front_figure, front), picture), class_="wide"),
+                    tag(
+                        "div",
+                        tag("div", picture_figure(picture_of(".svg", front_figure, front), picture), class_="wide"),
+                        # Only a front of two goals has an order.
+                        bend_lines(designs, "Where the front bends") if len(front.goals) == 2 else Markup(""),
+                        class_="beside",
+                    ),
                 ]
             ),
         ),
-        # Only a front of two goals has an order.
-        ("active", "Where the front bends", bend_lines(designs) if len(front.goals) == 2 else Markup("")),
         ("designs", "The designs", design_figures(designs)),
         ("points", "Every point", html_table(front_table(front), "points of the front")),
     ]

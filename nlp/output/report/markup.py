@@ -215,7 +215,7 @@ def picture_figure(svg: bytes, words: str) -> Markup:
         svg: content of the picture's file.
         words: below the picture, and for readers who do not see it.
     """
-    image = tag("img", src=image_source(svg), alt=words, style="max-width: 100%")
+    image = tag("img", src=image_source(svg), alt=words)
     return tag("figure", image, tag("figcaption", words))
 
 

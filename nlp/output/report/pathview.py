@@ -12,8 +12,7 @@ from ...results.rounding import number
 from ..pictures.drawing import Drawing, drawing_without_task
 from ..pictures.pathpanels import LIMIT_COLOURS, PathPicture, percent
 from ..pictures.posture import Linkage, Posture
-from ..pictures.view import View, clearest_view
-from .frames import ELEVATION, JointData, LinkData, PointData, joint_data, link_data
+from .frames import JointData, LinkData, PointData, first_eye, joint_data, link_data
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -100,7 +99,7 @@ def path_view(picture: PathPicture) -> PathView | None:
         {
             "unit": case.units.length,
             "size": size,
-            "eye": View(clearest_view(drawing).azimuth, ELEVATION).axes[2].tolist(),
+            "eye": first_eye(drawing),
             "ranges": np.stack([every.min(axis=0) - _ROOM * size, every.max(axis=0) + _ROOM * size], 1).tolist(),
             "points": [{"name": point.name, "body": point.body.value} for point in model.scene.points],
             "links": link_data(drawing),

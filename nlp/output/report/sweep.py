@@ -13,7 +13,7 @@ from ...results.text import TextTable
 from ...sweeps.columns import SweepColumns, stated_pose_note
 from ...sweeps.points import Points
 from ..pictures.figures import picture_of
-from ..pictures.sweeps import sweep_figure
+from ..pictures.sweeps import sweep_figure, sweep_legend
 from ..sweeptable import TablePoint
 from .markup import answer_box, html_table, join_markup, paragraphs, picture_figure, tag, whole_page
 
@@ -40,8 +40,9 @@ def sweep_page(case: Case, points: Points, found: SweepColumns) -> str:
     changing = [axis for axis in points.axes if len(axis) > 1]
     if 1 <= len(changing) <= 2 and answers:
         sides = [TablePoint(float(F), "; ".join(active)) for F, active in zip(found.F, found.active, strict=True)]
-        picture = picture_of(".svg", sweep_figure, case, points, sides)
-        parts.append(picture_figure(picture, "F at each point; a line where the active limits change."))
+        picture = picture_of(".svg", sweep_figure, case, points, sides, legend=())
+        parts.append(picture_figure(picture, "F at each point. Numbers: the limits that are active in a region."))
+        parts.append(tag("ul", *(tag("li", line) for line in sweep_legend(sides)), class_="plain"))
     else:
         parts.append(paragraphs(["A picture needs a grid over one or two numbers."]))
     if len(found) > _ROWS:

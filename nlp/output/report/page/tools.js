@@ -2,13 +2,15 @@
 // Where the eye stands so that a box fills its frame: Plotly's camera, whose unit makes the product of the sides 1.
 const fittedCamera = (ranges, eye, frame) => {
   // Half of the angle of Plotly's perspective is an eighth of a half turn; ticks and titles need room, in pixels.
-  const HALF = Math.tan(Math.PI / 8), SIDE = 72, TOP = 36;
+  const HALF = Math.tan(Math.PI / 8), SIDE = 72;
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const across = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const unit = (a) => a.map((each) => each / Math.hypot(...a));
   const sides = ranges.map(([low, high]) => high - low), mean = Math.cbrt(sides[0] * sides[1] * sides[2]);
   const half = sides.map((each) => each / mean / 2);
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => half.map((each, k) => ((n >> k) & 1 ? each : -each)));
+  // From above, the title of an axis stands beyond the far edge.
+  const TOP = eye[2] > 0.9 * Math.hypot(...eye) ? 64 : 36;
   const towards = unit(eye), right = unit(across([0, 0, 1], towards)), up = across(towards, right);
   const wide = Math.max(0.2, 1 - (2 * SIDE) / frame.width), high = Math.max(0.2, 1 - (2 * TOP) / frame.height);
   const shape = frame.width / frame.height;
