@@ -230,6 +230,24 @@ def test_a_singular_pose_is_touched_between_samples_without_a_change_of_sign() -
     y, _ = extreme_at(low)
     values = rpr_determinant(low, np.linspace(y - 0.1234, y + 0.2, 324))
     assert (values > 0).all() or (values < 0).all()
+    # A line near by crosses twice within 0.4 mm, between two of the samples at each millimetre.
+    near, far = low, 0.0
+
+    def roots(x: float) -> Array:
+        return np.sort(np.roots(np.polyfit([-1.0, 0.0, 1.0], rpr_determinant(x, np.array([-1.0, 0.0, 1.0])), 2)))
+
+    far = low + 1e-3 if np.isreal(roots(low + 1e-3)).all() else low - 1e-3
+    for _ in range(80):
+        middle = 0.5 * (near + far)
+        near, far = (near, middle) if np.isreal(roots(middle)).all() and np.ptp(roots(middle)) > 4e-4 else (middle, far)
+    one, other = roots(far)
+    assert other - one == pytest.approx(4e-4, rel=1e-3)
+    begin = 0.5 * (one + other) - 0.1235
+    values = rpr_determinant(far, begin + 1e-3 * np.arange(324))
+    assert (values > 0).all() or (values < 0).all()
+    twice = judge_path(case, table(case, (far, begin, 0, 0, 0, 0), (far, begin + 0.323, 0, 0, 0, 0))).ranks[0]
+    assert twice.outcome is Outcome.REFUTED
+    assert np.abs(roots(far) - twice.pose.position[1]).min() < 1e-8
     judged = [
         judge_path(case, table(case, (x, y - 0.1234, 0, 0, 0, 0), (x, y + 0.2, 0, 0, 0, 0)))
         for x in (low, low + 1e-4, low - 1e-4)

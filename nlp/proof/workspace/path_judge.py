@@ -19,7 +19,7 @@ import numpy as np
 from ....models import FloatArray, frozen_array
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
-from ...case.loads import Motion
+from ...case.motors import MotorNumber
 from ...case.pose import Free, Value
 from ...case.task import Sense
 from ...case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
@@ -30,8 +30,7 @@ from ...path.path import ProgrammedPath
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
-from ..statement.machine import workspace_of_case
-from ..statement.motors import motor_claims
+from ..statement.motors import in_motion, motor_claims
 from ..statement.tolerance import Directions
 from .numbers.bound_search import Minimum, Number
 from .numbers.expressions import Expressions
@@ -154,13 +153,16 @@ def judge_path(
         progress: called with what is done next.
 
     Raises:
-        CaseError: a dimension of the robot is free.
+        CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
         InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
             robot of which the positions of actuators are not known.
     """
     cover, box, workspace = _covered(path)
     case = replace(case, workspace=workspace)
-    workspace_of_case(case)
+    case.fixed_parameters("a path is judged with fixed dimensions")
+    if not path.is_timed:
+        case.require_motion(", or a path that states times")
+    stated, case = case, in_motion(case) if case.without_motion else case
     kernel()
     report = progress or (lambda _: None)
     with within(time_limit, _PART):
@@ -182,7 +184,7 @@ def judge_path(
             machines = Machines(case, closed, design)
         except NotJudgedError as error:
             rank = RankOnPath(REGULAR, Outcome.OPEN, None, None, 0, 0.0, str(error))
-            return PathJudgement(case, path, (rank,), (), knots=knots)
+            return PathJudgement(stated, path, (rank,), (), knots=knots)
         family = machines.family
         ranks = []
         for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
@@ -207,8 +209,8 @@ def judge_path(
         found = with_strokes(subject, found, partial(_finer, machines, claims))
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
-        found += _of_actuators(subject, machines, cover, gap, faults, with_all=not limits_alone)
-    return PathJudgement(case, path, tuple(ranks), tuple(found), faults, knots)
+        found += _of_actuators(subject, machines, cover, gap, faults, is_timed=path.is_timed, with_all=not limits_alone)
+    return PathJudgement(stated, path, tuple(ranks), tuple(found), faults, knots)
 
 
 def _of_actuators(
@@ -218,21 +220,28 @@ def _of_actuators(
     gap: float,
     faults: dict[tuple[str, Sense], Fault],
     *,
+    is_timed: bool,
     with_all: bool,
 ) -> list[Extreme]:
     """Return the numbers of actuators along a path, in its own motion where that is known; adds faults of speeds."""
-    if not np.isfinite(cover.seconds).any():
+    if not is_timed:
         found = list(motor_extremes(subject, with_all=with_all))
         faults |= _motor_faults(subject, found, cover)
         return found
-    speeds, case = speeds_on_path(machines, cover, gap), subject.case
+    # Powers are those in the path's motion, whether the case states another one or none.
+    speeds, moving = speeds_on_path(machines, cover, gap), in_motion(subject.case)
     bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
+    unknown: list[Extreme] = []
     if speeds.number is not None:
-        # Powers are those in the path's motion, whether the case states another one or none.
-        moving = case.loading._replace(motion=case.loading.motion or Motion(1.0))
-        subject = replace(subject, case=replace(case, loading=moving), machines=speeds.number.problem)
+        subject = replace(subject, case=moving, machines=speeds.number.problem)
         faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
-    found = list(motor_extremes(subject, speeds=bounds, with_all=with_all))
+    else:
+        powers = [each for each in motor_claims(moving) if each.motor and each.motor.number is MotorNumber.POWER]
+        unknown = [
+            extreme_of(each, Minimum(reason=speeds.extremes[0].reason)) for each in powers if each.limit is not None
+        ]
+        subject = replace(subject, case=replace(moving, loading=moving.loading._replace(motion=None)))
+    found = [*motor_extremes(subject, speeds=bounds, with_all=with_all), *unknown]
     faults |= _motor_faults(subject, found, cover)
     return [*speeds.extremes, *found]
 
