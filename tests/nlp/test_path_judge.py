@@ -320,6 +320,16 @@ def test_slides_of_a_robot_with_loops_are_followed_along_its_path() -> None:
             found = extreme(judged, f"actuator_length limb {k + 1}", sense)
             assert sense.sign * (found.bound - end) > -1e-9
             assert sense.sign * (end - found.reached) > -1e-9
+    # The third slide is beyond this limit long before its largest value: the first point is found there too.
+    assert slides.max() > 0.25
+    short = case_from(tables | {"limits": {"actuator_length": {"max": 0.1}}})
+    back = table(case, (0, 0, 0, 0, 0, 0), (0.1, 0.05, 0, 0, 0, 5), (0.1, 0.1, 0, 0, 0, -5), (0, 0, 0, 0, 0, 0))
+    faults = judge_path(short, back).faults
+    ((name, _), fault), first = *faults.items(), int(np.argmax(slides > 0.1))
+    assert name == "actuator_length limb 3"
+    assert fault.place.segment == first // len(SAMPLES)
+    assert fault.place.parameter == pytest.approx(SAMPLES[first % len(SAMPLES)], abs=SAMPLES[1])
+    assert fault.value == pytest.approx(0.1, abs=1e-6)
 
 
 @pytest.mark.parametrize("tolerance", [None, 1e-3])

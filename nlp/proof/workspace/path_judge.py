@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -32,13 +31,14 @@ from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
 from ..statement.motors import in_motion, motor_claims
 from ..statement.tolerance import Directions
-from .numbers.bound_search import Minimum, Number
+from .numbers.bound_search import Minimum
 from .numbers.expressions import Expressions
-from .numbers.extremes import Extreme, extreme_of, goal_of
+from .numbers.extremes import Extreme, extreme_of
 from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
+from .path_faults import Fault, first_faults, pose_at, refuted
 from .path_knots import Knots, Sampling, knots_of
 from .path_motion import speeds_on_path
 from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
@@ -64,8 +64,6 @@ _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
 _PARTS = 64
 #: Parameters of points of each segment at which a change of sign is looked for.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
-#: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
-_ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +87,6 @@ class RankOnPath:
     boxes: int
     seconds: float
     reason: str
-
-
-class Fault(NamedTuple):
-    """A point of a path that refutes a limit: its place, the value, and the pose."""
-
-    place: Place
-    value: float
-    pose: PoseNumbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,10 +190,10 @@ def judge_path(
         for group in (reaches, claims):
             searched = _searched(machines, group, gap)
             found += searched
-            wrong = _refuted(group, searched).values()
+            wrong = refuted(group, searched).values()
             if wrong:
                 numbers = Expressions(machines.family, ca.vertcat(*[machines.number(claim) for claim, _ in wrong]))
-                faults |= _first_faults(numbers, dict(enumerate(wrong)), cover)
+                faults |= first_faults(numbers, dict(enumerate(wrong)), cover)
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
         subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
         found = with_strokes(subject, found, partial(_finer, machines, claims))
@@ -234,7 +224,7 @@ def _of_actuators(
     unknown: list[Extreme] = []
     if speeds.number is not None:
         subject = replace(subject, case=moving, machines=speeds.number.problem)
-        faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
+        faults |= first_faults(speeds.number, refuted(speeds.claims, speeds.extremes), cover)
     else:
         powers = [each for each in motor_claims(moving) if each.motor and each.motor.number is MotorNumber.POWER]
         unknown = [
@@ -254,8 +244,8 @@ def _motor_faults(subject: Subject, found: Sequence[Extreme], cover: PathCover) 
     for _, group in itertools.groupby(claims, lambda claim: claim.motor and claim.motor.place):
         own = list(group)
         if subject.machines is not None:
-            refuted = {k: (each, wrong[each.name, each.sense]) for k, each in enumerate(own)}
-            faults |= _first_faults(Motors(subject.machines, subject.case, own), refuted, cover)
+            pairs = {k: (each, wrong[each.name, each.sense]) for k, each in enumerate(own)}
+            faults |= first_faults(Motors(subject.machines, subject.case, own), pairs, cover)
     return faults
 
 
@@ -327,7 +317,7 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
     """Return the verdict on the rank of a matrix along a path."""
     place = _sign_change(problem, matrix, cover)
     if place is not None:
-        return RankOnPath(name, Outcome.REFUTED, place, _pose(problem, cover, place), 0, 0.0, "")
+        return RankOnPath(name, Outcome.REFUTED, place, pose_at(problem, cover, place), 0, 0.0, "")
     effort = Effort()
     try:
         with one_search():
@@ -350,7 +340,7 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
     words = f"its smallest singular value is {value:.1e} of the largest there"
     words = words if math.isfinite(value) else reason
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
-    return RankOnPath(name, outcome, place, _pose(problem, cover, place), search.boxes, effort.seconds, words)
+    return RankOnPath(name, outcome, place, pose_at(problem, cover, place), search.boxes, effort.seconds, words)
 
 
 def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Place | None:
@@ -408,60 +398,3 @@ def _most_singular(
         low, high = float(s[max(k - 1, 0)]), float(s[min(k + 1, 4)])
     middle = 0.5 * (low + high)
     return Place(int(piece[0]), middle), at(middle)
-
-
-def _pose(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
-    """Return the pose at a place."""
-    return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
-
-
-def _refuted(claims: Sequence[Claim], found: Sequence[Extreme]) -> dict[int, tuple[Claim, Extreme]]:
-    """Return the claims that are refuted, with their extremes, by their places."""
-    pairs = enumerate(zip(claims, found, strict=True))
-    return {k: pair for k, pair in pairs if pair[1].outcome is Outcome.REFUTED}
-
-
-def _first_faults(
-    numbers: Number, wrong: Mapping[int, tuple[Claim, Extreme]], cover: PathCover
-) -> dict[tuple[str, Sense], Fault]:
-    """Return the first known points of the design that are beyond limits, where they are before those of worst values.
-
-    There are none where loops have to be followed.
-
-    Args:
-        numbers: of claims.
-        wrong: those of them that are refuted, by their places, with their extremes.
-        cover: of the path.
-    """
-    problem, found = numbers.problem, dict[tuple[str, Sense], Fault]()
-    if problem.problem.dependent or not wrong:
-        return found
-
-    def values(pieces: FloatArray, part: float) -> FloatArray:
-        return numbers.values(problem.exact(problem.path_points(cover, pieces, part)))
-
-    count = min(max(_ALL_SAMPLES // len(cover.pieces), _LEAST_SAMPLES), _MOST_SAMPLES)
-    left, parts = dict(wrong), np.linspace(0.0, 1.0, count).tolist()
-    for rows in cover.blocks():
-        if not left:
-            break
-        block = cover.pieces[rows]
-        every = np.stack([values(block, part) for part in parts], axis=1)
-        for k, (claim, worst) in list(left.items()):
-            goal = goal_of(claim)
-            least = (goal.limit or 0.0) - goal.slack
-            beyond = np.argwhere(every[:, :, k] < least)
-            if not len(beyond):
-                continue
-            del left[k]
-            row, sample = beyond[0].tolist()
-            piece, low, high = block[row : row + 1], parts[max(sample - 1, 0)], parts[sample]
-            for _ in range(_STEPS if sample else 0):
-                middle = 0.5 * (low + high)
-                low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)
-            place = Place(int(block[row, 0]), high)
-            if place > (worst.place or place):
-                continue
-            value = claim.reading.from_value(-claim.sense.sign * float(values(piece, high)[0, k]))
-            found[claim.name, claim.sense] = Fault(place, value, _pose(problem, cover, place))
-    return found
