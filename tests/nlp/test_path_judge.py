@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
 
-from screwsynth.nlp import Case, Outcome, judge_workspace
+from screwsynth.nlp import Case, Outcome, interruption, judge_workspace
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import PathOptions
@@ -159,6 +160,17 @@ def test_a_limit_is_refuted_in_the_first_line_that_leaves_it() -> None:
     stopped = judge_path(hexapod({"max": 50}), path, time_limit=0)
     assert {each.outcome for each in (*stopped.ranks, *stopped.extremes)} == {Outcome.OPEN}
     assert not stopped.is_proved
+
+
+def test_an_interrupted_judgement_keeps_what_is_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    requested = Event()
+    monkeypatch.setattr(interruption, "_requested", requested)
+    case = hexapod({"min": 17, "max": 43})
+    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    judged = judge_path(case, path, progress=lambda step: requested.set() if step == "limits" else None)
+    assert [each.outcome for each in judged.ranks] == [Outcome.PROVED]
+    assert {(each.outcome, each.reason) for each in judged.extremes} == {(Outcome.OPEN, interruption.STOPPED)}
+    assert not judged.is_proved
 
 
 @pytest.mark.parametrize(("part", "outcome"), [(1.0001, Outcome.PROVED), (0.9999, Outcome.REFUTED)])
