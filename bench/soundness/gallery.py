@@ -91,6 +91,13 @@ class Sampled:
 
     def at_poses(self, meant: Poses, errors: Array) -> tuple[dict[str, Array], Array]:
         """Return numbers at poses whose loops are closed along ways from home through the middle of the workspace."""
+        points = self.robot.points_array + errors
+        poses, q, good = self.closed(meant, points)
+        self.poses = poses
+        return self.values(poses, q, points), good & self.inside(poses)
+
+    def closed(self, meant: Poses, points: Array) -> tuple[Poses, Array, Array]:
+        """Return closed poses, joint coordinates and whether each is closed, along such ways."""
         n, robot = len(meant.p), self.robot
         middle = self.box.poses(np.full((1, self.box.size), 0.5))
         # From home to the middle, and on to each pose, in equal steps of both numbers of a pose.
@@ -98,8 +105,11 @@ class Sampled:
         path = [Poses(np.repeat(each.p, n, 0), np.repeat(each.R, n, 0)) for each in way]
         path += [between(path[-1], meant, s) for s in np.linspace(0, 1, STEPS + 1)[1:]]
         path += path[-1:]  # what a pose gave way to joints that were far from closed is taken back
-        points = robot.points_array + errors
-        poses, q, good = close(robot, path, points)
+        return close(robot, path, points)
+
+    def values(self, poses: Poses, q: Array, points: Array) -> dict[str, Array]:
+        """Return the numbers of machines at closed poses with joint coordinates."""
+        robot = self.robot
         values = numbers(robot, poses, q, points, self.chi)
         for k, (label, which) in enumerate(robot.labels):
             word = "length" if robot.slides[k] else "angle"
@@ -109,9 +119,7 @@ class Sampled:
                 values[f"joint.{label}{('', ' first', ' second')[which + 1]}"] = q[:, k]
         for k in range(values["shares"].shape[1]):
             values[f"rate_share limb {k + 1}"] = values["shares"][:, k]
-        inside = good & self.inside(poses)
-        self.poses = poses
-        return values, inside
+        return values
 
     def inside(self, poses: Poses) -> Array:
         """Return which poses (N,) are in the workspace, up to rounding."""

@@ -21,13 +21,16 @@ from campaign import Row, campaign, command
 from gallery import Sampled, limited, random_gallery
 from legs import Array, Legs, Poses, turned
 from randomcases import limited_legs, random_legs, text_of
+from robots import follow
 from workspaces import value_name
 
 Tables = dict[str, Any]
 Values = dict[str, Array]
-#: Points of each segment, of straight legs and of loops that are closed; steps of a descent; and the condition number
-#: from which on a pose counts as singular.
-POINTS, CLOSED, STEPS = 10_000, 300, 12
+#: Points of each segment; those of them whose loops are closed along a way from home, and from which the joints of the
+#: others are followed; poses at once; steps of a descent; and the condition number from which on a pose is singular.
+POINTS, FROM_HOME, BLOCK, STEPS = 10_000, 128, 512, 12
+#: Part of a coordinate's size, or radians, by which it changes between points of one assembly at most.
+FAR = 0.3
 SINGULAR = 1e9
 GALLERY = ("6-pus", "6-rss", "6-rus", "6-ups", "delta", "orthoglide", "planar-3-rrr", "planar-3-prr", "planar-3-rpr")
 #: Of the programs, by minutes.
@@ -148,8 +151,8 @@ class Attack:
 
     Args:
         path: its segments.
-        values: returns numbers (N,) at poses, NaN where the robot has none, with the same random machine for a seed.
-        count: of points of each segment.
+        values: returns numbers (N,) at parameters of a segment, NaN where the robot has none, of the design or another
+            machine.
         unit: radians of the case's unit of angles.
         is_design: whether the design alone is meant.
     """
@@ -157,18 +160,14 @@ class Attack:
     def __init__(
         self,
         path: list[Segment],
-        values: Callable[[Poses, int], Values],
-        count: int,
+        values: Callable[[int, Array, int], Values],
         unit: float,
         *,
         is_design: bool = True,
     ) -> None:
-        self.path, self.numbers, self.unit, self.is_design = path, values, unit, is_design
-        self.s = np.linspace(0, 1, count)
+        self.at, self.unit, self.is_design = values, unit, is_design
+        self.s = np.linspace(0, 1, POINTS)
         self.sampled = [self.at(k, self.s, 1) for k in range(len(path))]
-
-    def at(self, k: int, s: Array, machine: int) -> Values:
-        return self.numbers(poses_of(self.path[k].at(s)), machine)
 
     def largest(self, name: str, sign: float) -> float:
         """Return the largest value times a sign, by a descent from the best samples; -inf without one."""
@@ -207,6 +206,13 @@ def judge(attack: Attack, result: Tables, label: str) -> tuple[Counter[str], lis
         kind = re.split(r" limb|joint|actuator |:", name)[0] or "joint"
         counts[f"{label}: {kind} {outcome}"] += 1
         proved &= outcome == "proved" or (sense is not None and "limit" not in each)
+        if name.startswith("reach limb") and name in attack.sampled[0]:
+            missed = sum(int((values[name] < 1).sum()) for values in attack.sampled)
+            if outcome == "proved" and missed:
+                faults.append(f"{name} is proved, and {missed} points are not closed")
+            if outcome == "refuted" and attack.value(name, each):
+                faults.append(f"{name} is refuted, and closed there")
+            continue
         if sense is None:
             own = "regular" if name == "regular" else "constraints"
             if own not in attack.sampled[0]:
@@ -262,14 +268,15 @@ def judge(attack: Attack, result: Tables, label: str) -> tuple[Counter[str], lis
     return counts, faults
 
 
-def of_legs(tables: Tables) -> Callable[[Poses, int], Values]:
+def of_legs(tables: Tables, path: list[Segment]) -> Callable[[int, Array, int], Values]:
     """Return the numbers of straight legs; those of machine 1 are at the edge of the tolerance."""
     legs, t = Legs(tables), tables.get("tolerance", {}).get("joint_centre", 0.0)
     errors = np.random.default_rng(0).normal(size=(2, len(legs.names), 3))
     errors *= t / np.linalg.norm(errors, axis=2, keepdims=True)
     pairs = [f"leg_clearance limbs {a} and {b}" for k, a in enumerate(legs.names) for b in legs.names[k + 1 :]]
 
-    def values(poses: Poses, machine: int) -> Values:
+    def values(k: int, s: Array, machine: int) -> Values:
+        poses = poses_of(path[k].at(s))
         found = legs.values(poses, *(machine * errors))
         if "leg_clearance" in legs.limits:
             found |= {name: legs.clearance(name, poses, *(machine * errors)) for name in pairs}
@@ -278,17 +285,60 @@ def of_legs(tables: Tables) -> Callable[[Poses, int], Values]:
     return values
 
 
-def of_loops(sampled: Sampled) -> Callable[[Poses, int], Values]:
-    """Return the numbers of a robot of the gallery, of the design alone."""
+class Followed:
+    """Numbers of the design of a gallery robot along a path: joints are followed from points closed from home."""
 
-    def values(poses: Poses, _: int) -> Values:
-        found, inside = sampled.at_poses(poses, np.zeros((len(poses.p), *sampled.robot.points_array.shape)))
-        off = np.linalg.norm(sampled.poses.p - poses.p, axis=1) > 1e-7 * np.abs(sampled.robot.points_array).max()
-        found["det"] = found.get("locked sign", np.ones(len(off)))
+    def __init__(self, sampled: Sampled, path: list[Segment]) -> None:
+        self.sampled, self.path, s = sampled, path, np.linspace(0, 1, FROM_HOME)
+        self.known = []
+        for each in path:
+            poses = poses_of(each.at(s))
+            _, q, _ = sampled.closed(poses, self._points(len(s)))
+            # A pose that gave way to joints is taken back.
+            self.known.append((s, *follow(sampled.robot, poses, q, self._points(len(s)))))
+
+    def _points(self, count: int) -> Array:
+        points = self.sampled.robot.points_array
+        return np.broadcast_to(points, (count, *points.shape))
+
+    def _start(self, k: int, s: Array) -> Array:
+        """Return joints near those at parameters of a segment."""
+        at, q, good = self.known[k]
+        right = np.clip(np.searchsorted(at, s), 1, len(at) - 1)
+        left = right - 1
+        part, found = ((s - at[left]) / (at[right] - at[left]))[:, None], np.zeros((len(s), q.shape[1]))
+        for limb, (_, own) in enumerate(self.sampled.robot.limbs):
+            a, b = q[np.ix_(left, own)], q[np.ix_(right, own)]
+            # At the edge of the reach, or where two closed points are of two assemblies, the nearer one tells.
+            both = (
+                good[left, limb] & good[right, limb] & (np.abs(a - b) < FAR * np.abs(q[:, own]).max(initial=1)).all(1)
+            )
+            is_left = good[left, limb] & ((part[:, 0] < 0.5) | ~good[right, limb])
+            found[:, own] = np.where(both[:, None], a + part * (b - a), np.where(is_left[:, None], a, b))
+        return found
+
+    def __call__(self, k: int, s: Array, _: int) -> Values:
+        robot, q, blocks = self.sampled.robot, self._start(k, s), []
+        good = np.zeros((len(s), len(robot.limbs)), bool)
+        for begin in range(0, len(s), BLOCK):
+            rows = slice(begin, begin + BLOCK)
+            poses = poses_of(self.path[k].at(s[rows]))
+            points = self._points(len(poses.p))
+            q[rows], good[rows] = follow(robot, poses, q[rows], points)
+            blocks.append(self.sampled.values(poses, q[rows], points))
+        if len(s) > len(self.known[k][0]):
+            self.known[k] = s, q, good
+        found = {name: np.concatenate([each[name] for each in blocks]) for name in blocks[0]}
+        found["det"] = found.get("locked sign", np.ones(len(s)))
         found["regular"] = found["locked"][:, 5] / found["locked"][:, 0]
-        return {name: np.where(inside & ~off, each, np.nan) for name, each in found.items() if np.ndim(each) == 1}
-
-    return values
+        values = {f"reach limb {limb + 1}": 1.0 * good[:, limb] for limb in range(len(robot.limbs))}
+        for name, each in found.items():
+            # The joints of a limb are those that its own loop closes by.
+            limb = re.match(r"(?:joint\.|actuator_\w+ limb )(\d+)", name)
+            closed = good[:, int(limb[1]) - 1] if limb else good.all(1)
+            if np.ndim(each) == 1:
+                values[name] = np.where(closed, each, np.nan)
+        return values
 
 
 def examine(seed: int) -> Row:
@@ -300,8 +350,8 @@ def examine(seed: int) -> Row:
         size, turn = rng.choice([0.02, 0.1, 0.4]) * home[2], np.radians(rng.choice([0, 4, 20, 80]))
         path = random_path(rng, home, np.repeat([size, turn], 3))
         tables = limited_legs(rng, boxed(tables, path, unit))
-        label, count = tables["robot"]["model"] + " with tolerance" * ("tolerance" in tables), POINTS
-        numbers = of_legs(tables)
+        label = tables["robot"]["model"] + " with tolerance" * ("tolerance" in tables)
+        numbers: Callable[[int, Array, int], Values] = of_legs(tables, path)
     else:
         name = str(rng.choice(GALLERY))
         tables, unit = random_gallery(rng, name), np.pi / 180
@@ -313,11 +363,11 @@ def examine(seed: int) -> Row:
         half = np.concatenate([size * flat, np.radians(rng.choice([3, 15])) * turns * np.ones(3)])
         path = random_path(rng, home, half)
         tables = limited(rng, boxed(tables, path, unit))
-        label, count, numbers = name, CLOSED, of_loops(Sampled(tables, rng))
+        label, numbers = name, Followed(Sampled(tables, rng), path)
     result, row = judged_path(tables, path, rng)
     if result is None:
         return row
-    attack = Attack(path, numbers, count, unit, is_design="tolerance" not in tables)
+    attack = Attack(path, numbers, unit, is_design="tolerance" not in tables)
     counts, faults = judge(attack, result, label)
     return {"counts": counts, "faults": faults}
 

@@ -20,6 +20,8 @@ import screwsynth.models
 FOLDER = Path(screwsynth.models.__file__).parent / "robots"
 #: Residual of loops, in parts of the robot and radians, that are closed.
 CLOSED = 1e-12
+#: Steps of Newton's method from joints near those that are meant.
+NEWTON = 8
 
 
 class Turn(NamedTuple):
@@ -90,6 +92,11 @@ class Robot:
                 self._limb(table, own, limb, lambda p, R=R, o=through: o + R @ (p - o), R)
         self.count = len(self.labels)
         self.points_array = np.array(self.points)
+        #: Chains and coordinates of each limb.
+        self.limbs: list[tuple[list[int], list[int]]] = []
+        for number in range(1, limb + 1):
+            chains = [k for k, each in enumerate(self.chains) if each.limb == number]
+            self.limbs.append((chains, sorted({each.coordinate for k in chains for each in self.chains[k].turns})))
 
     def _limb(self, table: dict[str, Any], names: dict[str, Any], limb: int, placed: Any, R: Array) -> None:  # noqa: ANN401
         centres: dict[tuple[float, ...], int] = {}
@@ -211,16 +218,7 @@ def close(
         p, R, todo, off = target.p.copy(), target.R.copy(), np.arange(n), np.zeros(n)
         for _ in range(12):
             T, S, _ = robot.moved(q[todo], points[todo])
-            D = np.tile(np.eye(4), (len(todo), 1, 1))  # displacement of the platform from home
-            D[:, :3, :3], D[:, :3, 3] = R[todo], p[todo] - np.einsum("nij,j->ni", R[todo], robot.home)
-            # The twist from each chain's end to the platform, about the world's origin, to first order.
-            Q = D[:, None, :3, :3] @ np.swapaxes(T[:, :, :3, :3], 2, 3)
-            omega = (
-                np.stack([Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]], -1)
-                / 2
-            )
-            v = D[:, None, :3, 3] - np.einsum("ncij,ncj->nci", Q, T[:, :, :3, 3])
-            r = np.concatenate([v / size, omega], 2).reshape(len(todo), -1)
+            r = residuals(robot, Poses(p[todo], R[todo]), T).reshape(len(todo), -1)
             off[todo] = np.abs(r).max(1)
             left = off[todo] > CLOSED
             if not left.any():
@@ -248,6 +246,44 @@ def close(
             q[todo] += step[:, 6:]
         good &= off < 1e-9
     return Poses(p, R), q, good
+
+
+def residuals(robot: Robot, poses: Poses, T: Array) -> Array:
+    """Return the twists (N, chains, 6) from each chain's end, displaced by T, to the platform, to first order.
+
+    Velocity of the point at the world's origin in parts of the robot's size, then angular velocity.
+    """
+    D = np.tile(np.eye(4), (len(T), 1, 1))  # displacement of the platform from home
+    D[:, :3, :3], D[:, :3, 3] = poses.R, poses.p - np.einsum("nij,j->ni", poses.R, robot.home)
+    Q = D[:, None, :3, :3] @ np.swapaxes(T[:, :, :3, :3], 2, 3)
+    omega = np.stack([Q[..., 2, 1] - Q[..., 1, 2], Q[..., 0, 2] - Q[..., 2, 0], Q[..., 1, 0] - Q[..., 0, 1]], -1) / 2
+    v = D[:, None, :3, 3] - np.einsum("ncij,ncj->nci", Q, T[:, :, :3, 3])
+    return np.concatenate([v / np.abs(robot.points_array).max(), omega], 2)
+
+
+def follow(robot: Robot, poses: Poses, q: Array, points: Array) -> tuple[Array, Array]:
+    """Return joint coordinates (N, count) at poses, from ones near by, and whether each limb (N, limbs) is closed."""
+    q, todo, off = q.copy(), np.arange(len(q)), np.full((len(q), len(robot.limbs)), np.inf)
+    size = float(np.abs(robot.points_array).max())
+    scale = np.where(robot.slides, size, 1.0)
+    for _ in range(NEWTON + 1):
+        T, S, _ = robot.moved(q[todo], points[todo])
+        r = residuals(robot, Poses(poses.p[todo], poses.R[todo]), T)
+        off[todo] = np.stack([np.abs(r[:, chains]).max((1, 2)) for chains, _ in robot.limbs], 1)
+        left = (off[todo] > CLOSED).any(1)
+        if not left.any():
+            break
+        todo, S, r = todo[left], S[left], r[left]
+        for chains, columns in robot.limbs:
+            A = S[:, chains][..., columns] / np.array([size] * 3 + [1] * 3)[:, None]
+            M = A.reshape(len(todo), -1, len(columns)) * scale[columns]
+            G = M @ np.swapaxes(M, 1, 2)
+            G += 1e-13 * np.trace(G, axis1=1, axis2=2)[:, None, None] * np.eye(G.shape[1])
+            y = np.linalg.solve(G, r[:, chains].reshape(len(todo), -1, 1))
+            step = (np.swapaxes(M, 1, 2) @ y)[:, :, 0]
+            step *= np.minimum(1, 0.1 / np.maximum(np.abs(step).max(1, keepdims=True), 1e-300))
+            q[np.ix_(todo, columns)] += step * scale[columns]
+    return q, off < 1e-9
 
 
 def cross_matrix(p: Array) -> Array:
@@ -299,17 +335,20 @@ def numbers(robot: Robot, poses: Poses, q: Array, points: Array, chi: Array) -> 
     # about the platform's origin, rotations times the size
     v = S[:, :, :3] + np.cross(S[:, :, 3:], poses.p[:, None, :, None], axis=2)
     A = np.concatenate([v, size * S[:, :, 3:]], 2)
-    X = np.tile(np.eye(6), (n, m, 1, 1)).reshape(n, 6 * m, 6)
-    for name, columns in (("locked", passive), ("free", np.arange(robot.count))):
-        P = A[..., columns].reshape(n, 6 * m, -1)
-        U, s, _ = np.linalg.svd(P, full_matrices=False)
-        rank = s > 1e-7 * s[:, :1]
-        U = U * rank[:, None]
-        found[name] = np.linalg.svd(X - U @ (np.swapaxes(U, 1, 2) @ X), compute_uv=False)
-        found[f"{name} rank"] = rank.sum(1)
-        M = np.concatenate([X, P], 2)
-        if name == "locked" and M.shape[1] == M.shape[2]:
-            found[f"{name} sign"] = np.linalg.slogdet(M)[0]
+    for name, meant in (("locked", passive), ("free", np.arange(robot.count))):
+        rows, ranks = [], np.zeros(n, int)
+        for chains, coordinates in robot.limbs:
+            P = A[:, chains][..., [k for k in coordinates if k in meant]].reshape(n, 6 * len(chains), -1)
+            X = np.tile(np.eye(6), (len(chains), 1))
+            U, s, _ = np.linalg.svd(P, full_matrices=False)
+            rank = s > 1e-7 * s[:, :1]
+            U = U * rank[:, None]
+            rows.append(X - U @ (np.swapaxes(U, 1, 2) @ X))
+            ranks += rank.sum(1)
+        found[name], found[f"{name} rank"] = np.linalg.svd(np.concatenate(rows, 1), compute_uv=False), ranks
+        if name == "locked" and 6 * m == 6 + len(meant):
+            X = np.tile(np.eye(6), (n, m, 1, 1))
+            found[f"{name} sign"] = np.linalg.slogdet(np.concatenate([X, A[..., meant]], 3).reshape(n, 6 * m, 6 * m))[0]
     F, shares = np.zeros(n), np.zeros((n, max(each.limb for each in robot.chains)))
     for c, chain in enumerate(robot.chains):
         own = np.array([k for k in sorted({each.coordinate for each in chain.turns}) if k not in robot.actuated], int)

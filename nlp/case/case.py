@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from ...models.whole import Whole
 from ..errors import CaseError, listing, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_statics, check_value, check_vector
-from .limits.limit import LimitedCase
+from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import parameter_name, pose_prefixes
@@ -156,6 +156,23 @@ class Case(Whole, Shown):
                 raise CaseError(f"robot.parameters.{item.name}", fault, source=self.source)
             found += values
         return np.array(found, dtype=np.float64)
+
+    @property
+    def without_motion(self) -> tuple[Limit[Any], ...]:
+        """The limits on speeds and powers for which the case states no motion: they are those of a path alone."""
+        return tuple(each for each in self.limits if each.needs_motion and self.loading.motion is None)
+
+    def require_motion(self, without: str = "") -> None:
+        """Refuse limits on speeds and powers where no motion is stated.
+
+        Args:
+            without: what else could state one, as the end of a sentence.
+
+        Raises:
+            CaseError: there is one.
+        """
+        for limit in self.without_motion:
+            raise CaseError(f"limits.{limit.name}", f"means nothing without [motion]{without}", source=self.source)
 
     def parameter_name(self, name: str) -> str:
         """Return the name of a parameter, or of one of its components, in this case; see :mod:`.names`.

@@ -23,6 +23,9 @@ def evaluate(
 
     Nothing is optimised. Free numbers are at their starts, or in the middle of their ranges.
     """
+    from dataclasses import replace
+
+    from ..case.limits.limits import Limits
     from ..evidence import state
     from ..evidence.closing import closed_start
     from ..program.epigraph import with_exact_level
@@ -31,6 +34,10 @@ def evaluate(
 
     given = options.read_machine(case, settings, of, at_pose=True).file
     loaded = given.case
+    if left_out := loaded.without_motion:  # a pose of a path, whose own motion is meant
+        loaded = replace(loaded, limits=Limits(*(each for each in loaded.limits if each not in left_out)))
+        names = ", ".join(f"limits.{each.name}" for each in left_out)
+        typer.echo(f"{names}: left out, as the case has no [motion]", err=True)
     files = options.Outputs(json=json_file, csv=csv_file)
     files.check(given.inputs)
     options.check_csv(csv_file, table, loaded, at_point=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+import time
 from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -37,20 +39,36 @@ def counting_line() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def spinner(first: str) -> Iterator[Callable[[str], None]]:
-    """Give a function that shows a text beside a spinner; at the beginning there is a first text."""
+    """Give a function that shows a text beside a spinner; at the beginning there is a first text.
+
+    With it the time is shown that the work may still take, where it is limited when the text is given.
+    """
     if not sys.stderr.isatty():
         yield lambda _: None
         return
     from rich.console import Console
     from rich.markup import escape
-    from rich.progress import Progress, SpinnerColumn, TextColumn
+    from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TextColumn
+    from rich.text import Text
 
     from ..errors import one_line
+    from ..interruption import seconds_left
 
-    columns = SpinnerColumn(), TextColumn("{task.description}")
+    class TimeLeft(ProgressColumn):
+        """Seconds until the end of the time."""
+
+        def render(self, task: Task) -> Text:
+            left = task.fields.get("end", math.inf) - time.perf_counter()
+            return Text("" if left == math.inf else f"at most {max(left, 0.0):.0f} s left")
+
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeLeft()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task(first, total=None)
-        yield lambda text: bar.update(line, description=escape(one_line(text)))
+
+        def show(text: str) -> None:
+            bar.update(line, description=escape(one_line(text)), end=time.perf_counter() + seconds_left())
+
+        yield show
 
 
 class SolveOutcome(NamedTuple):

@@ -56,10 +56,11 @@ def limit_constraints(
         table: the program's numbers as symbols.
 
     Raises:
-        CaseError: a limit that depends on fixed numbers alone has no finite value.
+        CaseError: a limit that depends on fixed numbers alone has no finite value, or one on speeds has no motion.
     """
     if not case.limits:
         return LimitConstraints((), ())
+    case.require_motion()
     x, p = table.variables_vector, table.arguments_vector
     few, deferred, fixed = _sorted_families(list(_families(case, robots, named)), table)
     limits = without_repeated(list(_constraints(case, robots, named, few)), x, p)

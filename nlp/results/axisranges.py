@@ -69,7 +69,8 @@ class AxisData(JsonObject):
         axis: ``x``, ``y``, ``z``, ``roll``, ``pitch`` or ``yaw``.
         unit: of its values.
         at: its value at the pose.
-        lower, upper: the ends of the proved range about the pose.
+        lower: the lower end of the proved range about the pose.
+        upper: the upper end.
     """
 
     axis: str

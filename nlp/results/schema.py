@@ -14,6 +14,7 @@ from ...models.fileversions import RESULT_FILES, VERSION_KEY
 from ..errors import InputError, listing
 from ..system.reading import check_version, read_limited
 from ..system.strictjson import Size, WrongValueError, below, json_tree, value_of
+from .axisranges import AxisRangesResult
 from .checks import ChecksResult
 from .comparison import ComparisonResult
 from .data import CombinedResult, SolveResult
@@ -35,6 +36,7 @@ RESULTS: tuple[type[JsonObject], ...] = (
     TradeoffResult,
     WorkspaceResult,
     PathResult,
+    AxisRangesResult,
     ComparisonResult,
     FrontResult,
     SweepResult,
@@ -184,6 +186,7 @@ Result: TypeAlias = (
     | TradeoffResult
     | WorkspaceResult
     | PathResult
+    | AxisRangesResult
     | ComparisonResult
     | FrontResult
     | SweepResult

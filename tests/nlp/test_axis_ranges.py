@@ -6,13 +6,16 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from builders import Array, case_from, output_of, refusal_of, rows_of, shipped_tables, starter_tables
 from measures import circle_joints
 
-from screwsynth.nlp import Case, InputError, Outcome
+from screwsynth.nlp import Case, InputError, Outcome, json_data, load_result
 from screwsynth.nlp.proof.workspace.axis_ranges import AxisRange, axis_ranges
+from screwsynth.nlp.results.axisranges import AxisRangesResult
+from screwsynth.nlp.results.schema import result_schema
 
 Run = Callable[..., tuple[int, str, str]]
 BASE, PLATFORM = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
@@ -216,14 +219,23 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     assert len(shown.splitlines()) <= 25
     assert "1, 0, 20 in; roll, pitch, yaw 0, 0, 10 deg" in shown
     result = json.loads(out.read_text())
+    jsonschema.validate(result, result_schema())
+    assert type(load_result(out)) is AxisRangesResult
+    assert json_data(load_result(out)) == result
     assert result["proved"] is True
     assert [each["axis"] for each in result["axes"]] == ["x", "y", "z", "roll", "pitch", "yaw"]
     assert (result["axes"][0]["lower"], result["axes"][5]["upper"]) == ({"value": -2.0}, {"value": 15.0})
     assert [each["factor"] for each in result["pairs"]] == [1.0] * 15
     axes = table.read_text().partition("\n\n")[0].partition("\n")[2]
     assert [row["limited below by"] for row in rows_of(axes)] == ["the largest range"] * 6
-    status, shown, _ = cli("path", "hexapod-linuxcnc", "--range", "--start", "0,0,50,0,0,0")
+    status, shown, _ = cli(
+        "path", "hexapod-linuxcnc", "--range", "--start", "0,0,50,0,0,0", "--json", str(tmp_path / "none.json")
+    )
     assert status == 1
+    none = json.loads((tmp_path / "none.json").read_text())
+    jsonschema.validate(none, result_schema())
+    assert none["faults"]
+    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--of", str(out)), "is no result of solve or evaluate")
     assert "leg_length limb 3+ above 43 in: 54.63139 in" in shown
     refusal_of(cli("path", "hexapod-linuxcnc"), "the table [path], or the file of a path")
     refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--along", "a.ngc"), "--along: is not for --range")

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
 
-from screwsynth.nlp import Case, Outcome, judge_workspace
+from screwsynth.nlp import Case, Outcome, interruption, judge_workspace
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import PathOptions
@@ -161,6 +162,17 @@ def test_a_limit_is_refuted_in_the_first_line_that_leaves_it() -> None:
     assert not stopped.is_proved
 
 
+def test_an_interrupted_judgement_keeps_what_is_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    requested = Event()
+    monkeypatch.setattr(interruption, "_requested", requested)
+    case = hexapod({"min": 17, "max": 43})
+    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    judged = judge_path(case, path, progress=lambda step: requested.set() if step == "limits" else None)
+    assert [each.outcome for each in judged.ranks] == [Outcome.PROVED]
+    assert {(each.outcome, each.reason) for each in judged.extremes} == {(Outcome.OPEN, interruption.STOPPED)}
+    assert not judged.is_proved
+
+
 @pytest.mark.parametrize(("part", "outcome"), [(1.0001, Outcome.PROVED), (0.9999, Outcome.REFUTED)])
 def test_a_stroke_is_the_longest_length_less_the_shortest_at_any_two_points(part: float, outcome: Outcome) -> None:
     tables = shipped_tables("hexapod-linuxcnc")
@@ -230,6 +242,24 @@ def test_a_singular_pose_is_touched_between_samples_without_a_change_of_sign() -
     y, _ = extreme_at(low)
     values = rpr_determinant(low, np.linspace(y - 0.1234, y + 0.2, 324))
     assert (values > 0).all() or (values < 0).all()
+    # A line near by crosses twice within 0.4 mm, between two of the samples at each millimetre.
+    near, far = low, 0.0
+
+    def roots(x: float) -> Array:
+        return np.sort(np.roots(np.polyfit([-1.0, 0.0, 1.0], rpr_determinant(x, np.array([-1.0, 0.0, 1.0])), 2)))
+
+    far = low + 1e-3 if np.isreal(roots(low + 1e-3)).all() else low - 1e-3
+    for _ in range(80):
+        middle = 0.5 * (near + far)
+        near, far = (near, middle) if np.isreal(roots(middle)).all() and np.ptp(roots(middle)) > 4e-4 else (middle, far)
+    one, other = roots(far)
+    assert other - one == pytest.approx(4e-4, rel=1e-3)
+    begin = 0.5 * (one + other) - 0.1235
+    values = rpr_determinant(far, begin + 1e-3 * np.arange(324))
+    assert (values > 0).all() or (values < 0).all()
+    twice = judge_path(case, table(case, (far, begin, 0, 0, 0, 0), (far, begin + 0.323, 0, 0, 0, 0))).ranks[0]
+    assert twice.outcome is Outcome.REFUTED
+    assert np.abs(roots(far) - twice.pose.position[1]).min() < 1e-8
     judged = [
         judge_path(case, table(case, (x, y - 0.1234, 0, 0, 0, 0), (x, y + 0.2, 0, 0, 0, 0)))
         for x in (low, low + 1e-4, low - 1e-4)
@@ -302,6 +332,16 @@ def test_slides_of_a_robot_with_loops_are_followed_along_its_path() -> None:
             found = extreme(judged, f"actuator_length limb {k + 1}", sense)
             assert sense.sign * (found.bound - end) > -1e-9
             assert sense.sign * (end - found.reached) > -1e-9
+    # The third slide is beyond this limit long before its largest value: the first point is found there too.
+    assert slides.max() > 0.25
+    short = case_from(tables | {"limits": {"actuator_length": {"max": 0.1}}})
+    back = table(case, (0, 0, 0, 0, 0, 0), (0.1, 0.05, 0, 0, 0, 5), (0.1, 0.1, 0, 0, 0, -5), (0, 0, 0, 0, 0, 0))
+    faults = judge_path(short, back).faults
+    ((name, _), fault), first = *faults.items(), int(np.argmax(slides > 0.1))
+    assert name == "actuator_length limb 3"
+    assert fault.place.segment == first // len(SAMPLES)
+    assert fault.place.parameter == pytest.approx(SAMPLES[first % len(SAMPLES)], abs=SAMPLES[1])
+    assert fault.value == pytest.approx(0.1, abs=1e-6)
 
 
 @pytest.mark.parametrize("tolerance", [None, 1e-3])

@@ -12,6 +12,7 @@ import pytest
 from builders import Array, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
 from measures import circle_joints
 
+import screwsynth.cases
 from screwsynth.nlp import Case, Outcome, inverse
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.path.gcode import read_program
@@ -130,10 +131,11 @@ def test_a_limit_on_speeds_is_that_of_the_path_and_names_the_first_line_beyond_i
     limit = 1.5 * sampled[0]
     line = int(path.lines[next(k for k, each in enumerate(sampled) if each > limit)])
     tables = shipped_tables("hexapod-linuxcnc")
-    # The fastest motions of the case are not those of the path.
-    tables |= {"limits": {"actuator_speed": {"max": limit}}, "motion": {"linear": 1e-3}}
-    judged = judge_path(case_from(tables), path)
+    tables |= {"limits": {"actuator_speed": {"max": limit}}}
+    # The fastest motions of a case that has any are not those of the path.
+    judged, same = (judge_path(case_from(tables | each), path) for each in ({}, {"motion": {"linear": 1e-3}}))
     speeds = largest(judged, "actuator_speed")
+    assert [each.reached for each in speeds] == [each.reached for each in largest(same, "actuator_speed")]
     assert {each.limit for each in speeds} == {limit}
     worst = np.nanmax(sampled)
     assert max(each.reached for each in speeds) == pytest.approx(worst, rel=1e-3)
@@ -146,6 +148,50 @@ def test_a_limit_on_speeds_is_that_of_the_path_and_names_the_first_line_beyond_i
     assert result["untimed"] == 1
     assert result["time"] == pytest.approx(np.nansum(path.durations))
     assert max(each["speed"] for each in result["actuators"]) == pytest.approx(worst, rel=2e-3)
+
+
+def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cli: Run, tmp_path: Path) -> None:
+    tables = shipped_tables("hexapod-linuxcnc")
+    text = (Path(screwsynth.cases.__file__).parent / "hexapod-linuxcnc.toml").read_text(encoding="utf-8")
+    text = f"{text.partition('[limits]')[0]}\n[workspace]\nposition = [0, 0, {{ min = 20, max = 21 }}]\n"
+    case, start = (
+        str(saved(tmp_path / "case.toml", f"{text}[limits]\nactuator_speed = {{ max = 2 }}\n")),
+        (0, 0, 20, 0, 0, 0),
+    )
+    timed, rapid = (
+        str(saved(tmp_path / f"{word}.ngc", f"G20 {word} X1 Y0 Z20\n{word} Z21\nM2")) for word in ("G1 F60", "G0")
+    )
+    assert "verdict  everything is proved" in output_of(cli("path", case, "--along", timed))
+    fault = "case.toml: limits.actuator_speed: means nothing without [motion]"
+    refusal_of(cli("path", case, "--along", rapid), f"{fault}, or a path that states times")
+    for words in (["workspace", case], ["solve", case], ["path", case, "--range"]):
+        assert refusal_of(cli(*words)).strip().endswith(fault)
+    # At a pose of the path, which an answer names, everything else is shown.
+    code, shown, err = cli("evaluate", case, "--set", "p_z=20.5")
+    assert (code, err) == (0, "limits.actuator_speed: left out, as the case has no [motion]\n")
+    assert "F" in shown
+    refusal_of(
+        cli(
+            "workspace",
+            str(
+                saved(
+                    tmp_path / "power.toml",
+                    f"{text}[[load]]\nforce = [0, 0, 9]\n[limits]\nactuator_power = {{ max = 2 }}\n",
+                )
+            ),
+        ),
+        "limits.actuator_power: means nothing without [motion]",
+    )
+    # Powers are the same whether the case has a motion, which is not used, or none.
+    tables |= {"limits": {"actuator_power": {"max": 1e3}}, "load": [{"name": "cut", "force": [3, -2, 10]}]}
+    found = []
+    for each in ({}, {"motion": {"linear": 100}}):
+        made = case_from(tables | each)
+        judged = judge_path(made, program(made, "G94 F60\nG1 X3 A2\nM2", start))
+        assert judged.is_proved
+        found.append([(each.name, each.bound, each.limit) for each in largest(judged, "actuator_power")])
+    assert found[0] == found[1]
+    assert len(found[0]) == 12
 
 
 def knots_along(case: Case, path: ProgrammedPath, within: float) -> Knots:
@@ -222,23 +268,21 @@ def rotation_vector(R: Array) -> Array:
 
 
 @pytest.mark.parametrize("name", ["cranks in space", "slides", "loops"])
-def test_knots_of_robots_with_loops_are_near_enough_by_their_second_differences(name: str) -> None:
+def test_knots_of_robots_with_loops_are_near_enough_at_points_between_them(name: str) -> None:
     case, middle, half = ROBOTS[name]
     rng, within = np.random.default_rng(3), 1e-3 * half[0]
     path = table(case, middle + half * rng.uniform(-1, 1, (3, 6)), np.array([0.0, 1.0, 3.0]))
     knots = knots_along(case, path, within)
     assert not knots.reason
-    worst = 0.0
-    for j, k in enumerate(knots.segments[1:]):
-        begin = 0.0 if knots.segments[j] != k else knots.parameters[j]
-        middle_s = 0.5 * (begin + knots.parameters[j + 1])
-        pose = path.poses_at([k], middle_s)
-        at = inverse(case, *pose)
-        off = 0.5 * (knots.coordinates[j] + knots.coordinates[j + 1]) - at.coordinates[0]
-        # To first order the platform moves by the motion whose rates these are.
-        moved = np.linalg.lstsq(at.rates[0], off, rcond=1e-9)[0]
-        worst = max(worst, float(np.linalg.norm(moved[3:])))
-    assert 0.5 * within <= worst <= within
+    k, part = knots.segments[1:], np.linspace(0, 1, 101)[:-1]
+    begin = np.where(k == knots.segments[:-1], knots.parameters[:-1], 0.0)
+    s = (begin + part[:, None] * (knots.parameters[1:] - begin)).T.ravel()
+    at = inverse(case, *path.poses_at(np.repeat(k, len(part)), s), follow="previous")
+    q = knots.coordinates[:-1, None] + part[:, None] * np.diff(knots.coordinates, axis=0)[:, None]
+    # To first order the platform moves by the motion whose rates these are.
+    off = q.reshape(len(s), -1) - at.coordinates
+    moved = (np.linalg.pinv(at.rates, rcond=1e-9) @ off[:, :, None])[:, 3:, 0]
+    assert 0.5 * within <= np.linalg.norm(moved, axis=1).max() <= knots.deviation <= within
 
 
 def test_knots_that_cannot_be_shown_are_said_to_be_open() -> None:

@@ -51,11 +51,10 @@ class LoadedLimit(Limit[TableT], abc.ABC):
     """A limit on what loads on the platform or its fastest motions demand of actuators.
 
     Attributes:
-        needs_loads, needs_motion: whether the numbers depend on loads, and on the platform's motions.
+        needs_loads: whether the numbers depend on loads.
     """
 
     needs_loads: ClassVar[bool] = True
-    needs_motion: ClassVar[bool] = False
 
     @classmethod
     def is_for(cls, model: Model) -> bool:
@@ -63,7 +62,7 @@ class LoadedLimit(Limit[TableT], abc.ABC):
         return bool(driven_joints(model))
 
     def check(self, case: LimitedCase) -> None:
-        """Refuse a number out of its range, and a case without the loads or motions that the limit needs.
+        """Refuse a number out of its range, and a case without the loads that the limit needs.
 
         Raises:
             CaseError: in the words of a case file.
@@ -71,8 +70,6 @@ class LoadedLimit(Limit[TableT], abc.ABC):
         super().check(case)
         if self.needs_loads and not case.loading.loads:
             raise CaseError(f"limits.{self.name}", "means nothing without [[load]]")
-        if self.needs_motion and case.loading.motion is None:
-            raise CaseError(f"limits.{self.name}", "means nothing without [motion]")
 
 
 @dataclass(frozen=True)

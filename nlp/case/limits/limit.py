@@ -216,6 +216,7 @@ class Limit(abc.ABC, Generic[TableT]):
         numbers: the range of each of its numbers, which have the same names in its table.
         needs_legs: whether only a robot with legs between joint centres can have it.
         needs_joints: whether only a robot given joint by joint can have it.
+        needs_motion: whether the numbers depend on the platform's motions: those of the case, or of a path with times.
         order: place of its constraints among those of other limits on the same plate, design or pose: lower first, and
             in the registry's order where equal.
     """
@@ -226,6 +227,7 @@ class Limit(abc.ABC, Generic[TableT]):
     numbers: ClassVar[Ranges] = {}
     needs_legs: ClassVar[bool] = False
     needs_joints: ClassVar[bool] = False
+    needs_motion: ClassVar[bool] = False
     order: ClassVar[int] = 0
 
     @classmethod

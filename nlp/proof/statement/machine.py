@@ -53,11 +53,12 @@ def workspace_of_case(case: Case) -> Workspace:
     """Return a case's workspace.
 
     Raises:
-        CaseError: the case has none, or a dimension of its robot is free.
+        CaseError: the case has none, a dimension of its robot is free, or limits need a motion that it does not state.
     """
     if case.workspace is None:
         raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
     case.fixed_parameters("a workspace is judged with fixed dimensions")
+    case.require_motion()
     return case.workspace
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from ....models import Dimension
 from ....models.statics import DrivenJoint, driven_joints
@@ -11,6 +12,7 @@ from ...case.case import Case
 from ...case.forces import dimension_of_force, dimension_of_speed
 from ...case.limits.constraint import Reading
 from ...case.limits.forces import ActuatorForce, ActuatorLimit, ActuatorPower, ActuatorSpeed
+from ...case.loads import Motion
 from ...case.motors import Motor, MotorNumber
 from ...case.task import Sense
 from .claims import Claim, ClaimKind
@@ -23,6 +25,11 @@ def motor_claims(case: Case) -> Iterator[Claim]:
     tighter counts.
     """
     yield from _tightest(_claims(case))
+
+
+def in_motion(case: Case) -> Case:
+    """Return a case that states a motion, for limits on speeds and powers of a path, whose own motion is meant."""
+    return replace(case, loading=case.loading._replace(motion=case.loading.motion or Motion(1.0)))
 
 
 def speed_claims(case: Case) -> Iterator[Claim]:

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -19,7 +18,7 @@ import numpy as np
 from ....models import FloatArray, frozen_array
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
-from ...case.loads import Motion
+from ...case.motors import MotorNumber
 from ...case.pose import Free, Value
 from ...case.task import Sense
 from ...case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
@@ -30,16 +29,16 @@ from ...path.path import ProgrammedPath
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
-from ..statement.machine import workspace_of_case
-from ..statement.motors import motor_claims
+from ..statement.motors import in_motion, motor_claims
 from ..statement.tolerance import Directions
-from .numbers.bound_search import Minimum, Number
+from .numbers.bound_search import Minimum
 from .numbers.expressions import Expressions
-from .numbers.extremes import Extreme, extreme_of, goal_of
+from .numbers.extremes import Extreme, extreme_of
 from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
+from .path_faults import Fault, first_faults, pose_at, refuted
 from .path_knots import Knots, Sampling, knots_of
 from .path_motion import speeds_on_path
 from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
@@ -65,8 +64,6 @@ _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
 _PARTS = 64
 #: Parameters of points of each segment at which a change of sign is looked for.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
-#: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
-_ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,14 +87,6 @@ class RankOnPath:
     boxes: int
     seconds: float
     reason: str
-
-
-class Fault(NamedTuple):
-    """A point of a path that refutes a limit: its place, the value, and the pose."""
-
-    place: Place
-    value: float
-    pose: PoseNumbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,13 +143,16 @@ def judge_path(
         progress: called with what is done next.
 
     Raises:
-        CaseError: a dimension of the robot is free.
+        CaseError: a dimension of the robot is free, or limits need a motion that neither the case nor the path states.
         InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
             robot of which the positions of actuators are not known.
     """
     cover, box, workspace = _covered(path)
     case = replace(case, workspace=workspace)
-    workspace_of_case(case)
+    case.fixed_parameters("a path is judged with fixed dimensions")
+    if not path.is_timed:
+        case.require_motion(", or a path that states times")
+    stated, case = case, in_motion(case) if case.without_motion else case
     kernel()
     report = progress or (lambda _: None)
     with within(time_limit, _PART):
@@ -182,7 +174,7 @@ def judge_path(
             machines = Machines(case, closed, design)
         except NotJudgedError as error:
             rank = RankOnPath(REGULAR, Outcome.OPEN, None, None, 0, 0.0, str(error))
-            return PathJudgement(case, path, (rank,), (), knots=knots)
+            return PathJudgement(stated, path, (rank,), (), knots=knots)
         family = machines.family
         ranks = []
         for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
@@ -198,17 +190,17 @@ def judge_path(
         for group in (reaches, claims):
             searched = _searched(machines, group, gap)
             found += searched
-            wrong = _refuted(group, searched).values()
+            wrong = refuted(group, searched).values()
             if wrong:
                 numbers = Expressions(machines.family, ca.vertcat(*[machines.number(claim) for claim, _ in wrong]))
-                faults |= _first_faults(numbers, dict(enumerate(wrong)), cover)
+                faults |= first_faults(numbers, dict(enumerate(wrong)), cover)
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
         subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
         found = with_strokes(subject, found, partial(_finer, machines, claims))
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
-        found += _of_actuators(subject, machines, cover, gap, faults, with_all=not limits_alone)
-    return PathJudgement(case, path, tuple(ranks), tuple(found), faults, knots)
+        found += _of_actuators(subject, machines, cover, gap, faults, is_timed=path.is_timed, with_all=not limits_alone)
+    return PathJudgement(stated, path, tuple(ranks), tuple(found), faults, knots)
 
 
 def _of_actuators(
@@ -218,21 +210,28 @@ def _of_actuators(
     gap: float,
     faults: dict[tuple[str, Sense], Fault],
     *,
+    is_timed: bool,
     with_all: bool,
 ) -> list[Extreme]:
     """Return the numbers of actuators along a path, in its own motion where that is known; adds faults of speeds."""
-    if not np.isfinite(cover.seconds).any():
+    if not is_timed:
         found = list(motor_extremes(subject, with_all=with_all))
         faults |= _motor_faults(subject, found, cover)
         return found
-    speeds, case = speeds_on_path(machines, cover, gap), subject.case
+    # Powers are those in the path's motion, whether the case states another one or none.
+    speeds, moving = speeds_on_path(machines, cover, gap), in_motion(subject.case)
     bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
+    unknown: list[Extreme] = []
     if speeds.number is not None:
-        # Powers are those in the path's motion, whether the case states another one or none.
-        moving = case.loading._replace(motion=case.loading.motion or Motion(1.0))
-        subject = replace(subject, case=replace(case, loading=moving), machines=speeds.number.problem)
-        faults |= _first_faults(speeds.number, _refuted(speeds.claims, speeds.extremes), cover)
-    found = list(motor_extremes(subject, speeds=bounds, with_all=with_all))
+        subject = replace(subject, case=moving, machines=speeds.number.problem)
+        faults |= first_faults(speeds.number, refuted(speeds.claims, speeds.extremes), cover)
+    else:
+        powers = [each for each in motor_claims(moving) if each.motor and each.motor.number is MotorNumber.POWER]
+        unknown = [
+            extreme_of(each, Minimum(reason=speeds.extremes[0].reason)) for each in powers if each.limit is not None
+        ]
+        subject = replace(subject, case=replace(moving, loading=moving.loading._replace(motion=None)))
+    found = [*motor_extremes(subject, speeds=bounds, with_all=with_all), *unknown]
     faults |= _motor_faults(subject, found, cover)
     return [*speeds.extremes, *found]
 
@@ -245,8 +244,8 @@ def _motor_faults(subject: Subject, found: Sequence[Extreme], cover: PathCover) 
     for _, group in itertools.groupby(claims, lambda claim: claim.motor and claim.motor.place):
         own = list(group)
         if subject.machines is not None:
-            refuted = {k: (each, wrong[each.name, each.sense]) for k, each in enumerate(own)}
-            faults |= _first_faults(Motors(subject.machines, subject.case, own), refuted, cover)
+            pairs = {k: (each, wrong[each.name, each.sense]) for k, each in enumerate(own)}
+            faults |= first_faults(Motors(subject.machines, subject.case, own), pairs, cover)
     return faults
 
 
@@ -318,7 +317,7 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
     """Return the verdict on the rank of a matrix along a path."""
     place = _sign_change(problem, matrix, cover)
     if place is not None:
-        return RankOnPath(name, Outcome.REFUTED, place, _pose(problem, cover, place), 0, 0.0, "")
+        return RankOnPath(name, Outcome.REFUTED, place, pose_at(problem, cover, place), 0, 0.0, "")
     effort = Effort()
     try:
         with one_search():
@@ -341,7 +340,7 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
     words = f"its smallest singular value is {value:.1e} of the largest there"
     words = words if math.isfinite(value) else reason
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
-    return RankOnPath(name, outcome, place, _pose(problem, cover, place), search.boxes, effort.seconds, words)
+    return RankOnPath(name, outcome, place, pose_at(problem, cover, place), search.boxes, effort.seconds, words)
 
 
 def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Place | None:
@@ -399,60 +398,3 @@ def _most_singular(
         low, high = float(s[max(k - 1, 0)]), float(s[min(k + 1, 4)])
     middle = 0.5 * (low + high)
     return Place(int(piece[0]), middle), at(middle)
-
-
-def _pose(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
-    """Return the pose at a place."""
-    return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
-
-
-def _refuted(claims: Sequence[Claim], found: Sequence[Extreme]) -> dict[int, tuple[Claim, Extreme]]:
-    """Return the claims that are refuted, with their extremes, by their places."""
-    pairs = enumerate(zip(claims, found, strict=True))
-    return {k: pair for k, pair in pairs if pair[1].outcome is Outcome.REFUTED}
-
-
-def _first_faults(
-    numbers: Number, wrong: Mapping[int, tuple[Claim, Extreme]], cover: PathCover
-) -> dict[tuple[str, Sense], Fault]:
-    """Return the first known points of the design that are beyond limits, where they are before those of worst values.
-
-    There are none where loops have to be followed.
-
-    Args:
-        numbers: of claims.
-        wrong: those of them that are refuted, by their places, with their extremes.
-        cover: of the path.
-    """
-    problem, found = numbers.problem, dict[tuple[str, Sense], Fault]()
-    if problem.problem.dependent or not wrong:
-        return found
-
-    def values(pieces: FloatArray, part: float) -> FloatArray:
-        return numbers.values(problem.exact(problem.path_points(cover, pieces, part)))
-
-    count = min(max(_ALL_SAMPLES // len(cover.pieces), _LEAST_SAMPLES), _MOST_SAMPLES)
-    left, parts = dict(wrong), np.linspace(0.0, 1.0, count).tolist()
-    for rows in cover.blocks():
-        if not left:
-            break
-        block = cover.pieces[rows]
-        every = np.stack([values(block, part) for part in parts], axis=1)
-        for k, (claim, worst) in list(left.items()):
-            goal = goal_of(claim)
-            least = (goal.limit or 0.0) - goal.slack
-            beyond = np.argwhere(every[:, :, k] < least)
-            if not len(beyond):
-                continue
-            del left[k]
-            row, sample = beyond[0].tolist()
-            piece, low, high = block[row : row + 1], parts[max(sample - 1, 0)], parts[sample]
-            for _ in range(_STEPS if sample else 0):
-                middle = 0.5 * (low + high)
-                low, high = (low, middle) if values(piece, middle)[0, k] < least else (middle, high)
-            place = Place(int(block[row, 0]), high)
-            if place > (worst.place or place):
-                continue
-            value = claim.reading.from_value(-claim.sense.sign * float(values(piece, high)[0, k]))
-            found[claim.name, claim.sense] = Fault(place, value, _pose(problem, cover, place))
-    return found

@@ -25,7 +25,7 @@ from ...evidence.inverse import InversePoses, inverse
 from ...path.path import Poses
 from ...path.sampling import Points, spread_points, twists_at
 from ..statement.claims import Claim, searched_claims
-from ..statement.motors import motor_claims, speed_claims
+from ..statement.motors import in_motion, motor_claims, speed_claims
 from .numbers.expressions import Expressions
 from .numbers.machines import Machines
 from .numbers.motors import Motors
@@ -119,6 +119,7 @@ def samples_of(judged: PathJudgement, most: int = MOST_POINTS) -> PathSamples:
         most: number of points that are spread over the path.
     """
     path, case = judged.path, replace(judged.case, joint_centre_tolerance=None)
+    case = in_motion(case) if path.is_timed else case
     points = spread_points(path, most, [(each.segment, each.parameter) for each in places_of(judged)])
     poses = path.poses_at(*points)
     try:

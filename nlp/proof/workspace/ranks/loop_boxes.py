@@ -323,10 +323,10 @@ def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
         end[:, problem.of_path] = found
     ends[:, :, problem.of_errors] = np.array([[[-problem.tolerance]], [[problem.tolerance]]])
     ends[:, :, list(problem.dependent)] = np.nan
-    return LoopBoxes(ends[0], ends[1], _closed_along(problem, cover), np.full(count, not problem.dependent))
+    return LoopBoxes(ends[0], ends[1], closed_along(problem, cover), np.full(count, not problem.dependent))
 
 
-def _closed_along(problem: Problem, cover: PathCover) -> FloatArray:
+def closed_along(problem: Problem, cover: PathCover) -> FloatArray:
     """Return closed points (N, n) of the design in the middle of segments, or in one before where one is lost."""
     near, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.dependent)
     if D:

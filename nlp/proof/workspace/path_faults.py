@@ -1,0 +1,121 @@
+"""The first point of a path, in the order of the program, at which a number is beyond its limit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ....models import FloatArray
+from ...case.task import Sense
+from ..statement.claims import Claim
+from .numbers.bound_search import Number
+from .numbers.extremes import Extreme, goal_of
+from .ranks.loop_boxes import closed_along
+from .robot.path_cover import PathCover, Place
+from .robot.pose_box import PoseNumbers
+from .robot.posed_robot import Problem
+from .verdict import Outcome
+
+#: Points at which the first one beyond a limit is looked for: of all segments together, and least and most of each one.
+_ALL_SAMPLES, _LEAST_SAMPLES, _MOST_SAMPLES = 50_000, 5, 129
+#: Bisections between two of them.
+_STEPS = 80
+
+
+class Fault(NamedTuple):
+    """A point of a path that refutes a limit: its place, the value, and the pose."""
+
+    place: Place
+    value: float
+    pose: PoseNumbers
+
+
+def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
+    """Return the pose at a place."""
+    return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
+
+
+def refuted(claims: Sequence[Claim], found: Sequence[Extreme]) -> dict[int, tuple[Claim, Extreme]]:
+    """Return the claims that are refuted, with their extremes, by their places."""
+    pairs = enumerate(zip(claims, found, strict=True))
+    return {k: pair for k, pair in pairs if pair[1].outcome is Outcome.REFUTED}
+
+
+def first_faults(
+    numbers: Number, wrong: Mapping[int, tuple[Claim, Extreme]], cover: PathCover
+) -> dict[tuple[str, Sense], Fault]:
+    """Return the first known points of the design that are beyond limits, where they are before those of worst values.
+
+    Args:
+        numbers: of claims.
+        wrong: those of them that are refuted, by their places, with their extremes.
+        cover: of the path.
+    """
+    problem, found = numbers.problem, dict[tuple[str, Sense], Fault]()
+    if not wrong:
+        return found
+    left, near = dict(wrong), closed_along(problem, cover)
+    for rows in cover.blocks():
+        if not left:
+            break
+        sampled = _Sampled(numbers, cover, cover.pieces[rows], near[rows])
+        for k, (claim, worst) in list(left.items()):
+            goal = goal_of(claim)
+            first = sampled.first(k, (goal.limit or 0.0) - goal.slack)
+            if first is None:
+                continue
+            del left[k]
+            place, value = first
+            if place <= (worst.place or place):
+                value = claim.reading.from_value(-claim.sense.sign * value)
+                found[claim.name, claim.sense] = Fault(place, value, pose_at(problem, cover, place))
+    return found
+
+
+class _Sampled:
+    """Values of the design at points of segments, whose loops are followed from the middle of each to its ends.
+
+    Args:
+        numbers: whose values they are.
+        cover: of the path.
+        pieces: (B, 3) the segments.
+        near: (B, n) closed points in their middles.
+    """
+
+    def __init__(self, numbers: Number, cover: PathCover, pieces: FloatArray, near: FloatArray) -> None:
+        self._numbers, self._cover, self._pieces = numbers, cover, pieces
+        # An odd number: the middle is one of them.
+        count = min(max(_ALL_SAMPLES // len(cover.pieces), _LEAST_SAMPLES), _MOST_SAMPLES) | 1
+        self._parts, middle = np.linspace(0.0, 1.0, count).tolist(), count // 2
+        self._points = [near] * count
+        for k in (*range(middle, count), *range(middle - 1, -1, -1)):
+            self._points[k] = self._closed(self._points[k + (k < middle) - (k > middle)], pieces, self._parts[k])
+        self._values = np.stack([self._values_at(z) for z in self._points], axis=1)
+
+    def _closed(self, near: FloatArray, pieces: FloatArray, part: float) -> FloatArray:
+        """Return closed points at a part of pieces, from others near by; NaN where one is lost."""
+        problem, z = self._numbers.problem, near.copy()
+        z[:, problem.of_path] = problem.path_points(self._cover, pieces, part)
+        return self._numbers.closed(z)
+
+    def _values_at(self, z: FloatArray) -> FloatArray:
+        """Return values (B, K) at closed points; NaN where there are none."""
+        found, known = np.full((len(z), self._numbers.count), np.nan), np.isfinite(z).all(axis=1)
+        found[known] = self._numbers.values(z[known])
+        return found
+
+    def first(self, k: int, least: float) -> tuple[Place, float] | None:
+        """Return the first place known at which a number is less than a value, and the number; None without one."""
+        beyond = np.argwhere(self._values[:, :, k] < least)
+        if not len(beyond):
+            return None
+        row, sample = beyond[0].tolist()
+        piece, z, high = self._pieces[row : row + 1], self._points[sample][row : row + 1], self._parts[sample]
+        low, value = self._parts[max(sample - 1, 0)], float(self._values[row, sample, k])
+        for _ in range(_STEPS if sample else 0):
+            half = 0.5 * (low + high)
+            there = float(self._values_at(self._closed(z, piece, half))[0, k])
+            low, high, value = (low, half, there) if there < least else (half, high, value)
+        return Place(int(piece[0, 0]), high), value
