@@ -25,6 +25,8 @@ _ENDS = ("min", "max", "start")
 _TASK = re.compile(r"task(\[\d+\])?\..+")
 #: Names of the six numbers of a task's twist.
 _TWIST = tuple(f"twist_{k}" for k in range(6))
+#: Forms of a rotation that are one list of numbers.
+_FORMS = ("rpy", "quaternion")
 #: Tables within that of a joint in ``limits.joint``.
 _PARTS_OF_JOINTS = ("first", "second", "angle", "stroke")
 
@@ -134,7 +136,7 @@ def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[
         name: name of the number to be set.
 
     Returns:
-        The place of each number by its name, and the names of the axis and the angle of each pose, which it may lack.
+        The place of each number by its name, and the names of the rotation of each pose, which it may lack.
     """
     parameters = tables.get("robot", {}).get("parameters", {})
     given = tables.setdefault("pose", {})
@@ -150,6 +152,12 @@ def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[
         if isinstance(pose.get("position"), list):
             names = component_names(f"{prefix}p", 3)
             places.update({part: (pose["position"], index) for index, part in enumerate(names)})
+        for part in _FORMS:
+            rotations.append(f"{prefix}{part}")
+            if name == f"{prefix}{part}" and name not in places:
+                # It takes the place of a rotation in any form.
+                pose["rotation"] = {part: None}
+                places[name] = (pose["rotation"], part)
         for part in ("angle", "axis"):
             rotations.append(f"{prefix}{part}")
             if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in _ENDS)):

@@ -414,6 +414,5 @@ def console() -> Console | None:
 
     from ..output.terminal import PLAIN_WIDTH
 
-    # In a file or a pipe, a table is as wide as its content.
     width = None if sys.stdout.isatty() else PLAIN_WIDTH
     return Console(highlight=False, markup=False, emoji=False, width=width)

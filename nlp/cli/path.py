@@ -74,7 +74,7 @@ def path(
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
     from ..results.pathwording import path_summary
-    from ..results.workspaceposes import evaluate_command
+    from ..results.posewording import evaluate_command
 
     sampling = _sampling(step, within, is_written=csv_file is not None)
     _refuse_elsewhere(
@@ -108,7 +108,7 @@ def path(
 
     def command(pose: WorkspacePose) -> str:
         """Return the command that shows a pose."""
-        return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
+        return evaluate_command(case, loaded, chosen, pose)
 
     options.write_json(json_file, result)
     _write(files, judged, result, text, command)

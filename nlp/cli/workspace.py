@@ -42,7 +42,7 @@ def workspace(
     from ..interruption import Milestone, answer_after
     from ..proof.statement.machine import workspace_of_case
     from ..results.workspace import scale_data, workspace_of
-    from ..results.workspaceposes import evaluate_command
+    from ..results.posewording import evaluate_command
     from .paper import paper_record, write_paper
 
     record = paper_record(proof, json_file)
@@ -62,7 +62,7 @@ def workspace(
 
     def command(pose: WorkspacePose) -> str:
         """Return the command that shows a pose."""
-        return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
+        return evaluate_command(case, loaded, chosen, pose)
 
     options.write_json(json_file, result)
     if csv_file is not None:

@@ -9,11 +9,12 @@ from ..case.pathfile import PLACE
 from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
+from .posewording import pose_words
 from .rounding import number
 from .text import Line, TextTable, Tone
 from .wording import title_line
 from .workspacemotors import TONES
-from .workspacewording import exchange_lines, machine_lines, pose_words, tightest_table
+from .workspacewording import exchange_lines, machine_lines, tightest_table
 
 if TYPE_CHECKING:
     from ..case.case import Case

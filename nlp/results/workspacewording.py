@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from ...models import Dimension
 from ..case.case import Case
 from ..case.motors import MotorNumber
-from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .jointwording import triple
-from .rounding import TURNED, number, ordered
+from .posewording import pose_words
+from .rounding import number, ordered
 from .text import Line, TextTable, Tone
 from .wording import title_line
 from .workspacemotors import TONES, ends_of_motor, motor_tables
@@ -212,17 +210,6 @@ def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
     for name, title, rows in titles:
         if rows:
             yield _table(case, name, title, rows)
-
-
-def pose_words(case: Case, pose: WorkspacePose) -> str:
-    """Return a pose in a few words."""
-    stated = () if case.workspace is None else case.workspace.position
-    ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]
-    size = max(map(abs, (*ends, *pose.position)))
-    position = ", ".join(number(value, size, digits=5) for value in pose.position)
-    if abs(case.units.to_internal(pose.angle, Dimension.ANGLE)) <= TURNED:
-        return f"({position})"
-    return f"({position}), {pose.angle:.5g} {case.units.angle} about {triple(pose.axis, 1.0)}"
 
 
 def _regular_lines(

@@ -9,7 +9,7 @@ import numpy as np
 from ...results.jsondata import json_data
 from ...results.pathwording import checked_claims, fault_words, first_refuted, path_summary, verdict_words
 from ...results.workspace import WorkspacePose
-from ...results.workspacewording import pose_words
+from ...results.posewording import pose_words
 from ..pictures.figures import picture as picture_file
 from ..pictures.pathpanels import (
     ACTUATOR_COLOURS,
