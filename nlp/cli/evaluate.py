@@ -18,6 +18,7 @@ def evaluate(
     json_file: options.JsonFile = None,
     csv_file: options.CsvFile = None,
     table: options.CsvTable = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Show F, J, rank and rates at one point.
 
@@ -43,8 +44,7 @@ def evaluate(
 
         options.write_csv(csv_file, evaluation_tables(loaded, result), table)
     if not files.is_piped:
-        from ..output.terminal import show
         from ..results.summary import evaluation_summary
 
-        show(options.console(), evaluation_summary(loaded, result))
+        options.show(evaluation_summary(loaded, result), whole=whole)
     raise typer.Exit(1 if result.violated else 0)

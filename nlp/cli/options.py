@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..case.overrides import Settings
     from ..case.reader import CaseFile
     from ..results.jsondata import JsonObject
-    from ..results.text import TextTable
+    from ..results.text import Line, TextTable
 
 
 _P = ParamSpec("_P")
@@ -195,6 +195,7 @@ CsvTable = Annotated[str | None, text("--table", "NAME", "Write this table only,
 PlotFile = Annotated[str | None, plot("Draw the robot")]
 CurveFile = Annotated[str | None, plot("Draw the curve")]
 PageFile = Annotated[str | None, page("")]
+ShowAll = Annotated[bool, flag("--all", "Show every row and every table, not the answer alone")]
 Folder = Annotated[str, text("--out", "DIR", "Folder to write into")]
 Force = Annotated[bool, flag("--force", "Write over files that screwsynth did not write")]
 
@@ -403,6 +404,13 @@ def write_csv(target: str | None, tables: Iterable[TextTable], name: str | None)
 
     if target is not None:
         write_text(target, tables_as_csv(tables, name))
+
+
+def show(items: Iterable[Line | TextTable], *, whole: bool) -> None:
+    """Print lines and tables: the answer with what fits beside it, or everything."""
+    from ..output.terminal import show as show_on
+
+    show_on(console(), items, whole=whole)
 
 
 def console() -> Console | None:

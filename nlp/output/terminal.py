@@ -154,7 +154,8 @@ def _command_lines(item: Line, width: int) -> Iterator[_Styled]:
             units[-1] += f" {word}"
         else:
             units.append(word)
-    label, line, lines = f"{item.label}  " if item.label else "", units[0], []
+    label, line = f"{item.label}  " if item.label else "", units[0]
+    lines: list[str] = []
     for unit in units[1:]:
         beside = cell_len(label) if not lines else len(_INDENT)
         # Two columns are for the backslash.

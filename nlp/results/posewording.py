@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Digits of a pose in a command: as few as show what all digits show, and so many where they show nothing.
 _FEWEST, _ENOUGH, _ALL = 3, 6, 17
+#: Name of a pose that the robot cannot take, among those of violated limits.
+_IMPOSSIBLE = "impossible"
 #: Keys of a rotation, behind the prefix of its pose.
 _ROTATION = ("axis", "angle", *(each.value for each in (RotationForm.RPY, RotationForm.QUATERNION)))
 
@@ -34,8 +36,8 @@ def rotation_form(case: Case) -> RotationForm:
     return RotationForm.RPY if case.path is not None else case.rotation.form
 
 
-def rotation_numbers(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> Settings:
-    """Return a rotation in a form, as ``--set`` takes it.
+def rotation_numbers(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> dict[str, list[float]]:
+    """Return a rotation in a form: its numbers, by the names that ``--set`` has for them.
 
     Args:
         case: the case.
@@ -48,7 +50,7 @@ def rotation_numbers(case: Case, axis: Sequence[float], angle: float, form: Rota
         # About an axis that the case states, an angle has a sign.
         is_back = turns is not None and turns.kind is TurnKind.AXIS and np.dot(axis, turns.axis) < 0
         sign = -1.0 if is_back else 1.0
-        return {"axis": [sign * each for each in axis], "angle": sign * angle}
+        return {"axis": [sign * each for each in axis], "angle": [sign * angle]}
     from ..path.orientation import roll_pitch_yaw  # noqa: PLC0415 - few cases state such rotations
 
     half = case.units.to_internal(angle, Dimension.ANGLE) / 2
@@ -59,20 +61,33 @@ def rotation_numbers(case: Case, axis: Sequence[float], angle: float, form: Rota
     return {form.value: [case.units.shown(each, Dimension.ANGLE) for each in angles]}
 
 
-def rotation_words(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> str:
+def _rotation(case: Case, numbers: Mapping[str, list[float]]) -> Rotation:
+    """Return the rotation of such numbers.
+
+    Raises:
+        CaseError: a quaternion is rounded too much.
+    """
+    if RotationForm.QUATERNION.value in numbers:
+        return Rotation.from_quaternion(numbers[RotationForm.QUATERNION.value])
+    if RotationForm.RPY.value in numbers:
+        angles = numbers[RotationForm.RPY.value]
+        return Rotation.from_rpy(*(case.units.to_internal(each, Dimension.ANGLE) for each in angles))
+    return Rotation(tuple(numbers["axis"]), case.units.to_internal(numbers["angle"][0], Dimension.ANGLE))
+
+
+def _rotation_words(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> str:
     """Return a rotation in words; empty for none."""
     if abs(case.units.to_internal(angle, Dimension.ANGLE)) <= TURNED:
         return ""
     numbers, unit = rotation_numbers(case, axis, angle, form), case.units.angle
-    stated = numbers.get(form.value)
-    if not isinstance(stated, list):
-        held, turned = numbers["axis"], numbers["angle"]
-        return f"{turned:.5g} {unit} about {triple(held if isinstance(held, list) else axis, 1.0)}"
     if form is RotationForm.QUATERNION:
-        return f"quaternion ({', '.join(number(each, 1.0, digits=5) for each in stated)})"
-    half_turn = case.units.shown(math.pi, Dimension.ANGLE)
-    roll, pitch, yaw = (number(each, half_turn, digits=5) for each in stated)
-    return f"roll {roll}, pitch {pitch}, yaw {yaw} {unit}"
+        return f"quaternion ({', '.join(number(each, 1.0, digits=5) for each in numbers[form.value])})"
+    if form is RotationForm.RPY:
+        half_turn = case.units.shown(math.pi, Dimension.ANGLE)
+        roll, pitch, yaw = (number(each, half_turn, digits=5) for each in numbers[form.value])
+        return f"roll {roll}, pitch {pitch}, yaw {yaw} {unit}"
+    x, y, z = numbers["axis"]
+    return f"{numbers['angle'][0]:.5g} {unit} about {triple((x, y, z), 1.0)}"
 
 
 def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None) -> str:
@@ -87,7 +102,7 @@ def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None
     ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]
     size = max(map(abs, (*ends, *pose.position)))
     position = f"({', '.join(number(value, size, digits=5) for value in pose.position)})"
-    rotation = rotation_words(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
+    rotation = _rotation_words(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
     return ", ".join(each for each in (position, rotation) if each)
 
 
@@ -105,24 +120,24 @@ def evaluate_command(
         pose: the pose.
         form: of its rotation; left out, that of the case.
     """
-    form = rotation_form(case) if form is None else form
-    turn = rotation_numbers(case, pose.axis, pose.angle, form)
-    exact: Settings = {**dict(zip(component_names("p", 3), pose.position, strict=True)), **turn}
-    wanted = _shown(case, exact, form)
-    chosen = exact
+    turn = rotation_numbers(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
+    position = list(pose.position)
+    wanted = _shown(case, position, turn)
     for digits in range(_FEWEST if wanted else _ENOUGH, _ALL):
-        rounded = _rounded(exact, digits)
-        if _shown(case, rounded, form) >= wanted:
-            chosen = rounded
+        shorter = _rounded(position, digits), {key: _rounded(each, digits) for key, each in turn.items()}
+        found = _shown(case, *shorter)
+        if found >= wanted and (_IMPOSSIBLE in found) == (_IMPOSSIBLE in wanted):
+            position, turn = shorter
             break
     prefix = case.pose_prefixes[0]
     others = {key: value for key, value in settings.items() if key.removeprefix(prefix) not in _ROTATION}
-    written = {**others, **{f"{prefix}{key}": value for key, value in chosen.items()}}
+    numbers = {key: [each] for key, each in zip(component_names("p", 3), position, strict=True)} | turn
+    written = {**others, **{f"{prefix}{key}": each for key, each in numbers.items()}}
     texts = [f"--set {shlex.quote(f'{key}={_digits(value)}')}" for key, value in written.items()]
     return " ".join(["screwsynth evaluate", shlex.quote(name), *texts])
 
 
-def _shown(case: Case, numbers: Settings, form: RotationForm) -> frozenset[str]:
+def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str]:
     """Return what an evaluation at a pose shows: names of violated limits, a lost rank, or that it is impossible."""
     from ..errors import ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
     from ..evidence.closing import closed_start  # noqa: PLC0415
@@ -131,48 +146,21 @@ def _shown(case: Case, numbers: Settings, form: RotationForm) -> frozenset[str]:
     from ..program.formulation import formulate_each  # noqa: PLC0415
     from ..proof.statement.posed_layout import at_one_pose  # noqa: PLC0415
 
-    position = [float(numbers[key]) for key in component_names("p", 3)]
     try:
-        nlp = formulate_each(at_one_pose(case, position, _rotation(case, numbers, form)))[0]
+        nlp = formulate_each(at_one_pose(case, position, _rotation(case, turn)))[0]
         x = closed_start(nlp)
         lost = ["rank"] if evaluate(nlp, x).is_singular else []
         return frozenset([*lost, *(row.name for row in margins_of(nlp, x, optimal=False) if row.violated)])
     except ScrewsynthError:
-        return frozenset(["impossible"])
+        return frozenset([_IMPOSSIBLE])
 
 
-def _rotation(case: Case, numbers: Settings, form: RotationForm) -> Rotation:
-    """Return the rotation that numbers state.
-
-    Raises:
-        CaseError: a quaternion is rounded too much.
-    """
-    stated = numbers.get(form.value)
-    if form is RotationForm.QUATERNION and isinstance(stated, list):
-        return Rotation.from_quaternion(stated)
-    if isinstance(stated, list):
-        return Rotation.from_rpy(*(case.units.to_internal(each, Dimension.ANGLE) for each in stated))
-    angle = numbers["angle"]
-    return Rotation(tuple(numbers["axis"]), case.units.to_internal(float(angle), Dimension.ANGLE))
-
-
-def _rounded(numbers: Settings, digits: int) -> dict[str, float | list[float]]:
-    """Return numbers with digits after the point so that the largest of those stated together has this many."""
-    position = [float(numbers[key]) for key in component_names("p", 3)]
-    largest = max(map(abs, position))
-    rounded: dict[str, float | list[float]] = {}
-    for key, value in numbers.items():
-        if isinstance(value, list):
-            size = max(map(abs, value))
-            rounded[key] = [_round(each, size, digits) for each in value]
-        else:
-            rounded[key] = _round(value, largest if key in component_names("p", 3) else abs(value), digits)
-    return rounded
-
-
-def _round(value: float, size: float, digits: int) -> float:
-    """Return a number rounded, so that a size has this many digits."""
-    return round(value, digits - 1 - math.floor(math.log10(size))) + 0.0 if size else value
+def _rounded(values: Sequence[float], digits: int) -> list[float]:
+    """Return numbers that are rounded at one place after the point, so that the largest has so many digits."""
+    size = max(map(abs, values))
+    if size == 0:
+        return list(values)
+    return [round(each, digits - 1 - math.floor(math.log10(size))) for each in values]
 
 
 def _digits(value: float | list[float]) -> str:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 #: Beginning of the keys of limits that no single pose refutes, but two: the shortest and the longest length of a leg.
 _OVER_POSES = "actuator."
+#: So many refuted claims, and open ones, are shown in full in a short view.
+SHOWN = 2
 #: Beginning of the names of the lengths of legs.
 _LENGTH = "leg_length limb "
 
@@ -96,13 +98,14 @@ def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str
         own = shown.setdefault(each.key, [])
         if each.beyond == farthest[each.key] and (not own or own[0].name == each.name):
             own.append(each)
-    for each in itertools.chain.from_iterable(shown.values()):
-        yield Line(each.words, label="refuted")
-        yield Line(command(each.pose), label="see it with", is_command=True)
+    for k, each in enumerate(itertools.chain.from_iterable(shown.values())):
+        part = "refuted claims" if k >= SHOWN else ""
+        yield Line(each.words, label="refuted", part=part)
+        yield Line(command(each.pose), label="see it with", is_command=True, part=part)
     # One number may have two limits: a claim is its name with the limit's key.
     left = len({(each.name, each.key) for each in claims}) - len(shown)
     if left:
-        yield Line(f"{left}, whose poses --html FILE lists", label="other refuted claims")
+        yield Line(f"{left}: --all, --csv FILE and --json FILE list them", label="other refuted claims")
 
 
 def _at_poses(result: WorkspaceResult, each: ExtremeData) -> Iterator[PosedClaim]:
