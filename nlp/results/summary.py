@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -34,6 +34,7 @@ from .wording import (
     fault_lines,
     heading_lines,
     holding_lines,
+    is_unasked_singularity,
     objective_lines,
     singularity_lines,
     starts_lines,
@@ -75,7 +76,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
     if robot is not None:
-        yield from in_part("limbs", [robot_table(case, robot)])
+        yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
     if result.tolerance is not None:
         yield from in_part("tolerance", [tolerance_line(result.tolerance, result.F, case.units)])
     yield from in_part("evidence", check_lines(result))
@@ -137,13 +138,13 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     yield from combined_value_lines(combined)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
-        for line in certificate_lines(task.certificate):
-            yield line if name is None else replace(line, text=f"{name}: {line.text}")
+        yield from _named(certificate_lines(task.certificate), name)
     yield from certificate_lines(combined.certificate)
     yield from _remark_lines(case)
     yield from in_part("notes", (Line(notice, label="note") for notice in combined.notices))
     if robot is not None:
-        yield from in_part("rank", singularity_lines(robot, case.units))
+        part = "" if is_unasked_singularity(robot, case) else "rank"
+        yield from in_part(part, singularity_lines(robot, case.units))
     if point is not None and point.limits:
         title = limits_title(case, result.workspace or result.path)
         yield from in_part("limits", [limit_table(point.limits, combined.value or 0.0, title)])
@@ -161,10 +162,15 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
     for task in result.tasks:
         if several:
             yield Line(f"{task.name}, {task.sense.value} F", label="task")
-        yield from certificate_lines(task.certificate)
+        yield from _named(certificate_lines(task.certificate), task.name if several else None)
     if several and result.certificate is not None:
         yield Line(case.method.value, label="combined by")
         yield from certificate_lines(result.certificate)
+
+
+def _named(lines: Iterable[Line], name: str | None) -> Iterator[Line]:
+    """Yield lines about a task, with its name where there are several."""
+    return (line if name is None else replace(line, text=f"{name}: {line.text}") for line in lines)
 
 
 def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
@@ -184,7 +190,7 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         yield Line(f"{len(result.limits)} kept", label="limits", tone=Tone.HOLDS)
     yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
-    yield from in_part("limbs", [robot_table(case, robot)])
+    yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
     yield from in_part("design", [design_table(case, robot)])
     # As many are zero as the rank says: what is left of them is rounding error.
     values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))

@@ -163,7 +163,7 @@ def workspace_summary(
 def outcome_lines(claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
     """Yield in one line each how many limits are proved, refuted and open, and which of them wholly."""
     every = Counter(map(_limit_of, claims))
-    for outcome in reversed(_ORDER):
+    for outcome in _ORDER:
         counts = Counter(_limit_of(each) for each in claims if each.outcome is outcome)
         if not counts:
             continue
