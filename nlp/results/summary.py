@@ -65,6 +65,8 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from heading_lines(case, result)
     yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
     yield from fault_lines(result)
+    if result.F is None:
+        yield from starts_lines(result.starts, robot)
     yield from _proof_lines(case, result)
     if robot is not None:
         yield solved_design_table(case, result, robot)
@@ -75,20 +77,27 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
+    yield from _task_parts(case, result)
+
+
+def _task_parts(case: Case, result: SolveResult) -> Summary:
+    """Yield what stands behind the answer of a solve of one task."""
+    robot = result.robot
     if robot is not None:
         yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
-    if result.tolerance is not None:
-        yield from in_part("tolerance", [tolerance_line(result.tolerance, result.F, case.units)])
     yield from in_part("evidence", check_lines(result))
-    yield from in_part("starts", starts_lines(result.starts, robot))
+    if result.F is not None:
+        yield from in_part("starts", starts_lines(result.starts, robot))
+    if robot is not None:
+        yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
+        yield from in_part("forces", loading_tables(case, robot.loading))
     if result.limits:
         size = 0.0 if robot is None else size_of_F(robot)
         title = limits_title(case, result.workspace or result.path)
         yield from in_part("limits", [limit_table(result.limits, size, title)])
+    if result.tolerance is not None:
+        yield from in_part("tolerance", [tolerance_line(result.tolerance, result.F, case.units)])
     yield from in_part("tightest limits", _proof_digest(result))
-    if robot is not None:
-        yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
-        yield from in_part("forces", loading_tables(case, robot.loading))
     if robot is not None and result.reached is None:
         yield from in_part("actuation", _limb_parts(case, robot))
 
@@ -190,16 +199,16 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         yield Line(f"{len(result.limits)} kept", label="limits", tone=Tone.HOLDS)
     yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
-    yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
     yield from in_part("design", [design_table(case, robot)])
+    yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
+    yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
+    yield from in_part("forces", loading_tables(case, robot.loading))
+    if result.limits:
+        yield from in_part("limits", [limit_table(result.limits, size_of_F(robot), limits_title(case))])
+    yield from in_part("J", [jacobian_table(case, robot)])
     # As many are zero as the rank says: what is left of them is rounding error.
     values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))
     yield from in_part("singular values", [Line(listed(values), label="singular values")])
-    if result.limits:
-        yield from in_part("limits", [limit_table(result.limits, size_of_F(robot), limits_title(case))])
-    yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
-    yield from in_part("forces", loading_tables(case, robot.loading))
-    yield from in_part("J", [jacobian_table(case, robot)])
     yield from in_part("motions", [principal_table(result.principal_motions, case.units, robot_size(robot))])
     yield from in_part("actuation", _limb_parts(case, robot))
 
