@@ -15,6 +15,12 @@ def evaluate(
     of: Annotated[
         str | None, options.text("--of", "RESULT", "Take dimensions and pose from a result that solve --json wrote")
     ] = None,
+    claim: Annotated[
+        str | None,
+        options.text(
+            "--set-from", "RESULT#N", "Take the pose of the N-th refuted claim of workspace --json or path --json"
+        ),
+    ] = None,
     json_file: options.JsonFile = None,
     csv_file: options.CsvFile = None,
     table: options.CsvTable = None,
@@ -30,7 +36,7 @@ def evaluate(
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    given = options.read_machine(case, settings, of, at_pose=True).file
+    given = options.read_machine(case, settings, of, at_pose=True, claim=claim).file
     loaded = given.case
     files = options.Outputs(json=json_file, csv=csv_file)
     files.check(given.inputs)

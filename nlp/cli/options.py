@@ -230,7 +230,9 @@ class Machine(NamedTuple):
     settings: Settings
 
 
-def read_machine(name: str, texts: list[str] | None, of: str | None, *, at_pose: bool = False) -> Machine:
+def read_machine(
+    name: str, texts: list[str] | None, of: str | None, *, at_pose: bool = False, claim: str | None = None
+) -> Machine:
     """Read a case with the numbers of ``--set``, and with the dimensions of a result of ``--of``.
 
     Args:
@@ -238,6 +240,7 @@ def read_machine(name: str, texts: list[str] | None, of: str | None, *, at_pose:
         texts: of ``--set``: numbers that replace those of the file, and of the result.
         of: file of the result; None without one.
         at_pose: whether a result of this case gives the pose too.
+        claim: result with the number of a refuted claim, of which dimensions and pose are taken; None without one.
 
     Raises:
         InputError: a file cannot be read or holds a fault, or the result is no answer for this robot in these units.
@@ -245,6 +248,10 @@ def read_machine(name: str, texts: list[str] | None, of: str | None, *, at_pose:
     from ..case.reader import read_case
 
     settings = read_settings(texts)
+    if claim is not None:
+        from ..results.settings import claim_settings
+
+        settings = {**claim_settings(claim, read_case(name, settings).case), **settings}
     if of is None:
         return Machine(read_case(name, settings), settings)
     from ..errors import one_line

@@ -35,7 +35,7 @@ def path_summary(
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; left out, none is named.
+        command: returns the command that shows a pose; left out, for a page, only tables have single claims.
     """
     yield title_line(case)
     path = result.path
@@ -58,8 +58,9 @@ def path_summary(
             after = f": {each.reason}" if each.reason else ""
             yield Line(each.outcome.value, label=each.name, tone=TONES[each.outcome], after=after + _place_words(each))
     yield from outcome_lines(limited)
-    yield from _other_faults(path, wrong)
-    yield from open_lines(limited)
+    if command is not None:
+        yield from _other_faults(path, wrong)
+        yield from open_lines(limited)
     yield from _knot_lines(path, case.units.length)
     if path.time is not None or path.knots is not None:
         yield _actuator_table(path)

@@ -136,7 +136,7 @@ def workspace_summary(
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; left out, none is named.
+        command: returns the command that shows a pose; left out, for a page, only tables have single claims.
     """
     limited = [each for each in result.extremes if each.limit is not None]
     yield title_line(case)
@@ -147,7 +147,7 @@ def workspace_summary(
     yield from outcome_lines(limited)
     if command is not None:
         yield from seeing_lines(result, command)
-    yield from open_lines(limited)
+        yield from open_lines(limited)
     yield from _needs_line(case, result)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)

@@ -264,7 +264,6 @@ def test_free_and_active_numbers_come_first_and_fixed_ones_are_folded() -> None:
     assert held == sorted(held, reverse=True)
     assert sum(ranges) == 3
     assert len(design.rows) - design.folded <= 10
-    text = printed([design], 80)
     assert f"and {design.folded} more fixed numbers" in shortly([design], 80)
     assert case.title
 

@@ -1,4 +1,4 @@
-"""What every command prints: the answer in 25 lines of 80 columns, everything with --all, commands that a shell reads."""
+"""What commands print: the answer in 25 lines of 80 columns, everything with --all, commands that a shell reads."""
 
 import io
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, commands_in, output_of, turn_about, unbroken
+from builders import Run, commands_in, output_of, refusal_of, turn_about, unbroken
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -241,3 +241,22 @@ def test_the_command_at_a_singular_pose_and_beyond_reach_shows_both(cli: Run, re
     status, _, err = cli(*beyond)
     assert status != 0 or err
     assert [each for each in beyond if each.startswith("rpy=")] == ["rpy=40,-40,65"]
+
+
+def test_a_refuted_claim_of_a_result_is_evaluated(cli: Run, tmp_path: Path) -> None:
+    """Each claim of the result is shown at its pose, and a wrong number or result is one sentence."""
+    target = str(tmp_path / "result.json")
+    cli("workspace", "hexapod-linuxcnc", "--set", "x1=25", "--set", "limits.leg_length.max=40", "--json", target)
+    claims = [each for each in json.loads(Path(target).read_text())["extremes"] if each["outcome"] == "refuted"]
+    assert len(claims) > 2
+    for k, claim in enumerate(claims, start=1):
+        limit = ("--set", "limits.leg_length.max=40")
+        status, out, _ = cli("evaluate", "hexapod-linuxcnc", "--set-from", f"{target}#{k}", *limit, "--json", "-")
+        point = json.loads(out)
+        assert status == 1
+        assert point["parameters"]["x1"] == 25
+        (limb,) = (value for key, value in point["quantities"]["leg_length"].items() if claim["name"].endswith(key))
+        assert limb == pytest.approx(claim["reached"], rel=1e-9)
+    for wrong, words in ((f"{target}#0", "refuted claims"), (target, "RESULT#N"), (f"{target}#99", "refuted claims")):
+        refusal_of(cli("evaluate", "hexapod-linuxcnc", "--set-from", wrong), "--set-from", words)
+    refusal_of(cli("evaluate", "hexapod-pocket", "--set-from", f"{target}#1"), "hexapod-linuxcnc", "hexapod-pocket")
