@@ -531,7 +531,7 @@ def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
     assert rows[rows.index("robot") :][1:3] == ["stewart-gough", "hexapod"]
     words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+")
     for name, shown in (("stewart-gough", words), ("hexapod", ("base_1_x", "platform_6_z", "leg_length", "any"))):
-        out = output_of(cli("models", name))
+        out = output_of(cli("models", name, "--all"))
         assert all(word in out for word in shown)
 
 

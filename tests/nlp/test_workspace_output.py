@@ -195,7 +195,7 @@ def test_each_command_shows_what_it_is_printed_for(refuted: tuple[str, Workspace
         assert row["limit"] == pytest.approx(float(limit))
         assert name in row["violated"]
         # Few digits: all of them are needed only where they decide.
-        assert max(len(digits) for digits in re.findall(r"\d+\.(\d+)", " ".join(arguments))) < 8
+        assert all(len(digits) < 8 for digits in re.findall(r"\d+\.(\d+)", " ".join(arguments)))
 
 
 def test_a_command_takes_the_place_of_a_rotation_in_another_form(tmp_path: Path, cli: Run) -> None:
