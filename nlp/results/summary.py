@@ -70,7 +70,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from _proof_lines(case, result)
     if robot is not None:
         yield solved_design_table(case, result, robot)
-    yield from holding_lines(result.limits)
+    yield from holding_lines(result.limits, limits_title(case, result.workspace or result.path))
     if result.optimality is not None:
         yield verdict_line(result.optimality)
     if robot is not None and result.reached is None:
@@ -143,7 +143,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     if robot is not None:
         yield combined_design_table(case, combined, robot)
     if point is not None:
-        yield from holding_lines(point.limits or ())
+        yield from holding_lines(point.limits or (), limits_title(case, result.workspace or result.path))
     yield from combined_value_lines(combined)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
@@ -196,7 +196,8 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         yield Line(f"{value} {objective_unit([each.task.motion.twist], case.units)}".rstrip(), label="F")
     yield from violation_lines(result.violated)
     if result.limits and not any(row.violated for row in result.limits):
-        yield Line(f"{len(result.limits)} kept", label="limits", tone=Tone.HOLDS)
+        where = f"; {limits_title(case)}" if limits_title(case) else ""
+        yield Line(f"{len(result.limits)} kept", label="limits", tone=Tone.HOLDS, after=where)
     yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
     yield from in_part("design", [design_table(case, robot)])

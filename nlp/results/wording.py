@@ -200,8 +200,14 @@ def costliest_words(limits: Sequence[LimitData]) -> str | None:
     return f"Per part of its own size, {row.key} costs most: {cost:+.4g} {slope_unit(row.unit)}."
 
 
-def holding_lines(limits: Sequence[LimitData]) -> Iterator[Line]:
-    """Yield the limits that hold a design, each with its cost, or how many are kept; nothing without a limit."""
+def holding_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:
+    """Yield the limits that hold a design, each with its cost, or how many are kept; nothing without a limit.
+
+    Args:
+        limits: of the case.
+        title: at which poses they hold; empty for all poses of the case.
+    """
+    where = f"; {title}" if title else ""
     if not limits:
         return
     active = [row for row in limits if row.active and not row.violated]
@@ -212,9 +218,9 @@ def holding_lines(limits: Sequence[LimitData]) -> Iterator[Line]:
         texts.append(f"{row.key} = {number(row.limit, digits=6)} {row.unit}".rstrip() + cost)
     if texts:
         rest = f", of {kept} that are kept" if kept > len(active) else ""
-        yield Line(", ".join(texts), label="held by limits", after=rest)
+        yield Line(", ".join(texts), label="held by limits", after=rest + where)
     elif kept:
-        yield Line(f"{kept} kept, of which none holds the design", label="limits")
+        yield Line(f"{kept} kept, of which none holds the design", label="limits", after=where)
     if kept < len(limits):
         words = ", ".join(row.key for row in limits if row.violated)
         yield Line(words, label="violated limits", tone=Tone.FAULT)
