@@ -195,9 +195,11 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         value = number(0.0 if is_free else each.F, size_of_F(robot, task=each.task), part=ZERO_F)
         yield Line(f"{value} {objective_unit([each.task.motion.twist], case.units)}".rstrip(), label="F")
     yield from violation_lines(result.violated)
-    if result.limits and not any(row.violated for row in result.limits):
+    if result.limits:
+        kept = sum(not row.violated for row in result.limits)
         where = f"; {limits_title(case)}" if limits_title(case) else ""
-        yield Line(f"{len(result.limits)} kept", label="limits", tone=Tone.HOLDS, after=where)
+        tone = Tone.HOLDS if kept == len(result.limits) else Tone.FAULT
+        yield Line(f"{kept} of {len(result.limits)} kept", label="limits", tone=tone, after=where)
     yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
     yield from in_part("design", [design_table(case, robot)])
