@@ -25,7 +25,7 @@ def _put(page: Path, opening: str, closing: str, text: str) -> None:
 
 solve = ("solve", "paper-4.1-helical")
 _put(ROOT / "README.md", f"```text\n$ screwsynth {' '.join(solve)}", "```", _output_of(*solve))
-limited = ("solve", "hexapod-machining")
+limited = ("solve", "hexapod-machining", "--all")
 # The last digits of the design differ between machines; those of the limits do not.
 lines = _output_of(*limited).splitlines(keepends=True)
 first, last = (next(i for i, line in enumerate(lines) if line.startswith(word)) for word in ("limit ", "tolerance"))
@@ -44,15 +44,15 @@ _put(
 )
 _put(
     ROOT / "docs" / "robots.md",
-    "<!-- begin: screwsynth models delta -->",
+    "<!-- begin: screwsynth models delta --all -->",
     "<!-- end -->",
-    f"```text\n{_output_of('models', 'delta')}```\n",
+    f"```text\n{_output_of('models', 'delta', '--all')}```\n",
 )
 page = (ROOT / "docs" / "robots.md").read_text(encoding="utf-8")
 (shown,) = (each for each in re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL) if "[[task]]" in each)
 with tempfile.TemporaryDirectory() as folder:
     (Path(folder) / "delta.toml").write_text(shown, encoding="utf-8")
-    lines = _output_of("solve", str(Path(folder) / "delta.toml")).splitlines(keepends=True)
+    lines = _output_of("solve", str(Path(folder) / "delta.toml"), "--all").splitlines(keepends=True)
 words = ("largest F", "        value", "rb ", "arm ", "p_z ", "actuator rates", "freedoms", "rank of J")
 kept = "".join(line for line in lines if line.startswith(words))
 _put(ROOT / "docs" / "robots.md", "<!-- begin: solve -->", "<!-- end -->", f"```text\n{kept}```\n")
@@ -61,5 +61,5 @@ _put(
     ROOT / "docs" / "paths.md",
     f"<!-- begin: screwsynth {' '.join(part)} -->",
     "<!-- end -->",
-    f"```text\n{_output_of(*part).partition('numbers at')[0]}```\n",
+    f"```text\n{_output_of(*part)}```\n",
 )

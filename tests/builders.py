@@ -6,6 +6,8 @@ import copy
 import csv
 import importlib.util
 import math
+import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -139,6 +141,17 @@ def output_of(ended: tuple[int, str, str]) -> str:
     code, out, err = ended
     assert (code, err) == (0, "")
     return out
+
+
+def commands_in(text: str, label: str) -> list[list[str]]:
+    """The arguments of the commands that stand behind a label in an output, as a shell reads them."""
+    found = re.findall(rf"^{label}  screwsynth ((?:.*\\\n)*.*)$", text, re.MULTILINE)
+    return [shlex.split(each.replace("\\\n", " ")) for each in found]
+
+
+def unbroken(text: str) -> str:
+    """An output without the breaks of its lines."""
+    return re.sub(r"\n  +(?=\S)", " ", text)
 
 
 def refusal_of(ended: tuple[int, str, str], *words: str) -> str:

@@ -287,7 +287,7 @@ def test_the_limits_of_the_documentation_are_valid() -> None:
 
 
 def test_the_limits_shown_in_the_documentation_are_what_the_command_prints() -> None:
-    begin = "<!-- begin: screwsynth solve hexapod-machining -->"
+    begin = "<!-- begin: screwsynth solve hexapod-machining --all -->"
     (shown,) = re.findall(rf"{begin}\n```text\n(.*?)```", text_of("limits.md"), flags=re.DOTALL)
-    lines = printed("solve", "hexapod-machining", "--starts", "4").splitlines()
+    lines = printed("solve", "hexapod-machining", "--starts", "4", "--all").splitlines()
     assert shown in "".join(f"{line.rstrip()}\n" for line in lines)

@@ -431,7 +431,7 @@ def _check_rotation(case: Case, given: Rotation, pose: str) -> Rotation:
         fault = "must be minus max, or both of one sign: with the axis free the sign of an angle means nothing"
         raise CaseError(f"{key}.min", fault, case.units.shown(angle.lower, Dimension.ANGLE))
     axis = None if given.axis is None else unit_vector(check_direction(given.axis, f"{pose}.rotation.axis"))
-    return Rotation(axis, angle)
+    return Rotation(axis, angle, given.form)
 
 
 def _check_further_poses(case: Case) -> tuple[Pose, ...]:

@@ -25,6 +25,8 @@ _ENDS = ("min", "max", "start")
 _TASK = re.compile(r"task(\[\d+\])?\..+")
 #: Names of the six numbers of a task's twist.
 _TWIST = tuple(f"twist_{k}" for k in range(6))
+#: Forms of a rotation that are one list of numbers.
+_FORMS = ("rpy", "quaternion")
 #: Tables within that of a joint in ``limits.joint``.
 _PARTS_OF_JOINTS = ("first", "second", "angle", "stroke")
 
@@ -134,7 +136,7 @@ def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[
         name: name of the number to be set.
 
     Returns:
-        The place of each number by its name, and the names of the axis and the angle of each pose, which it may lack.
+        The place of each number by its name, and the names of the rotation of each pose, which it may lack.
     """
     parameters = tables.get("robot", {}).get("parameters", {})
     given = tables.setdefault("pose", {})
@@ -150,16 +152,27 @@ def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[
         if isinstance(pose.get("position"), list):
             names = component_names(f"{prefix}p", 3)
             places.update({part: (pose["position"], index) for index, part in enumerate(names)})
-        for part in ("angle", "axis"):
-            rotations.append(f"{prefix}{part}")
-            if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in _ENDS)):
-                rotation = pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0})
-                if part == "axis":
-                    # An axis takes the place of a rotation in another form; it then needs an angle of its own.
-                    for other in rotation.keys() - {"axis", "angle"}:
-                        del rotation[other]
-                places[f"{prefix}{part}"] = (rotation, part)
+        rotations += [f"{prefix}{part}" for part in ("angle", "axis", *_FORMS)]
+        places |= {key: place for key, place in _rotation_places(pose, prefix, name).items() if key not in places}
     return places, rotations
+
+
+def _rotation_places(pose: dict[str, Any], prefix: str, name: str) -> dict[str, _Place]:
+    """Return the place of the number of a pose's rotation that is to be set, which is made where it lacks."""
+    for part in _FORMS:
+        if name == f"{prefix}{part}":
+            # It takes the place of a rotation in any form.
+            pose["rotation"] = {part: None}
+            return {name: (pose["rotation"], part)}
+    for part in ("angle", "axis"):
+        if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in _ENDS)):
+            rotation = pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0})
+            if part == "axis":
+                # An axis takes the place of a rotation in another form; it then needs an angle of its own.
+                for other in rotation.keys() - {"axis", "angle"}:
+                    del rotation[other]
+            return {f"{prefix}{part}": (rotation, part)}
+    return {}
 
 
 def _override_limit(tables: dict[str, Any], name: str, value: float | list[float]) -> None:

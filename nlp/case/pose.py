@@ -129,6 +129,14 @@ def sizes_of_turn(angle: Value) -> tuple[float, float]:
     return (0.0 if lower <= 0 <= upper else sizes[0]), sizes[1]
 
 
+class RotationForm(enum.Enum):
+    """Form in which a case states a rotation, and in which its poses are shown; a matrix counts as axis and angle."""
+
+    AXIS_ANGLE = "axis and angle"
+    RPY = "rpy"
+    QUATERNION = "quaternion"
+
+
 @dataclass(frozen=True, eq=False)
 class Rotation:
     """Orientation of the platform, ``exp(angle [axis]x)`` in the world frame (equation 9).
@@ -137,10 +145,12 @@ class Rotation:
         axis: (3,) axis that is held fixed, any length but zero; None leaves the axis free.
         angle: radians. About a free axis the sign of an angle has no meaning: ``Free(-0.5, 0.5)`` allows every rotation
             by at most 0.5 about any axis. The start of such an angle is about z.
+        form: in which the rotation was stated, and is shown.
     """
 
     axis: ArrayLike | None = (0.0, 0.0, 1.0)
     angle: Value = 0.0
+    form: RotationForm = RotationForm.AXIS_ANGLE
 
     @classmethod
     def from_rpy(cls, roll: float, pitch: float, yaw: float) -> Rotation:
@@ -149,7 +159,7 @@ class Rotation:
         Raises:
             CaseError: a number is not finite.
         """
-        return cls(*rotation_from_rpy((roll, pitch, yaw), "rotation.rpy"))
+        return cls(*rotation_from_rpy((roll, pitch, yaw), "rotation.rpy"), RotationForm.RPY)
 
     @classmethod
     def from_matrix(cls, matrix: ArrayLike) -> Rotation:
@@ -167,7 +177,7 @@ class Rotation:
         Raises:
             CaseError: the quaternion is not unit.
         """
-        return cls(*rotation_from_quaternion(quaternion, "rotation.quaternion"))
+        return cls(*rotation_from_quaternion(quaternion, "rotation.quaternion"), RotationForm.QUATERNION)
 
 
 #: No displacement.

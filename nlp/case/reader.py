@@ -25,6 +25,7 @@ from .pose import (
     OverPoses,
     Pose,
     Rotation,
+    RotationForm,
     Value,
     ends_of,
     internal_value,
@@ -326,13 +327,12 @@ def _rotation(written: RotationTable | None, units: Units, pose: str) -> Rotatio
         return Rotation()
     key = f"{pose}.rotation"
     if written.rpy is not None:
-        return Rotation(
-            *rotation_from_rpy([units.to_internal(part, Dimension.ANGLE) for part in written.rpy], f"{key}.rpy")
-        )
+        angles = [units.to_internal(part, Dimension.ANGLE) for part in written.rpy]
+        return Rotation(*rotation_from_rpy(angles, f"{key}.rpy"), RotationForm.RPY)
     if written.matrix is not None:
         return Rotation(*rotation_from_matrix(written.matrix, f"{key}.matrix"))
     if written.quaternion is not None:
-        return Rotation(*rotation_from_quaternion(written.quaternion, f"{key}.quaternion"))
+        return Rotation(*rotation_from_quaternion(written.quaternion, f"{key}.quaternion"), RotationForm.QUATERNION)
     if written.angle is None:
         raise CaseError(f"{key}.angle", "is missing")
     return Rotation(written.axis, internal_value(written.angle, units, Dimension.ANGLE))

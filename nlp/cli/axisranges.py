@@ -20,6 +20,8 @@ def show_ranges(
     time: float | None,
     files: options.Outputs,
     report: Callable[[str], None],
+    *,
+    whole: bool,
 ) -> AxisRangesResult:
     """Write how far each coordinate of a pose can move.
 
@@ -31,11 +33,11 @@ def show_ranges(
         time: seconds; None for the usual ones.
         files: that are written.
         report: called with what is done next.
+        whole: whether everything is printed, and not the answer alone.
 
     Raises:
         InputError: a number is not allowed.
     """
-    from ..output.terminal import show
     from ..proof.workspace.axis_ranges import TIME_LIMIT, axis_ranges
     from ..results.axisranges import axis_ranges_result, axis_ranges_summary, axis_ranges_tables
 
@@ -46,7 +48,7 @@ def show_ranges(
     options.write_json(files["json"], result)
     options.write_csv(files["csv"], axis_ranges_tables(result), None)
     if not files.is_piped:
-        show(options.console(), axis_ranges_summary(case, result))
+        options.show(axis_ranges_summary(case, result), whole=whole)
     return result
 
 

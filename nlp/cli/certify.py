@@ -24,12 +24,12 @@ def certify(
     all_assemblies: options.AllAssemblies = False,
     jobs: options.Jobs = None,
     json_file: options.JsonFile = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Prove a bound of the global optimum over the whole box."""
     from ..errors import InputError, one_line
     from ..interruption import Milestone, answer_after
     from ..output.files import write_text
-    from ..output.terminal import show
     from ..results.evidence import certified_of
     from ..results.robotwording import unknown_lines
     from ..solver.certified import CertifyOptions, OptionError, proof_of
@@ -43,7 +43,7 @@ def certify(
         loaded, text, inputs = options.read_machine(case, settings, of).file
         files.check(inputs)
         if not files.is_piped:
-            show(options.console(), unknown_lines(loaded.model, all_assemblies=all_assemblies))
+            options.show(unknown_lines(loaded.model, all_assemblies=all_assemblies), whole=True)
         certified = certify_with_progress(
             loaded,
             gap=gap,
@@ -68,5 +68,5 @@ def certify(
     if not files.is_piped:
         from ..results.summary import certified_summary
 
-        show(options.console(), certified_summary(loaded, result))
+        options.show(certified_summary(loaded, result), whole=whole)
     raise typer.Exit(0 if certified.is_proved else 1)

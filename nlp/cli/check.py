@@ -18,6 +18,7 @@ def check(
     junit: Annotated[str | None, options.file("--junit", "Write JUnit XML for a CI; - is stdout")] = None,
     markdown: Annotated[bool, options.flag("--markdown", "Print the published numbers as a table")] = False,
     _time: options.Time = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Compare cases with their expected and published values."""
     from ..case.source import case_inputs, shipped_cases
@@ -43,8 +44,7 @@ def check(
     if markdown:
         typer.echo(checks_as_markdown(checks), nl=False)
     elif "-" not in (json_file, junit):
-        from ..output.terminal import show
         from ..results.checks import checks_summary
 
-        show(options.console(), checks_summary(checks))
+        options.show(checks_summary(checks), whole=whole)
     raise typer.Exit(0 if all(each.passed for each in checks) and not is_stopped else 1)

@@ -35,6 +35,7 @@ def compare(
     csv_file: Annotated[str | None, options.table("a row for each robot")] = None,
     html: options.PageFile = None,
     plot: Annotated[str | None, options.plot("Draw the designs in one scale")] = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Compare several robots on the task of a case."""
     from pathlib import Path
@@ -69,12 +70,12 @@ def compare(
     if is_stopped:
         begun = f"{len(found.entries)} of {len(robots)} robots are begun, the last one not to its end"
         typer.echo(f"{why_stopped()}: {begun}", err=True)
-    _write(found, files)
+    _write(found, files, whole=whole)
     is_proved = not certified or all(each.certified is not None and each.certified.is_proved for each in found.ranked)
     raise typer.Exit(0 if found.ranked and is_proved and not is_stopped else 1)
 
 
-def _write(found: Comparison, files: options.Outputs) -> None:
+def _write(found: Comparison, files: options.Outputs, *, whole: bool) -> None:
     """Write a comparison into its files, and onto the terminal where standard output takes no file."""
     from ..comparison.data import comparison_result
     from ..results.comparison import comparison_csv, comparison_summary
@@ -91,6 +92,4 @@ def _write(found: Comparison, files: options.Outputs) -> None:
 
         files.draw("plot", comparison_figure, found)
     if not files.is_piped:
-        from ..output.terminal import show
-
-        show(options.console(), comparison_summary(result))
+        options.show(comparison_summary(result), whole=whole)

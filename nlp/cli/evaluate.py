@@ -15,9 +15,16 @@ def evaluate(
     of: Annotated[
         str | None, options.text("--of", "RESULT", "Take dimensions and pose from a result that solve --json wrote")
     ] = None,
+    claim: Annotated[
+        str | None,
+        options.text(
+            "--set-from", "RESULT#N", "Take the pose of the N-th refuted claim of workspace --json or path --json"
+        ),
+    ] = None,
     json_file: options.JsonFile = None,
     csv_file: options.CsvFile = None,
     table: options.CsvTable = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Show F, J, rank and rates at one point.
 
@@ -32,7 +39,7 @@ def evaluate(
     from ..program.formulation import formulate_each
     from ..results.evaluation import evaluation_of
 
-    given = options.read_machine(case, settings, of, at_pose=True).file
+    given = options.read_machine(case, settings, of, at_pose=True, claim=claim).file
     loaded = given.case
     if left_out := loaded.without_motion:  # a pose of a path, whose own motion is meant
         loaded = replace(loaded, limits=Limits(*(each for each in loaded.limits if each not in left_out)))
@@ -50,8 +57,7 @@ def evaluate(
 
         options.write_csv(csv_file, evaluation_tables(loaded, result), table)
     if not files.is_piped:
-        from ..output.terminal import show
         from ..results.summary import evaluation_summary
 
-        show(options.console(), evaluation_summary(loaded, result))
+        options.show(evaluation_summary(loaded, result), whole=whole)
     raise typer.Exit(1 if result.violated else 0)

@@ -35,6 +35,7 @@ def export(
     from ..evidence.state import loops_are_closed
     from ..formats.export import check_formats, check_pose, check_same_robot, files_at, fixed_point
     from ..output.files import check_folder, check_outputs, write_folder
+    from ..results.text import Line
     from .progress import solve_with_progress
 
     chosen = check_formats(formats)
@@ -70,4 +71,4 @@ def export(
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
     write_folder(out, files, force=force)
-    typer.echo(f"{len(files)} files in {one_line(out)}: {', '.join(files)}")
+    options.show([Line(f"{len(files)} files in {out}: {', '.join(files)}")], whole=True)

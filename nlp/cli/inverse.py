@@ -19,6 +19,7 @@ def inverse(
     ] = False,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Compute positions of actuators and joints at many poses.
 
@@ -40,7 +41,5 @@ def inverse(
     found = inverse_at(loaded, given.positions, given.rotations, follow="previous" if previous else "home")
     files.write("csv", inverse_csv, loaded, found, given.rows, derivatives=derivatives)
     if not files.is_piped:
-        from ..output.terminal import show
-
-        show(options.console(), inverse_summary(loaded, found, poses, given.rows))
+        options.show(inverse_summary(loaded, found, poses, given.rows), whole=whole)
     raise typer.Exit(0 if found.closed.all() else 1)

@@ -20,6 +20,7 @@ def models(
         str | None, typer.Argument(metavar="[NAME]", help="One robot, or a robot file (.toml), in full.")
     ] = None,
     plot: options.PlotFile = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """List the robots, or show one in full.
 
@@ -28,17 +29,16 @@ def models(
     from ...models import model_names
     from ..case.robots import build_model, model_options
     from ..errors import InputError
-    from ..output.terminal import show
-    from ..results.robotwording import model_words, models_table
+    from ..results.robotwording import model_words, models_words
 
     options.Outputs(plot=plot).check({})
     if name is None:
         if plot is not None:
             raise InputError(f"--plot {plot}: needs the name of a robot")
-        show(options.console(), [models_table((each, _description(each)) for each in model_names())])
+        options.show(models_words((each, _description(each)) for each in model_names()), whole=whole)
         return
     if name.endswith(".toml"):
-        _show_file(name, plot)
+        _show_file(name, plot, whole=whole)
         return
     found = model_options(name)
     needed = [option.name for option in found if option.default is None]
@@ -50,15 +50,14 @@ def models(
         if model is None:
             raise InputError(f"--plot {plot}: robot {name!r} needs its option {needed[0]!r} first")
         draw(_variants(name, model, found), plot)
-    show(options.console(), model_words(name, model, found))
+    options.show(model_words(name, model, found), whole=whole)
 
 
-def _show_file(file: str, plot: str | None) -> None:
+def _show_file(file: str, plot: str | None, *, whole: bool) -> None:
     """Show the robot of a robot file in full, and draw it into a file."""
     from pathlib import Path
 
     from ..output.files import check_outputs
-    from ..output.terminal import show
     from ..results.robotwording import model_words
 
     check_outputs({Path(file): "the robot file that is read"}, {"--plot": plot})
@@ -67,7 +66,7 @@ def _show_file(file: str, plot: str | None) -> None:
         from ..output.pictures.plot import plot as draw
 
         draw(model, plot)
-    show(options.console(), model_words(model.name, model, ()))
+    options.show(model_words(model.name, model, ()), whole=whole)
 
 
 def _variants(name: str, model: Model, found: Sequence[ModelOption]) -> list[Model]:

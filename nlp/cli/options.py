@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..case.overrides import Settings
     from ..case.reader import CaseFile
     from ..results.jsondata import JsonObject
-    from ..results.text import TextTable
+    from ..results.text import Line, TextTable
 
 
 _P = ParamSpec("_P")
@@ -195,6 +195,7 @@ CsvTable = Annotated[str | None, text("--table", "NAME", "Write this table only,
 PlotFile = Annotated[str | None, plot("Draw the robot")]
 CurveFile = Annotated[str | None, plot("Draw the curve")]
 PageFile = Annotated[str | None, page("")]
+ShowAll = Annotated[bool, flag("--all", "Show every row and every table, not the answer alone")]
 Folder = Annotated[str, text("--out", "DIR", "Folder to write into")]
 Force = Annotated[bool, flag("--force", "Write over files that screwsynth did not write")]
 
@@ -229,7 +230,9 @@ class Machine(NamedTuple):
     settings: Settings
 
 
-def read_machine(name: str, texts: list[str] | None, of: str | None, *, at_pose: bool = False) -> Machine:
+def read_machine(
+    name: str, texts: list[str] | None, of: str | None, *, at_pose: bool = False, claim: str | None = None
+) -> Machine:
     """Read a case with the numbers of ``--set``, and with the dimensions of a result of ``--of``.
 
     Args:
@@ -237,6 +240,7 @@ def read_machine(name: str, texts: list[str] | None, of: str | None, *, at_pose:
         texts: of ``--set``: numbers that replace those of the file, and of the result.
         of: file of the result; None without one.
         at_pose: whether a result of this case gives the pose too.
+        claim: result with the number of a refuted claim, of which dimensions and pose are taken; None without one.
 
     Raises:
         InputError: a file cannot be read or holds a fault, or the result is no answer for this robot in these units.
@@ -244,6 +248,10 @@ def read_machine(name: str, texts: list[str] | None, of: str | None, *, at_pose:
     from ..case.reader import read_case
 
     settings = read_settings(texts)
+    if claim is not None:
+        from ..results.settings import claim_settings
+
+        settings = {**claim_settings(claim, read_case(name, settings).case), **settings}
     if of is None:
         return Machine(read_case(name, settings), settings)
     from ..errors import one_line
@@ -405,6 +413,13 @@ def write_csv(target: str | None, tables: Iterable[TextTable], name: str | None)
         write_text(target, tables_as_csv(tables, name))
 
 
+def show(items: Iterable[Line | TextTable], *, whole: bool) -> None:
+    """Print lines and tables: the answer with what fits beside it, or everything."""
+    from ..output.terminal import show as show_on
+
+    show_on(console(), items, whole=whole)
+
+
 def console() -> Console | None:
     """Return a console on standard output for lines and tables; None where that shows no styles."""
     # With one of these variables, the console itself decides whether it shows styles.
@@ -414,6 +429,5 @@ def console() -> Console | None:
 
     from ..output.terminal import PLAIN_WIDTH
 
-    # In a file or a pipe, a table is as wide as its content.
     width = None if sys.stdout.isatty() else PLAIN_WIDTH
     return Console(highlight=False, markup=False, emoji=False, width=width)

@@ -11,9 +11,10 @@ if TYPE_CHECKING:
     from ..case.case import Case
     from ..case.pose import Value
     from ..proof.checker.proof_file import Proof, Unproved
-    from ..proof.checker.workspace.check import CheckedClaim
+    from ..proof.checker.workspace.check import CheckedClaim, VerifiedWorkspace
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.paper_record import PaperRecord
+    from ..results.text import Line
 
 
 def paper_record(target: str | None, json_file: str | None) -> PaperRecord | None:
@@ -61,42 +62,51 @@ def write_paper(
         typer.echo(f"--proof {one_line(target)}: not written, as no claim has a proof", err=True)
         return
     write_text(target, proof.as_text())
-    _echo_unproved(proof.unproved, err=True)
+    for words in _unproved_words(proof.unproved):
+        typer.echo(one_line(words), err=True)
 
 
-def verify_paper(proof: Proof, case: Case, leg_error: float) -> None:
-    """Check the proof of a workspace and say what it proves.
+def verify_paper(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]:
+    """Check the proof of a workspace, and return the lines that say what it proves.
 
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ..errors import one_line
-    from ..proof.checker.premises import exact
     from ..proof.checker.proof_file import ProofError
     from ..proof.checker.workspace.check import check_workspace_proof
-    from ..proof.statement.claims import ERRORS
 
     try:
         checked = check_workspace_proof(proof, case, leg_error=leg_error)
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
+    return _checked_lines(proof, checked, case, leg_error)
+
+
+def _checked_lines(proof: Proof, checked: VerifiedWorkspace, case: Case, leg_error: float) -> Iterator[Line]:
+    """Yield what a checked proof proves: the counts, claims that have no proof, then every premise and claim."""
+    from ..proof.checker.premises import exact
+    from ..proof.statement.claims import ERRORS
+    from ..results.text import Line
+    from ..results.workspaceposes import SHOWN
+
     count = len(checked.claims) + len(proof.unproved)
-    whose = f"the workspace of {one_line(case.name)}"
+    whose = f"the workspace of {case.name}"
     if case.joint_centre_tolerance:
         off = f"{exact(case.joint_centre_tolerance)} {case.units.length}"
         whose += f", for every machine whose joint centres are off by at most {off}"
-    typer.echo(f"holds: {len(checked.claims)} of {count} claims about {whose}")
+    yield Line(f"holds: {len(checked.claims)} of {count} claims about {whose}")
+    for k, words in enumerate(_unproved_words(proof.unproved)):
+        yield Line(words, part="claims that are not on paper" if k >= SHOWN else "")
+    if proof.unproved:
+        yield Line("the file's reasons for claims that are not on paper are not checked")
+    yield Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
     for line in _premises(case, checked.numbers_at):
-        typer.echo(f"  {one_line(line)}")
+        yield Line(f"  {line}", part="premises")
     legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
     for each in checked.claims:
         of = f", for lengths of legs that are {legs}" if any(each.name == error.name for error in ERRORS) else ""
-        typer.echo(f"  {one_line(each.name)}: {_words(each, case)}{of}")
-    _echo_unproved(proof.unproved, err=False)
-    if proof.unproved:
-        typer.echo("the file's reasons for claims that are not on paper are not checked")
-    typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
+        yield Line(f"  {each.name}: {_words(each, case)}{of}", part="claims")
 
 
 def _premises(case: Case, numbers_at: str) -> Iterator[str]:
@@ -149,10 +159,7 @@ def _words(claim: CheckedClaim, case: Case) -> str:
     return f"{text}, within the limit {case.units.shown(claim.limit, claim.dimension):.10g}"
 
 
-def _echo_unproved(unproved: Sequence[Unproved], *, err: bool) -> None:
-    """Say which claims have no proof."""
-    from ..errors import one_line
-
+def _unproved_words(unproved: Sequence[Unproved]) -> Iterator[str]:
+    """Yield which claims have no proof, and why."""
     for each in unproved:
-        name = f"{each.name} {each.sense}".strip()
-        typer.echo(f"not on paper: {one_line(name)}: {one_line(each.reason)}", err=err)
+        yield f"not on paper: {f'{each.name} {each.sense}'.strip()}: {each.reason}"

@@ -31,6 +31,7 @@ def pareto(
     json_file: options.JsonFile = None,
     html: options.PageFile = None,
     plot: options.CurveFile = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Find the front of two or more goals of a case."""
     from ..errors import InputError, UncoveredError
@@ -60,16 +61,16 @@ def pareto(
     is_stopped = is_requested()
     if is_stopped:
         typer.echo(f"{why_stopped()}: {len(found.points)} of {points} points are found", err=True)
-    _write(found, files)
+    _write(found, files, whole=whole)
     is_proved = all(each.certificate is None or each.certificate.status.value == "proved" for each in found.points)
     raise typer.Exit(0 if is_proved and not is_stopped else 1)
 
 
-def _write(found: Front, files: options.Outputs) -> None:
+def _write(found: Front, files: options.Outputs, *, whole: bool) -> None:
     """Write a front into its files, and onto the terminal where standard output takes no file."""
     from ..front.data import front_result
     from ..output.fronttable import front_csv, front_table, front_words
-    from ..output.terminal import show
+    from ..results.text import Line
 
     options.write_json(files["json"], front_result(found))
     files.write("csv", front_csv, found)
@@ -82,6 +83,4 @@ def _write(found: Front, files: options.Outputs) -> None:
 
         files.draw("plot", front_figure, found)
     if not files.is_piped:
-        for line in front_words(found):
-            typer.echo(line)
-        show(options.console(), [front_table(found)])
+        options.show([*map(Line, front_words(found)), front_table(found)], whole=whole)

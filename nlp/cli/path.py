@@ -64,17 +64,19 @@ def path(
     ] = None,
     plot: Annotated[str | None, options.plot("Draw numbers along the path")] = None,
     html: Annotated[str | None, options.page(": verdicts, curves, robot")] = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Prove regular poses and limits at every point of a path."""
     from pathlib import Path
 
+    from ..case.pose import RotationForm
     from ..interruption import Milestone, answer_after
     from ..path.options import PathOptions
     from ..path.reader import options_of, path_of_case, read_path
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result
     from ..results.pathwording import path_summary
-    from ..results.workspaceposes import evaluate_command
+    from ..results.posewording import evaluate_command
 
     sampling = _sampling(step, within, is_written=csv_file is not None)
     _refuse_elsewhere(
@@ -93,7 +95,7 @@ def path(
 
         files.check(inputs)
         with spinner("the pose") as show:
-            found = show_ranges(loaded, choices.start, most, time, files, show)
+            found = show_ranges(loaded, choices.start, most, time, files, show, whole=whole)
         raise typer.Exit(0 if found.proved else 1)
     if html is not None:
         from ..output.pictures.requirements import check_library
@@ -108,14 +110,12 @@ def path(
 
     def command(pose: WorkspacePose) -> str:
         """Return the command that shows a pose."""
-        return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
+        return evaluate_command(case, loaded, chosen, pose, RotationForm.RPY)
 
     options.write_json(json_file, result)
     _write(files, judged, result, text, command)
     if not files.is_piped:
-        from ..output.terminal import show as show_on
-
-        show_on(options.console(), path_summary(judged.case, result, command))
+        options.show(path_summary(judged.case, result, command), whole=whole)
     raise typer.Exit(0 if result.proved else 1)
 
 

@@ -32,6 +32,7 @@ def solve(
     ] = None,
     certify: options.Certify = False,
     gap: options.OptimumGap = 1e-4,
+    whole: options.ShowAll = False,
 ) -> None:
     """Maximise or minimise F, and show the evidence."""
     from ..errors import InputError
@@ -63,8 +64,7 @@ def solve(
 
         draw(solution, plot, pose=pose)
     if not files.is_piped:
-        from ..output.terminal import show
         from ..results.summary import case_summary
 
-        show(options.console(), case_summary(loaded, result))
+        options.show(case_summary(loaded, result), whole=whole)
     raise typer.Exit(0 if solution.status.is_answer and is_proved and solution.keeps_limits else 1)

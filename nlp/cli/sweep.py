@@ -164,10 +164,11 @@ def _show(found: Sweep, out: str, files: options.Outputs) -> int:
         proved = sum(row.certificate == "proved" for row in table_rows(out, found))
         ends += f", {proved:,} are proved"
     if not files.is_piped:
-        typer.echo(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")
+        from ..results.text import Line
+
         notice = _notice(found, out)
-        if notice is not None:
-            typer.echo(f"note: {notice}")
+        lines = [Line(f"{len(values):,} of {len(rows):,} points have an answer{ends}: {out}")]
+        options.show([*lines, *([] if notice is None else [Line(f"note: {notice}")])], whole=True)
     return 0 if values else 1
 
 

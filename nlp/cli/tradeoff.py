@@ -33,6 +33,7 @@ def tradeoff(
     csv_file: Annotated[str | None, options.table("the curve")] = None,
     plot: options.CurveFile = None,
     html: options.PageFile = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Solve along one limit or number, and show F against it."""
     from ..case.reader import read_case
@@ -76,9 +77,7 @@ def tradeoff(
 
         files.draw("plot", tradeoff_figure, loaded, result)
     if not files.is_piped:
-        from ..output.terminal import show
-
-        show(options.console(), tradeoff_summary(loaded, result))
+        options.show(tradeoff_summary(loaded, result), whole=whole)
     statuses = [point.status for point in result.points]
     is_done = all(status.is_answer or status is Status.INFEASIBLE for status in statuses)
     raise typer.Exit(0 if is_done and any(status.is_answer for status in statuses) else 1)

@@ -9,8 +9,11 @@ import typer
 from . import options
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from ..case.case import Case
     from ..proof.checker.proof_file import ProofClaim, Statement
+    from ..results.text import Line
 
 
 def verify_proof(
@@ -27,6 +30,7 @@ def verify_proof(
     ] = None,
     all_assemblies: options.AllAssemblies = False,
     leg_error: options.LegError = 0.0,
+    whole: options.ShowAll = False,
 ) -> None:
     """Check a proof with independent code.
 
@@ -36,6 +40,7 @@ def verify_proof(
     from ..errors import InputError
     from ..output.files import read_text
     from ..proof.checker.proof_file import Statement, read_proof
+    from ..results.text import Line
     from .paper import verify_paper
 
     is_given = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
@@ -51,23 +56,26 @@ def verify_proof(
     else:
         loaded = _carried_case(given.case, given.name, proof)
     if isinstance(given.premises, Statement):
-        _verify(given.premises, given.claims[0], loaded, above, all_assemblies=all_assemblies)
+        lines: Iterable[Line] = _verify(given.premises, given.claims[0], loaded, above, all_assemblies=all_assemblies)
     else:
-        verify_paper(given, loaded, leg_error)
+        lines = verify_paper(given, loaded, leg_error)
     whose = "the case is the one that the proof carries; " if case is None else ""
-    typer.echo(f"{whose}checked by screwsynth {__version__}")
+    first, *others = lines
+    options.show([first, Line(f"{whose}checked by screwsynth {__version__}"), *others], whole=whole)
 
 
-def _verify(statement: Statement, claim: ProofClaim, case: Case, above: float | None, *, all_assemblies: bool) -> None:
-    """Check the proof of a certificate and say what it proves.
+def _verify(
+    statement: Statement, claim: ProofClaim, case: Case, above: float | None, *, all_assemblies: bool
+) -> Iterable[Line]:
+    """Check the proof of a certificate, and return the lines that say what it proves.
 
     Raises:
         Exit: with status 1 where the proof does not hold.
     """
-    from ..errors import one_line
     from ..proof.checker.check import check_proof
     from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
     from ..proof.checker.proof_file import ProofError
+    from ..results.text import Line
 
     try:
         hold_statement(case, statement, above=above, all_assemblies=all_assemblies)
@@ -78,8 +86,8 @@ def _verify(statement: Statement, claim: ProofClaim, case: Case, above: float | 
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
-    typer.echo(f"holds: {one_line(claim_words(case, statement, claim.bound))}")
-    typer.echo(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
+    holds = Line(f"holds: {claim_words(case, statement, claim.bound)}")
+    return [holds, Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")]
 
 
 def _carried_case(text: str, name: str, proof: str) -> Case:

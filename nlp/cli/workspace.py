@@ -37,12 +37,13 @@ def workspace(
     plot: Annotated[str | None, options.plot("Draw slices of the workspace")] = None,
     plot_pose: Annotated[str | None, options.plot("Draw the robot at its worst pose", "--plot-pose")] = None,
     html: Annotated[str | None, options.page(": verdicts, poses, slices")] = None,
+    whole: options.ShowAll = False,
 ) -> None:
     """Prove regular poses and limits over a whole workspace."""
     from ..interruption import Milestone, answer_after
     from ..proof.statement.machine import workspace_of_case
+    from ..results.posewording import evaluate_command
     from ..results.workspace import scale_data, workspace_of
-    from ..results.workspaceposes import evaluate_command
     from .paper import paper_record, write_paper
 
     record = paper_record(proof, json_file)
@@ -62,7 +63,7 @@ def workspace(
 
     def command(pose: WorkspacePose) -> str:
         """Return the command that shows a pose."""
-        return evaluate_command(case, chosen, pose, loaded.pose_prefixes[0])
+        return evaluate_command(case, loaded, chosen, pose)
 
     options.write_json(json_file, result)
     if csv_file is not None:
@@ -84,10 +85,9 @@ def workspace(
     if proof is not None:
         write_paper(proof, judged, record, text, quantities or (), leg_error)
     if not files.is_piped:
-        from ..output.terminal import show
         from ..results.workspacewording import workspace_summary
 
-        show(options.console(), workspace_summary(loaded, result, command))
+        options.show(workspace_summary(loaded, result, command), whole=whole)
     raise typer.Exit(0 if result.proved else 1)
 
 

@@ -89,7 +89,7 @@ def front_table(front: Front) -> TextTable:
         )
         for point in front.points
     )
-    return TextTable(headers, rows)
+    return TextTable(headers, rows, extra=1, is_curve=True)
 
 
 def goal_names(front: Front) -> list[str]:

@@ -37,7 +37,7 @@ from .report.markup import html_table, image_source, join_markup, paragraphs, ta
 from .terminal import show
 
 #: Width of a text without a terminal, as the command line writes into a file.
-_WIDTH = 120
+_WIDTH = 80
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Picture:
 
 
 def text_of(found: Solution | Certified, width: int = _WIDTH) -> str:
-    """Return the tables of a solution as text, as ``solve`` prints them.
+    """Return the tables of a solution as text, as ``solve --all`` prints them.
 
     Args:
         found: a solution, or a solution with certificates.

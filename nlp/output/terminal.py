@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from rich.cells import cell_len
@@ -17,8 +20,12 @@ if TYPE_CHECKING:
 #: A line as its parts, each with its style.
 _Styled: TypeAlias = "list[tuple[str, str]]"
 
-#: Columns of a file or a pipe, where a table is as wide as its content.
-PLAIN_WIDTH = 120
+#: Columns of a file or a pipe.
+PLAIN_WIDTH = 80
+#: Lines of a short view.
+ROOM = 25
+#: Stands before the second and later lines of one that is broken.
+_INDENT = "  "
 
 _LABEL = "dim"
 _STYLES = {
@@ -38,35 +45,159 @@ _WRAPPED = 14
 _COMFORTABLE = 28
 
 
-def show(console: Console | None, items: Iterable[Line | TextTable]) -> None:
+def show(console: Console | None, items: Iterable[Line | TextTable], *, whole: bool = True) -> None:
     """Print lines and tables; no word or number of them is split unless it is wider than the terminal by itself.
 
     Args:
         console: terminal; None for a standard output without styles.
-        items: lines and tables.
+        items: lines and tables; those of the answer first, then those of parts.
+        whole: whether everything is printed; else the answer, then the parts that still fit, and the names of others.
     """
     width = PLAIN_WIDTH if console is None else console.width
+    lines = (each for item in items for each in _item_lines(item, width, whole=True)) if whole else _short(items, width)
+    for line in lines:
+        if console is None:
+            sys.stdout.write("".join(text for text, _ in line) + "\n")
+            continue
+        # Loading it takes as long as a tenth of a short command: a text without styles goes without it.
+        from rich.text import Text  # noqa: PLC0415
+
+        styled = Text(line[0][0], style=line[0][1]) if len(line) == 1 else Text.assemble(*line)
+        console.print(styled, soft_wrap=True)
+
+
+def _item_lines(item: Line | TextTable, width: int, *, whole: bool = False) -> Iterator[_Styled]:
+    """Yield a line or a table as lines in a width."""
+    if isinstance(item, TextTable):
+        yield from _table_lines(replace(item, folded=0) if whole else item, width)
+    elif item.is_command:
+        yield from _command_lines(item, width)
+    else:
+        yield from _broken(_text(item), width)
+
+
+def _short(items: Iterable[Line | TextTable], width: int) -> list[_Styled]:
+    """Return the answer in at most as many lines as there is room for, the parts that fit, and the names of others."""
+    answer: list[Line | TextTable] = []
+    parts: dict[str, list[_Styled]] = {}
     for item in items:
-        is_command = isinstance(item, Line) and item.is_command
-        for line in [_text(item)] if isinstance(item, Line) else _table_lines(item, width):
-            _print(console, line, is_command=is_command)
+        if item.part:
+            parts.setdefault(item.part, []).extend(_item_lines(item, width))
+        else:
+            answer.append(item)
+    last = _more_lines(parts, width)
+    shown = _answer_lines(answer, width, ROOM - len(last))
+    room = ROOM - len(shown)
+    if sum(map(len, parts.values())) > room:
+        room -= len(last)
+    left = []
+    for name, lines in parts.items():
+        if len(lines) <= room:
+            shown += lines
+            room -= len(lines)
+        else:
+            left.append(name)
+    return [*shown, *_more_lines(left, width)]
 
 
-def _print(console: Console | None, line: _Styled, *, is_command: bool) -> None:
-    """Print a line; a command is not broken into several."""
-    if console is None:
-        text = "".join(part for part, _ in line)
-        if "\t" not in text and (is_command or cell_len(text) <= PLAIN_WIDTH):
-            sys.stdout.write(f"{text}\n")
-            return
-    # Loading the console takes as long as a tenth of a short command: a text that needs none goes without it.
-    from rich.console import Console  # noqa: PLC0415
-    from rich.text import Text  # noqa: PLC0415
+def _more_lines(names: Iterable[str], width: int) -> list[_Styled]:
+    """Return the line that names what is not shown; nothing without a name."""
+    words = ", ".join(names)
+    return list(_broken([("more  ", _LABEL), (f"{words}: --all", "")], width)) if words else []
 
-    if console is None:
-        console = Console(highlight=False, markup=False, emoji=False, width=PLAIN_WIDTH)
-    styled = Text(line[0][0], style=line[0][1]) if len(line) == 1 else Text.assemble(*line)
-    console.print(styled, soft_wrap=is_command)
+
+def _answer_lines(items: Sequence[Line | TextTable], width: int, room: int) -> list[_Styled]:
+    """Return the lines of an answer, whose tables are shortened where there is no room, the last ones first."""
+    blocks = [list(_item_lines(item, width)) for item in items]
+    over = sum(map(len, blocks)) - room
+    for k in reversed(range(len(items))):
+        item = items[k]
+        if over > 0 and isinstance(item, TextTable):
+            short = _shortened(item, width, len(blocks[k]) - over)
+            over -= len(blocks[k]) - len(short)
+            blocks[k] = short
+    return [line for block in blocks for line in block]
+
+
+def _shortened(table: TextTable, width: int, room: int) -> list[_Styled]:
+    """Return the lines of a table without its extra columns, and with as few rows as there is room for, but one."""
+    lines: list[_Styled] = []
+    note: list[_Styled] = []
+    if table.extra:
+        names = " and ".join(header.replace("\n", ", ") for header in table.headers[-table.extra :])
+        note = list(_broken([(f"--all shows the column {names}", _LABEL)], width))
+        kept = len(table.headers) - table.extra
+        rows = tuple(row[:kept] for row in table.rows)
+        table = replace(table, headers=table.headers[:kept], rows=rows, extra=0)
+        lines = [*_table_lines(table, width), *note]
+        if len(lines) <= room:
+            return lines
+    every = len(table.rows)
+    for count in range(min(every - table.folded, max(room, 2)), 0, -1):
+        if table.is_curve:
+            places = [round(k * (every - 1) / max(count - 1, 1)) for k in range(count)]
+            words = f"{count} of {every} rows: --all shows every one"
+            last: list[_Styled] = [[(words, _LABEL)]] if count < every else []
+            lines = [*_table_lines(replace(table, rows=tuple(table.rows[k] for k in places)), width), *last, *note]
+        else:
+            lines = [*_table_lines(replace(table, folded=every - count), width), *note]
+        if len(lines) <= room:
+            break
+    return lines
+
+
+def _command_lines(item: Line, width: int) -> Iterator[_Styled]:
+    """Yield a command, broken between its options so that a shell reads it as one."""
+    units: list[str] = []
+    for word in map(shlex.quote, shlex.split(item.text)):
+        if units and units[-1].startswith("--") and " " not in units[-1] and not word.startswith("--"):
+            units[-1] += f" {word}"
+        else:
+            units.append(word)
+    label, line = f"{item.label}  " if item.label else "", units[0]
+    lines: list[str] = []
+    for unit in units[1:]:
+        beside = cell_len(label) if not lines else len(_INDENT)
+        # Two columns are for the backslash.
+        if beside + cell_len(line) + 1 + cell_len(unit) + 2 <= width:
+            line += f" {unit}"
+        else:
+            lines.append(f"{line} \\")
+            line = unit
+    first, *others = [*lines, line]
+    yield [(one_line(label), _LABEL), (one_line(first), "")] if label else [(one_line(first), "")]
+    yield from ([(f"{_INDENT}{one_line(each)}", "")] for each in others)
+
+
+def _broken(line: _Styled, width: int) -> Iterator[_Styled]:
+    """Yield a line, broken between words where it is too wide; what follows is indented."""
+    text = "".join(part for part, _ in line)
+    if cell_len(text) <= width:
+        yield line
+        return
+    signs = [(sign, style) for part, style in line for sign in part]
+    indent = " " * (len(text) - len(text.lstrip(" "))) + _INDENT
+    indent = indent if len(indent) < width // 2 else ""
+    begin, start = 0, ""
+    while begin < len(signs):
+        room, end, size = width - len(start), begin, 0
+        while end < len(signs) and size + cell_len(signs[end][0]) <= room:
+            size += cell_len(signs[end][0])
+            end += 1
+        if end < len(signs) and signs[end][0] != " ":
+            # The last space in the line, unless the line would be empty before it.
+            space = next((k for k in range(end - 1, begin, -1) if signs[k][0] == " "), None)
+            if space is not None and text[begin:space].strip():
+                end = space
+        end = max(end, begin + 1)
+        taken = list(signs[begin:end])
+        while taken and taken[-1][0] == " ":
+            taken.pop()
+        grouped = itertools.groupby(taken, key=lambda each: each[1])
+        yield [(start, "")] * bool(start) + [("".join(sign for sign, _ in group), style) for style, group in grouped]
+        begin, start = end, indent
+        while begin < len(signs) and signs[begin][0] == " ":
+            begin += 1
 
 
 def _header(text: str) -> str:
@@ -95,11 +226,11 @@ def _table_lines(table: TextTable, width: int) -> Iterator[_Styled]:
         for k, header in enumerate(table.headers)
     ]
     if table.title:
-        yield [(one_line(table.title), _LABEL)]
+        yield from _broken([(one_line(table.title), _LABEL)], width)
     for part in _parts(columns, width):
         yield from _part_lines(part, len(shown), width)
     if table.folded:
-        yield [(f"and {table.folded} {table.folded_words}; --csv FILE lists them", _LABEL)]
+        yield [(f"and {table.folded} {table.folded_words}: --all", _LABEL)]
 
 
 class _Column:

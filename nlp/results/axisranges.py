@@ -14,7 +14,7 @@ from .jsondata import Absent, Inline, JsonObject, Vector6, finite_or_none
 from .parts import HeadData, VersionsData
 from .point import head_data, versions
 from .rounding import number
-from .text import Line, TextTable, Tone
+from .text import Line, TextTable, Tone, in_part
 from .wording import title_line
 from .workspace import WorkspacePose, pose_data
 
@@ -228,7 +228,7 @@ def axis_ranges_summary(case: Case, result: AxisRangesResult) -> Iterator[Line |
     table, _ = axis_ranges_tables(result)
     yield table
     if result.pairs:
-        yield _matrix(result)
+        yield from in_part("two at once", [_matrix(result)])
 
 
 def _matrix(result: AxisRangesResult) -> TextTable:

@@ -5,7 +5,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from .jsondata import JsonObject, Vector
 from .parts import SCHEMA, SchemaVersion
 from .regression import CaseCheck, PublishedCheck, decimals_of
-from .text import Line, TextTable, Tone
+from .text import Line, TextTable, Tone, in_part
+from .wording import counted
+
+#: So many numbers that do not hold are shown in full in a short view.
+_FAULTS = 8
 
 
 class ExpectedData(JsonObject):
@@ -114,10 +118,18 @@ def _published_data(row: PublishedCheck) -> PublishedData:
 
 def checks_summary(checks: Sequence[CaseCheck]) -> Iterator[Line | TextTable]:
     """Yield the count of numbers that hold in each case, and every number that does not."""
-    yield TextTable(("case", "expected", "published", "seconds"), tuple(_summary_row(check) for check in checks))
     faults = [fault for check in checks for fault in _faults(check)]
-    yield from (Line(fault, tone=Tone.FAULT) for fault in faults)
     yield Line(f"{len(faults)} do not hold", tone=Tone.NO_ANSWER) if faults else Line("all hold", tone=Tone.HOLDS)
+    published = [row for check in checks for row in check.published]
+    held = sum(row.passed for check in checks for row in check.expected)
+    count = f"{held} of {sum(len(check.expected) for check in checks)} expected numbers hold"
+    reproduced = sum(row.reproduced for row in published)
+    words = f"; of {len(published)} published ones {reproduced} are reproduced" if published else ""
+    yield Line(f"{counted(len(checks), 'case')}: {count}{words}")
+    for k, fault in enumerate(faults):
+        yield Line(fault, tone=Tone.FAULT, part="numbers that do not hold" if k >= _FAULTS else "")
+    rows = tuple(_summary_row(check) for check in checks)
+    yield from in_part("cases", [TextTable(("case", "expected", "published", "seconds"), rows)])
 
 
 def _summary_row(check: CaseCheck) -> tuple[str | Line, ...]:

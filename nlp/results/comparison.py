@@ -185,17 +185,17 @@ _DIGITS, _FEW = 7, 4
 
 
 def comparison_summary(result: ComparisonResult) -> Iterator[Line | TextTable]:
-    """Yield a comparison: the rules, the table, then words and dimensions robot by robot."""
+    """Yield a comparison: the table, words and dimensions robot by robot, then the rules."""
     yield Line(result.title or result.case, tone=Tone.TITLE)
-    for sentence in result.sentences:
-        yield Line(sentence)
     yield comparison_table(result)
     for robot in result.robots:
         for sentence in robot.sentences:
             yield Line(sentence, label=robot.name, tone=Tone.CAUTION)
     for robot in result.robots:
         if robot.dimensions:
-            yield Line(dimension_words(robot), label=f"{robot.name}, dimensions")
+            yield Line(dimension_words(robot), label=f"{robot.name}, dimensions", part="dimensions")
+    for sentence in result.sentences:
+        yield Line(sentence, part="rules")
 
 
 def comparison_table(result: ComparisonResult) -> TextTable:

@@ -6,14 +6,16 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..case.pathfile import PLACE
-from ..case.pose import Free
+from ..case.pose import Free, RotationForm
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
+from .posewording import pose_words
 from .rounding import number
-from .text import Line, TextTable, Tone
+from .text import Line, TextTable, Tone, in_part
 from .wording import title_line
 from .workspacemotors import TONES
-from .workspacewording import exchange_lines, machine_lines, pose_words, tightest_table
+from .workspaceposes import SHOWN
+from .workspacewording import exchange_lines, machine_lines, open_lines, outcome_lines, tightest_table
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -33,10 +35,11 @@ def path_summary(
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; left out, none is named.
+        command: returns the command that shows a pose; left out, for a page, only tables have single claims.
     """
     yield title_line(case)
     path = result.path
+    limited = [each for each in path.claims if each.limit is not None]
     yield Line(f"{path.file}: {path.segments:,} segment{'s' * (path.segments != 1)}", label="path")
     if path.time is not None:
         yield Line(f"{number(path.time)} s", label="time", after=_untimed_words(path))
@@ -49,15 +52,30 @@ def path_summary(
     if wrong is not None and wrong.fault is not None:
         yield Line(fault_words(wrong, wrong.fault), label="first fault", tone=Tone.FAULT)
         if command is not None:
-            yield Line(command(wrong.fault.pose), label="see it")
+            yield Line(command(wrong.fault.pose), label="see it", is_command=True)
     for each in path.claims:
         if each.sense is None:
             after = f": {each.reason}" if each.reason else ""
             yield Line(each.outcome.value, label=each.name, tone=TONES[each.outcome], after=after + _place_words(each))
+    yield from outcome_lines(limited)
+    if command is not None:
+        yield from _other_faults(path, wrong)
+        yield from open_lines(limited)
     yield from _knot_lines(path, case.units.length)
     if path.time is not None or path.knots is not None:
         yield _actuator_table(path)
-    yield from claims_table(case, path.claims)
+    yield from in_part("tightest limits", tightest_table(limited, "tightest limits along the path"))
+    yield from in_part("every number", claims_table(case, path.claims))
+
+
+def _other_faults(path: PathData, first: PathClaimData | None) -> Iterator[Line]:
+    """Yield the faults of other claims than the first, in the order of the path; a few belong to the answer."""
+    others = [(each, each.fault) for each in path.claims if each.fault is not None and each is not first]
+    others.sort(key=lambda pair: (pair[1].segment, pair[1].parameter) if pair[1] is not None else (0, 0.0))
+    for k, (each, fault) in enumerate(others):
+        if fault is not None:
+            part = "refuted claims" if k >= SHOWN else ""
+            yield Line(fault_words(each, fault), label="refuted", tone=Tone.FAULT, part=part)
 
 
 def claims_table(case: Case, claims: Sequence[PathClaimData]) -> Iterator[TextTable]:
@@ -131,7 +149,7 @@ def verdict_words(result: PathResult) -> str:
     return f"not everything is proved: {counts}"
 
 
-def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line | TextTable]:
+def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line]:
     """Yield the proof of a solved design along its path."""
     whole = f"{proof.file}, {proof.segments:,} segment{'s' * (proof.segments != 1)}: "
     if proof.proved:
@@ -152,6 +170,10 @@ def path_proof_lines(case: Case, proof: PathProofData) -> Iterator[Line | TextTa
             yield Line(f"{number(given)} {case.units.label(dimension)}", label=f"place {name}", after=between)
     yield from exchange_lines(proof, "path")
     yield from machine_lines(case, proof.joint_centre)
+
+
+def tightest_along(proof: PathProofData) -> Iterator[TextTable]:
+    """Yield the tightest claims about a solved design along its path."""
     yield from tightest_table(proof.claims, "tightest limits along the path")
 
 
@@ -190,5 +212,5 @@ def _row(case: Case, each: PathClaimData) -> tuple[str | Line, ...]:
         "" if each.reached is None else number(each.reached),
         Line(each.outcome.value, tone=TONES[each.outcome], after=f": {each.reason}" if each.reason else ""),
         "" if each.line is None else str(each.line),
-        "" if each.pose is None else pose_words(case, each.pose),
+        "" if each.pose is None else pose_words(case, each.pose, RotationForm.RPY),
     )

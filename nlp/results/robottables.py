@@ -11,10 +11,11 @@ import numpy as np
 
 from ...models import Dimension, Model, WrenchKind, component_names
 from ..case.case import Case
-from ..case.pose import Free, Value, sizes_of_turn
+from ..case.pose import Free, RotationForm, Value, sizes_of_turn
 from ..case.task import Sense
 from ..units import Units, rate_unit, slope_unit
 from .loadtables import loading_tables
+from .posewording import rotation_numbers
 from .rounding import (
     STATED,
     TURNED,
@@ -171,13 +172,19 @@ def design_table(
 
 
 def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_Row]:
-    """Return the rows of a stated pose: position, axis and angle."""
+    """Return the rows of a stated pose: position, and rotation in the form in which the case states it."""
     prefix, pose = case.pose_prefixes[k], case.poses[k]
     largest = max(map(abs, found.position))
     rows = [
         reasons.row(f"{prefix}{name}", value, given, Dimension.LENGTH, largest)
         for name, value, given in zip(component_names("p", 3), found.position, pose.position, strict=True)
     ]
+    form = pose.rotation.form
+    if form is not RotationForm.AXIS_ANGLE:
+        names = ("roll", "pitch", "yaw") if form is RotationForm.RPY else ("q_w", "q_x", "q_y", "q_z")
+        dimension = Dimension.ANGLE if form is RotationForm.RPY else Dimension.NUMBER
+        stated = zip(names, rotation_numbers(case, found.axis, found.angle, form)[form.value], strict=True)
+        return [*rows, *(reasons.row(f"{prefix}{name}", each, each, dimension, 1.0) for name, each in stated)]
     angle, is_held = pose.rotation.angle, pose.rotation.axis is not None
     turned = abs(case.units.to_internal(found.angle, Dimension.ANGLE)) > TURNED
     if not is_held and isinstance(angle, Free):
@@ -265,9 +272,14 @@ def robot_table(case: Case, robot: RobotData) -> TextTable:
 def robot_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
     """Yield every limb, or with several poses the robot at each of them; then what holds the loads."""
     yield robot_table(case, robot)
+    yield from robot_tables_by_limb(case, robot)
+    yield from loading_tables(case, robot.loading)
+
+
+def robot_tables_by_limb(case: Case, robot: RobotData) -> Iterator[TextTable]:
+    """Yield the rates and measures by pose and limb; nothing for one pose."""
     if robot.several is not None:
         yield from _tables_by_limb(case, robot, robot.several)
-    yield from loading_tables(case, robot.loading)
 
 
 def _pose_table(case: Case, robot: RobotData, several: PosesData) -> TextTable:

@@ -9,12 +9,25 @@ from ...models import Model, Parameter
 from ..case.robots import ModelOption
 from ..units import Units
 from .jointwording import idle_words
-from .text import Line, TextTable, Tone
+from .text import Line, TextTable, Tone, in_part
+from .wording import counted
 
 
 def models_table(models: Iterable[tuple[str, str]]) -> TextTable:
     """Return names and descriptions of robots."""
     return TextTable(("robot", "description"), tuple(models))
+
+
+def models_words(models: Iterable[tuple[str, str]]) -> Iterator[Line | TextTable]:
+    """Yield the names of robots by their motions, which end the descriptions, then the descriptions."""
+    listed = tuple(models)
+    motions: dict[str, list[str]] = {}
+    for name, description in listed:
+        motions.setdefault(description.rpartition("; ")[2] if "; " in description else "others", []).append(name)
+    yield Line(f"{counted(len(listed), 'robot')}; models NAME shows one", tone=Tone.TITLE)
+    for motion, names in sorted(motions.items(), key=lambda each: (each[0] == "others", -len(each[1]))):
+        yield Line(", ".join(names), label=motion)
+    yield from in_part("descriptions", [models_table(listed)])
 
 
 def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) -> Iterator[Line | TextTable]:
@@ -44,12 +57,10 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
         ),
     )
     if model.structure:
-        yield from _structure_words(model)
+        yield from _freedom_lines(model)
         if model.legs:
             words = f"{', '.join(leg.name for leg in model.legs)}: straight, so that limits of legs can be set"
             yield Line(words, label="legs")
-    rows = [(str(index + 1), row.member, row.kind.value) for index, row in enumerate(model.rows)]
-    yield TextTable(("row", "limb", "wrench"), tuple(rows))
     words = "rows with forces of the norm f exert at most f sqrt(F) along a task"
     yield Line(words if not model.actuators else f"{words}; [[load]] tells those of actuators", label="forces")
     if model.quantities:
@@ -57,18 +68,33 @@ def model_words(name: str, model: Model | None, options: Sequence[ModelOption]) 
         yield TextTable(("quantity", "measures", "meaning"), tuple(rows))
     for remark in model.remarks:
         yield Line(remark, label="note")
+    yield from in_part("members", _member_tables(model))
+    yield from in_part("loops", _loop_words(model))
+    rows = [(str(index + 1), row.member, row.kind.value) for index, row in enumerate(model.rows)]
+    yield from in_part("rows of J", [TextTable(("row", "limb", "wrench"), tuple(rows))])
 
 
-def _structure_words(model: Model) -> Iterator[Line | TextTable]:
-    """Yield the structure of a robot given joint by joint: its members, ranks and freedoms, and its opened loops."""
+def _member_tables(model: Model) -> Iterator[TextTable]:
+    """Yield the members of a robot given joint by joint."""
     rows = [(each.name, each.joints, str(each.wrenches), str(each.constraints)) for each in model.structure]
-    yield TextTable(("member", "joints (* actuated)", "dim W", "dim C"), tuple(rows))
+    if rows:
+        yield TextTable(("member", "joints (* actuated)", "dim W", "dim C"), tuple(rows))
+
+
+def _freedom_lines(model: Model) -> Iterator[Line]:
+    """Yield the freedoms and ranks of a robot given joint by joint."""
     if model.generic is not None:
         freedoms, rank = 6 - model.generic.constraints, model.generic.jacobian
         yield Line(f"{freedoms} with free actuators", label="freedoms")
         yield Line(f"{rank} of all wrenches, {model.generic.constraints} of the constraints", label="ranks")
         if model.generic.undetermined:
             yield Line(idle_words(model.generic.undetermined), label="note")
+
+
+def _loop_words(model: Model) -> Iterator[Line | TextTable]:
+    """Yield the opened loops of a robot given joint by joint."""
+    if not model.structure:
+        return
     unknowns, every = len(model.unknowns), sum(each.equations for each in model.structure)
     if every == 0:
         yield Line("closed by the pose alone: no unknowns, no equations", label="loops")

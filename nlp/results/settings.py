@@ -6,12 +6,17 @@ from typing import TypeAlias
 
 from ..case.case import Case
 from ..case.overrides import Settings
-from ..case.pose import Free, Pose
+from ..case.pose import Free, Pose, RotationForm
 from ..errors import InputError
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
+from .jsondata import Vector
 from .parts import PoseData, RobotData
+from .path import PathResult
+from .posewording import rotation_form, rotation_numbers
 from .schema import load_result
+from .workspace import WorkspaceResult
+from .workspaceposes import refuted_claims
 
 Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
 
@@ -54,6 +59,41 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
     return robot
 
 
+def claim_settings(given: str, case: Case) -> Settings:
+    """Return the dimensions and the pose of a refuted claim by the names that they have in its case.
+
+    Args:
+        given: a file that ``workspace --json`` or ``path --json`` wrote, ``#``, and the number of the claim from 1, in
+            the order of the file: claims of a workspace with a pose, or those of a path with a fault.
+        case: the case.
+
+    Raises:
+        InputError: the file cannot be read or is another result, or there is no such claim.
+    """
+    file, _, text = given.rpartition("#")
+    if not file or not text.isdecimal():
+        raise InputError(f"--set-from {given}: must be RESULT#N: a file, and the number of a refuted claim in it")
+    result = load_result(file)
+    form, numbers = rotation_form(case), dict[str, float | list[float]]()
+    if isinstance(result, WorkspaceResult):
+        poses = [claim.pose for claim in refuted_claims(result)]
+        numbers |= {case.parameter_name(name): _setting(value) for name, value in result.parameters.items()}
+    elif isinstance(result, PathResult):
+        poses = [claim.fault.pose for claim in result.path.claims if claim.fault is not None]
+        form = RotationForm.RPY
+    else:
+        raise InputError(f"--set-from {given}: {file} is no result of workspace or path")
+    if (result.head.case, result.head.model) != (case.name, case.model.name):
+        fault = f"is a result of the case {result.head.case!r} with the robot {result.head.model!r}"
+        raise InputError(f"--set-from {given}: {fault}, not of {case.name!r} with {case.model.name!r}")
+    if not 1 <= int(text) <= len(poses):
+        raise InputError(f"--set-from {given}: {file} has {len(poses)} refuted claims with a pose")
+    pose, prefix = poses[int(text) - 1], case.pose_prefixes[0]
+    numbers |= {f"{prefix}p_{axis}": value for axis, value in zip("xyz", pose.position, strict=True)}
+    turn = rotation_numbers(case, pose.axis, pose.angle, form)
+    return numbers | {f"{prefix}{key}": each if len(each) > 1 else each[0] for key, each in turn.items()}
+
+
 def settings_of(robot: RobotData, case: Case) -> Settings:
     """Return the numbers of a robot by the names that they have in its case, in the case's units."""
     found = dict(dimensions_of(robot, case))
@@ -65,10 +105,11 @@ def settings_of(robot: RobotData, case: Case) -> Settings:
 
 def dimensions_of(robot: RobotData, case: Case) -> Settings:
     """Return the dimensions of a robot by the names that they have in its case, in the case's units."""
-    return {
-        case.parameter_name(name): list(value) if isinstance(value, tuple) else value
-        for name, value in robot.parameters.items()
-    }
+    return {case.parameter_name(name): _setting(value) for name, value in robot.parameters.items()}
+
+
+def _setting(value: float | Vector) -> float | list[float]:
+    return list(value) if isinstance(value, tuple) else value
 
 
 def place_of(result: Answer, case: Case) -> Settings:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from ..case.case import Case
@@ -10,30 +11,37 @@ from ..evidence.state import ZERO_F
 from ..units import objective_unit
 from .data import CombinedResult
 from .jointwording import limb_part_table
+from .loadtables import loading_tables
 from .robottables import (
     combined_design_table,
     design_table,
     jacobian_table,
     plural_name,
+    robot_table,
     robot_tables,
+    robot_tables_by_limb,
     solved_design_table,
 )
 from .rounding import listed, number, robot_size, size_of_F
 from .tables import limit_table, limits_title, margin_table, outcome_table, principal_table
-from .text import Line, TextTable, Tone
+from .text import Line, TextTable, Tone, in_part
 from .wording import (
     certificate_lines,
+    check_lines,
     choice_lines,
     combined_lines,
     combined_value_lines,
-    evidence_lines,
+    fault_lines,
     heading_lines,
+    holding_lines,
+    is_unasked_singularity,
     objective_lines,
     singularity_lines,
     starts_lines,
     task_lines,
     title_line,
     tolerance_line,
+    verdict_line,
     violation_lines,
 )
 
@@ -52,69 +60,104 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 
 
 def _task_summary(case: Case, result: SolveResult) -> Summary:
-    """Yield the result of a solve of one task."""
+    """Yield the result of a solve of one task: F, the design with what holds it, the verdict; then the parts."""
+    robot = result.robot
     yield from heading_lines(case, result)
     yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
-    yield from _proof_summary(case, result)
-    if result.robot is not None:
-        yield solved_design_table(case, result, result.robot)
-        yield from robot_tables(case, result.robot)
-    if result.limits:
-        size = 0.0 if result.robot is None else size_of_F(result.robot)
-        yield limit_table(result.limits, size, limits_title(case, result.workspace or result.path))
-    if result.tolerance is not None:
-        yield tolerance_line(result.tolerance, result.F, case.units)
-    yield from evidence_lines(result)
-    yield from starts_lines(result.starts, result.robot)
-    if result.robot is not None and result.reached is None:
-        yield from _limb_parts(case, result.robot)
-        yield from singularity_lines(result.robot, case.units)
+    yield from fault_lines(result)
+    if result.F is None:
+        yield from starts_lines(result.starts, robot)
+    yield from _proof_lines(case, result)
+    if robot is not None:
+        yield solved_design_table(case, result, robot)
+    yield from holding_lines(result.limits, limits_title(case, result.workspace or result.path))
+    if result.optimality is not None:
+        yield verdict_line(result.optimality)
+    if robot is not None and result.reached is None:
+        yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
     yield from certificate_lines(result.certificate)
+    yield from _task_parts(case, result)
 
 
-def _proof_summary(case: Case, result: CaseResult) -> Summary:
+def _task_parts(case: Case, result: SolveResult) -> Summary:
+    """Yield what stands behind the answer of a solve of one task."""
+    robot = result.robot
+    if robot is not None:
+        yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
+    yield from in_part("evidence", check_lines(result))
+    if result.F is not None:
+        yield from in_part("starts", starts_lines(result.starts, robot))
+    if robot is not None:
+        yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
+        yield from in_part("forces", loading_tables(case, robot.loading))
+    if result.limits:
+        size = 0.0 if robot is None else size_of_F(robot)
+        title = limits_title(case, result.workspace or result.path)
+        yield from in_part("limits", [limit_table(result.limits, size, title)])
+    if result.tolerance is not None:
+        yield from in_part("tolerance", [tolerance_line(result.tolerance, result.F, case.units)])
+    yield from in_part("tightest limits", _proof_digest(result))
+    if robot is not None and result.reached is None:
+        yield from in_part("actuation", _limb_parts(case, robot))
+
+
+def _proof_lines(case: Case, result: CaseResult) -> Iterator[Line]:
     """Yield the proof of a design over a workspace, or along a path."""
     if result.workspace is not None:
         # Few cases have a proof, and what shows it loads the room of proofs.
-        from .workspacewording import proof_digest, proof_lines  # noqa: PLC0415
+        from .workspacewording import machine_lines, proof_lines  # noqa: PLC0415
 
         yield from proof_lines(result.workspace)
-        yield from proof_digest(case, result.workspace)
+        yield from machine_lines(case, result.workspace.joint_centre)
     if result.path is not None:
         from .pathwording import path_proof_lines  # noqa: PLC0415 - in the same way
 
         yield from path_proof_lines(case, result.path)
 
 
+def _proof_digest(result: CaseResult) -> Summary:
+    """Yield the tightest claims of the proof of a design."""
+    if result.workspace is not None:
+        from .workspacewording import tightest_table  # noqa: PLC0415 - as above
+
+        yield from tightest_table(result.workspace.extremes)
+    if result.path is not None:
+        from .pathwording import tightest_along  # noqa: PLC0415 - as above
+
+        yield from tightest_along(result.path)
+
+
 def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     """Yield the result of a solve of several tasks."""
     combined, point = result.combined, result.combined.method_point
+    robot = None if point is None else point.robot
     yield title_line(case)
     for own in result.tasks:
         if own.robot is not None and own.robot.task is not None:
             yield from task_lines(own.robot.task, case.units)
     yield from combined_lines(result)
+    yield outcome_table(combined, result.tasks)
     yield from choice_lines(result.choice, result.rounding, is_answer=point is not None)
-    yield from _proof_summary(case, result)
-    robot = None if point is None else point.robot
+    yield from _proof_lines(case, result)
     if robot is not None:
         yield combined_design_table(case, combined, robot)
-    if point is not None and point.limits:
-        yield limit_table(point.limits, combined.value or 0.0, limits_title(case, result.workspace or result.path))
-    yield outcome_table(combined, result.tasks)
+    if point is not None:
+        yield from holding_lines(point.limits or (), limits_title(case, result.workspace or result.path))
     yield from combined_value_lines(combined)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
-        for line in certificate_lines(task.certificate):
-            yield Line("") if name is None else Line(name, label="task")
-            yield line
+        yield from _named(certificate_lines(task.certificate), name)
     yield from certificate_lines(combined.certificate)
-    for notice in combined.notices:
-        yield Line(notice, label="note")
     yield from _remark_lines(case)
+    yield from in_part("notes", (Line(notice, label="note") for notice in combined.notices))
     if robot is not None:
-        yield from singularity_lines(robot, case.units)
+        part = "" if is_unasked_singularity(robot, case) else "rank"
+        yield from in_part(part, singularity_lines(robot, case.units))
+    if point is not None and point.limits:
+        title = limits_title(case, result.workspace or result.path)
+        yield from in_part("limits", [limit_table(point.limits, combined.value or 0.0, title)])
+    yield from in_part("tightest limits", _proof_digest(result))
 
 
 def certified_summary(case: Case, result: CertifiedResult) -> Summary:
@@ -128,14 +171,19 @@ def certified_summary(case: Case, result: CertifiedResult) -> Summary:
     for task in result.tasks:
         if several:
             yield Line(f"{task.name}, {task.sense.value} F", label="task")
-        yield from certificate_lines(task.certificate)
+        yield from _named(certificate_lines(task.certificate), task.name if several else None)
     if several and result.certificate is not None:
         yield Line(case.method.value, label="combined by")
         yield from certificate_lines(result.certificate)
 
 
+def _named(lines: Iterable[Line], name: str | None) -> Iterator[Line]:
+    """Yield lines about a task, with its name where there are several."""
+    return (line if name is None else replace(line, text=f"{name}: {line.text}") for line in lines)
+
+
 def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
-    """Yield the robot at one point, with its Jacobian."""
+    """Yield the robot at one point: F, what is violated, the rank; then its parts, with its Jacobian."""
     robot = result.robot
     yield title_line(case)
     if result.objective is not None:
@@ -147,18 +195,25 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         value = number(0.0 if is_free else each.F, size_of_F(robot, task=each.task), part=ZERO_F)
         yield Line(f"{value} {objective_unit([each.task.motion.twist], case.units)}".rstrip(), label="F")
     yield from violation_lines(result.violated)
-    yield design_table(case, robot)
-    yield from robot_tables(case, robot)
     if result.limits:
-        yield limit_table(result.limits, size_of_F(robot), limits_title(case))
-    yield jacobian_table(case, robot)
-    # As many are zero as the rank says: what is left of them is rounding error.
-    values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))
-    yield Line(listed(values), label="singular values")
-    yield principal_table(result.principal_motions, case.units, robot_size(robot))
-    yield from _limb_parts(case, robot)
+        kept = sum(not row.violated for row in result.limits)
+        where = f"; {limits_title(case)}" if limits_title(case) else ""
+        tone = Tone.HOLDS if kept == len(result.limits) else Tone.FAULT
+        yield Line(f"{kept} of {len(result.limits)} kept", label="limits", tone=tone, after=where)
     yield from singularity_lines(robot, case.units)
     yield from _remark_lines(case)
+    yield from in_part("design", [design_table(case, robot)])
+    yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
+    yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
+    yield from in_part("forces", loading_tables(case, robot.loading))
+    if result.limits:
+        yield from in_part("limits", [limit_table(result.limits, size_of_F(robot), limits_title(case))])
+    yield from in_part("J", [jacobian_table(case, robot)])
+    # As many are zero as the rank says: what is left of them is rounding error.
+    values = (value if k < robot.rank else 0.0 for k, value in enumerate(robot.singular_values))
+    yield from in_part("singular values", [Line(listed(values), label="singular values")])
+    yield from in_part("motions", [principal_table(result.principal_motions, case.units, robot_size(robot))])
+    yield from in_part("actuation", _limb_parts(case, robot))
 
 
 def _limb_parts(case: Case, robot: RobotData) -> Summary:

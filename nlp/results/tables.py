@@ -131,7 +131,7 @@ def outcome_table(combined: CombinedData, tasks: Sequence[SolveResult] = ()) -> 
         verdict = "" if task.verdict is None else task.verdict.value
         rows.append((task.name, task.sense.value, f"{task.weight:g}", *cells, verdict))
     headers = ("task", "sense", "weight", "F", "best alone", "loss", "at this point")
-    return TextTable(headers, tuple(rows), "tasks")
+    return TextTable(headers, tuple(rows), "tasks", extra=1)
 
 
 def margin_table(margins: Sequence[MarginData]) -> TextTable:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from ...models.values import dataclass
 
@@ -31,7 +33,8 @@ class Line:
         label: name of the text; empty without one.
         tone: of the text.
         before, after: words around the text, without a tone.
-        is_command: whether the text is to be copied, so that no line break may stand in it.
+        is_command: whether the text is a command to be copied: it is broken so that a shell still reads it.
+        part: name of the part of the result that the line belongs to; empty for the answer.
     """
 
     text: str
@@ -40,6 +43,7 @@ class Line:
     before: str = ""
     after: str = ""
     is_command: bool = False
+    part: str = ""
 
     @property
     def words(self) -> str:
@@ -75,6 +79,9 @@ class TextTable:
         title: line above the table on a terminal; empty where the table needs none.
         folded: number of the last rows that are of less interest: a terminal counts them, a page opens them.
         folded_words: name of these rows in the plural.
+        part: name of the part of the result that the table belongs to; empty for the answer.
+        extra: number of the last columns that a short view leaves out where the table is too long for it.
+        is_curve: whether the rows are points of a curve: a short view takes some in equal steps, not the first ones.
     """
 
     headers: tuple[str, ...]
@@ -82,4 +89,13 @@ class TextTable:
     name: str = ""
     title: str = ""
     folded: int = 0
-    folded_words: str = "rows"
+    folded_words: str = "more rows"
+    part: str = ""
+    extra: int = 0
+    is_curve: bool = False
+
+
+def in_part(name: str, items: Iterable[Line | TextTable]) -> Iterator[Line | TextTable]:
+    """Yield lines and tables as a part of a result that stands behind the answer."""
+    for item in items:
+        yield replace(item, part=name)

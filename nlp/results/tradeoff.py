@@ -278,7 +278,7 @@ def tradeoff_table(result: TradeoffResult) -> TextTable:
         )
         for point in result.points
     )
-    return TextTable(headers, rows)
+    return TextTable(headers, rows, extra=1, is_curve=True)
 
 
 def throughout_words(result: TradeoffResult) -> str:

@@ -150,9 +150,16 @@ def objective_lines(case: Case) -> Iterator[Line]:
 
 def evidence_lines(result: SolveResult) -> Iterator[Line]:
     """Yield the verdict, the evidence for it, and the limits that a failed solve violates or that must be moved."""
+    if result.optimality is not None:
+        yield verdict_line(result.optimality)
+    yield from check_lines(result)
+    yield from fault_lines(result)
+
+
+def check_lines(result: SolveResult) -> Iterator[Line]:
+    """Yield the evidence for the verdict: flat directions, stationarity, feasibility and curvature."""
     evidence = result.optimality
     if evidence is not None:
-        yield verdict_line(evidence)
         for direction in evidence.flat_directions:
             yield Line(", ".join(f"{name} {rate:+.4g}" for name, rate in direction.items()), label="flat along")
         if evidence.stationarity is not None:
@@ -164,6 +171,10 @@ def evidence_lines(result: SolveResult) -> Iterator[Line]:
             if curvature:
                 smallest = f", smallest curvature {settled(min(curvature), 1.0, CURVED) or 0:.3g}"
             yield Line(checks + (smallest if result.reached is None else ""), label="evidence")
+
+
+def fault_lines(result: SolveResult) -> Iterator[Line]:
+    """Yield the limits that a failed solve violates, or that must be moved."""
     yield from violation_lines(() if result.reached is None else result.reached.violated)
     for row in result.relaxation or ():
         yield Line(f"would be {relaxation_words(row)}")
@@ -187,6 +198,32 @@ def costliest_words(limits: Sequence[LimitData]) -> str | None:
         return None
     row, cost = max(costly, key=lambda each: ordered(abs(each[1] * (each[0].limit or 1.0))))
     return f"Per part of its own size, {row.key} costs most: {cost:+.4g} {slope_unit(row.unit)}."
+
+
+def holding_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:
+    """Yield the limits that hold a design, each with its cost, or how many are kept; nothing without a limit.
+
+    Args:
+        limits: of the case.
+        title: at which poses they hold; empty for all poses of the case.
+    """
+    where = f"; {title}" if title else ""
+    if not limits:
+        return
+    active = [row for row in limits if row.active and not row.violated]
+    kept = len(active) + sum(not (row.active or row.violated) for row in limits)
+    texts = []
+    for row in active:
+        cost = f" ({row.cost:+.4g} {slope_unit(row.unit)})" if row.cost else ""
+        texts.append(f"{row.key} = {number(row.limit, digits=6)} {row.unit}".rstrip() + cost)
+    if texts:
+        rest = f", of {kept} that are kept" if kept > len(active) else ""
+        yield Line(", ".join(texts), label="held by limits", after=rest + where)
+    elif kept:
+        yield Line(f"{kept} kept, of which none holds the design", label="limits", after=where)
+    if kept < len(limits):
+        words = ", ".join(row.key for row in limits if row.violated)
+        yield Line(words, label="violated limits", tone=Tone.FAULT)
 
 
 def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
@@ -255,12 +292,12 @@ def certificate_lines(certificate: CertificateData | None) -> Iterator[Line]:
     tone = Tone.ANSWER if certificate.status is CertificateStatus.PROVED else Tone.NO_ANSWER
     yield Line(certificate.statement, label="certificate", tone=tone)
     if certificate.gap is not None:
-        part = "" if certificate.relative_gap is None else f" ({certificate.relative_gap:.2e} of it)"
-        yield Line(f"{certificate.gap:.3g}{part}", label="gap")
+        share = "" if certificate.relative_gap is None else f" ({certificate.relative_gap:.2e} of it)"
+        yield Line(f"{certificate.gap:.3g}{share}", label="gap", part="search")
     left = f", {certificate.open:,} left" if certificate.open else ""
     word = "box" if certificate.boxes == 1 else "boxes"
     boxes = f"{certificate.boxes:,} {word}{left} in {certificate.seconds:.2f} s"
-    yield Line(f"{boxes}, engine {certificate.engine}", label="search")
+    yield Line(f"{boxes}, engine {certificate.engine}", label="search", part="search")
 
 
 def choice_lines(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.task import Sense
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 #: Beginning of the keys of limits that no single pose refutes, but two: the shortest and the longest length of a leg.
 _OVER_POSES = "actuator."
+#: So many refuted claims, and open ones, are shown in full in a short view.
+SHOWN = 2
 #: Beginning of the names of the lengths of legs.
 _LENGTH = "leg_length limb "
 
@@ -81,31 +82,6 @@ def worst_claim(result: WorkspaceResult, sense: Sense) -> PosedClaim | None:
     return None
 
 
-def evaluate_command(
-    name: str, settings: Mapping[str, float | list[float]], pose: WorkspacePose, prefix: str = ""
-) -> str:
-    """Return the command that shows a machine at a pose, for a shell.
-
-    Args:
-        name: of the case, or of its file, as it was given.
-        settings: numbers that replace those of the case.
-        pose: the pose.
-        prefix: of the names of the numbers of the case's first pose.
-    """
-    p_x, p_y, p_z = pose.position
-    numbers: dict[str, float | list[float]] = {
-        "p_x": p_x,
-        "p_y": p_y,
-        "p_z": p_z,
-        "axis": list(pose.axis),
-        "angle": pose.angle,
-    }
-    written = {**settings, **{f"{prefix}{part}": value for part, value in numbers.items()}}
-    # All digits: a pose that is beyond a limit by a little is so only where it is exact.
-    texts = [f"--set {shlex.quote(f'{key}={_digits(value)}')}" for key, value in written.items()]
-    return " ".join(["screwsynth evaluate", shlex.quote(name), *texts])
-
-
 def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str]) -> Iterator[Line]:
     """Yield the commands that show what refutes claims: of each limit the claim that is farthest beyond it.
 
@@ -122,13 +98,14 @@ def seeing_lines(result: WorkspaceResult, command: Callable[[WorkspacePose], str
         own = shown.setdefault(each.key, [])
         if each.beyond == farthest[each.key] and (not own or own[0].name == each.name):
             own.append(each)
-    for each in itertools.chain.from_iterable(shown.values()):
-        yield Line(each.words, label="refuted")
-        yield Line(command(each.pose), label="see it with", is_command=True)
+    for k, each in enumerate(itertools.chain.from_iterable(shown.values())):
+        part = "refuted claims" if k >= SHOWN else ""
+        yield Line(each.words, label="refuted", part=part)
+        yield Line(command(each.pose), label="see it with", is_command=True, part=part)
     # One number may have two limits: a claim is its name with the limit's key.
     left = len({(each.name, each.key) for each in claims}) - len(shown)
     if left:
-        yield Line(f"{left}, whose poses --html FILE lists", label="other refuted claims")
+        yield Line(f"{left}: --all, --csv FILE and --json FILE list them", label="other refuted claims")
 
 
 def _at_poses(result: WorkspaceResult, each: ExtremeData) -> Iterator[PosedClaim]:
@@ -163,9 +140,3 @@ def _beyond(each: ExtremeData) -> float:
         return float("-inf")
     sign = each.sense.sign
     return sign * (each.reached - each.limit) / (abs(each.limit) or 1.0)
-
-
-def _digits(value: float | list[float]) -> str:
-    """Return a number, or several with commas, with all its digits."""
-    values = value if isinstance(value, list) else [value]
-    return ",".join(repr(float(each) + 0.0) for each in values)

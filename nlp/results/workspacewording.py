@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from ...models import Dimension
 from ..case.case import Case
 from ..case.motors import MotorNumber
-from ..case.pose import Free
 from ..case.task import Sense
 from ..proof.workspace.verdict import Outcome
-from .jointwording import triple
-from .rounding import TURNED, number, ordered
-from .text import Line, TextTable, Tone
-from .wording import title_line
+from .posewording import pose_words
+from .rounding import number, ordered
+from .text import Line, TextTable, Tone, in_part
+from .wording import counted, title_line
 from .workspacemotors import TONES, ends_of_motor, motor_tables
-from .workspaceposes import seeing_lines
+from .workspaceposes import SHOWN, seeing_lines
 
 if TYPE_CHECKING:
     from .path import PathClaimData, PathProofData
@@ -30,20 +29,19 @@ if TYPE_CHECKING:
         WorkspaceResult,
     )
 
-#: So many claims are in the digest.
-_TIGHTEST = 5
+#: So many claims are in the digest, and so many kinds of limits in the count of an outcome.
+_TIGHTEST, _GROUPS = 5, 6
 _ORDER = (Outcome.REFUTED, Outcome.OPEN, Outcome.PROVED)
 
 
-def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line | TextTable]:
-    """Yield the verdict on a machine, what it is about, F, and the tightest claims."""
+def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
+    """Yield the verdict on a machine, what it is about, and F."""
     yield Line(verdict_words(result), label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
     yield from machine_lines(case, result.joint_centre)
     for low, high in zip(result.extremes, result.extremes[1:], strict=False):
         if low.name == high.name and low.name.partition(" ")[0] == "F" and low.bound and high.bound:
             ends = f"{number(low.bound)} to {number(high.bound)}"
             yield Line(ends, label=low.name, after=", at no pose smaller or larger")
-    yield from tightest_table(result.extremes)
 
 
 def verdict_words(result: WorkspaceResult) -> str:
@@ -83,7 +81,7 @@ def tightest_table(
     rows = [
         (
             each.name,
-            f"{'>=' if each.sense is Sense.MIN else '<='} {number(each.limit or 0.0)} {each.unit}".rstrip(),
+            _limit_words(each),
             "none" if each.bound is None else number(each.bound),
             "none" if each.reached is None else number(each.reached),
             Line(each.outcome.value, tone=TONES[each.outcome]),
@@ -120,13 +118,6 @@ def refuting_machine(case: Case, name: str, machine: MachineData) -> TextTable:
     return TextTable(headers, tuple(rows), name="machine", title=f"the machine that refutes: {name}")
 
 
-def proof_digest(case: Case, proof: WorkspaceProofData | None) -> Iterator[Line | TextTable]:
-    """Yield the machines of a proof of a solved design, and its tightest claims."""
-    if proof is not None:
-        yield from machine_lines(case, proof.joint_centre)
-        yield from tightest_table(proof.extremes)
-
-
 def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
     """Yield the lengths that the actuators of straight legs need."""
     legs = [each for each in result.extremes if each.name.startswith("leg_length limb ") and each.bound is not None]
@@ -140,26 +131,68 @@ def _needs_line(case: Case, result: WorkspaceResult) -> Iterator[Line]:
 def workspace_summary(
     case: Case, result: WorkspaceResult, command: Callable[[WorkspacePose], str] | None = None
 ) -> Iterator[Line | TextTable]:
-    """Yield the verdicts on a machine over its workspace: a digest, then every number.
+    """Yield the verdicts on a machine over its workspace: the answer, then every number.
 
     Args:
         case: the case.
         result: the verdicts.
-        command: returns the command that shows a pose; left out, none is named.
+        command: returns the command that shows a pose; left out, for a page, only tables have single claims.
     """
+    limited = [each for each in result.extremes if each.limit is not None]
     yield title_line(case)
     yield from verdict_lines(case, result)
     yield from _regular_lines(case, result.regular)
     if result.constraints is not None:
         yield from _regular_lines(case, result.constraints, "constraints regular", "the constraint wrenches lose")
-    yield from _needs_line(case, result)
+    yield from outcome_lines(limited)
     if command is not None:
         yield from seeing_lines(result, command)
+        yield from open_lines(limited)
+    yield from _needs_line(case, result)
     if result.scale is not None:
         yield from _scale_lines(case, result.scale)
-    yield from _machine_lines(case, result.extremes)
-    yield from motor_tables(case, result.motors or ())
-    yield from _tables(case, result.extremes)
+    yield from tightest_table(result.extremes)
+    yield from in_part("motors", motor_tables(case, result.motors or ()))
+    for regular in (result.regular, result.constraints):
+        if regular is not None:
+            yield from in_part("searches", _search_lines(case, regular))
+    yield from in_part("the machine that refutes", _machine_lines(case, result.extremes))
+    yield from in_part("every number", _tables(case, result.extremes))
+
+
+def outcome_lines(claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
+    """Yield in one line each how many limits are proved, refuted and open, and which of them wholly."""
+    every = Counter(map(_limit_of, claims))
+    for outcome in _ORDER:
+        counts = Counter(_limit_of(each) for each in claims if each.outcome is outcome)
+        if not counts:
+            continue
+        texts = []
+        for name, count in counts.items():
+            size = every[name]
+            share = f"{count} of {size}" if count < size else "the" if size == 1 else f"all {size}"
+            texts.append(f"{share} {name}")
+        words = f"{counted(counts.total(), 'limit')}: {', '.join(texts[:_GROUPS])}"
+        words += f" and {len(texts) - _GROUPS} more kinds" if len(texts) > _GROUPS else ""
+        yield Line(words, label=outcome.value, tone=TONES[outcome])
+
+
+def _limit_of(claim: ExtremeData | PathClaimData) -> str:
+    """Return the name of a claim's limit, the same for all limbs, joints and actuators."""
+    return claim.name.partition(" ")[0].partition(".")[0]
+
+
+def open_lines(claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
+    """Yield the open claims with their reasons; the first ones belong to the answer."""
+    found = [each for each in claims if each.outcome is Outcome.OPEN]
+    for k, each in enumerate(found):
+        reason = f": {each.reason}" if each.reason else ""
+        yield Line(f"{each.name} {_limit_words(each)}{reason}", label="open", part="open claims" if k >= SHOWN else "")
+
+
+def _limit_words(each: ExtremeData | PathClaimData) -> str:
+    """Return the limit of a number with its sense and unit."""
+    return f"{'>=' if each.sense is Sense.MIN else '<='} {number(each.limit or 0.0)} {each.unit}".rstrip()
 
 
 def _machine_lines(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
@@ -214,20 +247,7 @@ def _tables(case: Case, extremes: Sequence[ExtremeData]) -> Iterator[TextTable]:
             yield _table(case, name, title, rows)
 
 
-def pose_words(case: Case, pose: WorkspacePose) -> str:
-    """Return a pose in a few words."""
-    stated = () if case.workspace is None else case.workspace.position
-    ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]
-    size = max(map(abs, (*ends, *pose.position)))
-    position = ", ".join(number(value, size, digits=5) for value in pose.position)
-    if abs(case.units.to_internal(pose.angle, Dimension.ANGLE)) <= TURNED:
-        return f"({position})"
-    return f"({position}), {pose.angle:.5g} {case.units.angle} about {triple(pose.axis, 1.0)}"
-
-
-def _regular_lines(
-    case: Case, regular: RegularData, label: str = "regular", of: str = ""
-) -> Iterator[Line | TextTable]:
+def _regular_lines(case: Case, regular: RegularData, label: str = "regular", of: str = "") -> Iterator[Line]:
     """Yield the verdict on a rank: that of J, or of the wrenches that a clause names."""
     share = f"{100 * regular.share:.3g} % of the box"
     found = f", {regular.reason}" if regular.reason and regular.between is None else ""
@@ -242,6 +262,10 @@ def _regular_lines(
     yield Line(regular.outcome.value, label=label, tone=TONES[regular.outcome], after=words[regular.outcome])
     if regular.pose is not None:
         yield Line(pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
+
+
+def _search_lines(case: Case, regular: RegularData) -> Iterator[Line | TextTable]:
+    """Yield the machine that refutes a rank, and the size of the search."""
     if regular.machine is not None:
         yield refuting_machine(case, "regular", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"

@@ -33,8 +33,8 @@ class Answer:
     The index of the package finds the functions that show it when they are needed.
     """
 
-    def table(self, width: int = 120) -> str:
-        """Return the tables of the answer as text, as ``solve`` prints them.
+    def table(self, width: int = 80) -> str:
+        """Return the tables of the answer as text, as ``solve --all`` prints them.
 
         Args:
             width: number of columns.

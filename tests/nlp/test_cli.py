@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import stat
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from builders import Run, edited, output_of, refusal_of, saved
+from builders import Run, edited, output_of, refusal_of, saved, unbroken
 
 import screwsynth.cases
 from screwsynth.models import model_names
@@ -112,7 +113,7 @@ def test_a_solve_as_a_process_prints_only_its_table(solved: Solved) -> None:
     ended, _ = solved
     assert ended.returncode == 0
     assert ended.stderr == ""
-    title, task, axis, found, *_ = ended.stdout.splitlines()
+    title, task, axis, found, *_ = unbroken(ended.stdout).splitlines()
     assert title == "Pose of a given 6-6 platform for a screw motion of pitch 1"
     assert task.startswith("task  drive the screw, max F: screw of pitch 1 cm about (0.6667, 0.6667, 0.3333)")
     assert task.endswith("through (2, 3, 6)")
@@ -426,7 +427,7 @@ def test_an_axis_has_any_length_but_zero(name: str, tmp_path: Path, cli: Run) ->
 def test_a_length_label_is_shown_as_it_is(label: str, tmp_path: Path, cli: Run) -> None:
     path = case_file(tmp_path, ('"cm"', f'"{label}"'), ("Pose of a", f"Pose {label} of a"))
     for command in ("solve", "evaluate"):
-        out = output_of(cli(command, path))
+        out = output_of(cli(command, path, "--all"))
         assert next(line for line in out.splitlines() if line.startswith("x1")).split()[2] == label
         assert f"Pose {label} of a" in out
 
@@ -523,11 +524,14 @@ def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
 
 
 def test_models_lists_the_shipped_robots_and_shows_one(cli: Run) -> None:
-    rows = [line.split()[0] for line in output_of(cli("models")).splitlines()]
-    assert rows[1:3] == ["stewart-gough", "hexapod"]
+    shown = unbroken(output_of(cli("models")))
+    assert all(re.search(rf"(?<!\S){name}\b", shown) for name in model_names())
+    assert "six freedoms  6-pus, 6-rss, 6-rus, 6-sps, 6-ups\n" in shown
+    rows = [line.split()[0] for line in output_of(cli("models", "--all")).splitlines() if line[0] != " "]
+    assert rows[rows.index("robot") :][1:3] == ["stewart-gough", "hexapod"]
     words = ("x1", "x4", "layout", '"octahedral"', "length", "angle", "leg_length", ">= 0, <= 30", "1-", "3+")
     for name, shown in (("stewart-gough", words), ("hexapod", ("base_1_x", "platform_6_z", "leg_length", "any"))):
-        out = output_of(cli("models", name))
+        out = output_of(cli("models", name, "--all"))
         assert all(word in out for word in shown)
 
 

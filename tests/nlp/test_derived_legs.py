@@ -494,7 +494,7 @@ OF_LEGS = {
 
 def test_the_command_line_shows_the_lengths_that_are_limited(cli: Run, tmp_path: Path) -> None:
     path = saved(tmp_path / "legs.toml", CASE)
-    out = output_of(cli("solve", str(path)))
+    out = output_of(cli("solve", str(path), "--all"))
     assert "leg length" in out
     assert "leg_length.max" in out
     result = json.loads(output_of(cli("solve", str(path), "--json", "-")))
@@ -517,7 +517,7 @@ def test_the_workspace_command_proves_limits_of_legs_on_paper(cli: Run, tmp_path
     text = text.replace("{ min = 18, max = 22 }]", "20]").replace("max = 27", "max = 34")
     box = "[workspace]\nposition = [0, { min = -0.5, max = 0.5 }, { min = 19, max = 20 }]\n"
     path, proof = saved(tmp_path / "legs.toml", text + box), tmp_path / "legs.proof"
-    out = output_of(cli("workspace", str(path), "--proof", str(proof), "--quantity", "leg_length"))
+    out = output_of(cli("workspace", str(path), "--proof", str(proof), "--quantity", "leg_length", "--all"))
     assert "actuator.dead_length" in out
     assert output_of(cli("verify-proof", str(proof), str(path)))
     saved(path, (text + box).replace("leg_clearance = { min = 2 }", "leg_clearance = { min = 2.5 }"))

@@ -19,7 +19,7 @@ def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Pat
     out = tmp_path / "robot"
     words = ("export", "paper-4.4-max", "--starts", "2", "--format", "mjcf", "--format", "csv", "--out", str(out))
     said = output_of(cli(*words))
-    assert said.startswith("6 files in ")
+    assert said.startswith("6 files in")
     files = {path.name: path.read_bytes() for path in out.iterdir()}
     tables = {"joints.csv", "links.csv", "cut-list.csv", "plates.csv"}
     assert set(files) == {"README.md", "robot.xml", *tables, "screwsynth-files.txt"}

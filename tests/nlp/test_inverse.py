@@ -198,7 +198,8 @@ def test_the_command_ends_with_status_1_where_poses_are_not_closed(tmp_path: Pat
     out = tmp_path / "out.csv"
     code, text, err = cli("inverse", str(case), "--poses", str(poses), "--csv", str(out))
     assert (code, err) == (1, "")
-    assert f"2 of 3 poses are not closed, the first in row 3 of {poses}" in " ".join(text.split())
+    assert "2 of 3 poses are not closed, the first in row 3 of" in " ".join(text.split())
+    assert str(poses).replace(" ", "") in "".join(text.split())
     rows = rows_of(out.read_text(encoding="utf-8"))
     assert [row["closed"] for row in rows] == ["yes", "no", "no"]
     expected = inverse(load_case(str(case)), [[x, y, z + 0.05]])

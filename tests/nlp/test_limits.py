@@ -333,7 +333,7 @@ def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible()
 
 def test_evaluate_shows_margins_and_exits_with_1_outside_of_a_limit(cli: Run, tmp_path: Path) -> None:
     path = saved(tmp_path / "case.toml", HEXAPOD + "[limits]\nleg_length = { max = 30 }\n")
-    code, out, _ = cli("evaluate", str(path))
+    code, out, _ = cli("evaluate", str(path), "--all")
     assert code == 1
     assert "violated: leg_length limb 1-" in out
     assert "leg_length.max" in out

@@ -154,7 +154,7 @@ def test_without_the_package_that_draws_a_notebook_shows_the_line(monkeypatch: p
 
 def test_the_table_is_what_the_command_prints(cli: Run) -> None:
     for name in ("paper-4.1-helical", "paper-4.2"):
-        _, out, _ = cli("solve", name, "--starts", "2")
+        _, out, _ = cli("solve", name, "--starts", "2", "--all")
         printed = [line.rstrip() for line in out.splitlines()]
         assert solve(load_case(name), starts=2).table().splitlines() == printed
     narrow = solve(load_case("paper-4.1-helical"), starts=2).table(width=70)

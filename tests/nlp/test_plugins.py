@@ -144,7 +144,8 @@ def case_file(folder: Path, *edits: tuple[str, str]) -> str:
 @pytest.mark.usefixtures("tripod")
 def test_it_is_listed_behind_the_shipped_ones(cli: Run) -> None:
     assert model_names() == ("stewart-gough", "hexapod", "three-upu", *gallery_names(), "tripod")
-    out = output_of(cli("models"))
+    assert "tripod" in output_of(cli("models"))
+    out = "robot " + output_of(cli("models", "--all")).partition("\nrobot ")[2]
     assert [line.split()[0] for line in out.splitlines() if not line.startswith(" ")] == ["robot", *model_names()]
     assert "legs and a joint" in out
 
@@ -167,7 +168,7 @@ def test_it_is_solved_like_a_shipped_one(tmp_path: Path, cli: Run) -> None:
     assert result["limbs"] == [*(f"leg {i}" for i in range(1, 7)), "joint"]
     assert result["characteristic_length"] == 5
     assert sum(rate**2 for rate in result["rates"]) == pytest.approx(result["F"], rel=1e-12)
-    out = output_of(cli("solve", path))
+    out = output_of(cli("solve", path, "--all"))
     assert "(optimal" in out
     assert "couple" in out
     assert json.loads(output_of(cli("evaluate", path, "--set", "radius=9", "--json", "-")))["parameters"]["radius"] == 9
@@ -255,7 +256,7 @@ def test_a_shipped_name_cannot_be_taken_over(install: Install, cli: Run) -> None
     assert model_names() == ("stewart-gough", "hexapod", "three-upu", *gallery_names(), "tripod")
     assert robot_function("hexapod").__module__ == "screwsynth.models.hexapod"
     assert build_model("stewart-gough").parameters[0].name == "x1"
-    out = output_of(cli("models"))
+    out = output_of(cli("models", "--all"))
     assert sum(line.startswith("hexapod") for line in out.splitlines()) == 1
     assert cli("solve", "paper-4.1-helical", "--starts", "1")[0] == 0
 
@@ -270,7 +271,7 @@ def test_a_name_that_two_packages_offer(install: Install, tmp_path: Path, cli: R
         build_model("tripod")
     for arguments in (("models", "tripod"), ("new", "tripod"), ("solve", case_file(tmp_path))):
         refusal_of(cli(*arguments), "first_robots and second_robots")
-    assert "first_robots" in " ".join(output_of(cli("models")).split())
+    assert "first_robots" in " ".join(output_of(cli("models", "--all")).split())
 
 
 def test_an_option_without_a_default(install: Install, tmp_path: Path, cli: Run) -> None:
@@ -296,10 +297,10 @@ def test_text_in_square_brackets_is_shown_as_it_is(install: Install, tmp_path: P
     module = edited(MODULE, *bracketed, ('"radius of the base"', '"radius [of the base]"'))
     install({"tripod": "robots:tripod"}, module)
     for arguments, word in (
-        (("models",), "legs [short] and a [/joint]"),
+        (("models", "--all"), "legs [short] and a [/joint]"),
         (("models", "tripod"), "radius [of the base]"),
-        (("models", "tripod"), "[leg0]"),
-        (("evaluate", case_file(tmp_path)), "[leg0]"),
+        (("models", "tripod", "--all"), "[leg0]"),
+        (("evaluate", case_file(tmp_path), "--all"), "[leg0]"),
     ):
         assert word in output_of(cli(*arguments))
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from, output_of, refusal_of
+from builders import case_from, output_of, refusal_of, unbroken
 
 from screwsynth.nlp import Case, load_case
 from screwsynth.nlp.case.source import find_case
@@ -283,6 +283,7 @@ def test_combined_programs_are_proved_and_checked(cli: Run, tmp_path: Path, meth
     code, out, err = cli("verify-proof", str(target))
     assert code == 0, err
     bound = result["certificate"]["bound"]
+    out = unbroken(out)
     stated = float(out.split(f"F is at {'most' if sense == 'max' else 'least'} ")[1].split(" ")[0])
     first, second = ("F('drive the screw')", "F('other')")
     best = [f"{each['certificate']['incumbent']:.6f}" for each in result["tasks"]]

@@ -330,10 +330,10 @@ def test_one_table_for_terminal_markdown_and_page() -> None:
     assert paragraphs([line]) == '<p><span class="label">F:</span> about 407 &lt;N&gt;</p>'
 
 
-def test_a_summary_begins_with_its_title_and_ends_with_the_rank() -> None:
+def test_an_answer_begins_with_its_title_and_ends_with_the_rank() -> None:
     case = load_case("paper-4.1-helical")
     items = list(case_summary(case, result_of(solve(case, starts=2))))
-    first, last = items[0], items[-1]
+    first, last = items[0], [item for item in items if not item.part][-1]
     assert isinstance(first, Line)
     assert (first.text, first.tone) == (case.title, Tone.TITLE)
     assert isinstance(last, Line)

@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from builders import Run, case_from, output_of, refusal_of, saved, shipped_tables
+from builders import Run, case_from, output_of, refusal_of, saved, shipped_tables, unbroken
 
 from screwsynth.nlp import Solution, certify, result_of, round_design, solve
 from screwsynth.nlp.case.writer import case_text
@@ -92,7 +92,9 @@ def test_none_is_found_and_refusals_are_one_sentence(tmp_path: Path, cli: Run) -
     path = saved(tmp_path / "case.toml", case_text(case_from(tables_with(free, limits={"custom": ["x1 == 7.5"]}))))
     status, said, _ = cli("solve", str(path), "--round", "1")
     assert status == 1
-    assert "rounded  to multiples of 1 cm: no multiples within 4 steps were found that keep all limits" in said
+    assert "rounded  to multiples of 1 cm: no multiples within 4 steps were found that keep all limits" in unbroken(
+        said
+    )
     sentence = "--round 20: robot.parameters.x1 has no multiple of it between 6 and 14 cm"
     refusal_of(cli("solve", str(path), "--round", "20"), sentence)
     refusal_of(cli("solve", str(path), "--round", "-1"), "--round -1: must be positive and finite")

@@ -156,7 +156,7 @@ def counted(result: WorkspaceResult) -> tuple[int, int]:
         for each in lines
         if each.label == "refuted"
     }
-    others = sum(int(each.words.partition(",")[0]) for each in lines if each.label == "other refuted claims")
+    others = sum(int(each.words.partition(":")[0]) for each in lines if each.label == "other refuted claims")
     counts = re.search(r"(\d+) refuted", verdict_words(result))
     return int(counts[1]), len(shown) + others
 

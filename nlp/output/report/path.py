@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...case.pose import RotationForm
 from ...results.jsondata import json_data
 from ...results.pathwording import checked_claims, fault_words, first_refuted, path_summary, verdict_words
+from ...results.posewording import pose_words
 from ...results.workspace import WorkspacePose
-from ...results.workspacewording import pose_words
 from ..pictures.figures import picture as picture_file
 from ..pictures.pathpanels import (
     ACTUATOR_COLOURS,
@@ -224,8 +225,9 @@ def _swatch(colour: str) -> Markup:
 def _refuted(picture: PathPicture, command: Callable[[WorkspacePose], str]) -> Markup:
     """Return each refuted claim with its first known fault and the command that shows it; empty without one."""
     case = picture.judged.case
+    refuted = [(each, each.fault) for each in checked_claims(picture.result)]
     return join_markup(
-        refuting_place(fault_words(claim, claim.fault), pose_words(case, claim.fault.pose), command(claim.fault.pose))
-        for claim in checked_claims(picture.result)
-        if claim.fault is not None
+        refuting_place(fault_words(each, fault), pose_words(case, fault.pose, RotationForm.RPY), command(fault.pose))
+        for each, fault in refuted
+        if fault is not None
     )

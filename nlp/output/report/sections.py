@@ -17,7 +17,6 @@ from ...results.point import task_data
 from ...results.robottables import combined_design_table, robot_tables, solved_design_table
 from ...results.rounding import number, size_of_F
 from ...results.tables import active_table, limit_table, limits_title, margin_table, origin_table, outcome_table
-from ...results.text import Line
 from ...results.wording import (
     certificate_lines,
     choice_lines,
@@ -121,7 +120,7 @@ def path_section(report: Report) -> Markup:
     result = report.result
     if result.path is None:
         return Markup("")
-    lines = (each for each in path_proof_lines(report.case, result.path) if isinstance(each, Line))
+    lines = path_proof_lines(report.case, result.path)
     tables = claims_table(report.case, [each for each in result.path.claims if each.limit is not None])
     return join_markup([paragraphs(lines), *(html_table(each, each.title, id=f"path-{each.name}") for each in tables)])
 

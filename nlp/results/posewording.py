@@ -1,0 +1,169 @@
+"""Poses in words, in the form in which their case states rotations, and the command that shows one with few digits."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...models import Dimension, component_names
+from ..case.pose import Free, Rotation, RotationForm
+from ..case.workspace import TurnKind
+from .jointwording import triple
+from .rounding import TURNED, number
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..case.overrides import Settings
+    from .workspace import WorkspacePose
+
+#: Digits of a pose in a command: as few as show what all digits show, and so many where they show nothing.
+_FEWEST, _ENOUGH, _ALL = 3, 6, 17
+#: Name of a pose that the robot cannot take, among those of violated limits.
+_IMPOSSIBLE = "impossible"
+#: Keys of a rotation, behind the prefix of its pose.
+_ROTATION = ("axis", "angle", *(each.value for each in (RotationForm.RPY, RotationForm.QUATERNION)))
+
+
+def rotation_form(case: Case) -> RotationForm:
+    """Return the form in which the poses of a case are shown: that of its workspace or its path, else of its pose."""
+    if case.workspace is not None:
+        is_rpy = case.workspace.turns.kind is TurnKind.ROLL_PITCH_YAW
+        return RotationForm.RPY if is_rpy else RotationForm.AXIS_ANGLE
+    return RotationForm.RPY if case.path is not None else case.rotation.form
+
+
+def rotation_numbers(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> dict[str, list[float]]:
+    """Return a rotation in a form: its numbers, by the names that ``--set`` has for them.
+
+    Args:
+        case: the case.
+        axis: (3,) unit axis.
+        angle: about it, in the case's unit.
+        form: of the numbers.
+    """
+    if form is RotationForm.AXIS_ANGLE:
+        turns = None if case.workspace is None else case.workspace.turns
+        # About an axis that the case states, an angle has a sign.
+        is_back = turns is not None and turns.kind is TurnKind.AXIS and np.dot(axis, turns.axis) < 0
+        sign = -1.0 if is_back else 1.0
+        return {"axis": [sign * each for each in axis], "angle": [sign * angle]}
+    from ..path.orientation import roll_pitch_yaw  # noqa: PLC0415 - few cases state such rotations
+
+    half = case.units.to_internal(angle, Dimension.ANGLE) / 2
+    quaternion = [math.cos(half), *(math.sin(half) * each for each in axis)]
+    if form is RotationForm.QUATERNION:
+        return {form.value: quaternion}
+    angles = roll_pitch_yaw(np.array([quaternion]))[0].tolist()
+    return {form.value: [case.units.shown(each, Dimension.ANGLE) for each in angles]}
+
+
+def _rotation(case: Case, numbers: Mapping[str, list[float]]) -> Rotation:
+    """Return the rotation of such numbers.
+
+    Raises:
+        CaseError: a quaternion is rounded too much.
+    """
+    if RotationForm.QUATERNION.value in numbers:
+        return Rotation.from_quaternion(numbers[RotationForm.QUATERNION.value])
+    if RotationForm.RPY.value in numbers:
+        angles = numbers[RotationForm.RPY.value]
+        return Rotation.from_rpy(*(case.units.to_internal(each, Dimension.ANGLE) for each in angles))
+    return Rotation(tuple(numbers["axis"]), case.units.to_internal(numbers["angle"][0], Dimension.ANGLE))
+
+
+def _rotation_words(case: Case, axis: Sequence[float], angle: float, form: RotationForm) -> str:
+    """Return a rotation in words; empty for none."""
+    if abs(case.units.to_internal(angle, Dimension.ANGLE)) <= TURNED:
+        return ""
+    numbers, unit = rotation_numbers(case, axis, angle, form), case.units.angle
+    if form is RotationForm.QUATERNION:
+        return f"quaternion ({', '.join(number(each, 1.0, digits=5) for each in numbers[form.value])})"
+    if form is RotationForm.RPY:
+        half_turn = case.units.shown(math.pi, Dimension.ANGLE)
+        roll, pitch, yaw = (number(each, half_turn, digits=5) for each in numbers[form.value])
+        return f"roll {roll}, pitch {pitch}, yaw {yaw} {unit}"
+    x, y, z = numbers["axis"]
+    return f"{numbers['angle'][0]:.5g} {unit} about {triple((x, y, z), 1.0)}"
+
+
+def pose_words(case: Case, pose: WorkspacePose, form: RotationForm | None = None) -> str:
+    """Return a pose in a few words.
+
+    Args:
+        case: the case.
+        pose: the pose.
+        form: of its rotation; left out, that of the case.
+    """
+    stated = () if case.workspace is None else case.workspace.position
+    ends = [part for each in stated for part in ((each.lower, each.upper) if isinstance(each, Free) else (each,))]
+    size = max(map(abs, (*ends, *pose.position)))
+    position = f"({', '.join(number(value, size, digits=5) for value in pose.position)})"
+    rotation = _rotation_words(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
+    return ", ".join(each for each in (position, rotation) if each)
+
+
+def evaluate_command(
+    name: str, case: Case, settings: Settings, pose: WorkspacePose, form: RotationForm | None = None
+) -> str:
+    """Return the command that shows a machine at a pose, for a shell.
+
+    The pose has as few digits as show every limit violated, and every rank lost, that all its digits show.
+
+    Args:
+        name: of the case, or of its file, as it was given.
+        case: the case, with fixed dimensions.
+        settings: numbers that replace those of the case's file.
+        pose: the pose.
+        form: of its rotation; left out, that of the case.
+    """
+    turn = rotation_numbers(case, pose.axis, pose.angle, rotation_form(case) if form is None else form)
+    position = list(pose.position)
+    wanted = _shown(case, position, turn)
+    for digits in range(_FEWEST if wanted else _ENOUGH, _ALL):
+        shorter = _rounded(position, digits), {key: _rounded(each, digits) for key, each in turn.items()}
+        found = _shown(case, *shorter)
+        if found >= wanted and (_IMPOSSIBLE in found) == (_IMPOSSIBLE in wanted):
+            position, turn = shorter
+            break
+    prefix = case.pose_prefixes[0]
+    others = {key: value for key, value in settings.items() if key.removeprefix(prefix) not in _ROTATION}
+    numbers = {key: [each] for key, each in zip(component_names("p", 3), position, strict=True)} | turn
+    written = {**others, **{f"{prefix}{key}": each for key, each in numbers.items()}}
+    texts = [f"--set {shlex.quote(f'{key}={_digits(value)}')}" for key, value in written.items()]
+    return " ".join(["screwsynth evaluate", shlex.quote(name), *texts])
+
+
+def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]]) -> frozenset[str]:
+    """Return what an evaluation at a pose shows: names of violated limits, a lost rank, or that it is impossible."""
+    from ..errors import ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
+    from ..evidence.closing import closed_start  # noqa: PLC0415
+    from ..evidence.margins import margins_of  # noqa: PLC0415
+    from ..evidence.state import evaluate  # noqa: PLC0415
+    from ..program.formulation import formulate_each  # noqa: PLC0415
+    from ..proof.statement.posed_layout import at_one_pose  # noqa: PLC0415
+
+    try:
+        nlp = formulate_each(at_one_pose(case, position, _rotation(case, turn)))[0]
+        x = closed_start(nlp)
+        lost = ["rank"] if evaluate(nlp, x).is_singular else []
+        return frozenset([*lost, *(row.name for row in margins_of(nlp, x, optimal=False) if row.violated)])
+    except ScrewsynthError:
+        return frozenset([_IMPOSSIBLE])
+
+
+def _rounded(values: Sequence[float], digits: int) -> list[float]:
+    """Return numbers that are rounded at one place after the point, so that the largest has so many digits."""
+    size = max(map(abs, values))
+    if size == 0:
+        return list(values)
+    return [round(each, digits - 1 - math.floor(math.log10(size))) for each in values]
+
+
+def _digits(value: float | list[float]) -> str:
+    """Return a number, or several with commas, with the digits that they have."""
+    values = value if isinstance(value, list) else [value]
+    return ",".join(repr(float(each) + 0.0).removesuffix(".0") for each in values)
