@@ -1,8 +1,8 @@
-"""Run the commands of the worked introductions and write what they print into the pages: run by ``make docs``.
+"""Run the commands of the worked introductions, and of README.md, and write what they print into the pages: run by ``make docs``.
 
-A page has three kinds of blocks. ``<!-- file: NAME -->`` stands before a block that is a file. ``<!-- run: A | B -->``
-stands before a block that begins with ``$`` and a command; below it are the lines of the output that begin with A or B, in
-their order, and every line without these words. ``<!-- run slowly: ... -->`` is the same, for what tests leave out.
+A page has three kinds of blocks. ``<!-- file: NAME -->`` stands before a block that is a file. ``<!-- run: WORDS -->``
+stands before a block that begins with ``$`` and a command, and has the lines of its output below that WORDS choose, see
+:func:`chosen`. ``<!-- run slowly: WORDS -->`` is the same, for commands that tests leave out.
 """
 
 import re
@@ -14,7 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-PAGES = ("intro-machine-tool", "intro-delta", "intro-motion-base", "intro-wrist")
+INTRODUCTIONS = ("intro-machine-tool", "intro-delta", "intro-motion-base", "intro-wrist")
+PAGES = (*INTRODUCTIONS, "../README")
 _PYTHON = [sys.executable, "-P"]
 #: Programs of the commands, and what runs them.
 _PROGRAMS = {"screwsynth": [*_PYTHON, "-m", "screwsynth.nlp"], "python": _PYTHON, "make": ["make", "--silent"]}
@@ -37,19 +38,31 @@ def output_of(command: str, folder: Path) -> list[str]:
 
 
 def chosen(lines: list[str], words: str) -> list[str]:
-    """Return the lines that begin with one of several words; all without words.
+    """Return the lines of an output that words choose, in the order of the words; spaces in lines count once.
+
+    Args:
+        lines: of the output.
+        words: nothing for all lines, ``none``, or parts with ``|`` between them: ``A`` for all lines that begin with A,
+            ``A!`` for the first of them, ``A .. B`` for the first of them and what follows, up to a line that begins with B.
 
     Raises:
-        ValueError: no line begins with one of them.
+        ValueError: no line begins with one of the parts.
     """
-    beginnings = tuple(each.strip() for each in words.split("|") if each.strip())
-    if not beginnings:
-        return lines
-    for each in beginnings:
-        if not any(line.startswith(each) for line in lines):
-            message = f"no line begins with {each!r}"
+    if words in {"", "none"}:
+        return [] if words else lines
+    kept: list[str] = []
+    squeezed = [" ".join(line.split()) for line in lines]
+    for part in words.split("|"):
+        begin, *end = (each.strip() for each in part.split(".."))
+        found = [k for k, line in enumerate(squeezed) if line.startswith(begin.removesuffix("!"))]
+        if not found:
+            message = f"no line begins with {begin!r}"
             raise ValueError(message)
-    return [line for line in lines if line.startswith(beginnings)]
+        if end:
+            ends = (k for k in range(found[0] + 1, len(lines)) if squeezed[k].startswith(end[0]))
+            found = list(range(found[0], next(ends, len(lines))))
+        kept += [lines[k] for k in (found[:1] if begin.endswith("!") else found)]
+    return kept
 
 
 def runs(page: str, folder: Path, *, slowly: bool) -> Iterator[tuple[str, str, str]]:
