@@ -1,4 +1,4 @@
-"""Run the commands of the worked introductions, and of README.md, and write what they print into the pages: run by ``make docs``.
+"""Run the commands of the introductions and of README.md, and write what they print there: run by ``make docs``.
 
 A page has three kinds of blocks. ``<!-- file: NAME -->`` stands before a block that is a file. ``<!-- run: WORDS -->``
 stands before a block that begins with ``$`` and a command, and has the lines of its output below that WORDS choose, see
@@ -43,7 +43,7 @@ def chosen(lines: list[str], words: str) -> list[str]:
     Args:
         lines: of the output.
         words: nothing for all lines, ``none``, or parts with ``|`` between them: ``A`` for all lines that begin with A,
-            ``A!`` for the first of them, ``A .. B`` for the first of them and what follows, up to a line that begins with B.
+            ``A!`` for the first of them, ``A .. B`` for the first of them and what follows, before one that begins with B.
 
     Raises:
         ValueError: no line begins with one of the parts.

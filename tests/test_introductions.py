@@ -48,7 +48,8 @@ def test_an_introduction_shows_its_case_file(page: str) -> None:
     assert len(pieces) > 3
     assert [each for each in pieces if each not in case and each not in own] == []
     # The optimum that the page shows is the one that `screwsynth check` holds the case to.
-    (shown,) = re.findall(rf"^\$ screwsynth solve {name} .*?\n(?:.*\n)??(?:largest|smallest) F = (\S+)", text, re.MULTILINE)
+    answer = rf"^\$ screwsynth solve {name} .*?\n(?:.*\n)??(?:largest|smallest) F = (\S+)"
+    (shown,) = re.findall(answer, text, flags=re.MULTILINE)
     assert float(shown) == pytest.approx(tomllib.loads(case)["expect"]["F"], rel=1e-5)
 
 

@@ -195,6 +195,6 @@ def test_every_speed_of_a_motor_that_turns_is_in_the_unit_of_angles_of_the_case(
         "workspace": {"position": [0, 0, 0], "rotation": {"axis": [0, 0, 1], "angle": {"min": -20, "max": 20}}},
     }
     found = result_of(solve(case_from_tables(tables, name="pivot", source="here"), starts=1))
-    assert found.F == pytest.approx(90)
+    assert pytest.approx(90) == found.F
     assert [each.F for each in found.starts.optima] == [pytest.approx(90)]
     assert [each.F for each in found.workspace.designs] == [pytest.approx(90)]
