@@ -43,7 +43,7 @@ def chosen(lines: list[str], words: str) -> list[str]:
     Args:
         lines: of the output.
         words: nothing for all lines, ``none``, or parts with ``|`` between them: ``A`` for all lines that begin with A,
-            ``A!`` for the first of them, ``A .. B`` for the first of them and what follows, before one that begins with B.
+            ``A!`` for the first of them, ``A .. B`` for the first of them and all before one that begins with B.
 
     Raises:
         ValueError: no line begins with one of the parts.
