@@ -51,6 +51,7 @@ docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/gallery.py
 	$(BIN)/python -P docs/pocket.py
 	$(BIN)/python -P docs/refresh.py
+	$(BIN)/python -P docs/introductions.py
 	$(BIN)/python -P docs/tour.py
 
 # Once its packages are there, a build needs no network. It ends at the first warning.

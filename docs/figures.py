@@ -50,6 +50,10 @@ SOLVED = (
     "flight-simulator",
     "handling-3-upu",
     "reachy-mini",
+    "machine-tool",
+    "pick-and-place",
+    "motion-base",
+    "agile-eye",
 )
 SLICED = ("hexapod-linuxcnc", "reachy-mini-envelope")
 

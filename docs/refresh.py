@@ -23,8 +23,6 @@ def _put(page: Path, opening: str, closing: str, text: str) -> None:
     page.write_text(re.sub(pattern, lambda m: m[1] + text + m[2], old, flags=re.DOTALL), encoding="utf-8")
 
 
-solve = ("solve", "paper-4.1-helical")
-_put(ROOT / "README.md", f"```text\n$ screwsynth {' '.join(solve)}", "```", _output_of(*solve))
 limited = ("solve", "hexapod-machining", "--all")
 # The last digits of the design differ between machines; those of the limits do not.
 lines = _output_of(*limited).splitlines(keepends=True)

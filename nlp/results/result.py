@@ -31,6 +31,7 @@ from .objective import case_number, objective_data, over_workspace
 from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
+    from ..case.case import Case
     from ..solver.certified import Certified
     from ..solver.over_path import PathProof
     from ..solver.semi_infinite import WorkspaceProof
@@ -112,13 +113,14 @@ def starts_data(solution: ProgramSolution) -> StartsData:
         run=len(solution.starts),
         converged=ended[StartStatus.CONVERGED],
         failed=MappingProxyType({status.value: ended[status] for status in reasons}),
-        optima=tuple(_optimum_data(found) for found in solution.optima),
+        optima=tuple(_optimum_data(found, solution.nlp.case) for found in solution.optima),
     )
 
 
-def _optimum_data(found: Optimum) -> OptimumData:
+def _optimum_data(found: Optimum, case: Case) -> OptimumData:
     """Return a distinct optimum."""
-    return OptimumData.of(found, assembly=None if found.assembly is None else found.assembly.brief)
+    assembly = None if found.assembly is None else found.assembly.brief
+    return OptimumData.of(found, F=case_number(case, found.F), assembly=assembly)
 
 
 def combined_result(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from builders import Array, Run, case_from, refusal_of, saved, unbroken
 
-from screwsynth.nlp import CaseError, certify, solve
+from screwsynth.nlp import CaseError, case_from_tables, certify, solve
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.evidence import certified_of
 from screwsynth.nlp.results.result import result_of
@@ -183,3 +183,20 @@ def test_what_has_no_meaning_for_objectives_of_actuators_is_refused(cli: Run, tm
     refusal_of(cli("pareto", case, *goals), "optimises actuator_force instead of F")
     over = str(saved(tmp_path / "over.toml", BOX))
     refusal_of(cli("certify", over, "--proof", str(tmp_path / "x.proof")), "proof")
+
+
+def test_every_speed_of_a_motor_that_turns_is_in_the_unit_of_angles_of_the_case() -> None:
+    """One motor whose axis is that of the platform's only rotation has the platform's speed."""
+    pivot = {"type": "R", "at": "0*x", "axis": "z", "actuated": True}
+    tables = {
+        "robot": {"definition": {"name": "pivot", "limb": [{"joints": [pivot]}]}},
+        "pose": {"position": [0, 0, 0], "rotation": {"axis": [0, 0, 1], "angle": {"min": -30, "max": 30}}},
+        "motion": {"angular": 90},
+        "objective": {"minimise": "actuator_speed"},
+        "limits": {"over": "workspace"},
+        "workspace": {"position": [0, 0, 0], "rotation": {"axis": [0, 0, 1], "angle": {"min": -20, "max": 20}}},
+    }
+    found = result_of(solve(case_from_tables(tables, name="pivot", source="here"), starts=1))
+    assert pytest.approx(90) == found.F
+    assert [each.F for each in found.starts.optima] == [pytest.approx(90)]
+    assert [each.F for each in found.workspace.designs] == [pytest.approx(90)]
