@@ -24,9 +24,9 @@ from ...proof.statement.posed_layout import at_one_pose
 from ...proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from ...proof.workspace.slices.slices import Region, Slice
 from ...proof.workspace.verdict import Outcome
+from ...results.posewording import pose_words
 from ...results.rounding import number
 from ...results.workspaceposes import PosedClaim
-from ...results.workspacewording import pose_words
 from .canvas import INK, draw_edges
 from .drawing import Drawing, drawing_of
 from .figures import picture_of
