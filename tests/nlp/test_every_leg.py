@@ -166,7 +166,7 @@ def test_no_solve_with_random_limits_answers_a_wrong_design(count: int) -> None:
 def test_no_c_with_random_limits_answers_a_wrong_design(name: str, tmp_path: Path) -> None:
     if not COMPILERS:
         pytest.skip("no C compiler is installed")
-    case, count = load_case(name), 1000
+    case, count = load_case(name), 300
     compiled, nlp, rng = load_compiled(written(case, tmp_path)), formulate(case), np.random.default_rng(8)
     names = [each.name for each in nlp.program.arguments]
     size = nlp.upper[0] / 32

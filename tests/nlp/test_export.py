@@ -145,15 +145,14 @@ def test_position_actuators_that_follow_the_rates_move_the_platform_by_the_task(
 
 def test_export_import_export_import_keeps_the_rows_of_every_robot(tmp_path: Path) -> None:
     for name in ROBOTS:
-        for seed in (0, 1):
-            nlp, x = placed(name, seed)
-            J = work_rates(evaluate(nlp, x).jacobian)
-            mechanism = exported(name, seed).mechanism
-            for _ in range(2):
-                (tmp_path / "robot.xml").write_text(mjcf_text(mechanism), encoding="utf-8")
-                mechanism = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).mechanism
-            again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
-            np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=name)
+        nlp, x = placed(name, 1)
+        J = work_rates(evaluate(nlp, x).jacobian)
+        mechanism = exported(name, 1).mechanism
+        for _ in range(2):
+            (tmp_path / "robot.xml").write_text(mjcf_text(mechanism), encoding="utf-8")
+            mechanism = import_robot(Request(tmp_path / "robot.xml", Ends("platform"))).mechanism
+        again = wrenches_of(mechanism, nlp.case.characteristic_length).jacobian
+        np.testing.assert_allclose(work_rates(again), J, atol=1e-10, err_msg=name)
         urdf = urdf_of(exported(name, 1).mechanism)
         (tmp_path / "robot.urdf").write_text(urdf.text, encoding="utf-8")
         (tmp_path / "robot.yaml").write_text(urdf.loops_text(exported(name, 1).mechanism), encoding="utf-8")

@@ -410,13 +410,13 @@ def test_limits_over_a_workspace_need_one(old: str, new: str, message: str) -> N
 
 
 @pytest.mark.slow
-def test_the_shipped_design_violates_nothing_at_a_million_poses() -> None:
+def test_the_shipped_design_violates_nothing_at_many_poses() -> None:
     proof = solve(load_case("hexapod-workspace")).workspace
     assert proof.is_proved
     robot, box = legs(proof.judgement.case), pose_box(proof.judgement.workspace)
     rng = np.random.default_rng(10)
     least, most = np.full(6, np.inf), np.zeros(6)
-    for _ in range(20):
+    for _ in range(5):
         points = box.random(50_000, rng)
         span = spans(robot, box, points)
         lengths = np.linalg.norm(span, axis=2)
