@@ -41,6 +41,26 @@ EACH_KIND = (
 )  # fmt: skip
 #: The command line in this process: exit status, standard output, standard error.
 Run = Callable[..., tuple[int, str, str]]
+# Six legs with one free height. Of unit forces along z, x and y the sums of squares are F of the translations along
+# these axes, so that F up + F side + F of the third axis = 6, and the last two are equal by the symmetry of the robot.
+TWO_GOALS = """
+task = [
+    { name = "up", sense = "max", axis = [0, 0, 1], pitch = inf },
+    { name = "side", sense = "max", axis = [1, 0, 0], pitch = inf },
+]
+[units]
+length = "cm"
+[robot]
+model = "stewart-gough"
+layout = "aligned"
+parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = 20 }
+[pose]
+position = [0, 0, { min = 5, max = 40 }]
+[limits]
+leg_length = { min = 2, max = 60 }
+[solve]
+starts = 2
+"""
 
 
 def case_from(given: str | Mapping[str, Any], name: str = "case") -> Case:

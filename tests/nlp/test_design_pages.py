@@ -8,27 +8,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from builders import Run, output_of, saved
+from builders import TWO_GOALS, Run, output_of, saved
 
 LIMIT = "limits.leg_length.max"
-FRONT = """
-task = [
-    { name = "up", sense = "max", axis = [0, 0, 1], pitch = inf },
-    { name = "side", sense = "max", axis = [1, 0, 0], pitch = inf },
-]
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-layout = "aligned"
-parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = 20 }
-[pose]
-position = [0, 0, { min = 5, max = 40 }]
-[limits]
-leg_length = { min = 2, max = 60 }
-[solve]
-starts = 2
-"""
 
 
 def figures_of(page: str) -> list[tuple[str, ElementTree.Element]]:
@@ -63,7 +45,7 @@ def test_a_tradeoff_shows_each_design_and_where_the_curve_bends(tmp_path: Path, 
 
 def test_all_designs_have_one_scale(tmp_path: Path, cli: Run) -> None:
     page = tmp_path / "page.html"
-    case = str(saved(tmp_path / "case.toml", FRONT))
+    case = str(saved(tmp_path / "case.toml", TWO_GOALS))
     goals = ("--goal", "max F:up", "--goal", "max F:side")
     output_of(cli("pareto", case, *goals, "--points", "3", "--html", str(page)))
     figures = figures_of(page.read_text())

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, edited, output_of, refusal_of, rows_of, saved
+from builders import TWO_GOALS, Run, edited, output_of, refusal_of, rows_of, saved
 
 from screwsynth.models import stewart_gough
 from screwsynth.nlp import (
@@ -31,33 +31,13 @@ from screwsynth.nlp.results.explorations import FrontResult
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.tradeoff import TradeoffResult
 
-# Six legs with one free height. Of unit forces along z, x and y the sums of squares are F of the translations along
-# these axes, so that F up + F side + F of the third axis = 6, and the last two are equal by the symmetry of the robot.
-CASE = """
-task = [
-    { name = "up", sense = "max", axis = [0, 0, 1], pitch = inf },
-    { name = "side", sense = "max", axis = [1, 0, 0], pitch = inf },
-]
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-layout = "aligned"
-parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = 20 }
-[pose]
-position = [0, 0, { min = 5, max = 40 }]
-[limits]
-leg_length = { min = 2, max = 60 }
-[solve]
-starts = 2
-"""
 #: Rounding of a corrected point: bounds hold to 1e-9 of half a range.
 EXACT = 1e-8
 
 
 @pytest.fixture
 def case(tmp_path: Path) -> str:
-    return str(saved(tmp_path / "case.toml", CASE))
+    return str(saved(tmp_path / "case.toml", TWO_GOALS))
 
 
 def test_two_objectives_on_a_line(case: str, tmp_path: Path, cli: Run) -> None:
@@ -174,7 +154,7 @@ def test_three_goals_on_an_exact_front(tmp_path: Path, cli: Run) -> None:
 
 def test_two_limits_as_goals(tmp_path: Path) -> None:
     edits = ("x1 = 12", "x1 = { min = 8, max = 20 }"), ("[solve]", "radius_ratio = { max = 0.5 }\n[solve]")
-    path = saved(tmp_path / "limits.toml", edited(CASE, *edits))
+    path = saved(tmp_path / "limits.toml", edited(TWO_GOALS, *edits))
     goals = ["min limits.leg_length.max", "min limits.radius_ratio.max"]
     front = pareto(load_case(str(path)), goals, points=5, starts=1)
     length, ratio = np.array([each.values for each in front.points]).T
