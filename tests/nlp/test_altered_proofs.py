@@ -181,11 +181,17 @@ def written(cli: Run, folder: Path, name: str) -> dict[str, Any]:
     return content
 
 
+@pytest.fixture(autouse=True)
+def _lines_are_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outputs are compared line by line, and so a line is not broken."""
+    monkeypatch.setattr("screwsynth.nlp.output.terminal.PLAIN_WIDTH", 10_000)
+
+
 def checked(cli: Run, folder: Path, name: str, content: object) -> tuple[int, str, str]:
     """The check of a content of a proof's file."""
     file = folder / "altered.json"
     file.write_text(json.dumps(content), encoding="utf-8")
-    return cli("verify-proof", str(file), str(folder / f"{name}.toml"), *KINDS[name].checks)
+    return cli("verify-proof", str(file), str(folder / f"{name}.toml"), *KINDS[name].checks, "--all")
 
 
 def places(content: object, place: Place = ()) -> Iterator[Place]:
