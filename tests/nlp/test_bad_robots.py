@@ -87,7 +87,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ("count = 1", 'count = 2, axis = "z"', 'limb 1, repeat, axis = "z": must be a list of 3 numbers'),
     (LIMB, f"{LIMB}{LIMB}".replace("count = 1", "count = 20"), "limb: has 40 limbs with all copies; at most 24 are allowed"),
     (LIMB, LIMB.replace("count = 1", "count = 24").replace(JOINTS, f"joints = [{', '.join([DRIVEN] * 6)}]"), "limb: has 144 joints with all copies; at most 120 are allowed"),
-    ("home =", f"{'x' * 5000} = 1\nhome =", f"{'x' * 57}...: no such key; allowed: name"),
+    ("home =", f"{'x' * 5000} = 1\nhome =", f"{'x' * 57}...: no such key; allowed: schema, name"),
     # Names.
     (AXIS, '"A - D"', "which has the name 'D', which is unknown; known are A, B, h, half, pi, rb, rp, x, y, z"),
     (LAST, 'at = "AA" }', "limb 1, joint 3 (S), at: is 'AA', which has the name 'AA', which is unknown; did you mean 'A'?"),
@@ -111,7 +111,7 @@ FAULTS: list[tuple[str, str | bytes, str]] = [
     ('half = "rb/2"', 'a = "a + 1"', "derived, a: is 'a + 1', which needs 'a' before it is given"),
     ("points = {", 'points = { D = "E", E = "D",', "limb 1, point D: is 'E', which needs 'E' before it is given"),
     # Keys.
-    ("home =", "colour = 1\nhome =", "colour: no such key; allowed: name, description, length_unit, home, dimensions, derived, limb"),
+    ("home =", "colour = 1\nhome =", "colour: no such key; allowed: schema, name, description, length_unit, home, dimensions, derived, limb"),
     ("name =", "nme =", "nme: no such key; did you mean 'name'?"),
     ("joints =", "joint =", "limb 1, joint: no such key; did you mean 'joints'?"),
     ('axis = "A - B", ', "", "limb 1, joint 2 (P), axis: is missing"),
@@ -219,7 +219,7 @@ LINK_FAULTS: list[tuple[str, str, str]] = [
     ("actuated = true", "actuated = 1", "joint motor, actuated = 1: must be true or false"),
     ("points = {", "points = { s = [0, 0, 0],", "point s: has the name of a dimension"),
     ("points = {", "points = { sin = [0, 0, 0],", "sin: is no name for a point: expressions use it for something else"),
-    ("name = ", "colour = 1\nname = ", "colour: no such key; allowed: name, description, length_unit, home"),
+    ("name = ", "colour = 1\nname = ", "colour: no such key; allowed: schema, name, description, length_unit, home"),
     (LINKS[LINKS.index("[[joint]]") :], "", "joint: is missing; it must be one or more tables [[joint]]"),
     (LINKS, LINKS.replace("actuated = true", ""), "actuated: is given at no joint of the robot; write actuated = true"),
     (LINKS, LINKS + COUPLING.replace("pivot", "none"), "coupling 1, none: is no joint; joints are motor, knee"),

@@ -32,8 +32,8 @@ Embedded = Any
 #: Cases whose C is another's but for numbers, robots or sizes; an average optimises nothing, and has no C, nor has an
 #: objective other than F.
 LIKE_OTHERS = {
-    "drilling-spindle", "handling-3-upu", "hexapod-pocket", "hexapod-workspace", "paper-4.1-rotation",
-    "paper-4.1-rotation-axis-z", "paper-4.2", "paper-4.2-rotation", "paper-4.3-axis-x", "paper-4.4-min", "reachy-mini",
+    "agile-eye", "drilling-spindle", "handling-3-upu", "hexapod-pocket", "hexapod-workspace", "machine-tool",
+    "motion-base", "paper-4.1-rotation", "paper-4.1-rotation-axis-z", "paper-4.2", "pick-and-place", "paper-4.2-rotation", "paper-4.3-axis-x", "paper-4.4-min", "reachy-mini",
 }  # fmt: skip
 CASES = [name for name in shipped_cases() if name not in LIKE_OTHERS]
 
