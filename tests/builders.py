@@ -28,8 +28,8 @@ DOCS = Path(__file__).parents[1] / "docs"
 Array = NDArray[np.float64]
 #: Shipped cases that another one is like, with the same robot and another task, sense or axis; and the others.
 LIKE_ANOTHER = {
-    "drilling-spindle", "hexapod-pocket", "paper-4.1-helical-axis-z", "paper-4.1-rotation",
-    "paper-4.1-rotation-axis-z", "paper-4.3-axis-x", "paper-4.4-min",
+    "drilling-spindle", "hexapod-pocket", "machine-tool", "motion-base", "paper-4.1-helical-axis-z",
+    "paper-4.1-rotation", "paper-4.1-rotation-axis-z", "paper-4.3-axis-x", "paper-4.4-min", "pick-and-place",
 }  # fmt: skip
 EACH_CASE = [name for name in shipped_cases() if name not in LIKE_ANOTHER]
 #: A robot of the gallery of each kind: cranks, slides, struts, members, parasitic motions, parallel rods and

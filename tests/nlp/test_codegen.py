@@ -33,7 +33,8 @@ Embedded = Any
 #: objective other than F.
 LIKE_OTHERS = {
     "agile-eye", "drilling-spindle", "handling-3-upu", "hexapod-pocket", "hexapod-workspace", "machine-tool",
-    "motion-base", "paper-4.1-rotation", "paper-4.1-rotation-axis-z", "paper-4.2", "pick-and-place", "paper-4.2-rotation", "paper-4.3-axis-x", "paper-4.4-min", "reachy-mini",
+    "motion-base", "paper-4.1-rotation", "paper-4.1-rotation-axis-z", "paper-4.2", "paper-4.2-rotation",
+    "paper-4.3-axis-x", "paper-4.4-min", "pick-and-place", "reachy-mini",
 }  # fmt: skip
 CASES = [name for name in shipped_cases() if name not in LIKE_OTHERS]
 
