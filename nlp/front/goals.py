@@ -176,7 +176,9 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
         level = layout.table.add(best.label, Dimension.NUMBER, Free(least / unit, most / unit)).symbols
         layout = replace(
             layout,
-            constraints=tuple(each for item in layout.constraints for each in _below(item, best, unit * level, (least, most))),
+            constraints=tuple(
+                each for item in layout.constraints for each in _below(item, best, unit * level, (least, most))
+            ),
         )
         objective, size = level, (most - least) / unit
     nlp = replace(assemble(layout, objective, best.sense, added), size=size)

@@ -1,8 +1,9 @@
 """Largest force, speed or power of the actuators as the objective, over loads, actuators and poses.
 
 It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`. Its square bounds their
-squares, which are smooth where a force changes its sense, and are what a search of a whole box bounds best. It is in the case's unit, in
-degrees per second where angles are in degrees: so are its bounds, slopes and multipliers.
+squares, which are smooth where a force changes its sense, and are what a search of a whole box bounds best.
+
+It is in the case's unit, degrees per second where angles are in degrees, and so are its bounds, slopes and multipliers.
 """
 
 from __future__ import annotations

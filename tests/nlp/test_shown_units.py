@@ -80,7 +80,9 @@ def test_rounding_of_wrenches_and_displacements_of_a_load_is_shown_as_zero() -> 
     held = np.array([each.wrench for each in load.constraints])
     assert 0 < np.abs(held).max() < 1e-12  # all digits are in JSON
     text = found.table(width=120)
-    tables_of = {title: text.partition(title)[2].splitlines() for title in ("wrenches of the limbs'", "displacement of")}
+    tables_of = {
+        title: text.partition(title)[2].splitlines() for title in ("wrenches of the limbs'", "displacement of")
+    }
     rows = [[row.split() for row in lines if row.startswith("part ")] for lines in tables_of.values()]
     assert [row[2:] for row in rows[0][:3]] == [["0"] * 6] * 3
     assert rows[1][0][-3:] == ["0"] * 3

@@ -1,4 +1,4 @@
-"""Units of what is optimised: the same case in degrees and in radians, with the same numbers of both in every result."""
+"""Units of what is optimised: the same case in degrees and in radians has the same numbers in every result."""
 
 import json
 import math
@@ -48,22 +48,22 @@ def delta(unit: str, high: float = 15.0, base: float = 0.164) -> str:
     return text
 
 
-def ratios(degrees: Any, radians: Any, name: str = "") -> Iterator[tuple[str, float]]:
+def ratios(degrees: object, radians: object, name: str = "") -> Iterator[tuple[str, float]]:
     """Yield each number of the case in degrees as a part of that in radians, with the last key that leads to it."""
     assert type(degrees) is type(radians), name
-    if isinstance(degrees, dict):
+    if isinstance(degrees, dict) and isinstance(radians, dict):
         assert degrees.keys() == radians.keys()
         for key in degrees:
             yield from ratios(degrees[key], radians[key], key)
-    elif isinstance(degrees, list):
+    elif isinstance(degrees, list) and isinstance(radians, list):
         assert len(degrees) == len(radians), name
         for one, other in zip(degrees, radians, strict=True):
             yield from ratios(one, other, name)
-    elif isinstance(degrees, float) and min(abs(degrees), abs(radians)) > 1e-8:
+    elif isinstance(degrees, float) and isinstance(radians, float) and min(abs(degrees), abs(radians)) > 1e-8:
         yield name, degrees / radians
 
 
-def of_F(found: dict[str, Any], name: str) -> list[float]:
+def parts_of(found: dict[str, Any], name: str) -> list[float]:
     """The ratios of the numbers with a name in the results of both units."""
     numbers = [ratio for key, ratio in ratios(found["deg"], found["rad"]) if key == name]
     assert numbers, name
@@ -72,12 +72,12 @@ def of_F(found: dict[str, Any], name: str) -> list[float]:
 
 def test_every_number_of_a_solve_is_in_the_unit_of_the_case() -> None:
     found = {unit: json.loads(json.dumps(json_data(result_of(solve(case_from(delta(unit))))))) for unit in UNITS}
-    assert of_F(found, "F") == pytest.approx([DEGREES] * 4, rel=1e-6)  # the optimum, that of a start, of two poses
+    assert parts_of(found, "F") == pytest.approx([DEGREES] * 4, rel=1e-6)  # the optimum, that of a start, of two poses
     assert found["deg"]["objective"]["value"] == pytest.approx(found["deg"]["F"])
     # A cost is per degree of an angle, and a slope per metre of a length.
     kinds = {unit: {row["unit"] for row in found[unit]["limits"] if row["active"]} for unit in UNITS}
     assert kinds == {"deg": {"deg"}, "rad": {"rad"}}
-    assert of_F(found, "cost") == pytest.approx([1.0] * 2, rel=1e-6)
+    assert parts_of(found, "cost") == pytest.approx([1.0] * 2, rel=1e-6)
     slopes = zip(*(found[unit]["sensitivity"] for unit in UNITS), strict=True)
     for one, other in slopes:
         if "derivative" in one and abs(one["derivative"]) > 1e-6:
@@ -124,7 +124,7 @@ def test_every_number_of_a_sweep_is_in_the_unit_of_the_case(cli: Run, tmp_path: 
         assert [float(row["F"]) for row in csv[unit]] == found[unit]["F"]
         sides = zip(found[unit]["multipliers"], csv[unit], strict=True)
         assert all([*map(repr, each)] == row["multipliers"].split("; ") for each, row in sides)
-    assert of_F(found, "F") == pytest.approx([DEGREES] * 2, rel=1e-6)
+    assert parts_of(found, "F") == pytest.approx([DEGREES] * 2, rel=1e-6)
     for unit in UNITS:
         single = result_of(solve(case_from(delta(unit, base=0.16))))
         assert found[unit]["F"][0] == pytest.approx(single.F, rel=1e-9)
