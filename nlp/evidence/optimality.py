@@ -25,6 +25,7 @@ from ...models.values import dataclass
 from ..case.task import Sense
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
+from ..units import Units
 from .kkt import FEASIBLE, STATIONARY, Linearisation, correct_point, lagrangian_hessian, linearise, multipliers
 from .linalg import echelon_basis
 from .singularities import is_passive_singular
@@ -114,6 +115,10 @@ class Evidence:
     licq: bool
     eigenvalues: FloatArray
     flat: tuple[Mapping[str, float], ...]
+
+    def multipliers_in(self, units: Units) -> tuple[float, ...]:
+        """Return the multipliers of the active sides, per unit of the case."""
+        return tuple(units.per_unit(side.multiplier, side.dimension) for side in self.active)
 
 
 def examine(nlp: Nlp, x: FloatArray) -> Evidence:

@@ -78,7 +78,7 @@ def _point(front: Front, point: FrontPoint) -> FrontPointData:
         status=point.solution.status,
         design=MappingProxyType(design),
         active=() if evidence is None else tuple(f"{side.name} {side.bound}" for side in evidence.active),
-        multipliers=() if evidence is None else tuple(side.multiplier for side in evidence.active),
+        multipliers=() if evidence is None else evidence.multipliers_in(units),
         kind=None if evidence is None else evidence.kind,
         stationarity=None if evidence is None else finite_or_none(evidence.stationarity),
         feasibility=None if evidence is None else finite_or_none(evidence.feasibility),

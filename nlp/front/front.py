@@ -287,10 +287,11 @@ class _Builder:
 def _start(program: GoalProgram, point: FrontPoint) -> FloatArray:
     """Return a point of the front as a start of another program, between its bounds.
 
-    A program whose optimised goal is a limit has that limit's number as its last variable.
+    A program whose optimised goal is a limit has that limit's number, in the case's unit, as its last variable.
     """
     nlp = program.nlp
-    level = point.values[program.optimised]
+    dimension = program.readings[program.optimised][0].dimension
+    level = nlp.case.units.shown(float(point.values[program.optimised]), dimension)
     both: FloatArray = np.append(point.solution.x, level)[: nlp.n]
     if nlp.n > point.solution.x.size:
         both[-1] = level

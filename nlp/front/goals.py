@@ -96,7 +96,7 @@ class GoalProgram:
     """A program of a front.
 
     Attributes:
-        nlp: the program; a limit that is optimised is its last variable.
+        nlp: the program; a limit that is optimised is its last variable, in the case's unit.
         optimised: index of the goal that is optimised.
         values: ``(x, p)`` to the expressions of each goal, (k, 1); for a limit those of its constraints.
         readings: how these expressions read, for each goal.
@@ -171,13 +171,16 @@ def program_of(case: Case, goals: tuple[Goal, ...], optimised: int, bounds: Sequ
         objective, size = _total(layout, tasks.index(best.task)), formulate(case, best.task).objective_scale
     else:
         least, most = _range(layout, best)
-        dimension = readings[optimised][0].dimension
-        level = layout.table.add(best.label, dimension, Free(least, most)).symbols
+        # In the case's unit, as all that a program optimises: so are its bounds and multipliers.
+        unit = case.units.to_internal(1.0, readings[optimised][0].dimension)
+        level = layout.table.add(best.label, Dimension.NUMBER, Free(least / unit, most / unit)).symbols
         layout = replace(
             layout,
-            constraints=tuple(each for item in layout.constraints for each in _below(item, best, level, (least, most))),
+            constraints=tuple(
+                each for item in layout.constraints for each in _below(item, best, unit * level, (least, most))
+            ),
         )
-        objective, size = level, most - least
+        objective, size = level, (most - least) / unit
     nlp = replace(assemble(layout, objective, best.sense, added), size=size)
     values = ca.Function("goals", [nlp.program.x, nlp.program.p], [ca.densify(each) for each in raw])
     return GoalProgram(nlp, optimised, values, readings, goals)

@@ -13,6 +13,7 @@ from ..proof.certificate.certificate import CertificateStatus
 from ..results.point import stated_pose_notice
 from ..results.text import TextTable
 from ..system.csvtext import csv_text
+from ..units import Units
 
 _SEPARATOR = "; "
 #: Begins the name of the constraint that bounds F of a task.
@@ -42,7 +43,7 @@ def front_csv(front: Front) -> str:
             *given,
             point.solution.status.value,
             *design,
-            *([None] * 6 if evidence is None else _evidence_cells(evidence)),
+            *([None] * 6 if evidence is None else _evidence_cells(evidence, units)),
             *([None] * 2 if certificate is None else [certificate.status.value, certificate.bound]),
             len(point.solution.starts),
             point.solution.seconds,
@@ -97,11 +98,11 @@ def goal_names(front: Front) -> list[str]:
     return [_words(goal) for goal in front.goals]
 
 
-def _evidence_cells(evidence: Evidence) -> list[object]:
+def _evidence_cells(evidence: Evidence, units: Units) -> list[object]:
     """Return the active sides, their multipliers, the verdict and the numbers that it rests on."""
     return [
         _SEPARATOR.join(f"{side.name} {side.bound}" for side in evidence.active),
-        _SEPARATOR.join(repr(side.multiplier) for side in evidence.active),
+        _SEPARATOR.join(repr(each) for each in evidence.multipliers_in(units)),
         *(evidence.kind.value, evidence.stationarity, evidence.feasibility),
         float(evidence.eigenvalues[0]) if len(evidence.eigenvalues) else None,
     ]

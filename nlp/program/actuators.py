@@ -2,6 +2,8 @@
 
 It is the worst of many values, and so an epigraph variable is minimised: :mod:`.epigraph`. Its square bounds their
 squares, which are smooth where a force changes its sense, and are what a search of a whole box bounds best.
+
+It is in the case's unit, degrees per second where angles are in degrees, and so are its bounds, slopes and multipliers.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ import numpy as np
 from casadi import SX
 
 from ...models.statics import posed_statics
-from ..case.forces import PosedForces, forces_at
+from ..case.case import Case
+from ..case.forces import PosedForces, dimension_of_speed, forces_at
 from ..case.limits.constraint import BoundedConstraint, Call, Form
 from ..case.pose import Free
 from ..case.task import Sense
@@ -42,17 +45,16 @@ class Measured(NamedTuple):
     value: SX
 
 
-def formulate_actuators(layout: Layout, measure: str) -> Nlp:
+def formulate_actuators(layout: Layout) -> Nlp:
     """Return the program that makes the largest number of the actuators as small as possible.
 
     Args:
-        layout: a case with one task.
-        measure: ``actuator_force``, ``actuator_speed`` or ``actuator_power``.
+        layout: a case with one task, which has a measure.
 
     Raises:
         CaseError: a limb has zero length at every point of the box.
     """
-    values = list(_values(layout, measure))
+    values = list(_values(layout))
     size = _size(assemble(layout, layout.robots[0].F[0], Sense.MIN), [each.value for each in values])
     epigraph = EpigraphBuilder(layout, Free(0.0, _LEVEL_BOUND * size, size), size, power=2)
     for each in values:
@@ -60,22 +62,25 @@ def formulate_actuators(layout: Layout, measure: str) -> Nlp:
     return replace(epigraph.program(Sense.MIN), size=size)
 
 
-def _values(layout: Layout, measure: str) -> Iterator[Measured]:
+def _values(layout: Layout) -> Iterator[Measured]:
     """Yield the squares of the numbers of all actuators, under each load case and at each pose."""
     case, robots = layout.case, layout.robots
     for k, robot in enumerate(robots):
         where = f" pose {k + 1}" if len(robots) > 1 else ""
         statics = posed_statics(case.model, robot)
-        for each in squares_of(forces_at(case.model, statics, robot.rotation, case.loading), measure):
+        for each in squares_of(case, forces_at(case.model, statics, robot.rotation, case.loading)):
             yield Measured(f"{each.name}{where}", each.value)
 
 
-def squares_of(forces: PosedForces, measure: str) -> Iterator[Measured]:
-    """Yield the squares of the numbers of all actuators at a pose, under each load case."""
+def squares_of(case: Case, forces: PosedForces) -> Iterator[Measured]:
+    """Yield the squares of the numbers of all actuators at a pose, under each load case, in the case's unit."""
+    measure = case.tasks[0].measure
     for k, joint in enumerate(forces.joints):
         name = f"{measure} actuator {joint.name}"
         if measure == "actuator_speed":
-            yield Measured(name, forces.speeds[k] ** 2)
+            # The objective alone is in degrees where the case is, so that all that derives from it is, too.
+            unit = case.units.to_internal(1.0, dimension_of_speed(joint))
+            yield Measured(name, (forces.speeds[k] / unit) ** 2)
             continue
         factor = forces.speeds[k] ** 2 if measure == "actuator_power" else SX(1)
         for each in forces.cases:
@@ -96,7 +101,7 @@ def level_constraints(nlp: Nlp, forces: PosedForces, names: Collection[str], whe
     if epigraph is None:
         return []
     found = []
-    for each in squares_of(forces, nlp.case.tasks[0].measure):
+    for each in squares_of(nlp.case, forces):
         if each.name.removesuffix(OTHER_SENSE) in names:
             inputs = ca.vertcat(program.p[epigraph.ceiling], program.x[epigraph.level], each.value)
             call = Call(Form(below_squared_level), inputs)

@@ -43,7 +43,7 @@ def formulate(case: Case, task: int = 0) -> Nlp:
     layout = lay_out(case, [case.tasks[task]])
     sense = case.tasks[task].sense
     if case.tasks[task].measure:
-        return formulate_actuators(layout, case.tasks[task].measure)
+        return formulate_actuators(layout)
     if len(layout.robots) > 1 and case.over_poses is OverPoses.WORST:
         return formulate_worst_pose(layout, sense)
     return assemble(layout, _weighted_call(layout, [SX(1)]), sense)

@@ -7,7 +7,6 @@ from ...models import Dimension
 from ..case.case import Case
 from ..case.choices import chosen_settings, listed_numbers
 from .jsondata import Absent, JsonObject, Vector
-from .objective import case_number
 
 if TYPE_CHECKING:
     from ..solver.solution import Choice, Rounding, Solution
@@ -141,8 +140,8 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
     )
     decided = solution.decided_by
     sign = 1.0 if decided is None else decided.nlp.sign
-    before = case_number(case, sign * rounding.before)
-    loss = case_number(case, rounding.after - rounding.before) if is_answer else None
+    before = sign * rounding.before
+    loss = rounding.after - rounding.before if is_answer else None
     choice = rounding.choice
     return RoundingData(
         step=rounding.step,

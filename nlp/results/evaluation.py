@@ -9,7 +9,7 @@ from ..program.nlp import Nlp
 from .design import limits_data, margins_data
 from .jointdata import MotionData, motion_data
 from .jsondata import Absent, Inline, JsonObject, Vector, vector
-from .objective import ObjectiveData, case_number, objective_data
+from .objective import ObjectiveData, objective_data
 from .parts import HeadData, LimitData, MarginData, RobotData, TaskData, VersionsData, ViolationData
 from .point import head_data, objective, robot_data, task_data, versions, violations
 
@@ -95,7 +95,7 @@ def evaluation_of(nlps: Sequence[Nlp], x: FloatArray, states: Sequence[RobotStat
     margins = margins_data(nlp, x, optimal=False)
     return EvaluationResult(
         head=head_data(case),
-        F=case_number(case, objective(nlp, x, states[0])),
+        F=objective(nlp, x, states[0]),
         objective=objective_data(case, objective(nlp, x, states[0])) if case.tasks[0].measure else None,
         robot=robot_data(nlp, x, states[0], 0),
         tasks=tuple(

@@ -35,9 +35,9 @@ def optimality_data(nlp: Nlp, evidence: Evidence | None) -> OptimalityData | Non
                 side,
                 value=units.shown(side.value, side.dimension),
                 unit=unit_of_side(nlp.case, side.name, side.dimension) or None,
-                multiplier=units.per_unit(side.multiplier, side.dimension),
+                multiplier=multiplier,
             )
-            for side in evidence.active
+            for side, multiplier in zip(evidence.active, evidence.multipliers_in(units), strict=True)
         ),
         reduced_hessian_eigenvalues=vector(evidence.eigenvalues),
         flat_directions=tuple(_flat(nlp, direction) for direction in evidence.flat),

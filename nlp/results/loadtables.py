@@ -7,21 +7,23 @@ from typing import TYPE_CHECKING
 
 from ...models import Dimension
 from ..case.case import Case
-from .rounding import number
+from .rounding import number, robot_size
 from .text import TextTable
 
 if TYPE_CHECKING:
-    from .loaddata import ActuatorSpeedData, LoadData, LoadingData
+    from .loaddata import ActuatorSpeedData, LoadData
+    from .parts import RobotData
 
 
-def loading_tables(case: Case, data: LoadingData | None) -> Iterator[TextTable]:
+def loading_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
     """Yield the forces and powers of the actuators, the wrenches of constraints, and the speeds of the actuators."""
+    data = robot.loading
     if data is None:
         return
     if data.loads is not None:
         yield _force_table(case, data.loads)
-        yield from _constraint_table(case, data.loads)
-        yield from _deflection_table(case, data.loads)
+        yield from _constraint_table(case, data.loads, robot_size(robot))
+        yield from _deflection_table(case, data.loads, robot_size(robot))
     if data.speeds is not None:
         size = max((each.value or 0.0 for each in data.speeds), default=0.0)
         rows = [(*_pose(each), each.actuator, _text(each.value, size), each.unit) for each in data.speeds]
@@ -47,13 +49,18 @@ def _force_table(case: Case, loads: Sequence[LoadData]) -> TextTable:
     return TextTable(headers, tuple(rows), "forces")
 
 
-def _constraint_table(case: Case, loads: Sequence[LoadData]) -> Iterator[TextTable]:
-    """Yield the wrenches by which the constraints of limbs hold the loads, where statics determines one of them."""
+def _constraint_table(case: Case, loads: Sequence[LoadData], length: float) -> Iterator[TextTable]:
+    """Yield the wrenches by which the constraints of limbs hold the loads, where statics determines one of them.
+
+    They are what is left of the load, which actuators may hold alone: their rounding is a part of it, of its moments
+    that with the robot's ``length`` as an arm.
+    """
     rows = []
     for load in loads:
         held = [(each.limb, each.wrench) for each in load.constraints or () if each.wrench is not None]
-        force = max((abs(part) for _, wrench in held for part in wrench[:3]), default=0.0)
-        moment = max((abs(part) for _, wrench in held for part in wrench[3:]), default=0.0)
+        wrenches = [load.wrench, *(wrench for _, wrench in held)]
+        force = max(abs(part) for wrench in wrenches for part in wrench[:3])
+        moment = max(length * force, *(abs(part) for wrench in wrenches for part in wrench[3:]))
         for limb, wrench in held:
             cells = [number(part, force, digits=6, signed=True) for part in wrench[:3]]
             cells += [number(part, moment, digits=6, signed=True) for part in wrench[3:]]
@@ -65,14 +72,20 @@ def _constraint_table(case: Case, loads: Sequence[LoadData]) -> Iterator[TextTab
         yield TextTable(headers, tuple(rows), "constraints", "wrenches of the limbs' constraints on the platform")
 
 
-def _deflection_table(case: Case, loads: Sequence[LoadData]) -> Iterator[TextTable]:
-    """Yield the platform's displacement under every load, where the actuators' stiffness is known."""
+def _deflection_table(case: Case, loads: Sequence[LoadData], length: float) -> Iterator[TextTable]:
+    """Yield the platform's displacement under every load, where the actuators' stiffness is known.
+
+    Its rounding is a part of it: of its turn also that of the translation by so much with the robot's ``length`` as an
+    arm, and the other way around.
+    """
     rows = []
     for load in loads:
         if load.deflection is None:
             continue
         found, none = load.deflection, ("none",) * 3
-        sizes = [max(map(abs, part), default=0.0) for part in (found.translation or (), found.rotation or ())]
+        way, turn = (max(map(abs, part or ()), default=0.0) for part in (found.translation, found.rotation))
+        of_turn = length * case.units.to_internal(1.0, Dimension.ANGLE)  # the way by a turn of 1 in the case's unit
+        sizes = (max(way, turn * of_turn), max(turn, way / of_turn))
         parts = [
             none if part is None else tuple(number(each, size, digits=5, signed=True) for each in part)
             for part, size in zip((found.translation, found.rotation), sizes, strict=True)

@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING
 
-from ...models import frozen_array
+from ...models import Dimension, frozen_array
 from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_measure
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.path_judge import PathJudgement
     from ..solver.certified import Certified
-
-if TYPE_CHECKING:
-    pass
 
 
 class ObjectiveData(JsonObject):
@@ -55,8 +52,8 @@ def objective_data(case: Case, value: float | None, certificate: Certificate | N
     measure = case.tasks[0].measure
     if not (measure or case.worst_everywhere):
         return None
-    bound = None if certificate is None else finite_or_none(case_number(case, certificate.bound))
-    shown = None if value is None else finite_or_none(case_number(case, value))
+    bound = None if certificate is None else finite_or_none(certificate.bound)
+    shown = None if value is None else finite_or_none(value)
     return ObjectiveData(
         minimise=measure or None,
         over=case.limits_over if case.worst_everywhere else None,
@@ -84,16 +81,8 @@ def over_workspace(case: Case, judged: "Judgement | PathJudgement") -> float:
     measure = case.tasks[0].measure
     bounds = [each.bound for each in judged.extremes if each.key.startswith(f"{measure or ObjectiveLimit.key}.")]
     if measure:
-        return max(map(abs, bounds), default=math.nan)
+        return _in_unit(case, max(map(abs, bounds), default=math.nan))
     return bounds[0] if bounds else math.nan
-
-
-def case_number(case: Case, value: float) -> float:
-    """Return what is optimised in the case's units: F as it is, an angular speed in its unit of angles."""
-    measure = case.tasks[0].measure
-    if not measure:
-        return value
-    return case.units.shown(value, dimension_of_measure(measure, driven_joints(case.model)[0]))
 
 
 def objective_words(case: Case) -> str:
@@ -109,7 +98,17 @@ def objective_words(case: Case) -> str:
 
 def pose_objective(case: Case, found: PoseLoads) -> float:
     """Return the number of the actuators that a case optimises, at one pose."""
-    return case_number(case, largest_of(found, case.tasks[0].measure))
+    return _in_unit(case, largest_of(found, case.tasks[0].measure))
+
+
+def _in_unit(case: Case, value: float) -> float:
+    """Return a number of the actuators from evidence or a proof in the case's unit, as the program has it."""
+    return case.units.shown(value, _dimension(case))
+
+
+def _dimension(case: Case) -> Dimension:
+    """Return the dimension of the number of the actuators that a case optimises."""
+    return dimension_of_measure(case.tasks[0].measure, driven_joints(case.model)[0])
 
 
 def unit_of_objective(case: Case, task: int | None = None) -> str:
@@ -121,7 +120,7 @@ def unit_of_objective(case: Case, task: int | None = None) -> str:
     """
     tasks = case.tasks if task is None else [case.tasks[task]]
     if tasks[0].measure:
-        return case.units.label(dimension_of_measure(tasks[0].measure, driven_joints(case.model)[0]))
+        return case.units.label(_dimension(case))
     return objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
 
 

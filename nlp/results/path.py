@@ -14,7 +14,6 @@ from ..proof.statement.claims import ACTUATED
 from ..proof.workspace.numbers.extremes import Extreme
 from ..proof.workspace.verdict import Outcome
 from .jsondata import Absent, Inline, JsonObject
-from .objective import case_number
 from .parts import HeadData, VersionsData
 from .pathtable import knot_motion
 from .point import head_data, versions
@@ -249,7 +248,7 @@ def path_proof_data(proof: "PathProof") -> PathProofData:
         proved=proof.is_proved,
         joint_centre=judged.case.joint_centre_tolerance,
         tighter=proof.tighter,
-        designs=tuple(DesignData(F=case_number(judged.case, F), unproved=count) for F, count in proof.history),
+        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
         poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
         file=judged.path.source,
         segments=len(judged.path),

@@ -27,11 +27,10 @@ from .data import (
 from .design import limits_data, margins_data, relaxation_data, sensitivity_data, tolerance_data
 from .evidence import certificate_data, optimality_data
 from .jsondata import finite_or_none, vector
-from .objective import case_number, objective_data, over_workspace
+from .objective import objective_data, over_workspace
 from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
-    from ..case.case import Case
     from ..solver.certified import Certified
     from ..solver.over_path import PathProof
     from ..solver.semi_infinite import WorkspaceProof
@@ -71,7 +70,7 @@ def task_result(
         solution,
         head=head_data(nlp.case),
         sense=nlp.sense,
-        F=case_number(nlp.case, objective(nlp, x, state)) if solved else None,
+        F=objective(nlp, x, state) if solved else None,
         objective=objective_data(nlp.case, value if solved else None, certificate),
         reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
         relaxation=relaxation_data(nlp, solution.relaxation),
@@ -113,14 +112,13 @@ def starts_data(solution: ProgramSolution) -> StartsData:
         run=len(solution.starts),
         converged=ended[StartStatus.CONVERGED],
         failed=MappingProxyType({status.value: ended[status] for status in reasons}),
-        optima=tuple(_optimum_data(found, solution.nlp.case) for found in solution.optima),
+        optima=tuple(_optimum_data(found) for found in solution.optima),
     )
 
 
-def _optimum_data(found: Optimum, case: Case) -> OptimumData:
+def _optimum_data(found: Optimum) -> OptimumData:
     """Return a distinct optimum."""
-    assembly = None if found.assembly is None else found.assembly.brief
-    return OptimumData.of(found, F=case_number(case, found.F), assembly=assembly)
+    return OptimumData.of(found, assembly=None if found.assembly is None else found.assembly.brief)
 
 
 def combined_result(

@@ -273,7 +273,7 @@ def robot_tables(case: Case, robot: RobotData) -> Iterator[TextTable]:
     """Yield every limb, or with several poses the robot at each of them; then what holds the loads."""
     yield robot_table(case, robot)
     yield from robot_tables_by_limb(case, robot)
-    yield from loading_tables(case, robot.loading)
+    yield from loading_tables(case, robot)
 
 
 def robot_tables_by_limb(case: Case, robot: RobotData) -> Iterator[TextTable]:

@@ -90,7 +90,7 @@ def _task_parts(case: Case, result: SolveResult) -> Summary:
         yield from in_part("starts", starts_lines(result.starts, robot))
     if robot is not None:
         yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
-        yield from in_part("forces", loading_tables(case, robot.loading))
+        yield from in_part("forces", loading_tables(case, robot))
     if result.limits:
         size = 0.0 if robot is None else size_of_F(robot)
         title = limits_title(case, result.workspace or result.path)
@@ -205,7 +205,7 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
     yield from in_part("design", [design_table(case, robot)])
     yield from in_part("limbs" if robot.several is None else "poses", [robot_table(case, robot)])
     yield from in_part("poses by limb", robot_tables_by_limb(case, robot))
-    yield from in_part("forces", loading_tables(case, robot.loading))
+    yield from in_part("forces", loading_tables(case, robot))
     if result.limits:
         yield from in_part("limits", [limit_table(result.limits, size_of_F(robot), limits_title(case))])
     yield from in_part("J", [jacobian_table(case, robot)])

@@ -14,7 +14,6 @@ from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.verdict import Outcome
 from ..units import Units
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
-from .objective import case_number
 from .parts import HeadData, VersionsData
 from .point import head_data, versions
 
@@ -278,7 +277,7 @@ def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
         proved=proof.is_proved,
         joint_centre=judged.case.joint_centre_tolerance,
         tighter=proof.tighter,
-        designs=tuple(DesignData(F=case_number(judged.case, F), unproved=count) for F, count in proof.history),
+        designs=tuple(DesignData(F=F, unproved=count) for F, count in proof.history),
         poses=tuple(BindingData(claim=each.name, pose=pose_data(each.pose, units)) for each in proof.poses),
         regular=_regular_data(judged.regularity, judged.case),
         extremes=tuple(_extreme_data(each, judged.case) for each in judged.extremes),

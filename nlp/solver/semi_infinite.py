@@ -20,7 +20,9 @@ import numpy as np
 
 from ...models import FloatArray
 from ...models.joints.closedform import closed_form
+from ...models.statics import driven_joints
 from ..case.case import Case
+from ..case.forces import dimension_of_measure
 from ..case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from ..case.limits.limits import Limits
 from ..case.limits.objective import ObjectiveLimit
@@ -203,7 +205,8 @@ def with_objective(design: Case, level: float) -> Case:
     if not measure:
         return design
     own = next((each for each in design.limits if each.name == measure), None)
-    most = level * (1 + LEVEL_ROOM)
+    dimension = dimension_of_measure(measure, driven_joints(design.model)[0])
+    most = design.units.to_internal(level * (1 + LEVEL_ROOM), dimension)
     ends = {end: getattr(own, end) for end in ("min", "max") if getattr(own, end, None) is not None}
     limit = kinds[measure](**{**ends, "max": min(most, ends.get("max", most))})
     return replace(design, limits=Limits(*(each for each in design.limits if each is not own), limit))

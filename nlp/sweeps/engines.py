@@ -106,7 +106,7 @@ def row_of_solution(solution: Solution, index: int, seconds: float) -> Row:
     if decided is not None:
         converged = sum(optimum.count for optimum in decided.optima)
         row = row._replace(starts=len(decided.starts), converged=converged)
-    return row if evidence is None else with_evidence(row, evidence)
+    return row if evidence is None else with_evidence(row, evidence, units)
 
 
 #: Number of starting points in the table of the generated C.
@@ -231,19 +231,21 @@ class CompiledEngine:
     def _with_evidence(self, row: Row, block: Block, x: FloatArray, k: int) -> Row | None:
         """Return a row with evidence that is computed for its point alone; None where that is no optimum."""
         evidence = examine(block.numbers.put_into(self.places.nlp, k), x)
-        return with_evidence(row, evidence) if evidence.kind.is_optimum else None
+        return with_evidence(row, evidence, self.places.nlp.case.units) if evidence.kind.is_optimum else None
 
     def _multiplier(self, verdicts: Verdicts, block: Block, k: int, j: int) -> float:
         """Return the multiplier of side j at point k in F per unit of its limit."""
         value = float(verdicts.multipliers[k, j] * verdicts.weights[k, j])
-        side = self.places.nlp.sides.sides[j]
+        nlp = self.places.nlp
+        side, units = nlp.sides.sides[j], nlp.case.units
         if side.constraint is None:
-            return value
+            return units.per_unit(value, nlp.program.variables[side.variable or 0].dimension)
+        reading = nlp.program.constraints[side.constraint].reading
         bounds = block.numbers.g_lower if side.bound == "min" else block.numbers.g_upper
         limit = float(bounds[k, side.constraint])
         key = (side.constraint, limit)
         if key not in self._slopes:
-            self._slopes[key] = self.places.nlp.program.constraints[side.constraint].reading.slope(limit)
+            self._slopes[key] = units.per_unit(reading.slope(limit), reading.dimension)
         return value * self._slopes[key]
 
 

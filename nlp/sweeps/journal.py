@@ -20,6 +20,7 @@ from ..evidence.optimality import Evidence
 from ..interruption import WRITING
 from ..results.jsondata import finite_or_none
 from ..system.strictjson import json_tree, value_of
+from ..units import Units
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,7 +38,7 @@ class Row(NamedTuple):
         F: objective; for several tasks the value of their combination. None where there is no answer.
         x: the free numbers of the design in the case's units; empty for a point that is refused.
         active: sides of bounds and limits on which the point lies, such as ``p_z max``.
-        multipliers: of the active sides, in F per unit of the limit, per radian for angles.
+        multipliers: of the active sides, in F per unit of the limit.
         verdict: on the point, in words.
         stationarity: largest scaled derivative of the Lagrangian.
         feasibility: largest distance outside a side, in half ranges.
@@ -73,11 +74,11 @@ class Row(NamedTuple):
     gap: float | None = None
 
 
-def with_evidence(row: Row, evidence: Evidence) -> Row:
-    """Return a row with the evidence at its point."""
+def with_evidence(row: Row, evidence: Evidence, units: Units) -> Row:
+    """Return a row with the evidence at its point, in the units of the case."""
     return row._replace(
         active=tuple(f"{side.name} {side.bound}" for side in evidence.active),
-        multipliers=tuple(side.multiplier for side in evidence.active),
+        multipliers=evidence.multipliers_in(units),
         verdict=evidence.kind.value,
         stationarity=finite_or_none(evidence.stationarity),
         feasibility=finite_or_none(evidence.feasibility),

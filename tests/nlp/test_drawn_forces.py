@@ -134,6 +134,18 @@ def test_a_load_without_forces_has_no_scale_of_arrows() -> None:
     assert "longest arrow" not in drawing.forces.words
 
 
+def test_an_arrow_has_the_name_of_its_load_and_not_of_the_load_case() -> None:
+    """A force of any direction has no arrow, and the weight that acts with it has one."""
+    loads = '[[load]]\nname = "tool"\nmass = 2\nalways = true\n[[load]]\nname = "cut"\nany = { force = 5 }\n'
+    (drawing,) = drawings_of(solve(case_from(DELTA + loads)))
+    assert drawing.forces is not None
+    (arrow,) = drawing.forces.arrows
+    assert (arrow.kind, arrow.name, arrow.words) == ("load", "tool", "weight of tool: 19.62 N")
+    assert drawing.forces.words.startswith("weight of tool, forces under load cut: longest arrow 19.62 N")
+    solution = solve(load_case("handling-3-upu"))
+    assert drawings_of(solution, 1)[0].forces.words.startswith("load handling: longest arrow")
+
+
 def test_a_page_has_the_arrows_beside_the_legs_and_the_forces_of_each_pose() -> None:
     solution = solve(load_case("handling-3-upu"))
     report = report_of("", solution, result_of(solution))

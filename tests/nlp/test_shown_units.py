@@ -65,3 +65,24 @@ def test_a_point_of_a_case_over_a_workspace_says_that_its_limits_are_of_that_poi
     _, out, _ = cli("evaluate", "hexapod-machining")
     assert "limits at" not in out
     assert load_case("hexapod-machining").workspace is None
+
+
+def test_rounding_of_wrenches_and_displacements_of_a_load_is_shown_as_zero() -> None:
+    """On its axis the platform of a Delta goes straight down, without a turn, and no limb holds a part of its load."""
+    tables = starter_tables("delta")
+    tables["robot"]["actuator_stiffness"] = 1000.0
+    tables["pose"] = {"position": [0, 0, -1]}
+    tables["robot"]["parameters"] = {"rb": 0.164, "rp": 0.044, "arm": 0.524, "rod": 1.244, "w": 0.131, "tilt": 20}
+    tables["load"] = [{"name": "part", "mass": 1}]
+    tables.pop("limits", None)
+    found = solve(case_from(tables, "delta"))
+    (load,) = result_of(found).robot.loading.loads
+    held = np.array([each.wrench for each in load.constraints])
+    assert 0 < np.abs(held).max() < 1e-12  # all digits are in JSON
+    text = found.table(width=120)
+    tables_of = {
+        title: text.partition(title)[2].splitlines() for title in ("wrenches of the limbs'", "displacement of")
+    }
+    rows = [[row.split() for row in lines if row.startswith("part ")] for lines in tables_of.values()]
+    assert [row[2:] for row in rows[0][:3]] == [["0"] * 6] * 3
+    assert rows[1][0][-3:] == ["0"] * 3

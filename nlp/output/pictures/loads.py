@@ -49,7 +49,7 @@ class DrawnForces(NamedTuple):
 
     Attributes:
         arrows: those of forces and moments.
-        words: the load case with its largest force and moment, by which arrows have their scale.
+        words: the loads with arrows, the load case, its largest force and moment, by which arrows have their scale.
         torques: torques of actuators that turn, and forces without a place, in words; empty without any.
     """
 
@@ -83,10 +83,10 @@ def drawn_forces(
     scale, turn = (part * size / (most or 1.0) for part, most in ((_LONGEST, largest), (_LONGEST_MOMENT, turning)))
     arrows = []
     for part in given:
-        words = f"load {held.name}: {_norm(part.force):.4g} {units.label(Dimension.FORCE)}"
-        arrows.append(_arrow("load", held.name, part.point - scale * part.force, part.point, words))
-        words = f"moment of load {held.name}: {_norm(part.moment):.4g} {units.label(Dimension.TORQUE)}"
-        arrows.append(_arrow("moment", held.name, part.point, part.point + turn * part.moment, words))
+        words = f"{part.words}: {_norm(part.force):.4g} {units.label(Dimension.FORCE)}"
+        arrows.append(_arrow("load", part.name, part.point - scale * part.force, part.point, words))
+        words = f"moment of {part.words}: {_norm(part.moment):.4g} {units.label(Dimension.TORQUE)}"
+        arrows.append(_arrow("moment", part.name, part.point, part.point + turn * part.moment, words))
     for joint, force in forces:
         line, words = lines[joint.name], f"{joint.name}: {force:+.4g} {units.label(Dimension.FORCE)}"
         along = scale * force * line.direction if abs(force) > _NOISE * largest else np.zeros(3)
@@ -105,7 +105,10 @@ def drawn_forces(
     scales = [f"longest arrow {largest:.4g} {units.label(Dimension.FORCE)}"] if largest > 0 else []
     scales += [f"with two heads {turning:.4g} {units.label(Dimension.TORQUE)}"] if turning > 0 else []
     of_scales = f": {', '.join(scales)}" if scales else ""
-    words = f"load {held.name}{more}{of_scales}{_any_words(held)}"
+    whole = f"load {held.name}"
+    shown = " and ".join(part.words for part in given if part.force.any() or part.moment.any()) or whole
+    under = "" if shown == whole else f", forces under {whole}"
+    words = f"{shown}{under}{more}{of_scales}{_any_words(held)}"
     return DrawnForces(tuple(each for each in arrows if np.ptp(each.ends, axis=0).any()), words, torques)
 
 
@@ -129,20 +132,23 @@ def _any_words(held: LoadState) -> str:
 
 
 class _Part(NamedTuple):
-    """A part of a load case in the world frame: its point (3,), force (3,) and moment (3,) about the point."""
+    """A load of a load case in the world frame: its point (3,), force (3,) and moment (3,) about the point."""
 
+    name: str
+    words: str
     point: FloatArray
     force: FloatArray
     moment: FloatArray
 
 
 def _parts(case: LoadCase, state: RobotState) -> Iterator[_Part]:
-    """Yield the parts of a load case."""
+    """Yield the loads of a load case."""
     for load, sign in case.parts:
         turn = state.rotation if load.in_platform else np.eye(3)
         force = sign * (turn @ np.array(load.force) + load.mass * np.array(case.gravity))
         point = state.position + state.rotation @ np.array(load.point)
-        yield _Part(point, force, sign * (turn @ np.array(load.moment)))
+        words = f"weight of {load.name}" if load.mass else f"load {load.name}"
+        yield _Part(load.name, words, point, force, sign * (turn @ np.array(load.moment)))
 
 
 class _Line(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ....models import frozen_array
 from ...case.task import Sense
-from ...results.objective import case_number, unit_of_objective
+from ...results.objective import unit_of_objective
 from ...solver.solution import Solution, TaskOutcome
 from ...solver.status import Status
 from ...units import objective_unit
@@ -67,7 +67,7 @@ def _headline(outcome: TaskOutcome) -> str:
     if not solution.status.is_answer:
         return f"{solution.status.value}: this is not an optimum"
     value = 0.0 if solution.state is not None and solution.state.is_zero else solution.F
-    words = f"F = {case_number(solution.nlp.case, value):.7g} {_unit(outcome)}"
+    words = f"F = {value:.7g} {_unit(outcome)}"
     if solution.status is not Status.OPTIMAL:
         return words
     return f"{'largest' if solution.nlp.sense is Sense.MAX else 'smallest'} {words}"
