@@ -207,7 +207,7 @@ def test_the_delta_of_the_documentation_is_what_the_commands_print(tmp_path: Pat
     (case,) = (each for each in re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL) if "[[task]]" in each)
     (tmp_path / "delta.toml").write_text(case, encoding="utf-8")
     for opening, arguments in (
-        ("screwsynth models delta", ["models", "delta"]),
+        ("screwsynth models delta --all", ["models", "delta", "--all"]),
         ("solve", ["solve", str(tmp_path / "delta.toml")]),
     ):
         (shown,) = re.findall(rf"<!-- begin: {opening} -->\n```text\n(.*?)```", text, flags=re.DOTALL)
