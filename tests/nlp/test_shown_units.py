@@ -49,14 +49,14 @@ def test_units_of_rates_and_slopes() -> None:
 
 @pytest.mark.slow
 def test_tables_over_a_workspace_say_at_which_poses_they_hold(cli: Run) -> None:
-    out = output_of(cli("solve", "hexapod-workspace", "--starts", "2", "--all"))
-    titles = [line for line in out.splitlines() if re.match(r"(tightest )?limits (over|at)", line)]
-    assert titles == [
-        "tightest limits over every pose",
-        "limits at the stated pose, and where a pose of the workspace became a constraint of its limit",
-    ]
+    out = unbroken(output_of(cli("solve", "hexapod-workspace", "--starts", "2", "--all")))
+    titles = re.findall(r"^(?:tightest )?limits (?:over|at).*", out, re.MULTILINE)
+    stated = "limits at the stated pose, and where a pose of the workspace became a constraint of its limit"
+    assert len(titles) == 2
+    assert titles[0].startswith(stated)
+    assert titles[1].startswith("tightest limits over every pose")
     # At the stated pose the joints are mounted straight: that the table says 0 degrees is true of that pose alone.
-    assert out.index(titles[1]) < out.index("base_joint_angle.max")
+    assert out.index(titles[0]) < out.index("base_joint_angle.max")
 
 
 def test_a_point_of_a_case_over_a_workspace_says_that_its_limits_are_of_that_point(cli: Run) -> None:
