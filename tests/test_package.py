@@ -54,6 +54,13 @@ def test_the_stub_is_the_one_list_of_public_names() -> None:
         _ = screwsynth.nlp.no_such_name  # type: ignore[attr-defined]
 
 
+def test_every_package_is_listed_for_the_wheel() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    modules = (path for folder in ("cases", "models", "nlp") for path in (ROOT / folder).rglob("*.py"))
+    packages = {".".join(("screwsynth", *path.parent.relative_to(ROOT).parts)) for path in modules}
+    assert sorted(project["tool"]["setuptools"]["packages"]) == sorted(packages)
+
+
 def test_the_version_is_that_of_the_distribution() -> None:
     assert screwsynth.nlp.__version__ == version("screwsynth")
     # A namespace package has no file that could hold a name.

@@ -144,7 +144,8 @@ def certify_with_progress(case: Case | Solution, **options: Any) -> Certified:  
     with spinner("solving for an incumbent") as show:
 
         def show_search(name: str, seconds: float, bound: float, incumbent: float, boxes: int, left: int) -> None:
-            text = f"{name}: bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
-            show(f"{text}, {boxes:,} boxes, {left:,} left, {seconds:.0f} s")
+            # The time stands first: narrow terminals cut the end.
+            text = f"{name}: {seconds:.0f} s, bound {bound:.7g}, best {incumbent:.7g}, gap {abs(bound - incumbent):.2g}"
+            show(f"{text}, {boxes:,} boxes, {left:,} left")
 
         return certify(case, **options, progress=lambda name: partial(show_search, name))

@@ -128,7 +128,10 @@ def _rules(found: Comparison) -> list[str]:
     case, lines = found.case, []
     if found.size is not None:
         size = case.units.text(found.size, Dimension.LENGTH)
-        lines.append(f"Size: the largest distance between two points of a robot at home is {size}.")
+        lines.append(
+            "Size: robots are scaled so that with their typical dimensions the largest distance between two of their "
+            f"points at home is {size}."
+        )
     else:
         lines.append("The robots are not scaled: typical lengths count as lengths in the unit of the case.")
     if found.part:

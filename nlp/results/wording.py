@@ -105,10 +105,13 @@ def headline(result: SolveResult, case: Case) -> Line:
     how = "" if several is None else "largest" if is_measured else several.over_poses.value
     over = "" if several is None else f", {how} over {len(several.poses)} poses"
     word, status = "fixed point:", result.status.value
-    if result.status is Status.OPTIMAL:
+    is_compared = result.choice is not None or result.rounding is not None
+    if result.status is Status.OPTIMAL or is_compared:
         word = "largest" if result.sense is Sense.MAX else "smallest"
-        if result.optimality is not None and result.optimality.kind is PointKind.UNDECIDED:
-            status = "stationary, not proven optimal"
+    if result.status is Status.EVALUATED and is_compared:
+        status = "chosen" if result.rounding is None else "rounded"
+    elif result.optimality is not None and result.optimality.kind is PointKind.UNDECIDED:
+        status = "stationary, not proven optimal"
     if robot is not None and robot.singular:
         status += f", singular: rank {robot.rank}"
     tone = Tone.CAUTION if is_unasked_singularity(robot, case) else Tone.ANSWER

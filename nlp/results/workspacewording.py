@@ -153,9 +153,9 @@ def workspace_summary(
         yield from _scale_lines(case, result.scale)
     yield from tightest_table(result.extremes)
     yield from in_part("motors", motor_tables(case, result.motors or ()))
-    for regular in (result.regular, result.constraints):
+    for regular, label in ((result.regular, "search"), (result.constraints, "search of constraints")):
         if regular is not None:
-            yield from in_part("searches", _search_lines(case, regular))
+            yield from in_part("searches", _search_lines(case, regular, label))
     yield from in_part("the machine that refutes", _machine_lines(case, result.extremes))
     yield from in_part("every number", _tables(case, result.extremes))
 
@@ -264,12 +264,12 @@ def _regular_lines(case: Case, regular: RegularData, label: str = "regular", of:
         yield Line(pose_words(case, regular.pose), label="at" if regular.outcome is Outcome.REFUTED else "left about")
 
 
-def _search_lines(case: Case, regular: RegularData) -> Iterator[Line | TextTable]:
+def _search_lines(case: Case, regular: RegularData, label: str) -> Iterator[Line | TextTable]:
     """Yield the machine that refutes a rank, and the size of the search."""
     if regular.machine is not None:
         yield refuting_machine(case, "regular", regular.machine)
     word = "box" if regular.boxes == 1 else "boxes"
-    yield Line(f"{regular.boxes:,} {word} in {regular.seconds:.2f} s, engine {regular.engine}", label="search")
+    yield Line(f"{regular.boxes:,} {word} in {regular.seconds:.2f} s, engine {regular.engine}", label=label)
 
 
 def _table(case: Case, name: str, title: str, rows: list[ExtremeData]) -> TextTable:

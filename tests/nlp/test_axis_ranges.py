@@ -242,6 +242,8 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--unit", "mm"), "--unit: is not for --range")
     refusal_of(cli("path", "hexapod-linuxcnc", "--along", "a.ngc", "--most", "1,1"), "--most: needs --range")
     refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--most", "1,-1"), "--most 1,-1: must be two positive")
+    free = cli("path", "paper-4.1-helical", "--range")
+    refusal_of(free, "paper-4.1-helical", "pose: has free numbers", "state it with --start")
 
 
 def test_without_time_nothing_is_claimed() -> None:

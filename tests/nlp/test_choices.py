@@ -164,6 +164,17 @@ def test_what_is_chosen_is_shown_and_a_result_is_taken_up(tmp_path: Path, cli: R
     )
 
 
+def test_a_choice_among_values_alone_is_called_the_largest(tmp_path: Path, cli: Run) -> None:
+    tables = tables_with({"x1": [9, 11.5], "x2": [7, 9]})
+    tables["pose"] = {"position": [0, 0, 30]}
+    path = saved(tmp_path / "case.toml", case_text(case_from(tables)))
+    best = max(brute_force({"x1": [9, 11.5], "x2": [7, 9]}, tables).values())
+    target = tmp_path / "result.json"
+    said = output_of(cli("solve", str(path), "--json", str(target)))
+    assert f"largest F = {best:.7g} (cm/rad)²   (chosen)" in said
+    assert json.loads(target.read_text(encoding="utf-8"))["status"] == "evaluated"
+
+
 def test_a_search_that_is_stopped_says_that_not_all_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     case = case_from(tables_with(FEW))
     calls = iter([False] * 2 + [True] * 50)

@@ -103,6 +103,13 @@ def test_none_is_found_and_refusals_are_one_sentence(tmp_path: Path, cli: Run) -
     refusal_of(cli("solve", "paper-4.1-helical", "--round", "1"), fixed)
 
 
+def test_round_numbers_alone_are_called_the_largest(tmp_path: Path, cli: Run) -> None:
+    tables = tables_with({"x1": {"min": 6, "max": 11.3}}, pose={"position": [0, 0, 30]})
+    said = output_of(cli("solve", str(saved(tmp_path / "case.toml", case_text(case_from(tables)))), "--round", "1"))
+    tables["robot"]["parameters"]["x1"] = 11
+    assert f"largest F = {solve(case_from(tables)).F:.7g} (cm/rad)²   (rounded)" in said
+
+
 def test_the_result_says_what_was_rounded_and_lost(tmp_path: Path, cli: Run) -> None:
     values = {"x1": {"values": [9, 11.5]}, "x2": {"min": 5, "max": 9.4}, "x3": 30, "x4": {"min": 0, "max": 30}}
     path = saved(tmp_path / "case.toml", case_text(case_from(tables_with(values))))

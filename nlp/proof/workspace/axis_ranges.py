@@ -259,7 +259,8 @@ def _of_case(case: Case) -> FloatArray:
     axis, values = case.axis, (*case.position, case.rotation.angle)
     fixed = [each for each in values if not isinstance(each, Free)]
     if len(fixed) < len(values) or axis is None:
-        raise InputError(f"{case.source or case.name}: the pose has free numbers: state one")
+        name = case.source or case.name
+        raise InputError(f"{name}: pose: has free numbers, and ranges are about one pose: state it with --start")
     half = fixed[3] / 2
     turn = roll_pitch_yaw(np.array([[math.cos(half), *(math.sin(half) * axis)]]))[0]
     # A sum with zero has no negative zero.
