@@ -224,7 +224,8 @@ def _arm(place: _Place) -> float:
 def _condition(place: _Place, arm: float) -> float:
     """Return the condition number of J at a place, with moments divided by an arm; infinite where J is singular."""
     values = np.linalg.svd(_scaled(place.rows, place.position, arm), compute_uv=False)
-    return float(values[0] / values[-1]) if values[-1] > _ZERO * values[0] else math.inf
+    # Fewer than six rows leave the platform a motion.
+    return float(values[0] / values[-1]) if len(values) == 6 and values[-1] > _ZERO * values[0] else math.inf
 
 
 def _null_space(rows: FloatArray) -> FloatArray:

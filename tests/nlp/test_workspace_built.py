@@ -436,7 +436,7 @@ def test_the_command_shows_the_machine_that_refutes(tmp_path: Path) -> None:
     keep = ("leg_length = { min = 10, max = 60 }", "leg_length = { min = 10, max = 32 }")
     head, _, tail = TEXT.replace(*keep).partition("actuator =")
     file.write_text(head + tail[tail.index("[workspace]") :], encoding="utf-8")
-    run = CliRunner().invoke(app, ["workspace", str(file), "--gap", "0.01", "--json", str(target)])
+    run = CliRunner().invoke(app, ["workspace", str(file), "--gap", "0.01", "--all", "--json", str(target)])
     assert run.exit_code == 1, run.output
     result = load_result(target)
     jsonschema.validate(json.loads(target.read_text(encoding="utf-8")), result_schema())
