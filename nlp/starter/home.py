@@ -22,6 +22,7 @@ from ...models import (
     constraint_rows,
     screw_from_axis,
 )
+from ...models.mechanism.freedoms import null_space
 from ...models.rows import rank_of
 from ..case.case import Case
 from ..case.pose import Free, Rotation, Value
@@ -228,17 +229,9 @@ def _condition(place: _Place, arm: float) -> float:
     return float(values[0] / values[-1]) if len(values) == 6 and values[-1] > _ZERO * values[0] else math.inf
 
 
-def _null_space(rows: FloatArray) -> FloatArray:
-    """Return an orthonormal basis (f, 6) of the twists, velocity first, in which scaled wrenches do no work."""
-    if not len(rows):
-        return np.eye(6)
-    _, values, right = np.linalg.svd(rows)
-    return np.asarray(right[rank_of(values) :])
-
-
 def _twists(place: _Place, size: float) -> FloatArray:
     """Return the twists (f, 6) of a place: velocity of the platform's origin, then angular velocity times the size."""
-    return _null_space(_scaled(place.constraints, place.position, size))
+    return null_space(_scaled(place.constraints, place.position, size)).T
 
 
 def _regular_twists(places: list[_Place], size: float) -> list[FloatArray]:
@@ -251,7 +244,7 @@ def _regular_twists(places: list[_Place], size: float) -> list[FloatArray]:
 def _common_twists(places: list[_Place], size: float) -> FloatArray:
     """Return the twists (f, 6) that are possible at all places; the velocity is that of the point at home's origin."""
     centre = places[0].position
-    return _null_space(np.vstack([_scaled(each.constraints, centre, size) for each in places]))
+    return null_space(np.vstack([_scaled(each.constraints, centre, size) for each in places])).T
 
 
 def _pose_numbers(places: list[_Place], size: float) -> tuple[tuple[bool, ...], Turning]:
