@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple, TypeVar
 
-import casadi as ca
 import numpy as np
 
-from ....models import Dimension, FloatArray, Substitution
+from ....models import Dimension, FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.limits.legs import Actuator
@@ -28,7 +27,7 @@ from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
 from ..statement.claims import CONSTRAINTS, REGULAR
-from ..statement.machine import workspace_of_case
+from ..statement.machine import robot_size, workspace_of_case
 from .alone import AXES, box_about, coordinates_alone
 from .edge_samples import EdgeSamples
 from .judge import Judgement, judge_workspace
@@ -200,7 +199,7 @@ def axis_ranges(
     # The workspace says nothing here, but a judged machine has one.
     case = replace(case, workspace=box_about(here, {0: (here[0] - 1.0, here[0] + 1.0)}))
     workspace_of_case(case)
-    most = (_size(case, here), LARGEST_ANGLE) if most is None else most
+    most = (robot_size(case, here[:3].tolist()), LARGEST_ANGLE) if most is None else most
     if not all(0 < each < math.inf for each in most):
         raise InputError("the largest length and angle to move by must be positive and finite")
     report = progress or (lambda _: None)
@@ -265,17 +264,6 @@ def _of_case(case: Case) -> FloatArray:
     turn = roll_pitch_yaw(np.array([[math.cos(half), *(math.sin(half) * axis)]]))[0]
     # A sum with zero has no negative zero.
     return np.array([*fixed[:3], *turn]) + 0.0
-
-
-def _size(case: Case, start: FloatArray) -> float:
-    """Return the largest distance between two points of a robot's drawing at a pose, its unknown joints at home."""
-    model = case.model
-    parts = [value for name in case.parameters for value in case.components(name)]
-    places = ca.horzcat(*[point.position for point in model.scene.points], ca.SX(model.pose.position))
-    function = ca.Function("points", Substitution.identity(model).all, [ca.densify(places)])
-    points = np.array(function(np.array(parts), np.zeros(len(model.unknowns)), np.eye(3), start[:3])).T
-    size = float(np.linalg.norm(points[:, None] - points[None], axis=2).max())
-    return size or 1.0
 
 
 def _range(case: Case, start: FloatArray, k: int, most: float, *, has_whole: bool) -> AxisRange:

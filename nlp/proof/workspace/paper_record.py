@@ -13,12 +13,15 @@ from ..checker.proof_file import ProofClaim
 from ..checker.tree import Node
 from ..statement.claims import Claim
 from ..statement.tolerance import Directions
+from .numbers.bound_search import Minimum
 from .verdict import slack_of
 
 #: Name and sense of a claim.
 Key = tuple[str, str]
 #: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
 _FOLDED = 1e-12
+#: Part of a gap, and part of itself, by which the bound of a search of boxes moves outwards.
+_ROOM, _OUTWARDS = 0.25, 1e-6
 
 
 @dataclass(eq=False)
@@ -55,6 +58,19 @@ class PaperRecord:
         most = math.inf if claim.limit is None else sign * claim.limit + slack_of(claim.limit)
         if is_bounded and math.isfinite(found.bound) and sign * found.bound <= most:
             self._keep(claim, found.nlp, -found.nlp.sign * found.bound, tree.tree(with_open=True))
+
+    def followed(self, claim: Claim, found: Minimum, tree: TreeRecord) -> None:
+        """Record a search of boxes in which the loops are followed, of a number, or of minus it for a largest one."""
+        sign, key = claim.sense.sign, (claim.name, claim.sense.value)
+        bound, reached = -sign * found.bound, -sign * found.value
+        if found.reason or not math.isfinite(bound):
+            return
+        # Forms of first order need smaller boxes for the same bound.
+        room = _ROOM * abs(bound - reached) if math.isfinite(reached) else 0.0
+        beyond = sign * bound + max(room, _OUTWARDS * abs(bound))
+        most = math.inf if claim.limit is None else sign * claim.limit
+        bound = sign * max(min(beyond, most), sign * bound)
+        self.programs.setdefault(key, ProofClaim(*key, "boxes", bound, tree=tree.tree(with_open=True)))
 
     def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
         """Keep the best bound of a program; of two programs of one name the first, as the check has it."""

@@ -1,0 +1,233 @@
+"""Coordinates of a pose that a robot cannot choose: which they are over a workspace, and where they lie.
+
+A robot with fewer than six degrees of freedom chooses as many coordinates of its pose as it has freedoms; the others
+follow from the closed loops, as joint positions do. The independent coordinates are chosen at the middle of the
+workspace among those with ranges, by the largest volume of the freedoms' directions in parts of these ranges, so that a
+wide range is more likely a limit than a set; fixed ones complete them. A dependent coordinate that stands still at its
+stated number over the whole workspace, such as the rotation of a Delta, stays a constant.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ....models import FloatArray, Model, Substitution
+from ....models.instance import sizes_at
+from ...case.case import Case
+from ...case.pose import Free, Value, ends_of
+from ...case.workspace import DependentCoordinate, TurnKind, Turns, Workspace
+from ...errors import CaseError
+from ...evidence.closed_loops import Loops, closed_from_home
+from .machine import robot_size
+from .posed_layout import turn_about
+
+#: Singular values below this part of the largest are zero, and parts of a size by which a constant is off by rounding.
+_ZERO, _STILL = 1e-9, 1e-9
+#: Direction of a freedom, in parts of the largest, that counts as one in which a coordinate moves.
+_MOVES = 1e-6
+#: Random poses at which dependent coordinates are computed beside the corners, corners at most, and steps to each.
+_POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
+#: Part of the computed range of a dependent coordinate by which its working range is wider on each side, and parts of
+#: the robot's size, or angle, that it is wider by at least.
+_WIDER, _LEAST = 0.5, 1e-3
+#: Volumes that differ by less than this part are equal: the first is taken.
+_TIE = 1e-9
+
+
+class LoopSystem(NamedTuple):
+    """Equations of a robot's closed loops where its pose and its unknowns have other symbols.
+
+    Attributes:
+        equations: (k, 1) independent equations, divided by their sizes.
+        every: (e, 1) all equations, divided by theirs.
+        signs: (s, 1) expressions that are positive in the home assembly mode.
+        sizes: (u,) of the unknowns.
+    """
+
+    equations: SX
+    every: SX
+    signs: SX
+    sizes: FloatArray
+
+
+def loop_system(model: Model, given: Substitution, values: Sequence[float]) -> LoopSystem:
+    """Return the equations of a robot's loops.
+
+    Args:
+        model: the robot.
+        given: what its symbols are replaced by.
+        values: of its parameters, at which sizes are taken.
+    """
+    own, every = Substitution.identity(model), (*model.closure, *model.loops)
+    outputs = [*(each.expression for each in every), *(each.value for each in model.signs)]
+    found = ca.Function("loops", own.all, outputs).call(given.all) if outputs else []
+    ones = SX.ones(len(every) + len(model.unknowns))
+    sizes = sizes_at(model, (*every, *model.unknowns), tuple(values), ones)
+    scaled = [found[k] / sizes[k] for k in range(len(every))]
+    whole = ca.vertcat(SX(0, 1), *scaled)
+    signs = ca.vertcat(SX(0, 1), *found[len(every) :])
+    unknowns = np.array(ca.DM(sizes[len(every) :, :]), dtype=np.float64).ravel()
+    return LoopSystem(whole[: len(model.closure), :], whole, signs, unknowns)
+
+
+def with_dependent(case: Case, workspace: Workspace) -> Workspace:
+    """Return a workspace with the coordinates that follow from the others over it.
+
+    Dependent coordinates of a workspace that has some already are kept, and their working ranges computed anew. Where
+    the loops do not close in the middle of the workspace nothing is known, and the workspace is returned as it is.
+
+    Args:
+        case: with fixed dimensions.
+        workspace: a box of poses.
+
+    Raises:
+        CaseError: the robot can choose no coordinate that has a range, or a rotation about one axis is stated, and the
+            platform turns about others too.
+    """
+    model = case.model
+    if model.generic is None or not 0 < model.generic.constraints <= 6 or not model.closure:
+        return workspace
+    chart = _Chart(case, workspace)
+    middle = chart.closed_middle()
+    if middle is None:
+        return workspace
+    before = [each.index for each in workspace.dependent]
+    independent = (
+        [k for k in range(6) if k not in before] if before else chart.independent(middle, 6 - model.generic.constraints)
+    )
+    if not any(chart.half[k] > 0 for k in independent):
+        ranged = " and ".join(workspace.names[k] for k in range(6) if chart.half[k] > 0)
+        chosen = ", ".join(workspace.names[k] for k in independent)
+        fault = f"{ranged} cannot be chosen for this robot: give a range to at least one of {chosen}"
+        raise CaseError("workspace", fault, source=case.source)
+    points = chart.points(middle, independent)
+    if points is None:
+        return workspace
+    fixed = np.abs(points - chart.middle[:6]) <= _STILL * chart.size[:6]
+    found = [
+        k for k in range(6) if k not in independent and (k in before or chart.half[k] > 0 or not fixed[:, k].all())
+    ]
+    if workspace.turns.kind is TurnKind.AXIS and any(k > 3 for k in found):
+        return with_dependent(case, workspace.by_three_angles())
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = _WIDER * (high - low) + _LEAST * chart.size[:6]
+    ends = chart.ends(low - room), chart.ends(high + room)
+    dependent = tuple(DependentCoordinate(k, float(ends[0][k]), float(ends[1][k])) for k in found)
+    return replace(workspace, dependent=dependent)
+
+
+class _Chart:
+    """The loops of a robot in six coordinates of its pose, then its unknowns.
+
+    Rotations have the tangents of half of roll, pitch and yaw, or the components of a Cayley vector: along the axis of
+    a rotation about one axis, and across it.
+
+    Attributes:
+        middle: (6 + u,) of the workspace, with unknowns of 0.
+        half: (6,) half ranges; 0 for fixed coordinates.
+        size: (6 + u,) by which coordinates are comparable.
+    """
+
+    def __init__(self, case: Case, workspace: Workspace) -> None:
+        self._kind, model = workspace.turns.kind, case.model
+        numbers = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
+        y, u = SX.sym("y", 6), SX.sym("u", len(model.unknowns))
+        given = replace(
+            Substitution.identity(model),
+            parameters=SX(ca.DM(numbers)),
+            unknowns=u,
+            rotation=_rotation(workspace.turns, y[3:]),
+            position=y[:3],
+        )
+        system = loop_system(model, given, numbers)
+        values: list[Value] = [*workspace.position, *workspace.turns.angles, 0.0, 0.0][:6]
+        if self._kind is TurnKind.ANY_AXIS:
+            most = max(map(abs, ends_of(workspace.turns.angles[0])))
+            values[3:] = [Free(-most, most)] * 3
+        ends = np.array([ends_of(each) for each in values])
+        ends[3:] = np.tan(0.5 * ends[3:])
+        self.half = 0.5 * (ends[:, 1] - ends[:, 0])
+        self.middle = np.concatenate([ends.mean(axis=1), np.zeros(u.numel())])
+        length = robot_size(case, self.middle[:3].tolist())
+        self.size = np.concatenate([[length] * 3, np.ones(3), system.sizes])
+        self.loops = Loops(ca.vertcat(y, u), system.equations, system.every, system.signs, self.size)
+
+    def ends(self, y: FloatArray) -> FloatArray:
+        """Return coordinates (6,) as lengths and angles, radians."""
+        return np.concatenate([y[:3], 2 * np.arctan(y[3:])])
+
+    def closed_middle(self) -> FloatArray | None:
+        """Return closed loops (6 + u,) in the home assembly mode near the middle of the workspace; None without."""
+        return closed_from_home(self.loops, self.middle, 6)
+
+    def independent(self, z: FloatArray, freedoms: int) -> list[int]:
+        """Return the indices of as many coordinates of the pose as the robot has freedoms at a closed point."""
+        slopes = self.loops.slopes(z[:, None])[0] * self.size
+        _, values, right = np.linalg.svd(slopes)
+        rank = int(np.count_nonzero(values > _ZERO * values.max(initial=0.0)))
+        moves = right[rank:, :6].T
+        ranged = [k for k in range(6) if self.half[k] > 0]
+        scale = np.where(self.half > 0, self.size[:6] / np.where(self.half > 0, self.half, 1.0), 1.0)
+        chosen = _largest(moves * scale[:, None], ranged, [], min(_rank(moves[ranged]), freedoms))
+        others = [k for k in range(6) if k not in ranged]
+        return sorted(_largest(moves, others, chosen, min(freedoms, _rank(moves)) - len(chosen)))
+
+    def points(self, z: FloatArray, independent: list[int]) -> FloatArray | None:
+        """Return the pose (P, 6) of closed loops at the middle, corners and random points of the workspace.
+
+        Args:
+            z: a closed point near the middle.
+            independent: indices of the coordinates that the robot chooses.
+        """
+        moving = [k for k in range(len(z)) if k not in independent]
+        ranged = [k for k in independent if self.half[k] > 0]
+        sides = np.array(list(itertools.islice(itertools.product((-1, 1), repeat=len(ranged)), _MOST_CORNERS)))
+        inside = np.random.default_rng(_SEED).uniform(-1, 1, (_POSES, len(ranged)))
+        parts = np.vstack([np.zeros((1, len(ranged))), sides.reshape(-1, len(ranged)), inside])
+        to = np.tile(self.middle, (len(parts), 1))
+        to[:, ranged] += parts * self.half[ranged]
+        points, way = np.tile(z, (len(parts), 1)), (to - z)[:, independent]
+        for left in range(_WAY - 1, -1, -1):
+            points[:, independent] = to[:, independent] - left / _WAY * way
+            points = self.loops.all_closed(points.T, moving, zero=_ZERO).T
+        found = points[np.isfinite(points).all(axis=1)]
+        return found[:, :6] if np.isfinite(points[0]).all() else None
+
+
+def _largest(moves: FloatArray, among: Sequence[int], chosen: list[int], count: int) -> list[int]:
+    """Return the chosen rows of a matrix and as many more as span the largest volume with them."""
+    best, most = list(chosen), -1.0
+    for more in itertools.combinations(among, max(count, 0)):
+        rows = [*chosen, *more]
+        volume = math.sqrt(max(float(np.linalg.det(moves[rows] @ moves[rows].T)), 0.0))
+        if volume > most * (1 + _TIE):
+            best, most = rows, volume
+    return best
+
+
+def _rank(moves: FloatArray) -> int:
+    """Return the number of directions in which coordinates move."""
+    values = np.linalg.svd(moves, compute_uv=False)
+    return int(np.count_nonzero(values > _MOVES))
+
+
+def _rotation(turns: Turns, y: SX) -> SX:
+    """Return the rotation (3, 3) with three coordinates (3, 1) of a chart."""
+    if turns.kind is TurnKind.ROLL_PITCH_YAW:
+        factors = [2 / (1 + y[k] * y[k]) for k in range(3)]
+        about = [turn_about(k, factor - 1, factor * y[k]) for k, factor in enumerate(factors)]
+        return about[2] @ about[1] @ about[0]
+    r = y
+    if turns.kind is TurnKind.AXIS:
+        across = np.linalg.svd(np.array([turns.axis]))[2][1:]
+        r = SX(np.column_stack([turns.axis, *across]).tolist()) @ y
+    cross = ca.skew(r)
+    return SX.eye(3) + 2 / (1 + ca.sumsqr(r)) * (cross + cross @ cross)
