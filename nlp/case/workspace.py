@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from ...models.values import dataclass
 from ..errors import CaseError
 from ..units import Units
 from .checks import check_value
-from .pose import Free, Value, written_value
+from .pose import Free, Value, ends_of, written_value
 
 if TYPE_CHECKING:
     from .toml import TomlValue
@@ -129,6 +129,46 @@ class Workspace:
         elif self.turns.kind is TurnKind.AXIS:
             turns = ("angle", "tilt_1", "tilt_2")
         return (*POSITION, *turns)
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the coordinates with ranges that the robot chooses."""
+        dependent = [each.index for each in self.dependent]
+        return tuple(self.names[k] for k, _ in self._ranged() if k not in dependent)
+
+    def set_words(self, units: Units, digits: Callable[[float], str] = "{:.7g}".format) -> str:
+        """Return the set of poses in words, without dependent coordinates, such as ``roll, pitch in [-5, 5] deg``.
+
+        Args:
+            units: units for people.
+            digits: writes a number.
+        """
+        dependent, groups = [each.index for each in self.dependent], dict[str, list[str]]()
+        is_any = self.turns.kind is TurnKind.ANY_AXIS
+        for k, value in self._ranged():
+            if k in dependent or (is_any and k >= 3):
+                continue
+            dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
+            low, high = (digits(units.shown(each, dimension)) for each in ends_of(value))
+            groups.setdefault(f"in [{low}, {high}] {units.label(dimension)}", []).append(self.names[k])
+        texts = [f"{', '.join(names)} {ends}".rstrip() for ends, names in groups.items()]
+        if is_any:
+            most = max(map(abs, ends_of(self.turns.angles[0])))
+            angle = f"{digits(units.shown(most, Dimension.ANGLE))} {units.label(Dimension.ANGLE)}"
+            own = [self.names[k] for k in range(3, 6) if k not in dependent]
+            texts.append(
+                f"rotation by at most {angle} about any axis"
+                if len(own) == 3
+                else f"rotation with ({', '.join(own)}) of at most {angle}"
+            )
+        return ", ".join(texts)
+
+    def _ranged(self) -> list[tuple[int, Value]]:
+        """Return the coordinates that have ranges, with their indices."""
+        values: list[Value] = [*self.position, *self.turns.angles]
+        if self.turns.kind is TurnKind.ANY_AXIS:
+            values += self.turns.angles * 2
+        return [(k, each) for k, each in enumerate(values) if isinstance(each, Free)]
 
     def by_three_angles(self) -> Workspace:
         """Return the same box with the rotation about one coordinate axis as roll, pitch and yaw.

@@ -19,6 +19,7 @@ from .....models import Dimension, rate_relations
 from ....case.case import Case
 from ....case.limits.constraint import LENGTH
 from ....case.task import Sense
+from ....case.workspace import Workspace
 from ....errors import InputError, UncoveredError
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
@@ -85,12 +86,14 @@ class VerifiedWorkspace:
         claims: what it proves.
         numbers_at: assemblies that the claims about numbers cover, but for those of actuators under loads, which are
             about home's as ranks are; empty for a robot without loops.
+        workspace: the poses, with the dependent coordinates of the robot.
         leaves: number of claims about boxes in it.
         pieces: number of boxes that were evaluated to show them.
     """
 
     claims: tuple[CheckedClaim, ...]
     numbers_at: str
+    workspace: Workspace
     leaves: int
     pieces: int
 
@@ -126,7 +129,7 @@ def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -
             claims.append(checker.check(expected[key], given[key]))
         except ProofError as error:
             raise ProofError(f"{' '.join(key).strip()}: {error}") from None
-    return VerifiedWorkspace(tuple(claims), checker.robot.numbers_at, checker.leaves, checker.pieces)
+    return VerifiedWorkspace(tuple(claims), checker.robot.numbers_at, checker.workspace, checker.leaves, checker.pieces)
 
 
 class _Checker:
@@ -134,7 +137,7 @@ class _Checker:
 
     def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
         stated, premises = workspace_of_case(case), proof.premises
-        workspace = with_dependent(case, stated)
+        self.workspace = workspace = with_dependent(case, stated)
         if not isinstance(premises, Premises):
             raise ProofError("the proof is not about a workspace")
         self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
