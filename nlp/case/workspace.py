@@ -123,7 +123,7 @@ class Workspace:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the six coordinates of a pose: those of a rotation about any axis are parts of its Cayley vector."""
-        turns = TURNS
+        turns: tuple[str, ...] = TURNS
         if self.turns.kind is TurnKind.ANY_AXIS:
             turns = tuple(f"cayley_{axis}" for axis in POSITION)
         elif self.turns.kind is TurnKind.AXIS:

@@ -32,6 +32,7 @@ from ..errors import CaseError
 from ..interruption import is_requested, one_call
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
+from ..proof.statement.dependent import with_dependent
 from ..proof.statement.machine import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import Judgement, judge_workspace
@@ -214,8 +215,9 @@ def with_objective(design: Case, level: float) -> Case:
 
 def _judged(case: Case) -> Judgement:
     """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone."""
-    closed, workspace = closed_form(case.model), workspace_of_case(case)
-    if closed.reaches:
+    closed, workspace = closed_form(case.model), with_dependent(case, workspace_of_case(case))
+    # Poses that the robot cannot take say nothing of the reach of its limbs.
+    if closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)
         found = tuple(prove_extreme(layout, claim, gap=GAP, jobs=1) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):

@@ -12,6 +12,7 @@ import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
+from ....models.instance import RobotInstance
 from ...case.case import Case
 from ...case.limits.clearance import LegClearance
 from ...case.limits.constraint import LENGTH, NUMBER, SQUARED_LENGTH, Reading
@@ -103,14 +104,14 @@ def one_machine_name(claim: str) -> str:
     return f"{claim}, lengths of one machine"
 
 
-def dependent_claims(layout: Layout, workspace: Workspace) -> Iterator[Claim]:
+def dependent_claims(robot: RobotInstance, workspace: Workspace) -> Iterator[Claim]:
     """Yield the smallest and the largest value of each dependent coordinate of the pose, with its stated range.
 
     Args:
-        layout: the case as symbols of one pose of the workspace.
+        robot: at one pose of the workspace.
         workspace: with its dependent coordinates.
     """
-    robot, turns = layout.robots[0], workspace.turns
+    turns = workspace.turns
     stated = [*workspace.position, *turns.angles]
     for k in (each.index for each in workspace.dependent):
         expression, reading = (robot.position[k], LENGTH) if k < 3 else _turn(robot.rotation, turns, k - 3)

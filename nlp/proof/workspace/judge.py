@@ -220,7 +220,7 @@ class _Numbers:
         """Yield the extremes of expressions over all machines."""
         reaches, claims = machines.symbols.claims(self.names, with_objective=self.with_objective)
         prove = partial(machines.extreme, jobs=self.jobs, paper=self.paper)
-        yield from self._proved([*reaches, *dependent_claims(machines.symbols.layout, self.workspace)], prove)
+        yield from self._proved([*reaches, *dependent_claims(machines.symbols.layout.robots[0], self.workspace)], prove)
         if any(each.fails and each.key == REACH for each in self.found):
             yield from (extreme_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
         else:
@@ -251,13 +251,16 @@ class _Numbers:
         """
         if design is None:
             layout = coordinate_layout(self.case, pose_coordinates(self.box))
-            claims = [*dependent_claims(layout, self.workspace), *claims_of(layout, self.names, with_objective=False)]
+            claims = [
+                *dependent_claims(layout.robots[0], self.workspace),
+                *claims_of(layout, self.names, with_objective=False),
+            ]
             yield from (extreme_of(claim, Minimum(reason=self.reason)) for claim in claims)
             return
         alone = Machines(self.case, self.closed, design)
         reaches, claims = alone.symbols.claims(self.names, with_objective=self.with_objective)
         # The range of a dependent coordinate is part of the answer, however wide its limits are.
-        every = [*reaches, *dependent_claims(alone.symbols.layout, self.workspace), *claims]
+        every = [*reaches, *dependent_claims(alone.symbols.layout.robots[0], self.workspace), *claims]
         limited = [claim for claim in (*reaches, *claims) if claim.limit is not None]
         decided = {(each.name, each.sense, each.key): each for each in alone.followed(limited, gap=self.gap)}
         prove = partial(alone.extreme, jobs=self.jobs, paper=self.paper)

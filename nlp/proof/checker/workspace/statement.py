@@ -164,7 +164,7 @@ def _followed(
 ) -> RobotClaims:
     """Return the claims about a robot whose loops are followed."""
     home = "the assembly of home" if is_open else ""
-    reaches, dependent = symbols.claims(())[0], tuple(dependent_claims(symbols.layout, workspace))
+    reaches, dependent = symbols.claims(())[0], tuple(dependent_claims(symbols.layout.robots[0], workspace))
     whole = RobotClaims(legs, symbols.layout, model, symbols.layout, tuple(reaches), home, machines)
     return replace(whole, dependent=dependent, followed=symbols)
 
