@@ -134,7 +134,7 @@ class Workspace:
     def independent(self) -> tuple[str, ...]:
         """Names of the coordinates with ranges that the robot chooses."""
         dependent = [each.index for each in self.dependent]
-        return tuple(self.names[k] for k, _ in self._ranged() if k not in dependent)
+        return tuple(self.names[k] for k, _ in self.ranged if k not in dependent)
 
     def set_words(self, units: Units, digits: Callable[[float], str] = "{:.7g}".format) -> str:
         """Return the set of poses in words, without dependent coordinates, such as ``roll, pitch in [-5, 5] deg``.
@@ -145,7 +145,7 @@ class Workspace:
         """
         dependent, groups = [each.index for each in self.dependent], dict[str, list[str]]()
         is_any = self.turns.kind is TurnKind.ANY_AXIS
-        for k, value in self._ranged():
+        for k, value in self.ranged:
             if k in dependent or (is_any and k >= 3):
                 continue
             dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
@@ -163,8 +163,9 @@ class Workspace:
             )
         return ", ".join(texts)
 
-    def _ranged(self) -> list[tuple[int, Value]]:
-        """Return the coordinates that have ranges, with their indices."""
+    @property
+    def ranged(self) -> list[tuple[int, Value]]:
+        """The coordinates that have ranges, with their indices."""
         values: list[Value] = [*self.position, *self.turns.angles]
         if self.turns.kind is TurnKind.ANY_AXIS:
             values += self.turns.angles * 2

@@ -50,11 +50,16 @@ def _dependent_lines(result: WorkspaceResult) -> Iterator[Line]:
     if result.poses is None:
         return
     yield Line(result.poses, label="poses")
-    for name in result.dependent or ():
-        ends = {each.sense: each for each in result.extremes if each.name == name}
+    yield from following_lines(result.dependent or (), result.extremes)
+
+
+def following_lines(names: Sequence[str], claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
+    """Yield the proved range of each dependent coordinate of the pose."""
+    for name in names:
+        ends = {each.sense: each for each in claims if each.name == name}
         bounds = [ends[sense].bound if sense in ends else None for sense in (Sense.MIN, Sense.MAX)]
         low, high = ("unknown" if each is None else number(each) for each in bounds)
-        unit = next((each.unit for each in ends.values()), "")
+        unit = next((each.unit or "" for each in ends.values()), "")
         words = f"{name} {low} to {high} {unit}".rstrip() if None not in bounds else f"{name}, no range is proved"
         yield Line(words, label="follows")
 

@@ -39,13 +39,13 @@ from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..case.limits.objective import ObjectiveLimit
 from ..case.task import Sense
 from ..case.workspace import Workspace
+from ..evidence.dependent import with_dependent
 from ..path.path import SymbolicPose
 from ..program.actuators import level_constraints
 from ..program.epigraph import level_constraint
 from ..program.nlp import Nlp
 from ..program.places import Scalar
 from ..proof.statement.claims import Claim, dependent_claims
-from ..proof.statement.dependent import with_dependent
 from ..proof.statement.machine import workspace_of_case
 from ..proof.statement.tolerance import BuiltModel, built_model
 from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of

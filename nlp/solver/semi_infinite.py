@@ -29,10 +29,10 @@ from ..case.limits.objective import ObjectiveLimit
 from ..case.pose import Free
 from ..case.task import Method, Sense
 from ..errors import CaseError
+from ..evidence.dependent import with_dependent
 from ..interruption import is_requested, one_call
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
-from ..proof.statement.dependent import with_dependent
 from ..proof.statement.machine import JointErrors, workspace_of_case
 from ..proof.statement.posed_layout import reach_claims
 from ..proof.workspace.judge import Judgement, judge_workspace

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from ....models import FloatArray, Model, Substitution, frozen_array
+from ....models import FloatArray, Model, frozen_array
 from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import Workspace
@@ -61,23 +60,6 @@ def workspace_of_case(case: Case) -> Workspace:
     case.fixed_parameters("a workspace is judged with fixed dimensions")
     case.require_motion()
     return case.workspace
-
-
-def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
-    """Return the largest distance between two points of a robot's drawing, its unknown joints at home; 1 of a point.
-
-    Args:
-        case: with fixed dimensions.
-        position: (3,) of the platform, not rotated; the model's home for typical dimensions if left out.
-    """
-    model = case.model
-    parts = [value for name in case.parameters for value in case.components(name)]
-    places = ca.horzcat(*[point.position for point in model.scene.points], ca.SX(model.pose.position))
-    function = ca.Function("points", Substitution.identity(model).all, [ca.densify(places)])
-    at = model.home if position is None else position
-    points = np.array(function(np.array(parts), np.zeros(len(model.unknowns)), np.eye(3), np.array(at))).T
-    size = float(np.linalg.norm(points[:, None] - points[None], axis=2).max())
-    return size if 0 < size < np.inf else 1.0
 
 
 def check_leg_error(case: Case, leg_error: float) -> None:

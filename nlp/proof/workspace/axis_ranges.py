@@ -22,12 +22,13 @@ from ...case.case import Case
 from ...case.limits.legs import Actuator
 from ...case.pose import Free
 from ...errors import InputError, nearest
+from ...evidence.dependent import robot_size
 from ...interruption import is_requested, one_call, one_search, why_stopped, within
 from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
 from ..statement.claims import CONSTRAINTS, REGULAR
-from ..statement.machine import robot_size, workspace_of_case
+from ..statement.machine import workspace_of_case
 from .alone import AXES, box_about, coordinates_alone
 from .edge_samples import EdgeSamples
 from .judge import Judgement, judge_workspace
@@ -135,7 +136,7 @@ class AxisRanges:
         stops: claims that are not proved at the pose itself; the ranges are empty where there are any.
         axes: ranges of the independent coordinates alone.
         pairs: of each two of them.
-        others: independent coordinates that do not move alone, as other numbers of the pose follow from them.
+        others: coordinates that follow from these, and move with them.
         reason: why the work ended before all axes and pairs were judged; else empty.
     """
 

@@ -11,10 +11,10 @@ from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.task import Sense
 from ...case.workspace import Workspace
+from ...evidence.dependent import with_dependent
 from ...interruption import is_requested, one_call, within
 from ..enclosure.engine import kernel
 from ..statement.claims import REACH, SPECTRAL, Claim, claims_of, dependent_claims
-from ..statement.dependent import with_dependent
 from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ..statement.tolerance import Directions, coordinate_layout, length_of_one_machine

@@ -21,9 +21,9 @@ from ....case.limits.constraint import LENGTH
 from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....errors import InputError, UncoveredError
+from ....evidence.dependent import with_dependent
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
-from ...statement.dependent import with_dependent
 from ...statement.machine import Legs, check_leg_error, workspace_of_case
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_machine, second_order_name

@@ -236,7 +236,13 @@ def _parts_of(case: Case, claim: Claim) -> list[_Part]:
 
 
 def path_twist(problem: Problem) -> SX:
-    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its numbers in the motion of a path."""
+    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its numbers in the motion of a path.
+
+    Raises:
+        NotJudgedError: some follow from others.
+    """
+    if problem.box.dependent:
+        raise NotJudgedError("the platform's twist along the path has dependent components")
     rates = SX(6, 1)
     rates[list(problem.free)] = problem.z[list(problem.rates), :]
     turn = problem.box.symbols(problem.z)[3:]

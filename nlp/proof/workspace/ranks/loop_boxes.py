@@ -342,13 +342,13 @@ def _followed(problem: Problem, cover: PathCover) -> FloatArray:
 
     The searches of one path share them.
     """
-    near, free, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.free), problem.dependent
+    near, D, stated = np.repeat(problem.start[None], len(cover.pieces), axis=0), problem.dependent, problem.stated
     z = problem.start.copy()
-    points = [cover.points(cover.pieces, part)[:, free] for part in (0.5, 1.0)]
+    points = [cover.points(cover.pieces, part)[:, [problem.free[j] for j in stated]] for part in (0.5, 1.0)]
     for k, both in enumerate(zip(*points, strict=True)):
         for point in both:
             moved = z.copy()
-            moved[: len(free)] = point
+            moved[stated] = point
             moved = problem.loops.all_closed(moved[:, None], D)[:, 0]
             z = moved if np.isfinite(moved).all() else z
             near[k] = z if point is both[0] else near[k]

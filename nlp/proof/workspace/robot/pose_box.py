@@ -22,10 +22,10 @@ from casadi import SX
 
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from .....models.arrays import values_at
+from .....models.rotation import turn_about
 from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ....path.orientation import matrices_from_quaternions
-from ...statement.posed_layout import turn_about
 from ...statement.tolerance import PoseCoordinates
 
 if TYPE_CHECKING:

@@ -37,7 +37,7 @@ from .....models.member import scaled_twists
 from ....case.case import Case
 from ....case.pose import Free
 from ....evidence.closed_loops import Loops
-from ...statement.dependent import loop_system
+from ....evidence.dependent import loop_system
 from .pose_box import PoseBox, polynomial_rotation, rotation_of
 
 

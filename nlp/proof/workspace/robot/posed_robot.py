@@ -68,7 +68,7 @@ class Problem:
         design: the design alone, of all machines.
         cover: of the path that is meant; None for the whole box.
         rates: indices of the coordinates that are rates, by seconds, of the pose's numbers in the path's motion: of
-            positions and angles. There is one for each free number, or none.
+            positions and angles. There is one for each free number that is independent, or none.
         resting: the design without rates, of a design with them.
     """
 
@@ -97,7 +97,12 @@ class Problem:
     @property
     def has_following(self) -> bool:
         """Whether numbers of the pose follow from others, so that each machine has its own."""
-        return any(k < len(self.free) for k in self.dependent)
+        return bool(self.box.dependent)
+
+    @property
+    def stated(self) -> list[int]:
+        """Indices of the coordinates that are independent ones of the pose."""
+        return [j for j, k in enumerate(self.free) if k not in self.box.dependent]
 
     @property
     def length(self) -> float:
@@ -133,14 +138,14 @@ class Problem:
     @property
     def of_path(self) -> list[int]:
         """Indices of the coordinates that a place of a path determines."""
-        return [*range(len(self.free)), *self.rates]
+        return [*self.stated, *self.rates]
 
     def path_boxes(self, cover: PathCover, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the ends (B, c) of these coordinates over pieces (B, 3) of a path."""
-        free = list(self.free)
-        low, high = (each[:, free] for each in cover.boxes(pieces))
+        chosen = [self.free[j] for j in self.stated]
+        low, high = (each[:, chosen] for each in cover.boxes(pieces))
         if self.rates:
-            slow, fast = (each[:, free] for each in cover.rates(pieces))
+            slow, fast = (each[:, chosen] for each in cover.rates(pieces))
             low, high = np.hstack([low, slow]), np.hstack([high, fast])
         return low, high
 

@@ -22,8 +22,8 @@ from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind, Workspace
 from ....errors import CaseError, UncoveredError
+from ....evidence.dependent import with_dependent
 from ...boxes.search import Boxes, Order, Search, Verdicts, bisected, joined, some
-from ...statement.dependent import with_dependent
 from ...statement.machine import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
 from ..ranks.rank_rule import RankTest, is_polynomial

@@ -19,15 +19,14 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray, Model, Substitution
-from ....models.instance import sizes_at
-from ...case.case import Case
-from ...case.pose import Free, Value, ends_of
-from ...case.workspace import DependentCoordinate, TurnKind, Turns, Workspace
-from ...errors import CaseError
-from ...evidence.closed_loops import Loops, closed_from_home
-from .machine import robot_size
-from .posed_layout import turn_about
+from ...models import FloatArray, Model, Substitution
+from ...models.instance import sizes_at
+from ...models.rotation import matrix_from_cayley, turn_about
+from ..case.case import Case
+from ..case.pose import Free, Value, ends_of
+from ..case.workspace import DependentCoordinate, TurnKind, Turns, Workspace
+from ..errors import CaseError
+from .closed_loops import Loops, closed_from_home
 
 #: Singular values below this part of the largest are zero, and parts of a size by which a constant is off by rounding.
 _ZERO, _STILL = 1e-9, 1e-9
@@ -79,6 +78,22 @@ def loop_system(model: Model, given: Substitution, values: Sequence[float]) -> L
 
 
 def with_dependent(case: Case, workspace: Workspace) -> Workspace:
+    """Return a workspace as :func:`dependent_of` does, or refuse one in which the robot chooses nothing.
+
+    Raises:
+        CaseError: the robot can choose no coordinate that has a range, or as :func:`dependent_of`.
+    """
+    found = dependent_of(case, workspace)
+    if not found.independent and found.dependent:
+        places = [each.index for each in found.dependent]
+        ranged = " and ".join(found.names[k] for k, _ in found.ranged)
+        chosen = ", ".join(found.names[k] for k in range(6) if k not in places)
+        fault = f"this robot cannot choose {ranged}: give a range to at least one of {chosen}"
+        raise CaseError("workspace", fault, source=case.source)
+    return found
+
+
+def dependent_of(case: Case, workspace: Workspace) -> Workspace:
     """Return a workspace with the coordinates that follow from the others over it.
 
     Dependent coordinates of a workspace that has some already are kept, and their working ranges computed anew. Where
@@ -89,39 +104,64 @@ def with_dependent(case: Case, workspace: Workspace) -> Workspace:
         workspace: a box of poses.
 
     Raises:
-        CaseError: the robot can choose no coordinate that has a range, or a rotation about one axis is stated, and the
-            platform turns about others too.
+        CaseError: a rotation about one axis is stated, and the platform turns about others too.
     """
-    model = case.model
-    if model.generic is None or not 0 < model.generic.constraints <= 6 or not model.closure:
+    if not _may_depend(case.model):
         return workspace
     chart = _Chart(case, workspace)
     middle = chart.closed_middle()
     if middle is None:
         return workspace
     before = [each.index for each in workspace.dependent]
-    independent = (
-        [k for k in range(6) if k not in before] if before else chart.independent(middle, 6 - model.generic.constraints)
-    )
-    if not any(chart.half[k] > 0 for k in independent):
-        ranged = " and ".join(workspace.names[k] for k in range(6) if chart.half[k] > 0)
-        chosen = ", ".join(workspace.names[k] for k in independent)
-        fault = f"{ranged} cannot be chosen for this robot: give a range to at least one of {chosen}"
-        raise CaseError("workspace", fault, source=case.source)
+    independent = [k for k in range(6) if k not in before] if before else chart.independent(middle)
     points = chart.points(middle, independent)
     if points is None:
         return workspace
     fixed = np.abs(points - chart.middle[:6]) <= _STILL * chart.size[:6]
     found = [
-        k for k in range(6) if k not in independent and (k in before or chart.half[k] > 0 or not fixed[:, k].all())
+        k for k in range(6) if k not in independent and (k in before or k in chart.ranged or not fixed[:, k].all())
     ]
     if workspace.turns.kind is TurnKind.AXIS and any(k > 3 for k in found):
-        return with_dependent(case, workspace.by_three_angles())
+        return dependent_of(case, workspace.by_three_angles())
     low, high = points.min(axis=0), points.max(axis=0)
     room = _WIDER * (high - low) + _LEAST * chart.size[:6]
     ends = chart.ends(low - room), chart.ends(high + room)
     dependent = tuple(DependentCoordinate(k, float(ends[0][k]), float(ends[1][k])) for k in found)
     return replace(workspace, dependent=dependent)
+
+
+def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
+    """Return the largest distance between two points of a robot's drawing, its unknown joints at home; 1 of a point.
+
+    Args:
+        case: with fixed dimensions.
+        position: (3,) of the platform, not rotated; the model's home for typical dimensions if left out.
+    """
+    model = case.model
+    parts = [value for name in case.parameters for value in case.components(name)]
+    places = ca.horzcat(*[point.position for point in model.scene.points], SX(model.pose.position))
+    function = ca.Function("points", Substitution.identity(model).all, [ca.densify(places)])
+    at = model.home if position is None else position
+    points = np.array(function(np.array(parts), np.zeros(len(model.unknowns)), np.eye(3), np.array(at))).T
+    size = float(np.linalg.norm(points[:, None] - points[None], axis=2).max())
+    return size if 0 < size < np.inf else 1.0
+
+
+def independent_coordinates(case: Case, workspace: Workspace) -> list[int] | None:
+    """Return the indices of the coordinates of the pose that the robot chooses over a workspace.
+
+    They are all six for a robot whose poses are all closed; None where the loops do not close in the middle.
+    """
+    if not _may_depend(case.model):
+        return list(range(6))
+    chart = _Chart(case, workspace)
+    middle = chart.closed_middle()
+    return None if middle is None else chart.independent(middle)
+
+
+def _may_depend(model: Model) -> bool:
+    """Return whether a robot has fewer than six freedoms, and loops that say so."""
+    return model.generic is not None and model.generic.constraints > 0 and bool(model.closure)
 
 
 class _Chart:
@@ -133,6 +173,7 @@ class _Chart:
     Attributes:
         middle: (6 + u,) of the workspace, with unknowns of 0.
         half: (6,) half ranges; 0 for fixed coordinates.
+        ranged: indices of the coordinates that have ranges, wider than rounding.
         size: (6 + u,) by which coordinates are comparable.
     """
 
@@ -158,6 +199,9 @@ class _Chart:
         self.middle = np.concatenate([ends.mean(axis=1), np.zeros(u.numel())])
         length = robot_size(case, self.middle[:3].tolist())
         self.size = np.concatenate([[length] * 3, np.ones(3), system.sizes])
+        self.ranged: list[int] = np.flatnonzero(self.half > _STILL * self.size[:6]).tolist()
+        constraints = 0 if model.generic is None else model.generic.constraints
+        self._freedoms = 6 - constraints
         self.loops = Loops(ca.vertcat(y, u), system.equations, system.every, system.signs, self.size)
 
     def ends(self, y: FloatArray) -> FloatArray:
@@ -168,17 +212,17 @@ class _Chart:
         """Return closed loops (6 + u,) in the home assembly mode near the middle of the workspace; None without."""
         return closed_from_home(self.loops, self.middle, 6)
 
-    def independent(self, z: FloatArray, freedoms: int) -> list[int]:
+    def independent(self, z: FloatArray) -> list[int]:
         """Return the indices of as many coordinates of the pose as the robot has freedoms at a closed point."""
         slopes = self.loops.slopes(z[:, None])[0] * self.size
         _, values, right = np.linalg.svd(slopes)
         rank = int(np.count_nonzero(values > _ZERO * values.max(initial=0.0)))
         moves = right[rank:, :6].T
-        ranged = [k for k in range(6) if self.half[k] > 0]
-        scale = np.where(self.half > 0, self.size[:6] / np.where(self.half > 0, self.half, 1.0), 1.0)
-        chosen = _largest(moves * scale[:, None], ranged, [], min(_rank(moves[ranged]), freedoms))
+        ranged, scale = self.ranged, np.ones(6)
+        scale[ranged] = self.size[ranged] / self.half[ranged]
+        chosen = _largest(moves * scale[:, None], ranged, [], min(_rank(moves[ranged]), self._freedoms))
         others = [k for k in range(6) if k not in ranged]
-        return sorted(_largest(moves, others, chosen, min(freedoms, _rank(moves)) - len(chosen)))
+        return sorted(_largest(moves, others, chosen, min(self._freedoms, _rank(moves)) - len(chosen)))
 
     def points(self, z: FloatArray, independent: list[int]) -> FloatArray | None:
         """Return the pose (P, 6) of closed loops at the middle, corners and random points of the workspace.
@@ -188,10 +232,10 @@ class _Chart:
             independent: indices of the coordinates that the robot chooses.
         """
         moving = [k for k in range(len(z)) if k not in independent]
-        ranged = [k for k in independent if self.half[k] > 0]
+        ranged = [k for k in independent if k in self.ranged]
         sides = np.array(list(itertools.islice(itertools.product((-1, 1), repeat=len(ranged)), _MOST_CORNERS)))
         inside = np.random.default_rng(_SEED).uniform(-1, 1, (_POSES, len(ranged)))
-        parts = np.vstack([np.zeros((1, len(ranged))), sides.reshape(-1, len(ranged)), inside])
+        parts = np.vstack([np.zeros((1, len(ranged))), sides, inside])
         to = np.tile(self.middle, (len(parts), 1))
         to[:, ranged] += parts * self.half[ranged]
         points, way = np.tile(z, (len(parts), 1)), (to - z)[:, independent]
@@ -215,7 +259,7 @@ def _largest(moves: FloatArray, among: Sequence[int], chosen: list[int], count: 
 
 def _rank(moves: FloatArray) -> int:
     """Return the number of directions in which coordinates move."""
-    values = np.linalg.svd(moves, compute_uv=False)
+    values = np.linalg.svd(moves, compute_uv=False) if len(moves) else np.zeros(0)
     return int(np.count_nonzero(values > _MOVES))
 
 
@@ -229,5 +273,4 @@ def _rotation(turns: Turns, y: SX) -> SX:
     if turns.kind is TurnKind.AXIS:
         across = np.linalg.svd(np.array([turns.axis]))[2][1:]
         r = SX(np.column_stack([turns.axis, *across]).tolist()) @ y
-    cross = ca.skew(r)
-    return SX.eye(3) + 2 / (1 + ca.sumsqr(r)) * (cross + cross @ cross)
+    return matrix_from_cayley(r)
