@@ -13,13 +13,14 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ...models import FloatArray, Model, Substitution
+from ...models.arrays import values_at
 from ...models.instance import sizes_at
 from ...models.rotation import matrix_from_cayley, turn_about
 from ..case.case import Case
@@ -27,6 +28,9 @@ from ..case.pose import Free, Value, ends_of
 from ..case.workspace import DependentCoordinate, TurnKind, Turns, Workspace
 from ..errors import CaseError
 from .closed_loops import Loops, closed_from_home
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Singular values below this part of the largest are zero, and parts of a size by which a constant is off by rounding.
 _ZERO, _STILL = 1e-9, 1e-9
@@ -37,8 +41,9 @@ _POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
 #: Part of the computed range of a dependent coordinate by which its working range is wider on each side, and parts of
 #: the robot's size, or angle, that it is wider by at least.
 _WIDER, _LEAST = 0.5, 1e-3
-#: Volumes that differ by less than this part are equal: the first is taken.
-_TIE = 1e-9
+#: Volumes that differ by less than this part are equal: the first is taken. Of fixed coordinates those of the position
+#: come first, and are taken where they have this part of the largest volume.
+_TIE, _ENOUGH = 1e-9, 0.2
 
 
 class LoopSystem(NamedTuple):
@@ -159,6 +164,62 @@ def independent_coordinates(case: Case, workspace: Workspace) -> list[int] | Non
     return None if middle is None else chart.independent(middle)
 
 
+class CompletedPoses(NamedTuple):
+    """Poses that a robot can take.
+
+    Attributes:
+        positions: (N, 3) origins of the platform frame, length.
+        rotations: (N, 3, 3) platform to world coordinates.
+        dependent: names of the coordinates that follow from the others, and may differ from those given.
+    """
+
+    positions: FloatArray
+    rotations: FloatArray
+    dependent: tuple[str, ...]
+
+
+def completed(
+    case: Case, positions: FloatArray, rotations: FloatArray, which: NDArray[np.bool_]
+) -> CompletedPoses | None:
+    """Return poses with the dependent coordinates as they follow from the others; None where all are independent.
+
+    Args:
+        case: with fixed dimensions.
+        positions: (N, 3) length.
+        rotations: (N, 3, 3).
+        which: (N,) the poses whose dependent coordinates are computed; one that does not close is left as it is.
+    """
+    if not _may_depend(case.model) or not which.any():
+        return None
+    angles = np.array([_angles(each) for each in rotations])
+    y = np.hstack([positions, angles])
+    lower, upper = y[which].min(axis=0), y[which].max(axis=0)
+    values: list[Value] = [Free(a, b) if b > a else a for a, b in zip(lower.tolist(), upper.tolist(), strict=True)]
+    workspace = Workspace(values[:3], Turns(TurnKind.ROLL_PITCH_YAW, tuple(values[3:])))
+    chart = _Chart(case, workspace)
+    middle = chart.closed_middle()
+    if middle is None:
+        return None
+    chosen = chart.independent(middle)
+    to = np.hstack([y[which, :3], np.tan(0.5 * y[which, 3:])])
+    found = chart.reached(middle, chosen, to)
+    kept = np.isfinite(found).all(axis=1)
+    y = np.hstack([positions, np.tan(0.5 * angles)])
+    rows = np.flatnonzero(which)[kept]
+    y[rows] = found[kept]
+    turn = SX.sym("turn", 3)
+    function = ca.Function("rotation", [turn], [ca.densify(_rotation(workspace.turns, turn))])
+    rotations = rotations.copy()
+    rotations[rows] = values_at(function, y[rows, 3:])[0]
+    moved = np.abs(found[kept] - to[kept]).max(axis=0, initial=0.0) > _STILL * chart.size[:6]
+    return CompletedPoses(y[:, :3], rotations, tuple(workspace.names[k] for k in range(6) if moved[k]))
+
+
+def _angles(R: FloatArray) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw of a rotation (3, 3), radians."""
+    return math.atan2(R[2, 1], R[2, 2]), math.asin(min(max(-R[2, 0], -1.0), 1.0)), math.atan2(R[1, 0], R[0, 0])
+
+
 def _may_depend(model: Model) -> bool:
     """Return whether a robot has fewer than six freedoms, and loops that say so."""
     return model.generic is not None and model.generic.constraints > 0 and bool(model.closure)
@@ -222,7 +283,8 @@ class _Chart:
         scale[ranged] = self.size[ranged] / self.half[ranged]
         chosen = _largest(moves * scale[:, None], ranged, [], min(_rank(moves[ranged]), self._freedoms))
         others = [k for k in range(6) if k not in ranged]
-        return sorted(_largest(moves, others, chosen, min(self._freedoms, _rank(moves)) - len(chosen)))
+        count = min(self._freedoms, _rank(moves)) - len(chosen)
+        return sorted(_largest(moves, others, chosen, count, enough=_ENOUGH))
 
     def points(self, z: FloatArray, independent: list[int]) -> FloatArray | None:
         """Return the pose (P, 6) of closed loops at the middle, corners and random points of the workspace.
@@ -231,30 +293,43 @@ class _Chart:
             z: a closed point near the middle.
             independent: indices of the coordinates that the robot chooses.
         """
-        moving = [k for k in range(len(z)) if k not in independent]
         ranged = [k for k in independent if k in self.ranged]
         sides = np.array(list(itertools.islice(itertools.product((-1, 1), repeat=len(ranged)), _MOST_CORNERS)))
         inside = np.random.default_rng(_SEED).uniform(-1, 1, (_POSES, len(ranged)))
         parts = np.vstack([np.zeros((1, len(ranged))), sides, inside])
         to = np.tile(self.middle, (len(parts), 1))
         to[:, ranged] += parts * self.half[ranged]
-        points, way = np.tile(z, (len(parts), 1)), (to - z)[:, independent]
+        found = self.reached(z, independent, to)
+        return found[np.isfinite(found).all(axis=1)] if np.isfinite(found[0]).all() else None
+
+    def reached(self, z: FloatArray, independent: list[int], to: FloatArray) -> FloatArray:
+        """Return the pose (P, 6) of closed loops on the way from a closed point to others; NaN where they end.
+
+        Args:
+            z: the closed point.
+            independent: indices of the coordinates that the robot chooses.
+            to: (P, 6 or more) of which these are reached.
+        """
+        moving = [k for k in range(len(z)) if k not in independent]
+        points, way = np.tile(z, (len(to), 1)), (to[:, independent] - z[independent])
         for left in range(_WAY - 1, -1, -1):
             points[:, independent] = to[:, independent] - left / _WAY * way
             points = self.loops.all_closed(points.T, moving, zero=_ZERO).T
-        found = points[np.isfinite(points).all(axis=1)]
-        return found[:, :6] if np.isfinite(points[0]).all() else None
+        points[~np.isfinite(points).all(axis=1)] = np.nan
+        return points[:, :6]
 
 
-def _largest(moves: FloatArray, among: Sequence[int], chosen: list[int], count: int) -> list[int]:
-    """Return the chosen rows of a matrix and as many more as span the largest volume with them."""
-    best, most = list(chosen), -1.0
-    for more in itertools.combinations(among, max(count, 0)):
-        rows = [*chosen, *more]
-        volume = math.sqrt(max(float(np.linalg.det(moves[rows] @ moves[rows].T)), 0.0))
-        if volume > most * (1 + _TIE):
-            best, most = rows, volume
-    return best
+def _largest(
+    moves: FloatArray, among: Sequence[int], chosen: list[int], count: int, enough: float = 1 - _TIE
+) -> list[int]:
+    """Return the chosen rows of a matrix and as many more as span the largest volume with them.
+
+    Of several the first is taken that has enough of it, as a part.
+    """
+    every = [[*chosen, *more] for more in itertools.combinations(among, max(count, 0))]
+    squares = [max(float(np.linalg.det(moves[rows] @ moves[rows].T)), 0.0) for rows in every]
+    least = enough * enough * max(squares)
+    return next(rows for rows, square in zip(every, squares, strict=True) if square >= least)
 
 
 def _rank(moves: FloatArray) -> int:

@@ -168,7 +168,7 @@ def judge_path(
         closed = closed_form(case.model)
         try:
             box, workspace = _with_dependent(case, box, workspace)
-            case = replace(case, workspace=workspace)
+            stated, case = replace(stated, workspace=workspace), replace(case, workspace=workspace)
             design = _design(case, closed, box, cover)
             machines = Machines(case, closed, design)
         except NotJudgedError as error:
