@@ -13,7 +13,6 @@ from ..checker.proof_file import ProofClaim
 from ..checker.tree import Node
 from ..statement.claims import Claim
 from ..statement.tolerance import Directions
-from .numbers.bound_search import Minimum
 from .verdict import slack_of
 
 #: Name and sense of a claim.
@@ -59,11 +58,10 @@ class PaperRecord:
         if is_bounded and math.isfinite(found.bound) and sign * found.bound <= most:
             self._keep(claim, found.nlp, -found.nlp.sign * found.bound, tree.tree(with_open=True))
 
-    def followed(self, claim: Claim, found: Minimum, tree: TreeRecord) -> None:
-        """Record a search of boxes in which the loops are followed, of a number, or of minus it for a largest one."""
+    def followed(self, claim: Claim, bound: float, reached: float, tree: TreeRecord) -> None:
+        """Record a search of boxes in which the loops are followed: the bound of a number, and its best value known."""
         sign, key = claim.sense.sign, (claim.name, claim.sense.value)
-        bound, reached = -sign * found.bound, -sign * found.value
-        if found.reason or not math.isfinite(bound):
+        if not math.isfinite(bound):
             return
         # Forms of first order need smaller boxes for the same bound.
         room = _ROOM * abs(bound - reached) if math.isfinite(reached) else 0.0

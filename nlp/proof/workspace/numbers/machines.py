@@ -224,8 +224,9 @@ class Machines:
         goals = [goal_of(claim, gap * sizes.get(claim.reading, 0.0), gap, is_enough=is_enough) for claim in claims]
         recorder = None if paper is None else TreeRecord()
         every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals, recorder)
-        if paper is not None and recorder is not None:
-            paper.followed(claims[0], every[0], recorder)
+        if paper is not None and recorder is not None and not every[0].reason:
+            sign = -claims[0].sense.sign
+            paper.followed(claims[0], sign * every[0].bound, sign * every[0].value, recorder)
         for claim, found in zip(claims, every, strict=True):
             is_known = math.isfinite(found.value)
             pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None
