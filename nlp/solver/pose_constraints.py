@@ -39,7 +39,6 @@ from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..case.limits.objective import ObjectiveLimit
 from ..case.task import Sense
 from ..case.workspace import Workspace
-from ..evidence.dependent import with_dependent
 from ..path.path import SymbolicPose
 from ..program.actuators import level_constraints
 from ..program.epigraph import level_constraint
@@ -211,7 +210,7 @@ class PoseConstraints:
         first = [each for each in fresh if each.name.startswith(REACH)]
         if not fresh:
             return []
-        self._workspace = with_dependent(design, workspace_of_case(design))
+        self._workspace = workspace_of_case(design)
         problem = _problem(design, self._workspace)
         if problem is None:
             return []

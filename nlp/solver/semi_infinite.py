@@ -29,7 +29,6 @@ from ..case.limits.objective import ObjectiveLimit
 from ..case.pose import Free
 from ..case.task import Method, Sense
 from ..errors import CaseError
-from ..evidence.dependent import with_dependent
 from ..interruption import is_requested, one_call
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
@@ -215,7 +214,7 @@ def with_objective(design: Case, level: float) -> Case:
 
 def _judged(case: Case) -> Judgement:
     """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone."""
-    closed, workspace = closed_form(case.model), with_dependent(case, workspace_of_case(case))
+    closed, workspace = closed_form(case.model), workspace_of_case(case)
     # Poses that the robot cannot take say nothing of the reach of its limbs.
     if closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)

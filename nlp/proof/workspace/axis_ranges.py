@@ -28,7 +28,6 @@ from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
 from ..statement.claims import CONSTRAINTS, REGULAR
-from ..statement.machine import workspace_of_case
 from .alone import AXES, box_about, coordinates_alone
 from .edge_samples import EdgeSamples
 from .judge import Judgement, judge_workspace
@@ -199,7 +198,8 @@ def axis_ranges(
     _check(here, axes)
     # The workspace says nothing here, but a judged machine has one.
     case = replace(case, workspace=box_about(here, {0: (here[0] - 1.0, here[0] + 1.0)}))
-    workspace_of_case(case)
+    case.fixed_parameters("a range is judged with fixed dimensions")
+    case.require_motion()
     most = (robot_size(case, here[:3].tolist()), LARGEST_ANGLE) if most is None else most
     if not all(0 < each < math.inf for each in most):
         raise InputError("the largest length and angle to move by must be positive and finite")

@@ -130,7 +130,7 @@ def judge_workspace(
     own = workspace_of_case(case)
     kernel()  # before any work where it is missing
     check_leg_error(case, leg_error)
-    workspace = with_dependent(case, own if workspace is None else workspace)
+    workspace = own if workspace is None else with_dependent(case, workspace)
     with within(time_limit, _PART):
         whole = (case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
         numbers = _Numbers(*whole, at_once=until_fault)

@@ -21,7 +21,6 @@ from ....case.limits.constraint import LENGTH
 from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....errors import InputError, UncoveredError
-from ....evidence.dependent import with_dependent
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
 from ...statement.machine import Legs, check_leg_error, workspace_of_case
@@ -136,12 +135,12 @@ class _Checker:
     """A check of claims one after the other; later ones use the bounds of earlier ones."""
 
     def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
-        stated, premises = workspace_of_case(case), proof.premises
-        self.workspace = workspace = with_dependent(case, stated)
+        self.workspace = workspace = workspace_of_case(case)
+        premises = proof.premises
         if not isinstance(premises, Premises):
             raise ProofError("the proof is not about a workspace")
         self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
-        hold_premises(case, stated, robot.legs, leg_error, premises)
+        hold_premises(case, workspace, robot.legs, leg_error, premises)
         self._case, self._root, self._tolerance = case, pose_root(workspace), case.joint_centre_tolerance or 0.0
         self._given = {(each.name, each.sense): each for each in proof.claims}
         self._firsts = {

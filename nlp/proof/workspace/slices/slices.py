@@ -22,7 +22,6 @@ from ....case.case import Case
 from ....case.limits.legs import Actuator
 from ....case.workspace import TurnKind, Workspace
 from ....errors import CaseError, UncoveredError
-from ....evidence.dependent import with_dependent
 from ...boxes.search import Boxes, Order, Search, Verdicts, bisected, joined, some
 from ...statement.machine import workspace_of_case
 from ..ranks.loop_boxes import Examiner, Followed, LoopBoxes, LoopRule, loop_boxes_of, one_assembly
@@ -100,7 +99,7 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
             robot whose loops are not closed in the middle of the workspace.
     """
     case = replace(case, joint_centre_tolerance=None)
-    workspace = with_dependent(case, workspace_of_case(case))
+    workspace = workspace_of_case(case)
     # A slice shows the square around the ball of rotations.
     wide = replace(pose_box(scaled(workspace, min(_WIDER, largest_factor(workspace)))), ball=np.inf)
     robot = _Robot(case, workspace)
