@@ -90,9 +90,8 @@ def with_dependent(case: Case, workspace: Workspace) -> Workspace:
     """
     found = dependent_of(case, workspace)
     if not found.independent and found.dependent:
-        places = [each.index for each in found.dependent]
         ranged = " and ".join(found.names[k] for k, _ in found.ranged)
-        chosen = ", ".join(found.names[k] for k in range(6) if k not in places)
+        chosen = ", ".join(found.names[k] for k in independent_coordinates(case, found) or ())
         fault = f"this robot cannot choose {ranged}: give a range to at least one of {chosen}"
         raise CaseError("workspace", fault, source=case.source)
     return found
@@ -202,8 +201,11 @@ def completed(
         return None
     chosen = chart.independent(middle)
     to = np.hstack([y[which, :3], np.tan(0.5 * y[which, 3:])])
-    found = chart.reached(middle, chosen, to)
-    kept = np.isfinite(found).all(axis=1)
+    closed = chart.reached(middle, chosen, to)
+    found, kept = closed[:, :6], np.isfinite(closed).all(axis=1)
+    # A coordinate that never changes, such as the height of a planar robot, is wrong where it is given otherwise.
+    off = np.abs(found - to) > _STILL * chart.size[:6]
+    kept &= ~(off & chart.is_still(closed)).any(axis=1)
     y = np.hstack([positions, np.tan(0.5 * angles)])
     rows = np.flatnonzero(which)[kept]
     y[rows] = found[kept]
@@ -275,10 +277,7 @@ class _Chart:
 
     def independent(self, z: FloatArray) -> list[int]:
         """Return the indices of as many coordinates of the pose as the robot has freedoms at a closed point."""
-        slopes = self.loops.slopes(z[:, None])[0] * self.size
-        _, values, right = np.linalg.svd(slopes)
-        rank = int(np.count_nonzero(values > _ZERO * values.max(initial=0.0)))
-        moves = right[rank:, :6].T
+        moves = self._moves(z)
         ranged, scale = self.ranged, np.ones(6)
         scale[ranged] = self.size[ranged] / self.half[ranged]
         chosen = _largest(moves * scale[:, None], ranged, [], min(_rank(moves[ranged]), self._freedoms))
@@ -299,11 +298,11 @@ class _Chart:
         parts = np.vstack([np.zeros((1, len(ranged))), sides, inside])
         to = np.tile(self.middle, (len(parts), 1))
         to[:, ranged] += parts * self.half[ranged]
-        found = self.reached(z, independent, to)
+        found = self.reached(z, independent, to)[:, :6]
         return found[np.isfinite(found).all(axis=1)] if np.isfinite(found[0]).all() else None
 
     def reached(self, z: FloatArray, independent: list[int], to: FloatArray) -> FloatArray:
-        """Return the pose (P, 6) of closed loops on the way from a closed point to others; NaN where they end.
+        """Return closed loops (P, 6 + u) on the way from a closed point to others; NaN where they end.
 
         Args:
             z: the closed point.
@@ -316,7 +315,20 @@ class _Chart:
             points[:, independent] = to[:, independent] - left / _WAY * way
             points = self.loops.all_closed(points.T, moving, zero=_ZERO).T
         points[~np.isfinite(points).all(axis=1)] = np.nan
-        return points[:, :6]
+        return points
+
+    def is_still(self, z: FloatArray) -> NDArray[np.bool_]:
+        """Return whether each coordinate (6,) of the pose is the same at closed points (P, 6 + u), and all around."""
+        z = z[np.isfinite(z).all(axis=1)]
+        moves = np.max([np.linalg.norm(self._moves(each), axis=1) for each in z], axis=0, initial=0.0)
+        spread = np.ptp(z[:, :6], axis=0) if len(z) else np.zeros(6)
+        return np.asarray((moves <= _MOVES) & (spread <= _STILL * self.size[:6]))
+
+    def _moves(self, z: FloatArray) -> FloatArray:
+        """Return the directions (6, m) in which the pose can move at a closed point, for coordinates of size 1."""
+        _, values, right = np.linalg.svd(self.loops.slopes(z[:, None])[0] * self.size)
+        rank = int(np.count_nonzero(values > _ZERO * values.max(initial=0.0)))
+        return np.asarray(right[rank:, :6].T)
 
 
 def _largest(

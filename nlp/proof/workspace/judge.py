@@ -11,7 +11,6 @@ from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.task import Sense
 from ...case.workspace import Workspace
-from ...evidence.dependent import with_dependent
 from ...interruption import is_requested, one_call, within
 from ..enclosure.engine import kernel
 from ..statement.claims import REACH, SPECTRAL, Claim, claims_of, dependent_claims
@@ -127,10 +126,9 @@ def judge_workspace(
         CaseError: the case has no workspace, or a free dimension.
         InputError: the robot has no such measure, the error of legs is negative or not for it, or there is no C kernel.
     """
-    own = workspace_of_case(case)
+    workspace = workspace_of_case(case if workspace is None else replace(case, workspace=workspace))
     kernel()  # before any work where it is missing
     check_leg_error(case, leg_error)
-    workspace = own if workspace is None else with_dependent(case, workspace)
     with within(time_limit, _PART):
         whole = (case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
         numbers = _Numbers(*whole, at_once=until_fault)
