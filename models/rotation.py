@@ -48,6 +48,15 @@ def matrix_from_cayley(c: SX) -> SX:
     return SX.eye(3) + 2 / (1 + ca.sumsqr(c)) * (cross + cross @ cross)
 
 
+def turn_about(about: int, cosine: SX, sine: SX, scale: SX | float = 1.0) -> SX:
+    """Return the rotation matrix (3, 3) about a coordinate axis times a scale, by which its cosine and sine are too."""
+    i, j = (about + 1) % 3, (about + 2) % 3
+    matrix = SX.eye(3) * scale
+    matrix[i, i] = matrix[j, j] = cosine
+    matrix[j, i], matrix[i, j] = sine, -sine
+    return matrix
+
+
 def matrix_from_axis_angle(axis: SX, angle: SX) -> SX:
     """Return the rotation matrix ``exp(angle [axis]x)``, (3, 3) (equation 9, Rodrigues' formula).
 

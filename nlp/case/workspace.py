@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import field, replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from ...models.values import dataclass
 from ..errors import CaseError
 from ..units import Units
 from .checks import check_value
-from .pose import Free, Value, written_value
+from .pose import Free, Value, ends_of, written_value
 
 if TYPE_CHECKING:
     from .toml import TomlValue
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 #: Largest size of a rotation's angle: the coordinates in which boxes of rotations are covered, tangents of half the
 #: angle, grow without bound towards half a turn.
 LARGEST_TURN = math.radians(150)
-#: The three angles of a rotation by roll, pitch and yaw.
+#: The coordinates of a position, and the three angles of a rotation by roll, pitch and yaw.
+POSITION = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
 
 
@@ -50,6 +51,20 @@ class Turns:
 
 
 @dataclass(frozen=True)
+class DependentCoordinate:
+    """A coordinate of the pose that the robot cannot choose: it follows from the others.
+
+    Attributes:
+        index: among the six of a pose: position, then rotation.
+        lower, upper: working range in which a search begins, length or radians: no limit, and nothing is proved of it.
+    """
+
+    index: int
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
 class Workspace:
     """A box of poses.
 
@@ -57,6 +72,8 @@ class Workspace:
         position: origin of the platform frame in the world frame, length; fixed or free components.
         turns: rotations.
         has_limits: whether a solve must find a design that is regular and keeps the case's limits at each of the poses.
+        dependent: coordinates that the robot of a case cannot choose, as a judgement of it finds them; empty in a case.
+            A range stated for one is a limit, and a number the place where its value is looked for.
 
     Raises:
         CaseError: a number is not allowed; the key is in the words of a case file.
@@ -65,6 +82,7 @@ class Workspace:
     position: Sequence[Value]
     turns: Turns = field(default_factory=Turns)
     has_limits: bool = False
+    dependent: tuple[DependentCoordinate, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.position) != 3:
@@ -102,6 +120,72 @@ class Workspace:
         if not any(isinstance(value, Free) for value in (*self.position, *turns.angles)):
             raise CaseError("workspace", "is one pose: give at least one number as { min, max }")
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the six coordinates of a pose: those of a rotation about any axis are parts of its Cayley vector."""
+        turns: tuple[str, ...] = TURNS
+        if self.turns.kind is TurnKind.ANY_AXIS:
+            turns = tuple(f"cayley_{axis}" for axis in POSITION)
+        elif self.turns.kind is TurnKind.AXIS:
+            turns = ("angle", "tilt_1", "tilt_2")
+        return (*POSITION, *turns)
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the coordinates with ranges that the robot chooses."""
+        dependent = [each.index for each in self.dependent]
+        return tuple(self.names[k] for k, _ in self.ranged if k not in dependent)
+
+    def set_words(self, units: Units, digits: Callable[[float], str] = "{:.7g}".format) -> str:
+        """Return the set of poses in words, without dependent coordinates, such as ``roll, pitch in [-5, 5] deg``.
+
+        Args:
+            units: units for people.
+            digits: writes a number.
+        """
+        dependent, groups = [each.index for each in self.dependent], dict[str, list[str]]()
+        is_any = self.turns.kind is TurnKind.ANY_AXIS
+        for k, value in self.ranged:
+            if k in dependent or (is_any and k >= 3):
+                continue
+            dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
+            low, high = (digits(units.shown(each, dimension)) for each in ends_of(value))
+            groups.setdefault(f"in [{low}, {high}] {units.label(dimension)}", []).append(self.names[k])
+        texts = [f"{', '.join(names)} {ends}".rstrip() for ends, names in groups.items()]
+        if is_any:
+            most = max(map(abs, ends_of(self.turns.angles[0])))
+            angle = f"{digits(units.shown(most, Dimension.ANGLE))} {units.label(Dimension.ANGLE)}"
+            own = [self.names[k] for k in range(3, 6) if k not in dependent]
+            texts.append(
+                f"rotation by at most {angle} about any axis"
+                if len(own) == 3
+                else f"rotation with ({', '.join(own)}) of at most {angle}"
+            )
+        return ", ".join(texts)
+
+    @property
+    def ranged(self) -> list[tuple[int, Value]]:
+        """The coordinates that have ranges, with their indices."""
+        values: list[Value] = [*self.position, *self.turns.angles]
+        if self.turns.kind is TurnKind.ANY_AXIS:
+            values += self.turns.angles * 2
+        return [(k, each) for k, each in enumerate(values) if isinstance(each, Free)]
+
+    def by_three_angles(self) -> Workspace:
+        """Return the same box with the rotation about one coordinate axis as roll, pitch and yaw.
+
+        Raises:
+            CaseError: the rotation is about another axis.
+        """
+        axis, (angle,) = self.turns.axis, self.turns.angles
+        places = [k for k in range(3) if abs(axis[k]) == 1.0]
+        if not places:
+            fault = "the platform turns about other axes too: state the rotation as { roll, pitch, yaw }"
+            raise CaseError("workspace.rotation", fault)
+        angles: list[Value] = [0.0, 0.0, 0.0]
+        angles[places[0]] = angle if axis[places[0]] > 0 else _negative(angle)
+        return replace(self, turns=Turns(TurnKind.ROLL_PITCH_YAW, tuple(angles)))
+
     def to_keys(self, units: Units) -> dict[str, TomlValue | None]:
         """Return the table of a case file that states this workspace."""
         turns = self.turns
@@ -115,6 +199,11 @@ class Workspace:
             "position": [_written(value, units, Dimension.LENGTH) for value in self.position],
             "rotation": None if turns == Turns() else rotation,
         }
+
+
+def _negative(value: Value) -> Value:
+    """Return the same number of the opposite sense."""
+    return Free(-value.upper, -value.lower) if isinstance(value, Free) else -value
 
 
 def _written(value: Value, units: Units, dimension: Dimension) -> TomlValue:

@@ -101,7 +101,7 @@ def _checked_lines(proof: Proof, checked: VerifiedWorkspace, case: Case, leg_err
     if proof.unproved:
         yield Line("the file's reasons for claims that are not on paper are not checked")
     yield Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")
-    for line in _premises(case, checked.numbers_at):
+    for line in _premises(case, checked):
         yield Line(f"  {line}", part="premises")
     legs = f"off by at most {exact(leg_error)} {case.units.length}" if leg_error else "exact"
     for each in checked.claims:
@@ -109,7 +109,7 @@ def _checked_lines(proof: Proof, checked: VerifiedWorkspace, case: Case, leg_err
         yield Line(f"  {each.name}: {_words(each, case)}{of}", part="claims")
 
 
-def _premises(case: Case, numbers_at: str) -> Iterator[str]:
+def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
     """Yield the poses, the tasks and the assemblies that claims are about."""
     from ...models import Dimension
     from ..case.pose import Free
@@ -119,24 +119,28 @@ def _premises(case: Case, numbers_at: str) -> Iterator[str]:
         ends = (value.lower, value.upper) if isinstance(value, Free) else (value,)
         return " to ".join(exact(case.units.shown(each, dimension)) for each in ends)
 
-    workspace = case.workspace
-    if workspace is None:
-        return
+    workspace = checked.workspace
     turns, length, angle = workspace.turns, Dimension.LENGTH, Dimension.ANGLE
     about = f" {' '.join(map(exact, turns.axis))}" if turns.kind.value == "axis" else ""
     position = ", ".join(f"{name} {span(each, length)}" for name, each in zip("xyz", workspace.position, strict=True))
     rotation = ", ".join(span(each, angle) for each in turns.angles)
-    yield (
-        f"poses: {position} {case.units.label(length)}; rotation by {turns.kind.value}{about}: {rotation} "
-        f"{case.units.label(angle)}"
-    )
+    if workspace.dependent:
+        chosen, names = workspace.set_words(case.units, exact), workspace.names
+        following = ", ".join(names[each.index] for each in workspace.dependent)
+        yield f"poses: every {chosen}; {following} follow{'s' * (len(workspace.dependent) == 1)} from these"
+    else:
+        yield (
+            f"poses: {position} {case.units.label(length)}; rotation by {turns.kind.value}{about}: {rotation} "
+            f"{case.units.label(angle)}"
+        )
     for task in case.tasks:
         yield f"{'F' if len(case.tasks) == 1 else f'F of {task.name}'}: of the task {task.name!r}"
-    if numbers_at:
+    if checked.numbers_at:
         # The boxes of actuators' loads follow the loops from the middle, as those of ranks do.
         followed = "ranks, forces, speeds and powers" if case.loading.cases or case.loading.motion else "ranks"
         others = "numbers" if followed == "ranks" else "other numbers"
-        yield f"assemblies: {followed} in the one of home in the middle of the workspace, {others} in {numbers_at}"
+        middle = "the one of home in the middle of the workspace"
+        yield f"assemblies: {followed} in {middle}, {others} in {checked.numbers_at}"
 
 
 def _words(claim: CheckedClaim, case: Case) -> str:

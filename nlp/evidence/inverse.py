@@ -29,6 +29,7 @@ from ..case.pose import ROUNDING
 from ..errors import InputError
 from .assembly import home_position, unknowns_from_home
 from .closed_loops import DEPENDENT, Loops
+from .dependent import completed
 from .state import CLOSED, ZERO_SINGULAR_VALUE
 
 if TYPE_CHECKING:
@@ -70,6 +71,9 @@ class InversePoses:
             velocity of its origin, in the world frame. They hold for motions that the platform can make.
         closed: (N,) whether all loops close at the pose, in the assembly that is followed. Limits do not count.
         singular: (N,) whether J has not the rank 6 at a closed pose, or rates are not finite.
+        positions: (N, 3) origins of the platform frame at the poses, length.
+        rotations: (N, 3, 3) platform to world coordinates.
+        dependent: names of the coordinates that the robot cannot choose, and that differ from those given.
     """
 
     actuators: tuple[str, ...]
@@ -81,6 +85,9 @@ class InversePoses:
     rates: FloatArray
     closed: NDArray[np.bool_]
     singular: NDArray[np.bool_]
+    positions: FloatArray
+    rotations: FloatArray
+    dependent: tuple[str, ...] = ()
 
 
 def inverse(
@@ -92,7 +99,9 @@ def inverse(
 ) -> InversePoses:
     """Return positions of all joints, J and rates of the actuators at many poses.
 
-    No pose raises an error: where the loops do not close, or the numbers are no pose, ``closed`` is False.
+    No pose raises an error: where the loops do not close, or the numbers are no pose, ``closed`` is False. Of a pose
+    that a robot with fewer than six freedoms cannot take, the coordinates that it cannot choose are those that follow
+    from the others.
 
     Args:
         case: whose robot has fixed dimensions; its poses, limits and tasks do not count.
@@ -114,6 +123,15 @@ def inverse(
         raise InputError(f"poses must be arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}")
     if follow not in ("home", "previous"):
         raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
+    found = _inverse(case, p, R, follow)
+    near = None if found.closed.all() else completed(case, p, R, ~found.closed & _are_poses(R, p))
+    if near is None or not near.dependent:
+        return found
+    return replace(_inverse(case, near.positions, near.rotations, follow), dependent=near.dependent)
+
+
+def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePoses:
+    """Return the joints at positions (N, 3) with rotations (N, 3, 3), as they are."""
     machine = _machine_of(case)
     poses = np.concatenate([R.transpose(0, 2, 1).reshape(-1, 9), p], axis=1)
     is_pose = _are_poses(R, p)
@@ -134,9 +152,10 @@ def inverse(
     turning = machine.turning
     if follow == "previous" and turning:
         q[np.ix_(closed, turning)] = np.unwrap(q[np.ix_(closed, turning)], axis=0)
-    for each in (q, unknowns, J, rates, closed, singular):
+    arrays = q, unknowns, J, rates, closed, singular, p.copy(), R.copy()
+    for each in arrays:
         each.flags.writeable = False
-    return InversePoses(machine.actuators, machine.measures, machine.joints, q, unknowns, J, rates, closed, singular)
+    return InversePoses(machine.actuators, machine.measures, machine.joints, *arrays)
 
 
 class _Values(NamedTuple):

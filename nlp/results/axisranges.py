@@ -107,7 +107,7 @@ class AxisRangesResult(JsonObject):
         faults: what is not proved at the pose itself.
         axes: the independent coordinates alone.
         pairs: each two of them.
-        not_alone: coordinates that cannot change alone, as other numbers of the pose follow from them.
+        not_alone: coordinates that the robot cannot choose: they follow from the others, and move with them.
         reason: why the work ended before all axes and pairs were judged; absent otherwise.
         versions: of the programs.
     """
@@ -217,8 +217,7 @@ def axis_ranges_summary(case: Case, result: AxisRangesResult) -> Iterator[Line |
         value = "" if each.value is None else f": {number(each.value)} {each.unit}".rstrip()
         yield Line(_stop_words(each), label="not proved there", tone=Tone.FAULT, after=value)
     if result.not_alone:
-        text = f"{', '.join(result.not_alone)}: other numbers of the pose follow; judge a workspace"
-        yield Line(text, label="cannot change alone", tone=Tone.CAUTION)
+        yield Line(f"{', '.join(result.not_alone)}, and move with these coordinates", label="follow")
     if result.reason:
         yield Line(f"{result.reason}: not every axis and pair is judged", label="stopped", tone=Tone.CAUTION)
     if not result.axes:

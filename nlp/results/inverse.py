@@ -10,6 +10,7 @@ import numpy as np
 from ...models import Dimension, FloatArray
 from ...models.statics import driven_joints
 from ..case.case import Case
+from ..case.workspace import POSITION, TURNS
 from ..evidence.inverse import InversePoses
 from ..system.csvtext import csv_text
 from .rounding import number
@@ -38,6 +39,8 @@ def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[i
         yield Line("the pose is closed" if total == 1 else f"all {total} poses are closed", tone=Tone.HOLDS)
     else:
         yield Line(f"{_of(total - closed, total)} not closed", tone=Tone.FAULT, after=_first(~found.closed, file, rows))
+    if found.dependent:
+        yield Line(", ".join(found.dependent), label="follow", after=" from the other coordinates of each pose")
     if found.singular.any():
         yield Line(
             f"{_of(int(found.singular.sum()), total)} singular",
@@ -72,12 +75,15 @@ def inverse_csv(case: Case, found: InversePoses, rows: Sequence[int], *, derivat
         rows: number of each pose's row in its file.
         derivatives: whether the rates of the actuators and J follow, in radians and the case's unit of length.
     """
-    head = ["row", "closed", "singular"]
+    head = ["row", "closed", "singular", *found.dependent]
     head += [f"{measure} {name}" for measure, name in zip(found.measures, found.actuators, strict=True)]
     head += found.joints
     dimensions = [each.dimension for each in driven_joints(case.model)]
     dimensions += [each.dimension for each in case.model.unknowns]
-    parts = [_in_units(case, np.hstack([found.coordinates, found.unknowns]), dimensions)]
+    following = [_coordinate(found, name) for name in found.dependent]
+    shown = [Dimension.LENGTH if name in POSITION else Dimension.ANGLE for name in found.dependent]
+    columns = np.stack(following, axis=1) if following else np.zeros((len(rows), 0))
+    parts = [_in_units(case, np.hstack([columns, found.coordinates, found.unknowns]), [*shown, *dimensions])]
     if derivatives:
         head += [f"rate {name} {part}" for name in found.actuators for part in _TWIST]
         head += [f"J {k + 1} {part}" for k in range(found.jacobian.shape[1]) for part in _WRENCH]
@@ -92,6 +98,15 @@ def inverse_csv(case: Case, found: InversePoses, rows: Sequence[int], *, derivat
             )
         ),
     )
+
+
+def _coordinate(found: InversePoses, name: str) -> FloatArray:
+    """Return a coordinate (N,) of the poses: of the position, or roll, pitch or yaw, radians."""
+    if name in POSITION:
+        return found.positions[:, POSITION.index(name)]
+    R = found.rotations
+    angles = np.arctan2(R[:, 2, 1], R[:, 2, 2]), np.arcsin(-R[:, 2, 0]), np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    return np.asarray(angles[TURNS.index(name)])
 
 
 def _in_units(case: Case, values: FloatArray, dimensions: Sequence[Dimension]) -> FloatArray:

@@ -143,6 +143,7 @@ class PathData(JsonObject):
         time: seconds of the segments whose time is stated; absent where none is.
         untimed: number of the others, of which speeds are not known; absent where no time is stated.
         idle: what moves nothing, in the order of the lines.
+        dependent: names of the coordinates of the pose that follow from the others; absent without any.
         claims: ranks first.
         actuators: of the robot.
         knots: of a table of the actuators; absent where none is asked for.
@@ -153,6 +154,7 @@ class PathData(JsonObject):
     time: Absent[float]
     untimed: Absent[int]
     idle: tuple[IdleData, ...]
+    dependent: Absent[tuple[str, ...]]
     claims: tuple[PathClaimData, ...]
     actuators: tuple[PathActuatorData, ...]
     knots: Absent[PathKnotsData]
@@ -232,6 +234,7 @@ def path_result(judged: "PathJudgement") -> PathResult:
             time=judged.path.time if judged.path.is_timed else None,
             untimed=len(judged.path.untimed) if judged.path.is_timed else None,
             idle=tuple(IdleData.of(each) for each in judged.path.idle),
+            dependent=judged.dependent or None,
             claims=_claims(judged),
             actuators=tuple(_actuators(judged)),
             knots=None if judged.knots is None else _knots_data(judged.case.units, judged.knots),

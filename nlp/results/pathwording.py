@@ -15,7 +15,7 @@ from .text import Line, TextTable, Tone, in_part
 from .wording import title_line
 from .workspacemotors import TONES
 from .workspaceposes import SHOWN
-from .workspacewording import exchange_lines, machine_lines, open_lines, outcome_lines, tightest_table
+from .workspacewording import exchange_lines, following_lines, machine_lines, open_lines, outcome_lines, tightest_table
 
 if TYPE_CHECKING:
     from ..case.case import Case
@@ -48,6 +48,7 @@ def path_summary(
         rest = len(path.idle) - _SHOWN
         yield Line(words + (f", and {rest} more" if rest > 0 else ""), label="moves nothing")
     yield Line(verdict_words(result), label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
+    yield from following_lines(path.dependent or (), path.claims)
     wrong = first_refuted(result)
     if wrong is not None and wrong.fault is not None:
         yield Line(fault_words(wrong, wrong.fault), label="first fault", tone=Tone.FAULT)

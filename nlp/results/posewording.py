@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
 #: Digits of a pose in a command: as few as show what all digits show, and so many where they show nothing.
 _FEWEST, _ENOUGH, _ALL = 3, 6, 17
-#: Name of a pose that the robot cannot take, among those of violated limits.
-_IMPOSSIBLE = "impossible"
+#: Names of a pose without values, and of one at which loops are not closed, among those of violated limits.
+_IMPOSSIBLE, _OPEN = "impossible", "open loops"
 #: Keys of a rotation, behind the prefix of its pose.
 _ROTATION = ("axis", "angle", *(each.value for each in (RotationForm.RPY, RotationForm.QUATERNION)))
 
@@ -126,7 +126,7 @@ def evaluate_command(
     for digits in range(_FEWEST if wanted else _ENOUGH, _ALL):
         shorter = _rounded(position, digits), {key: _rounded(each, digits) for key, each in turn.items()}
         found = _shown(case, *shorter)
-        if found >= wanted and (_IMPOSSIBLE in found) == (_IMPOSSIBLE in wanted):
+        if found >= wanted and {*found} & {_IMPOSSIBLE, _OPEN} == {*wanted} & {_IMPOSSIBLE, _OPEN}:
             position, turn = shorter
             break
     prefix = case.pose_prefixes[0]
@@ -142,7 +142,7 @@ def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]
     from ..errors import ScrewsynthError  # noqa: PLC0415 - few results have a pose to be shown
     from ..evidence.closing import closed_start  # noqa: PLC0415
     from ..evidence.margins import margins_of  # noqa: PLC0415
-    from ..evidence.state import evaluate  # noqa: PLC0415
+    from ..evidence.state import evaluate, loops_are_closed  # noqa: PLC0415
     from ..program.formulation import formulate_each  # noqa: PLC0415
     from ..proof.statement.posed_layout import at_one_pose  # noqa: PLC0415
 
@@ -150,6 +150,7 @@ def _shown(case: Case, position: Sequence[float], turn: Mapping[str, list[float]
         nlp = formulate_each(at_one_pose(case, position, _rotation(case, turn)))[0]
         x = closed_start(nlp)
         lost = ["rank"] if evaluate(nlp, x).is_singular else []
+        lost += [] if loops_are_closed(nlp, x) else [_OPEN]
         return frozenset([*lost, *(row.name for row in margins_of(nlp, x, optimal=False) if row.violated)])
     except ScrewsynthError:
         return frozenset([_IMPOSSIBLE])

@@ -199,6 +199,8 @@ class WorkspaceResult(JsonObject):
         joint_centre: every claim is about all machines whose joint centres are off by at most this; absent where it is
             about the exact machine alone.
         proved: whether J is regular at every pose, and every limit holds; numbers without a limit are information.
+        poses: the set of poses that the verdicts are about, in words; absent without dependent coordinates.
+        dependent: names of the coordinates of the pose that follow from the others; absent without any.
         regular: whether J has full rank at every pose.
         constraints: whether the constraint wrenches alone keep their rank at every pose; absent for a robot without.
         extremes: smallest and largest values; those of actuators under loads where they have a limit.
@@ -211,6 +213,8 @@ class WorkspaceResult(JsonObject):
     parameters: Mapping[str, float | Vector]
     joint_centre: Absent[float]
     proved: bool
+    poses: Absent[str]
+    dependent: Absent[tuple[str, ...]]
     regular: RegularData
     constraints: Absent[RegularData]
     extremes: tuple[ExtremeData, ...]
@@ -296,6 +300,8 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
         parameters=parameters,
         joint_centre=case.joint_centre_tolerance,
         proved=judged.is_proved,
+        poses=poses_of(judged),
+        dependent=tuple(judged.workspace.names[each.index] for each in judged.workspace.dependent) or None,
         regular=_regular_data(judged.regularity, case),
         constraints=None if judged.constraints is None else _regular_data(judged.constraints, case),
         extremes=tuple(_extreme_data(each, case) for each in judged.extremes if each.motor is None or each.key),
@@ -303,6 +309,12 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
         scale=scale,
         versions=versions(),
     )
+
+
+def poses_of(judged: "Judgement") -> str | None:
+    """Return the set of poses that a judgement is about, in words; None without dependent coordinates."""
+    workspace = judged.workspace
+    return f"every {workspace.set_words(judged.case.units)}" if workspace.dependent else None
 
 
 def _motors(judged: "Judgement") -> Iterator[MotorData]:

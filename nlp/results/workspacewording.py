@@ -38,10 +38,30 @@ def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
     """Yield the verdict on a machine, what it is about, and F."""
     yield Line(verdict_words(result), label="verdict", tone=Tone.ANSWER if result.proved else Tone.NO_ANSWER)
     yield from machine_lines(case, result.joint_centre)
+    yield from _dependent_lines(result)
     for low, high in zip(result.extremes, result.extremes[1:], strict=False):
         if low.name == high.name and low.name.partition(" ")[0] == "F" and low.bound and high.bound:
             ends = f"{number(low.bound)} to {number(high.bound)}"
             yield Line(ends, label=low.name, after=", at no pose smaller or larger")
+
+
+def _dependent_lines(result: WorkspaceResult) -> Iterator[Line]:
+    """Yield the set of poses of a robot with dependent coordinates, and the proved range of each of these."""
+    if result.poses is None:
+        return
+    yield Line(result.poses, label="poses")
+    yield from following_lines(result.dependent or (), result.extremes)
+
+
+def following_lines(names: Sequence[str], claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:
+    """Yield the proved range of each dependent coordinate of the pose."""
+    for name in names:
+        ends = {each.sense: each for each in claims if each.name == name}
+        bounds = [ends[sense].bound if sense in ends else None for sense in (Sense.MIN, Sense.MAX)]
+        low, high = ("unknown" if each is None else number(each) for each in bounds)
+        unit = next((each.unit or "" for each in ends.values()), "")
+        words = f"{name} {low} to {high} {unit}".rstrip() if None not in bounds else f"{name}, no range is proved"
+        yield Line(words, label="follows")
 
 
 def verdict_words(result: WorkspaceResult) -> str:

@@ -37,11 +37,14 @@ from ..case.limits.constraint import NUMBER, BoundedConstraint, Constraint
 from ..case.limits.joints import JointAngle
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..case.limits.objective import ObjectiveLimit
+from ..case.task import Sense
+from ..case.workspace import Workspace
 from ..path.path import SymbolicPose
 from ..program.actuators import level_constraints
 from ..program.epigraph import level_constraint
 from ..program.nlp import Nlp
 from ..program.places import Scalar
+from ..proof.statement.claims import Claim, dependent_claims
 from ..proof.statement.machine import workspace_of_case
 from ..proof.statement.tolerance import BuiltModel, built_model
 from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of
@@ -61,8 +64,9 @@ _SQUARED, _MORE, _MOST = 1e-4, 4.0, 1e-2
 _ABOVE = (0.0, math.inf)
 #: Steps from the middle of the workspace to a pose, along which closed loops are followed.
 _WAY = 16
-#: Half ranges by which a dependent number of the pose may leave its range in a search.
-_BEYOND = 0.5
+#: Working ranges by which a dependent coordinate of the pose may leave its own in a search: that of another design
+#: is another.
+_BEYOND = 2.0
 #: Steps of Newton's method for the further variables, and largest residual of closed loops.
 _STEPS, _CLOSED = 12, 1e-9
 #: Part of its size by which two constraints may differ that count as the same; and the distance of designs, in half
@@ -159,6 +163,7 @@ class PoseConstraints:
         own = nlp.program.places.unknowns[0] if names else ()
         self._unknowns = [own[names.index(item.name)] for item in self._closed.model.unknowns]
         self._claims: list[_PosedClaim] = []
+        self._workspace: Workspace | None = None
         self._singular = 0
 
     @property
@@ -203,7 +208,10 @@ class PoseConstraints:
         """
         # Where a limb does not reach a pose, J and the limits are not defined nearby: the reach comes first.
         first = [each for each in fresh if each.name.startswith(REACH)]
-        problem = _problem(design) if fresh else None
+        if not fresh:
+            return []
+        self._workspace = workspace_of_case(design)
+        problem = _problem(design, self._workspace)
         if problem is None:
             return []
         kept, known = list[BindingPose](), list[tuple[str, FloatArray]]()
@@ -365,8 +373,21 @@ class PoseConstraints:
             farthest = int(np.argmin(numbers(x, self._nlp.arguments).full()))
             yield BoundedConstraint(Constraint(name, reaches[farthest], NUMBER, stated=_ABOVE), _REACH, math.inf)
             return
+        stated = [each for each in self._of_dependent(closed.robot) if each.name == binding.name]
+        if stated:
+            low, high = (next((each.limit for each in stated if each.sense is sense), None) for sense in Sense)
+            constraint = Constraint(name, stated[0].expression, stated[0].reading)
+            ends = (-math.inf if low is None else low), (math.inf if high is None else high)
+            yield _tightened(BoundedConstraint(constraint, *ends), name)
+            return
         items = self._of_stroke(binding.name, poses) if binding.longest is not None else self._at_pose(closed, where)
         yield from (_tightened(item, name) for item in items if item.constraint.name in (binding.name, name))
+
+    def _of_dependent(self, robot: RobotInstance) -> list[Claim]:
+        """Return the claims about the stated ranges of dependent coordinates of a pose."""
+        if self._workspace is None:
+            return []
+        return [each for each in dependent_claims(robot, self._workspace) if each.limit is not None]
 
     def _regular(self, robot: RobotInstance, name: str) -> BoundedConstraint:
         """Return the constraint that J keeps its rank: a determinant of its six rows also keeps its sign."""
@@ -430,10 +451,10 @@ def _are_alike(one: FloatArray, other: FloatArray) -> bool:
     return one.shape == other.shape and bool(np.abs(one - other).max() <= _ALIKE * np.abs(other).max(initial=0.0))
 
 
-def _problem(design: Case) -> Problem | None:
+def _problem(design: Case, workspace: Workspace) -> Problem | None:
     """Return a design over its workspace; None where its loops are not closed in the middle."""
     try:
-        return build_problem(design, closed_form(design.model).model, pose_box(workspace_of_case(design)))
+        return build_problem(design, closed_form(design.model).model, pose_box(workspace))
     except NotJudgedError:
         return None
 

@@ -215,7 +215,8 @@ def with_objective(design: Case, level: float) -> Case:
 def _judged(case: Case) -> Judgement:
     """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
-    if closed.reaches:
+    # Poses that the robot cannot take say nothing of the reach of its limbs.
+    if closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)
         found = tuple(prove_extreme(layout, claim, gap=GAP, jobs=1) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):

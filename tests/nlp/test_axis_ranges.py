@@ -184,13 +184,13 @@ def test_a_pose_beyond_a_limit_has_no_ranges_and_says_which() -> None:
     assert [(each.name, each.outcome) for each in singular.stops] == [("regular", Outcome.REFUTED)]
 
 
-def test_numbers_from_which_others_follow_do_not_move_alone() -> None:
+def test_dependent_coordinates_move_with_those_that_the_robot_chooses() -> None:
     tables = starter_tables("3-rps")
     tables["robot"]["parameters"]["rb"] = 1.0
     case = case_from(tables)
     found = axis_ranges(case, [*map(float, case.model.home), 0, 0, 0], most=(0.01, 0.01))
-    assert [each.axis for each in found.axes] == ["z"]
-    assert found.others == ("roll", "pitch")
+    assert [each.axis for each in found.axes] == ["z", "roll", "pitch"]
+    assert found.others == ("x", "y", "yaw")
     assert found.axes[0].upper.value - found.axes[0].at == pytest.approx(0.01)
 
 

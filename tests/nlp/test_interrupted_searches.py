@@ -139,7 +139,7 @@ def six_legs() -> Claim:
 def any_robot() -> Problem:
     case = workspace_case("6-rss", "", width=0.5, turn=30)
     assert case.workspace is not None
-    return build_problem(case, closed_form(case.model).model, pose_box(case.workspace))
+    return build_problem(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
 
 
 def any_rank() -> Claim:

@@ -11,6 +11,7 @@ from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.statement.claims import REGULAR
+from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
@@ -111,7 +112,7 @@ def test_a_box_in_which_a_loop_loses_its_rank_is_not_regular() -> None:
     """Where coupler and rocker are in line, the locked crank does not hold the rocker."""
     case = case_of(ROCKER, 1.008, (0.002, 0.004), 0.1)
     assert signs_of(ROCKER, case) == {-1.0, 1.0}
-    problem = build_problem(case, case.model, pose_box(case.workspace))  # type: ignore[arg-type]
+    problem = build_problem(case, case.model, pose_box(workspace_of_case(case)))
     assert prove_rank(problem, problem.locked, most_boxes=3000).outcome is not Outcome.PROVED
 
 
@@ -119,7 +120,7 @@ def test_a_box_in_which_a_loop_loses_its_rank_is_not_regular() -> None:
 def test_boxes_beside_it_are_regular(middle: float) -> None:
     case = case_of(ROCKER, middle, (1e-4, 1.7e-3), 0.01)
     assert len(signs_of(ROCKER, case)) == 1
-    problem = build_problem(case, case.model, pose_box(case.workspace))  # type: ignore[arg-type]
+    problem = build_problem(case, case.model, pose_box(workspace_of_case(case)))
     assert prove_rank(problem, problem.locked, most_boxes=200).outcome is Outcome.PROVED
 
 
@@ -131,7 +132,7 @@ def test_the_check_shows_no_box_about_a_singular_pose() -> None:
         y = 0.5 * (low + high)
         low, high = (y, high) if side * np.linalg.det(locked(ROCKER, np.array([0, y, 0]))) > 0 else (low, y)
     assert case.workspace is not None
-    claim = rank_claim(case, case.model, pose_root(case.workspace), REGULAR)
+    claim = rank_claim(case, case.model, pose_root(workspace_of_case(case)), REGULAR)
     half = np.array([1e-7, 1e-7, 0, 1e-7, 0, 0])
     centres = np.array([[0, y, 0, 0, 0, 0] for y in (low, 1.0062, 1.0095)])
     assert claim.attempt(centres - half, centres + half).holds.tolist() == [False, True, True]
@@ -143,7 +144,7 @@ def test_random_robots_have_no_singular_pose_where_they_are_regular() -> None:
         rocker = ROCKER + rng.uniform(-0.04, 0.04, ROCKER.shape)
         case = case_of(rocker, rng.uniform(0.98, 1.03), (2e-3, 2e-3), 0.1)
         try:
-            problem = build_problem(case, case.model, pose_box(case.workspace))  # type: ignore[arg-type]
+            problem = build_problem(case, case.model, pose_box(workspace_of_case(case)))
         except NotJudgedError:
             continue
         if prove_rank(problem, problem.locked, most_boxes=600).outcome is Outcome.PROVED:

@@ -26,6 +26,7 @@ from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, pose_root, show_on_leaves
 from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
+from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
@@ -150,7 +151,7 @@ def test_no_box_with_a_singular_pose_is_shown_to_be_regular(name: str, part: flo
     """The pose is one that Newton's method finds to 1e-10, in a robot with random dimensions."""
     case = gallery_case(name, part, degrees, seed)
     assert case.workspace is not None
-    root, box = pose_root(case.workspace), pose_box(case.workspace)
+    root, box = pose_root(workspace_of_case(case)), pose_box(workspace_of_case(case))
     problem = build_problem(case, closed_form(case.model).model, box)
     newton, rng = SingularPose(problem, problem.locked), np.random.default_rng(seed)
     tried = (newton.search(each) for each in box.random(200, rng))
@@ -169,7 +170,7 @@ def test_no_box_with_a_singular_pose_is_shown_to_be_regular(name: str, part: flo
 def test_no_box_with_a_singular_closed_pose_is_shown(name: str, part: float, degrees: float, seed: int) -> None:
     case = gallery_case(name, part, degrees, seed)
     assert case.workspace is not None
-    root, box = pose_root(case.workspace), pose_box(case.workspace)
+    root, box = pose_root(workspace_of_case(case)), pose_box(workspace_of_case(case))
     problem = build_problem(case, closed_form(case.model).model, box)
     newton, rng = SingularPose(problem, problem.locked), np.random.default_rng(seed)
     shown = rank_claim(case, closed_form(case.model).model, root, "regular")
@@ -187,7 +188,7 @@ def test_no_box_with_a_singular_closed_pose_is_shown(name: str, part: float, deg
 def test_closed_loops_are_where_they_are_shown_to_be(name: str) -> None:
     case = gallery_case(name, 0.1, 20, 4)
     assert case.workspace is not None
-    root = pose_root(case.workspace)
+    root = pose_root(workspace_of_case(case))
     assembly = rank_claim(case, closed_form(case.model).model, root, "regular").assembly
     own, D = assembly.independent, assembly.dependent
     rng = np.random.default_rng(5)
@@ -223,7 +224,7 @@ def test_robots_with_loops_are_on_paper() -> None:
 def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     case = gallery_case("3-rps", 0.03, 6)
     assert case.workspace is not None
-    root = pose_root(case.workspace)
+    root = pose_root(workspace_of_case(case))
     shown = rank_claim(case, closed_form(case.model).model, root, "regular")
     tree = node_bytes(Node.CUT, 2, value=0.5 * (root.lower[2] + root.upper[2])) + bytes([Node.BOUNDED] * 2)
     show_on_leaves(shown, root, tree)
@@ -254,7 +255,7 @@ def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
 def test_forms_hold_the_entries_and_could_be_no_smaller() -> None:
     case = gallery_case("6-rus", 0.1, 20)
     assert case.workspace is not None
-    root = pose_root(case.workspace)
+    root = pose_root(workspace_of_case(case))
     entries = rank_claim(case, closed_form(case.model).model, root, "regular")._entries
     rng = np.random.default_rng(3)
     lower, upper = boxes_about(0.5 * (root.lower + root.upper), 0.5 * (root.upper - root.lower), rng)

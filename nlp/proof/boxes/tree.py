@@ -28,8 +28,6 @@ class TreeRecord:
 
     Attributes:
         begin: bytes before those of the root's node.
-        lacks_boxes: whether boxes were left out that the check has no rule for: a number of the pose that follows from
-            others leaves its range there.
     """
 
     def __init__(self) -> None:
@@ -37,7 +35,7 @@ class TreeRecord:
 
     def clear(self) -> None:
         """Forget everything recorded: the search begins again."""
-        self.begin, self.lacks_boxes, self._root = b"", False, b""
+        self.begin, self._root = b"", b""
         self._nodes: dict[bytes, tuple[bytes, tuple[bytes, ...]]] = {}
         self._limbs: list[tuple[TreeRecord, Callable[[], float]]] = []
 

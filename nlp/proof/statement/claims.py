@@ -12,6 +12,7 @@ import casadi as ca
 from casadi import SX
 
 from ....models import Dimension
+from ....models.instance import RobotInstance
 from ...case.case import Case
 from ...case.limits.clearance import LegClearance
 from ...case.limits.constraint import LENGTH, NUMBER, SQUARED_LENGTH, Reading
@@ -19,7 +20,9 @@ from ...case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from ...case.limits.legs import Actuator, LegLength
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...case.motors import Motor
+from ...case.pose import Free
 from ...case.task import Sense
+from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import InputError, nearest
 from ...program.layout import Layout
 
@@ -27,6 +30,10 @@ from ...program.layout import Layout
 REGULAR, CONSTRAINTS = "regular", "constraints regular"
 #: Key of the claims that limbs reach every pose.
 REACH = "reach"
+#: First part of the keys of ranges that a case states for dependent coordinates of the pose.
+WORKSPACE = "workspace"
+#: Ends of a range by sense.
+_ENDS = {Sense.MIN: "lower", Sense.MAX: "upper"}
 #: Names of the measures that are no quantities of a robot.
 SPECTRAL = (SmallestSingularValue.key, ConditionNumber.key)
 #: Names of the measures that are coordinates of actuators.
@@ -95,6 +102,35 @@ ERRORS = (
 def one_machine_name(claim: str) -> str:
     """Return the name of the lengths from which a claim about one machine at two poses follows."""
     return f"{claim}, lengths of one machine"
+
+
+def dependent_claims(robot: RobotInstance, workspace: Workspace) -> Iterator[Claim]:
+    """Yield the smallest and the largest value of each dependent coordinate of the pose, with its stated range.
+
+    Args:
+        robot: at one pose of the workspace.
+        workspace: with its dependent coordinates.
+    """
+    turns = workspace.turns
+    stated = [*workspace.position, *turns.angles]
+    for k in (each.index for each in workspace.dependent):
+        expression, reading = (robot.position[k], LENGTH) if k < 3 else _turn(robot.rotation, turns, k - 3)
+        is_stated = k < len(stated) and not (k >= 3 and turns.kind is TurnKind.ANY_AXIS)
+        value, name = stated[k] if is_stated else None, workspace.names[k]
+        for sense in Sense:
+            limit = getattr(value, _ENDS[sense]) if isinstance(value, Free) else None
+            yield Claim(name, sense, expression, reading, "" if limit is None else f"{WORKSPACE}.{name}", limit)
+
+
+def _turn(R: SX, turns: Turns, k: int) -> tuple[SX, Reading]:
+    """Return a coordinate of a rotation (3, 3), and how it reads."""
+    if turns.kind is TurnKind.ROLL_PITCH_YAW:
+        angles = ca.atan2(R[2, 1], R[2, 2]), ca.asin(-R[2, 0]), ca.atan2(R[1, 0], R[0, 0])
+        return angles[k], Reading(Dimension.ANGLE)
+    cayley = ca.vertcat(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]) / (1 + ca.trace(R))
+    if turns.kind is TurnKind.ANY_AXIS:
+        return cayley[k], NUMBER
+    return 2 * ca.atan(ca.dot(cayley, SX(list(turns.axis)))), Reading(Dimension.ANGLE)
 
 
 def length_claims(case: Case) -> Iterator[Claim]:

@@ -12,6 +12,7 @@ from ...case.case import Case
 from ...case.pose import Free
 from ...case.workspace import Workspace
 from ...errors import CaseError, InputError
+from ...evidence.dependent import with_dependent
 
 #: Number of legs, as many as the platform has freedoms.
 LEGS = 6
@@ -50,16 +51,17 @@ class JointErrors(NamedTuple):
 
 
 def workspace_of_case(case: Case) -> Workspace:
-    """Return a case's workspace.
+    """Return a case's workspace, with the coordinates that its robot cannot choose.
 
     Raises:
-        CaseError: the case has none, a dimension of its robot is free, or limits need a motion that it does not state.
+        CaseError: the case has none, a dimension of its robot is free, limits need a motion that it does not state, or
+            as :func:`~...evidence.dependent.with_dependent`.
     """
     if case.workspace is None:
         raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
     case.fixed_parameters("a workspace is judged with fixed dimensions")
     case.require_motion()
-    return case.workspace
+    return with_dependent(case, case.workspace)
 
 
 def check_leg_error(case: Case, leg_error: float) -> None:

@@ -14,6 +14,7 @@ from casadi import SX
 
 from ....models import Dimension, Model, Substitution
 from ....models.joints.closedform import ClosedForm, Reach
+from ....models.rotation import turn_about
 from ...case.case import Case
 from ...case.limits.constraint import Reading
 from ...case.limits.limits import Limits
@@ -67,15 +68,6 @@ def posed_layout(case: Case, workspace: Workspace) -> Layout:
         return StatedPoseSymbols(turned, position.symbols, position.places, position.symbols, None, [], (HERE,))
 
     return lay_out(one, one.tasks, add_turns)
-
-
-def turn_about(about: int, cosine: SX, sine: SX, scale: SX | float = 1.0) -> SX:
-    """Return the rotation matrix (3, 3) about a coordinate axis times a scale, by which its cosine and sine are too."""
-    i, j = (about + 1) % 3, (about + 2) % 3
-    matrix = SX.eye(3) * scale
-    matrix[i, i] = matrix[j, j] = cosine
-    matrix[j, i], matrix[i, j] = sine, -sine
-    return matrix
 
 
 def extreme_program(layout: Layout, expression: SX, sense: Sense) -> Nlp:

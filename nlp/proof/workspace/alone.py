@@ -1,4 +1,4 @@
-"""Coordinates of a pose that a platform can change alone, the others held."""
+"""Coordinates of a pose that a robot chooses about it, and those that follow."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.pose import Free, Value
 from ...case.workspace import TurnKind, Turns, Workspace
-from ...evidence.closed_loops import DEPENDENT
-from .edge_samples import coordinates_of
+from ...evidence.dependent import dependent_of, independent_coordinates
 from .robot.pose_box import pose_box, rotation_of
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
 
@@ -28,8 +27,8 @@ class Coordinates(NamedTuple):
     """Indices of the independent coordinates of a pose.
 
     Attributes:
-        alone: those that can change while the others are held.
-        others: those from which other numbers of the pose follow.
+        alone: those that the robot chooses.
+        others: those that follow from these, and move with them.
     """
 
     alone: list[int]
@@ -53,23 +52,18 @@ def coordinates_alone(case: Case, start: FloatArray, length: float) -> Coordinat
         length: of the order of the robot's.
     """
     half = _NEAR * np.array([length] * 3 + [1.0] * 3)
-    box = pose_box(box_about(start, {k: (start[k] - half[k], start[k] + half[k]) for k in range(6)}))
+    about = box_about(start, {k: (start[k] - half[k], start[k] + half[k]) for k in range(6)})
+    chosen = independent_coordinates(case, about) or list(range(6))
+    if len(chosen) < len(AXES):
+        moved = dependent_of(case, box_about(start, {k: (start[k] - half[k], start[k] + half[k]) for k in chosen}))
+        return Coordinates(chosen, [each.index for each in moved.dependent])
     try:
-        problem = build_problem(case, closed_form(case.model).model, box)
+        problem = build_problem(case, closed_form(case.model).model, pose_box(about))
     except NotJudgedError:
         return Coordinates(list(range(len(AXES))), [])
-    if not problem.dependent:
-        # Loops of a robot that is given by its rows are not known: its constraint wrenches must do no work.
-        work = np.zeros(6) if problem.unactuated is None else _work(problem, problem.unactuated.matrix, start)
-        return Coordinates(np.flatnonzero(work <= _ZERO).tolist(), [])
-    # Where other numbers of the pose follow, the loops do not close as one of them moves alone.
-    own, loops = [k for k in problem.independent if k < len(AXES)], problem.loops
-    moved = np.tile(problem.start, (len(own), 1))
-    moved[:, : len(AXES)] = coordinates_of(start + np.diag(half)[own])
-    found = loops.all_closed(moved.T, range(len(AXES), len(problem.start)), zero=DEPENDENT).T
-    is_alone = [bool(np.isfinite(each).all()) and loops.is_closed(each) for each in found]
-    pairs = list(zip(own, is_alone, strict=True))
-    return Coordinates(*([k for k, alone in pairs if alone is kind] for kind in (True, False)))
+    # Loops of a robot that is given by its rows are not known: its constraint wrenches must do no work.
+    work = np.zeros(6) if problem.unactuated is None else _work(problem, problem.unactuated.matrix, start)
+    return Coordinates(np.flatnonzero(work <= _ZERO).tolist(), [])
 
 
 def _work(problem: Problem, matrix: ca.SX, start: FloatArray) -> FloatArray:

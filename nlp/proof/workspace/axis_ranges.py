@@ -14,21 +14,20 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple, TypeVar
 
-import casadi as ca
 import numpy as np
 
-from ....models import Dimension, FloatArray, Substitution
+from ....models import Dimension, FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.limits.legs import Actuator
 from ...case.pose import Free
 from ...errors import InputError, nearest
+from ...evidence.dependent import robot_size
 from ...interruption import is_requested, one_call, one_search, why_stopped, within
 from ...path.options import Between
 from ...path.orientation import ORDERS, roll_pitch_yaw
 from ...path.path import Kind, ProgrammedPath
 from ..statement.claims import CONSTRAINTS, REGULAR
-from ..statement.machine import workspace_of_case
 from .alone import AXES, box_about, coordinates_alone
 from .edge_samples import EdgeSamples
 from .judge import Judgement, judge_workspace
@@ -136,7 +135,7 @@ class AxisRanges:
         stops: claims that are not proved at the pose itself; the ranges are empty where there are any.
         axes: ranges of the independent coordinates alone.
         pairs: of each two of them.
-        others: independent coordinates that do not move alone, as other numbers of the pose follow from them.
+        others: coordinates that follow from these, and move with them.
         reason: why the work ended before all axes and pairs were judged; else empty.
     """
 
@@ -199,8 +198,9 @@ def axis_ranges(
     _check(here, axes)
     # The workspace says nothing here, but a judged machine has one.
     case = replace(case, workspace=box_about(here, {0: (here[0] - 1.0, here[0] + 1.0)}))
-    workspace_of_case(case)
-    most = (_size(case, here), LARGEST_ANGLE) if most is None else most
+    case.fixed_parameters("a range is judged with fixed dimensions")
+    case.require_motion()
+    most = (robot_size(case, here[:3].tolist()), LARGEST_ANGLE) if most is None else most
     if not all(0 < each < math.inf for each in most):
         raise InputError("the largest length and angle to move by must be positive and finite")
     report = progress or (lambda _: None)
@@ -265,17 +265,6 @@ def _of_case(case: Case) -> FloatArray:
     turn = roll_pitch_yaw(np.array([[math.cos(half), *(math.sin(half) * axis)]]))[0]
     # A sum with zero has no negative zero.
     return np.array([*fixed[:3], *turn]) + 0.0
-
-
-def _size(case: Case, start: FloatArray) -> float:
-    """Return the largest distance between two points of a robot's drawing at a pose, its unknown joints at home."""
-    model = case.model
-    parts = [value for name in case.parameters for value in case.components(name)]
-    places = ca.horzcat(*[point.position for point in model.scene.points], ca.SX(model.pose.position))
-    function = ca.Function("points", Substitution.identity(model).all, [ca.densify(places)])
-    points = np.array(function(np.array(parts), np.zeros(len(model.unknowns)), np.eye(3), start[:3])).T
-    size = float(np.linalg.norm(points[:, None] - points[None], axis=2).max())
-    return size or 1.0
 
 
 def _range(case: Case, start: FloatArray, k: int, most: float, *, has_whole: bool) -> AxisRange:

@@ -13,10 +13,10 @@ from ...case.task import Sense
 from ...case.workspace import Workspace
 from ...interruption import is_requested, one_call, within
 from ..enclosure.engine import kernel
-from ..statement.claims import SPECTRAL, Claim, claims_of
+from ..statement.claims import REACH, SPECTRAL, Claim, claims_of, dependent_claims
 from ..statement.machine import check_leg_error, has_straight_legs, workspace_of_case
 from ..statement.posed_layout import closed_layout, posed_layout, reach_claims
-from ..statement.tolerance import Directions, length_of_one_machine
+from ..statement.tolerance import Directions, coordinate_layout, length_of_one_machine
 from .home_poses import Homes
 from .numbers.bound_search import Minimum
 from .numbers.extremes import GAP, Extreme, extreme_of, prove_extreme
@@ -25,7 +25,7 @@ from .numbers.pose_error import pose_errors
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
 from .ranks.ranks import RankProgress, Ranks, not_judged, prove_ranks
-from .robot.pose_box import pose_box
+from .robot.pose_box import pose_box, pose_coordinates
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
 from .verdict import Outcome, RankVerdict
 
@@ -126,10 +126,9 @@ def judge_workspace(
         CaseError: the case has no workspace, or a free dimension.
         InputError: the robot has no such measure, the error of legs is negative or not for it, or there is no C kernel.
     """
-    own = workspace_of_case(case)
+    workspace = workspace_of_case(case if workspace is None else replace(case, workspace=workspace))
     kernel()  # before any work where it is missing
     check_leg_error(case, leg_error)
-    workspace = own if workspace is None else workspace
     with within(time_limit, _PART):
         whole = (case, workspace, quantities, leg_error, with_objective, gap, jobs, progress, paper)
         numbers = _Numbers(*whole, at_once=until_fault)
@@ -219,8 +218,8 @@ class _Numbers:
         """Yield the extremes of expressions over all machines."""
         reaches, claims = machines.symbols.claims(self.names, with_objective=self.with_objective)
         prove = partial(machines.extreme, jobs=self.jobs, paper=self.paper)
-        yield from self._proved(reaches, prove)
-        if any(each.fails for each in self.found):
+        yield from self._proved([*reaches, *dependent_claims(machines.symbols.layout.robots[0], self.workspace)], prove)
+        if any(each.fails and each.key == REACH for each in self.found):
             yield from (extreme_of(claim, Minimum(reason=_OUT_OF_REACH)) for claim in claims)
         else:
             yield from self._proved(claims, prove)
@@ -228,6 +227,9 @@ class _Numbers:
     def _of_design(self) -> Iterator[Extreme]:
         """Yield the extremes of expressions of the design."""
         case, closed, workspace = self.case, self.closed, self.workspace
+        if workspace.dependent:
+            yield from self._followed(self.meant)
+            return
         if closed.reaches:
             layout, reaches = reach_claims(case, closed, workspace)
             yield from self._proved(reaches, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper))
@@ -239,6 +241,28 @@ class _Numbers:
         is_together = self.meant is not None and (bool(closed.model.unknowns) or (self.at_once and is_reached))
         decided = self._in_home(self.meant, is_reached=is_reached) if self.meant and is_together else []
         yield from self._proved(claims, partial(prove_extreme, layout, jobs=self.jobs, paper=self.paper), decided)
+
+    def _followed(self, design: Problem | None) -> Iterator[Extreme]:
+        """Yield the extremes of a design with dependent coordinates of the pose, in the home assembly mode.
+
+        No other search keeps to the poses that the robot can take.
+        """
+        if design is None:
+            layout = coordinate_layout(self.case, pose_coordinates(self.box))
+            claims = [
+                *dependent_claims(layout.robots[0], self.workspace),
+                *claims_of(layout, self.names, with_objective=False),
+            ]
+            yield from (extreme_of(claim, Minimum(reason=self.reason)) for claim in claims)
+            return
+        alone = Machines(self.case, self.closed, design)
+        reaches, claims = alone.symbols.claims(self.names, with_objective=self.with_objective)
+        # The range of a dependent coordinate is part of the answer, however wide its limits are.
+        every = [*reaches, *dependent_claims(alone.symbols.layout.robots[0], self.workspace), *claims]
+        limited = [claim for claim in (*reaches, *claims) if claim.limit is not None]
+        decided = {(each.name, each.sense, each.key): each for each in alone.followed(limited, gap=self.gap)}
+        prove = partial(alone.extreme, jobs=self.jobs, paper=self.paper)
+        yield from self._proved(every, prove, [each for each in decided.values() if each.outcome is not Outcome.OPEN])
 
     def _in_home(self, design: Problem, *, is_reached: bool) -> Iterator[Extreme]:
         """Yield the extremes of a design with loops that are decided in the assembly of home.

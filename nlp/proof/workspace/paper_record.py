@@ -19,6 +19,8 @@ from .verdict import slack_of
 Key = tuple[str, str]
 #: Part of itself by which the bound of a number that is the same at every pose moves outwards, as that of a search.
 _FOLDED = 1e-12
+#: Part of a gap, and part of itself, by which the bound of a search of boxes moves outwards.
+_ROOM, _OUTWARDS = 0.25, 1e-6
 
 
 @dataclass(eq=False)
@@ -55,6 +57,18 @@ class PaperRecord:
         most = math.inf if claim.limit is None else sign * claim.limit + slack_of(claim.limit)
         if is_bounded and math.isfinite(found.bound) and sign * found.bound <= most:
             self._keep(claim, found.nlp, -found.nlp.sign * found.bound, tree.tree(with_open=True))
+
+    def followed(self, claim: Claim, bound: float, reached: float, tree: TreeRecord) -> None:
+        """Record a search of boxes in which the loops are followed: the bound of a number, and its best value known."""
+        sign, key = claim.sense.sign, (claim.name, claim.sense.value)
+        if not math.isfinite(bound):
+            return
+        # Forms of first order need smaller boxes for the same bound.
+        room = _ROOM * abs(bound - reached) if math.isfinite(reached) else 0.0
+        beyond = sign * bound + max(room, _OUTWARDS * abs(bound))
+        most = math.inf if claim.limit is None else sign * claim.limit
+        bound = sign * max(min(beyond, most), sign * bound)
+        self.programs.setdefault(key, ProofClaim(*key, "boxes", bound, tree=tree.tree(with_open=True)))
 
     def _keep(self, claim: Claim, nlp: Nlp, bound: float, tree: bytes) -> None:
         """Keep the best bound of a program; of two programs of one name the first, as the check has it."""

@@ -33,8 +33,16 @@ class Fault(NamedTuple):
 
 
 def pose_at(problem: Problem, cover: PathCover, place: Place) -> PoseNumbers:
-    """Return the pose at a place."""
-    return problem.box.pose(cover.points(np.array([[place.segment, place.parameter, place.parameter]]), 0.0)[0])
+    """Return the pose at a place, of the design where coordinates follow from others."""
+    piece = np.array([[place.segment, place.parameter, place.parameter]])
+    if not problem.box.dependent:
+        return problem.box.pose(cover.points(piece, 0.0)[0])
+    problem = problem.problem.resting or problem.problem
+    row = int(np.flatnonzero(cover.pieces[:, 0] == place.segment)[0])
+    z = closed_along(problem, cover)[row].copy()
+    z[problem.of_path] = problem.path_points(cover, piece, 0.0)[0]
+    closed = problem.loops.all_closed(z[:, None], problem.dependent)[:, 0]
+    return problem.box.pose(problem.pose_of(closed if np.isfinite(closed).all() else z))
 
 
 def refuted(claims: Sequence[Claim], found: Sequence[Extreme]) -> dict[int, tuple[Claim, Extreme]]:

@@ -16,19 +16,20 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ....models.joints.closedform import closed_form
+from ....models.joints.closedform import ClosedForm, closed_form
 from ...case.case import Case
 from ...case.motors import MotorNumber
-from ...case.pose import Free, Value
+from ...case.pose import Free, Value, ends_of
 from ...case.task import Sense
 from ...case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
 from ...errors import InputError, UncoveredError
+from ...evidence.dependent import dependent_of, robot_size
 from ...interruption import is_requested, one_call, one_search, within
 from ...path.arcs import PLANES
 from ...path.path import ProgrammedPath
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
-from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim
+from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim, dependent_claims
 from ..statement.motors import in_motion, motor_claims
 from ..statement.tolerance import Directions
 from .numbers.bound_search import Minimum
@@ -46,7 +47,7 @@ from .ranks.ranks import RankRule
 from .ranks.singular_pose import DeterminantSigns, SingularPose
 from .robot.path_cover import PathCover, Place
 from .robot.path_turns import turns_of_path
-from .robot.pose_box import PoseBox, PoseNumbers
+from .robot.pose_box import PoseBox, PoseNumbers, pose_box
 from .robot.posed_model import RankMatrix
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
 from .verdict import Outcome
@@ -57,6 +58,8 @@ TIME_LIMIT = 600.0
 _PART, GAP = 0.5, 1e-3
 #: Part of the sizes of positions by which the box of all poses is wider than a path that stays at one.
 _ROOM = 1e-9
+#: Parts of a robot's size, or angle, by which a coordinate moves that stands still but for rounding.
+_STILL = 1e-9
 #: Singular value, in parts of the largest, that counts as 0 at a point of a path, steps in the search of it, and powers
 #: of two of a piece's width at which it begins.
 _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
@@ -101,6 +104,7 @@ class PathJudgement:
         faults: the first known point that refutes a limit, by name and sense of the claim, where it is before the one
             of the worst value.
         knots: places of the path with the joints of the design there; None where none are asked for.
+        dependent: names of the coordinates of the pose that follow from the others.
     """
 
     case: Case
@@ -109,6 +113,7 @@ class PathJudgement:
     extremes: tuple[Extreme, ...]
     faults: Mapping[tuple[str, Sense], Fault] = field(default_factory=dict)
     knots: Knots | None = None
+    dependent: tuple[str, ...] = ()
 
     @property
     def is_proved(self) -> bool:
@@ -162,15 +167,9 @@ def judge_path(
             knots = knots_of(case, path, cover, workspace, sampling)
         closed = closed_form(case.model)
         try:
-            first = cover.points(cover.pieces[:1], 0.0)[0]
-            design = replace(build_problem(case, closed.model, box, first), cover=cover)
-            if design.has_following:
-                raise NotJudgedError(
-                    "its platform has fewer than six freedoms, and the path states more of its numbers"
-                )
-            # An equation of a number that hardly changes counts as one that follows from others, but must hold.
-            if not np.array_equal(design.start[: len(design.free)], first[list(design.free)]):
-                raise NotJudgedError("its loops could not be closed at the first point of the path")
+            box, workspace = _with_dependent(case, box, workspace)
+            stated, case = replace(stated, workspace=workspace), replace(case, workspace=workspace)
+            design = _design(case, closed, box, cover)
             machines = Machines(case, closed, design)
         except NotJudgedError as error:
             rank = RankOnPath(REGULAR, Outcome.OPEN, None, None, 0, 0.0, str(error))
@@ -185,6 +184,7 @@ def judge_path(
         asked = () if limits_alone else (*ACTUATED, "leg_length")
         names = [item.name for item in case.model.quantities if item.name in asked]
         reaches, claims = machines.symbols.claims(names, with_objective=False)
+        claims += dependent_claims(machines.symbols.layout.robots[0], workspace)
         found: list[Extreme] = []
         faults: dict[tuple[str, Sense], Fault] = {}
         for group in (reaches, claims):
@@ -200,7 +200,8 @@ def judge_path(
         found += searched_extremes(subject, (), gap=gap)
         report("actuators")
         found += _of_actuators(subject, machines, cover, gap, faults, is_timed=path.is_timed, with_all=not limits_alone)
-    return PathJudgement(stated, path, tuple(ranks), tuple(found), faults, knots)
+    dependent = tuple(workspace.names[each.index] for each in workspace.dependent)
+    return PathJudgement(stated, path, tuple(ranks), tuple(found), faults, knots, dependent)
 
 
 def _of_actuators(
@@ -308,6 +309,50 @@ def _covered(path: ProgrammedPath) -> tuple[PathCover, PoseBox, Workspace]:
     return cover, box, Workspace(_values(low[:3], high[:3]), about)
 
 
+def _design(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover) -> Problem:
+    """Return the design along a path.
+
+    Raises:
+        NotJudgedError: it is not judged, or its loops are not closed at the first point.
+    """
+    first = cover.points(cover.pieces[:1], 0.0)[0]
+    design = replace(build_problem(case, closed.model, box, first), cover=cover)
+    # An equation of a number that hardly changes counts as one that follows from others, but must hold.
+    if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
+        raise NotJudgedError("its loops could not be closed at the first point of the path")
+    return design
+
+
+def _with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[PoseBox, Workspace]:
+    """Return the box of a path, and the workspace about it, with the coordinates that the robot cannot choose.
+
+    Raises:
+        NotJudgedError: the path moves one of these, or its rotations are not those of three angles.
+    """
+    if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
+        return box, workspace
+    found = dependent_of(case, workspace)
+    places = [each.index for each in found.dependent]
+    if not places:
+        return box, workspace
+    stated, angle = (*workspace.position, *workspace.turns.angles), _STILL
+    length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in workspace.position])
+    moved = [k for k in places if np.ptp(ends_of(stated[k])) > (length if k < 3 else angle)]
+    if moved:
+        names, chosen = (
+            " and ".join(found.names[k] for k in which) for which in (moved, [k for k in range(6) if k not in places])
+        )
+        raise NotJudgedError(f"the path moves {names}, which this robot cannot choose: of the pose it chooses {chosen}")
+    wide = pose_box(found)
+    lower, upper = box.lower.copy(), box.upper.copy()
+    lower[places], upper[places] = wide.lower[places], wide.upper[places]
+    lower, upper = frozen_array(lower, (6,)), frozen_array(upper, (6,))
+    # Ranges of rounding are no limits.
+    still = [sum(ends_of(each)) / 2 if k in places else each for k, each in enumerate(stated)]
+    found = replace(found, position=still[:3], turns=replace(found.turns, angles=tuple(still[3:])))
+    return replace(box, lower=lower, upper=upper, dependent=tuple(places)), found
+
+
 def _values(low: FloatArray, high: FloatArray) -> list[Value]:
     """Return ranges, or fixed numbers where both ends are one."""
     return [Free(a, b) if b > a else a for a, b in zip(low.tolist(), high.tolist(), strict=True)]
@@ -375,11 +420,12 @@ def _most_singular(
     problem: Problem, matrix: RankMatrix, cover: PathCover, piece: FloatArray, box: LoopBoxes
 ) -> tuple[Place, float]:
     """Return the place in a piece with its box, and near it, with the smallest singular value, and the value."""
-    newton, free = SingularPose(problem, matrix), list(problem.free)
+    newton, stated = SingularPose(problem, matrix), problem.stated
+    chosen = [problem.free[j] for j in stated]
 
     def at(s: float) -> float:
         z = box.near[0].copy()
-        z[: len(free)] = cover.points(np.array([[piece[0], s, s]]), 0.0)[0, free]
+        z[stated] = cover.points(np.array([[piece[0], s, s]]), 0.0)[0, chosen]
         if problem.dependent:
             z = problem.loops.all_closed(z[:, None], list(problem.dependent))[:, 0]
         return newton.smallest(z) if np.isfinite(z).all() else math.inf

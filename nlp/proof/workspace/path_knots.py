@@ -16,8 +16,9 @@ from ....models import FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
 from ...case.pose import Free, ends_of
-from ...case.workspace import TurnKind, Workspace
+from ...case.workspace import DependentCoordinate, TurnKind, Workspace
 from ...errors import InputError, UncoveredError
+from ...evidence.dependent import independent_coordinates, with_dependent
 from ...evidence.inverse import InversePoses, inverse
 from ...interruption import is_requested, one_search, why_stopped
 from ...path.path import ProgrammedPath
@@ -194,6 +195,10 @@ def _machine(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Proble
     rooms = [_ROOM * (size or 1.0)] * 3 + [_ROOM] * 3
     free = [Free(low - room, high + room) for (low, high), room in zip(ends, rooms, strict=True)]
     opened = replace(workspace, position=free[:3], turns=replace(workspace.turns, angles=tuple(free[3:])))
+    # Independent ones are those that the path moves, and not those with the narrowest rooms.
+    chosen = independent_coordinates(case, workspace) or range(6)
+    others = (DependentCoordinate(k, *ends[k]) for k in range(6) if k not in chosen)
+    opened = with_dependent(case, replace(opened, dependent=tuple(others)))
     case = replace(case, workspace=opened, joint_centre_tolerance=None)
     closed, first = closed_form(case.model), cover.points(cover.pieces[:1], 0.0)[0]
     problem = replace(build_problem(case, closed.model, pose_box(opened), first), cover=cover)

@@ -127,7 +127,10 @@ def samples_of(judged: PathJudgement, most: int = MOST_POINTS) -> PathSamples:
     except InputError:
         joints = None
     speeds = np.zeros((len(points.parameters), 0))
-    if joints is not None:
+    if joints is not None and joints.dependent:
+        # The path does not say how fast dependent coordinates change.
+        poses = poses._replace(positions=joints.positions, rotations=joints.rotations)
+    elif joints is not None:
         speeds = np.einsum("pai,pi->pa", joints.rates, twists_at(path, points))
     numbers, left_out = _numbers(replace(judged, case=case), poses, joints)
     if path.is_timed:

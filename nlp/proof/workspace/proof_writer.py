@@ -11,7 +11,7 @@ from ....models import FloatArray
 from ..checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, workspace_numbers
 from ..checker.workspace.statement import expected_claims, legs_numbers, robot_claims
 from ..statement.claims import ERRORS, REACH, REGULAR, Claim, ClaimKind, one_machine_name
-from ..statement.machine import INSIDE, legs_of
+from ..statement.machine import INSIDE, legs_of, workspace_of_case
 from ..statement.tolerance import second_order_name
 from .judge import Judgement
 from .numbers.extremes import Extreme
@@ -31,7 +31,6 @@ _NO_RULES = "claims of this kind have no proof on paper"
 _NOT_JUDGED = "it was not judged"
 _NO_BOUND = "its search has no bound"
 _ONE_ASSEMBLY = "it is proved in home's assembly of the joints, and proofs on paper are about all assemblies"
-_BEYOND = "boxes were left out in which a number of the pose that follows from others leaves its range"
 _NO_REACH = "the reach of limbs that it needs has no proof"
 _NO_LENGTHS = "the lengths of legs that it needs have no proof"
 
@@ -64,7 +63,7 @@ def paper_of(
         if writer.proved.pop(other.label, None):
             unproved.append(Unproved(*other.label, f"the {missing[0].name} has no proof"))
     premises = Premises(
-        workspace=workspace_numbers(judged.workspace),
+        workspace=workspace_numbers(workspace_of_case(judged.case)),
         legs=legs_numbers(legs_of(judged.case)),
         quantities=tuple(quantities),
         leg_error=leg_error,
@@ -125,10 +124,7 @@ class _Writer:
             return self._singular(name, found, found.y)
         if found.outcome is not Outcome.PROVED:
             raise ProofError(_words(found))
-        tree = self._record.own(name)
-        if tree.lacks_boxes:
-            raise ProofError(_BEYOND)
-        return ProofClaim(name, "", "regular", tree=tree.tree(with_open=True))
+        return ProofClaim(name, "", "regular", tree=self._record.own(name).tree(with_open=True))
 
     def _singular(self, name: str, found: RankVerdict, y: FloatArray) -> ProofClaim:
         """Return the opposite of a claim about a rank, which is refuted at a pose (6,)."""
@@ -148,7 +144,7 @@ class _Writer:
     def _program(self, found: Extreme) -> ProofClaim:
         """Return a claim with a tree of the search of ``certify``."""
         # The search needs the reach of all limbs for the closed forms, and so do the claims on paper.
-        is_reached = all(each.outcome is Outcome.PROVED for each in self._reaches)
+        is_reached = all(each.outcome is Outcome.PROVED for each in self._reaches) and not self.robot.dependent
         if found.key != REACH and is_reached and any((each.name, "min") not in self.proved for each in self._reaches):
             raise ProofError(_NO_REACH)
         program = self._record.programs.get((found.name, found.sense.value))
@@ -174,8 +170,6 @@ class _Writer:
         if each.name not in self._record.boxes:
             raise ProofError(_ONE_ASSEMBLY)
         record, is_motor = self._record.own(each.name), each.kind is ClaimKind.MOTOR
-        if record.lacks_boxes:
-            raise ProofError(_BEYOND)
         of_legs = self._case.joint_centre_tolerance and each.kind is ClaimKind.SPECTRUM
         if each.kind is ClaimKind.ERROR or of_legs:
             self._need_lengths([leg.name for leg in self._case.model.legs], ("min",))

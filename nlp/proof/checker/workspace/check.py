@@ -19,6 +19,7 @@ from .....models import Dimension, rate_relations
 from ....case.case import Case
 from ....case.limits.constraint import LENGTH
 from ....case.task import Sense
+from ....case.workspace import Workspace
 from ....errors import InputError, UncoveredError
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
@@ -31,7 +32,15 @@ from ..tree import Node
 from .loop_claims import PosedLoops, posed_loops
 from .motion_matrix import PosedRobot
 from .motor_claims import MotorClaims
-from .number_claims import ClearanceClaim, ErrorClaim, SecondOrderClaim, SingularClaim, change_of_jacobian, whole_errors
+from .number_claims import (
+    ClearanceClaim,
+    ErrorClaim,
+    NumberClaim,
+    SecondOrderClaim,
+    SingularClaim,
+    change_of_jacobian,
+    whole_errors,
+)
 from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
 from .ranks import rank_claim
 from .statement import Machines, expected_claims, hold_premises, leg_error_of, robot_claims
@@ -76,12 +85,14 @@ class VerifiedWorkspace:
         claims: what it proves.
         numbers_at: assemblies that the claims about numbers cover, but for those of actuators under loads, which are
             about home's as ranks are; empty for a robot without loops.
+        workspace: the poses, with the dependent coordinates of the robot.
         leaves: number of claims about boxes in it.
         pieces: number of boxes that were evaluated to show them.
     """
 
     claims: tuple[CheckedClaim, ...]
     numbers_at: str
+    workspace: Workspace
     leaves: int
     pieces: int
 
@@ -117,14 +128,15 @@ def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -
             claims.append(checker.check(expected[key], given[key]))
         except ProofError as error:
             raise ProofError(f"{' '.join(key).strip()}: {error}") from None
-    return VerifiedWorkspace(tuple(claims), checker.robot.numbers_at, checker.leaves, checker.pieces)
+    return VerifiedWorkspace(tuple(claims), checker.robot.numbers_at, checker.workspace, checker.leaves, checker.pieces)
 
 
 class _Checker:
     """A check of claims one after the other; later ones use the bounds of earlier ones."""
 
     def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
-        workspace, premises = workspace_of_case(case), proof.premises
+        self.workspace = workspace = workspace_of_case(case)
+        premises = proof.premises
         if not isinstance(premises, Premises):
             raise ProofError("the proof is not about a workspace")
         self.robot = robot = robot_claims(case, workspace, {each.name for each in proof.claims})
@@ -148,6 +160,7 @@ class _Checker:
         """Check one claim."""
         rules: dict[tuple[ClaimKind, str], Callable[[Claim, ProofClaim], float]] = {
             (ClaimKind.EXPRESSION, "program"): self._number,
+            (ClaimKind.EXPRESSION, "boxes"): self._followed,
             (ClaimKind.LENGTHS, "lengths"): self._lengths,
             (ClaimKind.LENGTHS, "one machine"): self._lengths,
             (ClaimKind.ERROR, "boxes"): self._error,
@@ -207,11 +220,26 @@ class _Checker:
     def _number(self, claim: Claim, given: ProofClaim) -> float:
         """Return the bound of a number that a tree of ``certify`` proves, of all machines with a lemma."""
         layout = self.robot.place if claim.key == REACH else self.robot.layout
+        if self.robot.dependent:
+            raise ProofError("dependent coordinates of the pose are followed over boxes")
         if self.robot.machines is None:
             return self._program(claim.expression, claim.sense, given, layout)
         if claim.key != REACH and any(reach.label not in self._bounds for reach in self.robot.reaches):
             raise ProofError("the reach of limbs of every machine has no proof")
         return self._of_machines(self.robot.machines, claim, given)
+
+    def _followed(self, claim: Claim, given: ProofClaim) -> float:
+        """Return the bound of a number that a tree of boxes proves, in which the loops are followed."""
+        symbols = self.robot.followed
+        if symbols is None:
+            raise ProofError("'boxes' is no reason of this claim")
+        bound, loops = _stated(given), self._loops
+        z, count = loops.robot.z, loops.robot.errors
+        split = z.numel() - count
+        number = NumberClaim(loops, symbols.of(claim.expression, z[split:, :], z[:split, :]), claim.sense, bound)
+        self._show(number, given.tree)
+        number.finish()
+        return bound
 
     def _of_machines(self, machines: Machines, claim: Claim, given: ProofClaim) -> float:
         """Return the bound of a number over all machines that a tree of ``certify``, and a lemma, prove."""

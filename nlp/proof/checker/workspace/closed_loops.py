@@ -179,15 +179,12 @@ class Assembly:
         self._arithmetic = FormArithmetic(robot.z, ca.vertcat(SX(0, 1), equations, ca.vec(ca.densify(columns))))
 
     def _determined(self, start: FloatArray) -> list[int]:
-        """Return the coordinates that follow from others: all unknowns, and numbers of the pose as far as needed."""
+        """Return the coordinates that follow from others: dependent ones of the pose, and all unknowns."""
         poses, count = len(self._robot.free), self._count
         unknowns = list(range(poses, len(start) - self._robot.errors))
         if count < len(unknowns):
             raise ProofError("the loops leave a passive joint free")
-        J = self.points.at(start[None])[1][0]
-        basis = np.linalg.svd(J[:, unknowns])[0] if unknowns else np.eye(count)
-        rest = basis[:, len(unknowns) :].T @ J[:, :poses]
-        chosen = [*(sorted(independent_rows([rest.T])) if count > len(unknowns) else []), *unknowns]
+        J, chosen = self.points.at(start[None])[1][0], [*self._robot.dependent, *unknowns]
         values = np.linalg.svd(J[:, chosen], compute_uv=False) if len(chosen) == count else np.zeros(1)
         if not values.min(initial=1.0) > _ZERO * values.max(initial=0.0):
             raise ProofError("the loops are singular in the middle of the workspace")

@@ -57,6 +57,7 @@ class PosedRobot:
         z: (n, 1) symbols: those of the six coordinates of the pose that vary, then the unknowns, then errors.
         errors: number of components of errors.
         free: indices of the varying coordinates among the six.
+        dependent: places among these of the coordinates that follow from the others.
         centre: (n,) the middle of the workspace, with unknowns and errors of 0.
         size: (n,) by which coordinates are comparable: half ranges, sizes of the unknowns, and the tolerance.
         length: by which rotations are multiplied, length: any positive number.
@@ -75,6 +76,7 @@ class PosedRobot:
     def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
         middle, symbols = 0.5 * root.lower + 0.5 * root.upper, Substitution.identity(model).all
         self.free: list[int] = np.flatnonzero(root.upper > root.lower).tolist()
+        self.dependent = [j for j, k in enumerate(self.free) if k in root.dependent]
         y = [SX.sym(f"y{k}") if k in self.free else SX(float(middle[k])) for k in range(6)]
         unknowns = ca.vertcat(SX(0, 1), *[SX.sym(item.name) for item in model.unknowns])
         values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]

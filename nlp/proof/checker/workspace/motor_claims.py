@@ -91,7 +91,7 @@ class MotorClaims(LoopClaim):
         if self._is_six_legs or not self._has_speeds:
             D = D[:, motor.place]
         moment = forces[motor.place].T / robot.length if self._is_six_legs else SX(1, 3)
-        self._ball = math.sqrt(root.ball) * (1 + _UNIT) if math.isfinite(root.ball) else math.inf
+        self._ball = math.sqrt(root.ball) * (1 + _UNIT) if root.is_ball else math.inf
         turn = [z for z, k in zip(ca.vertsplit(robot.z), robot.free, strict=False) if k >= 3]
         scaled = ca.vertcat(wrench[:3], wrench[3:] / robot.length)
         every = [A, D, scaled.T, moment, ca.horzcat(SX(1, 0), *turn), *arms]

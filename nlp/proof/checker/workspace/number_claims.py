@@ -28,11 +28,14 @@ from numpy.typing import NDArray
 
 from .....models import FloatArray
 from ....case.pose import Free
+from ....case.task import Sense
 from ....errors import UncoveredError
 from ...statement.machine import Legs
 from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
+from .closed_loops import Enclosed
 from .forms import ENLARGED, PRODUCT, UP, AffineMatrix, FormArithmetic, solved
+from .loop_claims import LoopClaim, PosedLoops
 from .motion_matrix import PosedRobot
 from .pose_boxes import Attempt
 from .statement import Machines
@@ -51,6 +54,31 @@ _DENSE, _ENDS = (np.indices(shape, dtype=np.intp).reshape(2, -1) for shape in ((
 _CHOLESKY = 1e-13
 #: Steps in the search of the part of second order of errors, and of the nearest points of two legs.
 _STEPS, _NEAREST = 200, 12
+
+
+class NumberClaim(LoopClaim):
+    """The claim that a number (1, 1) in a robot's coordinates is at most, or at least, a bound at its closed loops.
+
+    Args:
+        loops: the robot.
+        number: the number.
+        sense: whether the bound is of the largest value or of the smallest.
+        bound: the bound.
+    """
+
+    def __init__(self, loops: PosedLoops, number: SX, sense: Sense, bound: float) -> None:
+        super().__init__(loops, number)
+        self._sign, self._most = sense.sign, sense.sign * bound
+
+    def examined(self, closed: Enclosed) -> Attempt:
+        """Try to show the claim over closed loops."""
+        forms, p = self.assembly.followed(self.values(closed).forms(), closed), len(self.free)
+        slopes = np.abs(forms.a[:, 0])
+        errors = np.sqrt((slopes[:, p:].reshape(len(slopes), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
+        middle, spread = self._sign * forms.c[:, 0], slopes[:, :p].sum(axis=1) + errors
+        rest = (forms.r[:, 0] + PRODUCT * (np.abs(middle) + spread)) * UP
+        holds = middle + spread * UP + rest <= self._most
+        return Attempt(np.asarray(holds), closed.shares[:, :p] + slopes[:, :p], np.asarray(middle - rest > self._most))
 
 
 class SecondOrderClaim:

@@ -24,6 +24,8 @@ from ..tree import Node, TreeReader
 
 #: Number of coordinates of a pose.
 COORDINATES = 6
+#: Number of those of its position.
+POSITION = 3
 #: Part of itself by which tangents move outwards where they multiply an axis: its doubles are of length 1 to rounding.
 #: A fixed angle's coordinate is a rounded tangent too.
 _AXIS = Fraction(1, 2**50)
@@ -40,6 +42,8 @@ class PoseRoot:
         lower, upper: (6,) ends, which hold every pose of the workspace.
         inner: (6,) pairs of ends between which every pose is one of the workspace; of a fixed angle those of its box.
         ball, inner_ball: the same of the squared size of a Cayley vector; infinite without a ball.
+        dependent: indices of the coordinates that follow from the others: their ends leave no pose out, and a ball is
+            one of the other components.
     """
 
     kind: TurnKind
@@ -50,26 +54,41 @@ class PoseRoot:
     inner: tuple[tuple[Fraction, Fraction], ...]
     ball: float
     inner_ball: Fraction | None
+    dependent: tuple[int, ...] = ()
+
+    @property
+    def _turns(self) -> list[int]:
+        """Indices of the components of the ball."""
+        return [k for k in range(3, COORDINATES) if k not in self.dependent]
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether all three components of a Cayley vector lie in a ball."""
+        return math.isfinite(self.ball) and len(self._turns) == 3
 
     def holds(self, y: FloatArray) -> bool:
         """Return whether a point (6,) is surely a pose of the workspace."""
         at = [Fraction(each) for each in y.tolist()]
-        inside = all(low <= each <= high for (low, high), each in zip(self.inner, at, strict=True))
-        return inside and (self.inner_ball is None or sum(each * each for each in at[3:]) <= self.inner_ball)
+        inside = all(
+            low <= each <= high or k in self.dependent
+            for k, ((low, high), each) in enumerate(zip(self.inner, at, strict=True))
+        )
+        return inside and (self.inner_ball is None or sum(at[k] * at[k] for k in self._turns) <= self.inner_ball)
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Return boxes (B, 6) with their ends moved to the ball, never past a pose, and which (B,) may have poses."""
         if not math.isfinite(self.ball):
             return lower, upper, np.ones(len(lower), dtype=bool)
-        least = np.maximum(np.maximum(lower[:, 3:], -upper[:, 3:]), 0.0)
+        turns = self._turns
+        least = np.maximum(np.maximum(lower[:, turns], -upper[:, turns]), 0.0)
         squares = least * least
         whole = squares.sum(axis=1, keepdims=True)
         # Sums and differences of three squares round by less than 8 parts in 2^53 of the numbers in them.
         room = np.maximum(self.ball - (whole - squares) + 2.0**-50 * (self.ball + whole), 0.0)
         most = np.sqrt(room) * (1 + 2.0**-50)
-        low, high = np.maximum(lower[:, 3:], -most), np.minimum(upper[:, 3:], most)
-        has_poses = (low <= high).all(axis=1)
-        return np.hstack([lower[:, :3], low]), np.hstack([upper[:, :3], high]), np.asarray(has_poses)
+        low, high = lower.copy(), upper.copy()
+        low[:, turns], high[:, turns] = np.maximum(lower[:, turns], -most), np.minimum(upper[:, turns], most)
+        return low, high, np.asarray((low <= high).all(axis=1))
 
 
 def pose_root(workspace: Workspace) -> PoseRoot:
@@ -96,13 +115,16 @@ def pose_root(workspace: Workspace) -> PoseRoot:
             inner.append(wide if low == high else narrow)
     flat = [(Fraction(0), Fraction(0))] * (COORDINATES - len(outer))
     ends = [(_down(Fraction(low)), _up(Fraction(high))) for low, high in outer + flat]
+    spans += [(0.0, 0.0)] * len(flat)
+    for each in workspace.dependent:
+        spans[each.index] = each.lower, each.upper
+        is_turn = each.index >= POSITION
+        ends[each.index] = (math.tan(each.lower / 2), math.tan(each.upper / 2)) if is_turn else spans[each.index]
     lower, upper = np.array(ends).T
-    values = (
-        Free(*each) if low < high else low
-        for (low, high), each in zip(spans + [(0.0, 0.0)] * len(flat), ends, strict=True)
-    )
+    values = (Free(*each) if low < high else low for (low, high), each in zip(spans, ends, strict=True))
     axis = np.array(turns.axis, dtype=float)
-    return PoseRoot(turns.kind, axis, tuple(values), lower, upper, tuple(inner + flat), ball, inner_ball)
+    dependent = tuple(each.index for each in workspace.dependent)
+    return PoseRoot(turns.kind, axis, tuple(values), lower, upper, tuple(inner + flat), ball, inner_ball, dependent)
 
 
 def _down(value: Fraction) -> float:

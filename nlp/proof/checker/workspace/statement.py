@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import casadi as ca
@@ -25,13 +25,21 @@ from ...statement.claims import (
     Claim,
     ClaimKind,
     claims_of,
+    dependent_claims,
     length_claims,
     searched_claims,
 )
 from ...statement.machine import Legs, legs_of
 from ...statement.motors import motor_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
-from ...statement.tolerance import MachineLayout, PoseCoordinates, built_model, design_layout, machine_layout
+from ...statement.tolerance import (
+    BuiltModel,
+    MachineLayout,
+    PoseCoordinates,
+    built_model,
+    design_layout,
+    machine_layout,
+)
 from ..premises import exact
 from ..proof_file import Premises, ProofError, workspace_numbers
 from .motion_matrix import turned_rotation
@@ -62,14 +70,7 @@ class Machines:
     """
 
     def __init__(self, case: Case, model: Model, root: PoseRoot) -> None:
-        self._case, self.model, self.root = case, model, root
-
-        def rotation(turn: SX) -> SX:
-            """Return the rotation (3, 3) with coordinates (3, 1)."""
-            turned, scale = turned_rotation(root, ca.vertsplit(turn))
-            return turned / scale
-
-        self._at = PoseCoordinates(root.values, rotation, root.ball)
+        self._case, self.model, self.root, self._at = case, model, root, _coordinates(root)
         tolerance = case.joint_centre_tolerance or 0.0
         self.symbols: MachineLayout = machine_layout(case, built_model(case.model), tolerance, self._at)
 
@@ -111,6 +112,9 @@ class RobotClaims:
             robot without unknowns.
         machines: every machine within the tolerance, in whose symbols the numbers and ``reaches`` are then; None where
             the design is meant, or machines cannot be assembled.
+        dependent: claims about dependent coordinates of the pose.
+        followed: the symbols of the numbers of a robot whose loops are followed in the home assembly mode, as they are
+            with dependent coordinates and within a tolerance; else None.
     """
 
     legs: Legs | None
@@ -120,6 +124,8 @@ class RobotClaims:
     reaches: tuple[Claim, ...] = ()
     numbers_at: str = ""
     machines: Machines | None = None
+    dependent: tuple[Claim, ...] = ()
+    followed: MachineLayout | None = None
 
 
 def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> RobotClaims:
@@ -131,9 +137,12 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         except RobotError:
             pass
         else:
-            layout, home = machines.symbols.layout, "the assembly of home" if is_open else ""
-            reaches, _ = machines.symbols.claims(())
-            return RobotClaims(legs, layout, closed.model, layout, tuple(reaches), home, machines)
+            return _followed(legs, closed.model, workspace, machines.symbols, is_open=is_open, machines=machines)
+    if workspace.dependent:
+        symbols = machine_layout(
+            case, BuiltModel(closed.model, (), closed.reaches), 0.0, _coordinates(pose_root(workspace))
+        )
+        return _followed(legs, closed.model, workspace, symbols, is_open=is_open)
     layout = posed_layout(case, workspace)
     place, every = reach_claims(case, closed, workspace) if closed.reaches else (layout, ())
     if every and all(each.name in reached for each in every):
@@ -144,6 +153,33 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
     return RobotClaims(legs, layout, closed.model, place, every, numbers_at)
 
 
+def _followed(
+    legs: Legs | None,
+    model: Model,
+    workspace: Workspace,
+    symbols: MachineLayout,
+    *,
+    is_open: bool,
+    machines: Machines | None = None,
+) -> RobotClaims:
+    """Return the claims about a robot whose loops are followed."""
+    home = "the assembly of home" if is_open else ""
+    reaches, dependent = symbols.claims(())[0], tuple(dependent_claims(symbols.layout.robots[0], workspace))
+    whole = RobotClaims(legs, symbols.layout, model, symbols.layout, tuple(reaches), home, machines)
+    return replace(whole, dependent=dependent, followed=symbols)
+
+
+def _coordinates(root: PoseRoot) -> PoseCoordinates:
+    """Return the coordinates of a box as those of a layout."""
+
+    def rotation(turn: SX) -> SX:
+        """Return the rotation (3, 3) with coordinates (3, 1)."""
+        turned, scale = turned_rotation(root, ca.vertsplit(turn))
+        return turned / scale
+
+    return PoseCoordinates(root.values, rotation, root.ball)
+
+
 def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[Claim]:
     """Return the claims about a case over its workspace, and about measures that were asked for.
 
@@ -152,7 +188,12 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
     """
     ranks = [REGULAR, *([CONSTRAINTS] if _has_constraints(robot.model) else [])]
     claims = claims_of(robot.layout, [name for name in quantities if name not in SPECTRAL])
-    every = [*(Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in ranks), *robot.reaches, *claims]
+    every = [
+        *(Claim(name, Sense.MIN, kind=ClaimKind.RANK) for name in ranks),
+        *robot.reaches,
+        *robot.dependent,
+        *claims,
+    ]
     every += [*length_claims(case), *searched_claims(case, quantities), *motor_claims(case)]
     if robot.legs is None:
         return [each for each in every if each.kind is not ClaimKind.SPECTRUM]

@@ -30,6 +30,7 @@ from ....case.limits.constraint import LENGTH, Reading
 from ....errors import UncoveredError
 from ....interruption import is_requested, why_stopped
 from ....program.layout import Layout
+from ...boxes.tree import TreeRecord
 from ...enclosure.tape import compile_tape
 from ...statement.claims import Claim
 from ...statement.machine import JointErrors
@@ -111,7 +112,7 @@ class Machines:
         try:
             if not self.family.problem.dependent and is_smooth(number):
                 found = self._by_first_order(claim, number, gap, jobs, paper)
-            return found or next(self._by_search([claim], gap))
+            return found or next(self._by_search([claim], gap, paper=paper))
         except UncoveredError as error:
             return extreme_of(claim, Minimum(reason=str(error)))
 
@@ -198,7 +199,13 @@ class Machines:
         return self._rests[key]
 
     def _by_search(
-        self, claims: Sequence[Claim], gap: float, *, is_enough: bool = False, small: float = 0.0
+        self,
+        claims: Sequence[Claim],
+        gap: float,
+        *,
+        is_enough: bool = False,
+        small: float = 0.0,
+        paper: PaperRecord | None = None,
     ) -> Iterator[Extreme]:
         """Yield the extremes of numbers by one search of boxes of poses for all machines.
 
@@ -207,6 +214,7 @@ class Machines:
             gap: as a part of a number.
             is_enough: whether bounds within limits are enough whatever the gap is.
             small: length, in parts of the robot's, or angle, of which the gap is a part too: numbers may be 0 at home.
+            paper: records the search of one number for a proof.
 
         Raises:
             UncoveredError: an expression holds an operation without a rule.
@@ -214,7 +222,11 @@ class Machines:
         problem = self.family.problem
         sizes = {LENGTH: small * problem.length, Reading(Dimension.ANGLE): small}
         goals = [goal_of(claim, gap * sizes.get(claim.reading, 0.0), gap, is_enough=is_enough) for claim in claims]
-        every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals)
+        recorder = None if paper is None else TreeRecord()
+        every = smallest_values(Expressions(self.family, ca.vertcat(*map(self.number, claims))), goals, recorder)
+        if paper is not None and recorder is not None and not every[0].reason:
+            sign = -claims[0].sense.sign
+            paper.followed(claims[0], sign * every[0].bound, sign * every[0].value, recorder)
         for claim, found in zip(claims, every, strict=True):
             is_known = math.isfinite(found.value)
             pose = problem.box.pose(problem.pose_of(found.at)) if is_known else None

@@ -13,7 +13,6 @@ Rotations about any axis lie in a ball, ``|r|^2 <= b``, so that a bound may have
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -76,7 +75,7 @@ class Motors(Number):
             row_of_leg, D = posed.scaled.jacobian[row, :].T, D[:, row]
         self._column = 0 if D.shape[1] == 1 else self._actuator
         free, loading = problem.free, self._loading
-        is_ball = math.isfinite(problem.box.ball)
+        is_ball = problem.box.is_ball
         turn = [problem.z[j] for j, k in enumerate(free) if k >= 3 and is_ball]
         # Minus the matrices of cross products with arms, in parts of the length by which rotations are multiplied.
         arms = [-ca.skew(R @ SX([float(part) for part in each.point])) / problem.length for each in loading.loads]
@@ -237,7 +236,13 @@ def _parts_of(case: Case, claim: Claim) -> list[_Part]:
 
 
 def path_twist(problem: Problem) -> SX:
-    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its numbers in the motion of a path."""
+    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its numbers in the motion of a path.
+
+    Raises:
+        NotJudgedError: some follow from others.
+    """
+    if problem.box.dependent:
+        raise NotJudgedError("the platform's twist along the path has dependent components")
     rates = SX(6, 1)
     rates[list(problem.free)] = problem.z[list(problem.rates), :]
     turn = problem.box.symbols(problem.z)[3:]

@@ -29,12 +29,12 @@ from .quadratic_forms import Quadratics, solved
 
 def with_rates(problem: Problem, cover: PathCover) -> Problem:
     """Return the same machines along a path, with rates of the pose's free numbers as further coordinates."""
-    return _with(problem, cover, ca.vertcat(SX(0, 1), *[SX.sym(f"rate{k}") for k in problem.free]))
+    return _with(problem, cover, ca.vertcat(SX(0, 1), *[SX.sym(f"rate{problem.free[j]}") for j in problem.stated]))
 
 
 def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
     """Return the same machines with symbols (f, 1) of the rates."""
-    free, n = list(problem.free), len(problem.start) - len(problem.of_errors)
+    free, n = [problem.free[j] for j in problem.stated], len(problem.start) - len(problem.of_errors)
     ends = [each[:, free] for each in cover.rates(cover.pieces)]
     largest = np.abs(np.concatenate(ends)).max(axis=0)
     first = [each[0, free] for each in cover.rates(np.zeros((1, 3)))]
@@ -100,11 +100,17 @@ class PathSpeeds(Number):
 
 
 def pose_rates(problem: Problem) -> SX:
-    """Return the rates (f, 1) of the pose's free coordinates, of which angles have tangents of their halves."""
-    rates = problem.z[list(problem.rates), :]
+    """Return the rates (f, 1) of the pose's free coordinates, of which angles have tangents of their halves.
+
+    Dependent coordinates have 0: their rates follow from the loops.
+    """
+    rates = iter(ca.vertsplit(problem.z[list(problem.rates), :]))
     has_angles = problem.box.kind is TurnKind.ROLL_PITCH_YAW
     angles = [problem.z[j] if k >= 3 and has_angles else None for j, k in enumerate(problem.free)]
     return ca.vertcat(
         SX(0, 1),
-        *[rates[j] if t is None else 0.5 * (1 + t * t) * rates[j] for j, t in enumerate(angles)],
+        *[
+            SX(0) if j not in problem.stated else next(rates) if t is None else 0.5 * (1 + t * t) * next(rates)
+            for j, t in enumerate(angles)
+        ],
     )

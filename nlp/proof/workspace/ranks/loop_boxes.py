@@ -342,13 +342,13 @@ def _followed(problem: Problem, cover: PathCover) -> FloatArray:
 
     The searches of one path share them.
     """
-    near, free, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.free), problem.dependent
+    near, D, stated = np.repeat(problem.start[None], len(cover.pieces), axis=0), problem.dependent, problem.stated
     z = problem.start.copy()
-    points = [cover.points(cover.pieces, part)[:, free] for part in (0.5, 1.0)]
+    points = [cover.points(cover.pieces, part)[:, [problem.free[j] for j in stated]] for part in (0.5, 1.0)]
     for k, both in enumerate(zip(*points, strict=True)):
         for point in both:
             moved = z.copy()
-            moved[: len(free)] = point
+            moved[stated] = point
             moved = problem.loops.all_closed(moved[:, None], D)[:, 0]
             z = moved if np.isfinite(moved).all() else z
             near[k] = z if point is both[0] else near[k]
@@ -356,24 +356,20 @@ def _followed(problem: Problem, cover: PathCover) -> FloatArray:
     return near
 
 
-def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return boxes contracted to the workspace.
+def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_]]:
+    """Return boxes contracted to the workspace, and whether each holds poses of it, (B,).
 
-    Returns:
-        (B,) the boxes; whether each holds poses of the workspace; whether a number of the pose that follows from others
-        is outside of its range.
+    Dependent coordinates of the pose leave no box out.
     """
-    box, free = problem.box, list(problem.free)
-    # Numbers of the pose that are not known yet may be any of the workspace.
+    box, free, following = problem.box, list(problem.free), list(problem.box.dependent)
     lower, upper = problem.pose_of(boxes.lower), problem.pose_of(boxes.upper)
-    lower, upper = np.where(np.isnan(lower), box.lower, lower), np.where(np.isnan(upper), box.upper, upper)
-    beyond = np.asarray((lower > box.upper).any(axis=1) | (upper < box.lower).any(axis=1))
+    lower[:, following], upper[:, following] = box.lower[following], box.upper[following]
     lower, upper, outside = box.contracted(lower, upper)
     own = [j for j in problem.independent if j < len(free)]
     columns = [free[j] for j in own]
     found = boxes._replace(lower=boxes.lower.copy(), upper=boxes.upper.copy())
     found.lower[:, own], found.upper[:, own] = lower[:, columns], upper[:, columns]
-    return found, ~(beyond | outside), beyond
+    return found, ~outside
 
 
 def coordinates_to_split(shares: FloatArray, width: FloatArray) -> NDArray[np.intp]:
@@ -500,11 +496,10 @@ class LoopRule(Rule[Followed]):
 
     def _contracted(self, boxes: LoopBoxes) -> LoopBoxes:
         """Return boxes contracted to the workspace, and record where they lead."""
-        found, kept, beyond = contracted_boxes(self._problem, boxes)
+        found, kept = contracted_boxes(self._problem, boxes)
         if self._recorder is not None:
             before, after = (self._poses(each.lower, each.upper) for each in (boxes, found))
             self._recorder.contractions(before, after, ~kept)
-            self._recorder.lacks_boxes |= bool(beyond.any())
         return found if kept.all() else some(found, kept)
 
     def _poses(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -22,10 +22,10 @@ from casadi import SX
 
 from .....models import FloatArray, axis_angle_from_matrix, frozen_array
 from .....models.arrays import values_at
+from .....models.rotation import turn_about
 from ....case.pose import Free, Value, ends_of
 from ....case.workspace import TurnKind, Workspace
 from ....path.orientation import matrices_from_quaternions
-from ...statement.posed_layout import turn_about
 from ...statement.tolerance import PoseCoordinates
 
 if TYPE_CHECKING:
@@ -67,6 +67,8 @@ class PoseBox:
         lower, upper: (6,) ends of the coordinates: position, then rotation.
         ball: largest squared size of a Cayley vector, rounded up; infinite where rotations are no ball.
         reference: the rotation with the Cayley vector zero.
+        dependent: indices of the coordinates that follow from the others: their ends are where a search begins, and
+            leave no pose out. A ball is one of the other components.
     """
 
     kind: TurnKind
@@ -75,6 +77,7 @@ class PoseBox:
     upper: FloatArray
     ball: float
     reference: Reference = UNTURNED
+    dependent: tuple[int, ...] = ()
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -95,13 +98,25 @@ class PoseBox:
         """
         sizes = np.maximum(np.abs(self.lower), np.abs(self.upper)) * np.repeat([0.0, 1.0], 3)
         slack = np.where(self.upper > self.lower, 8 * _TANGENT * sizes, 0.0)
-        return self.lower + slack, self.upper - slack, self.ball * (1 - 16 * _TANGENT)
+        lower, upper = self.lower + slack, self.upper - slack
+        lower[list(self.dependent)], upper[list(self.dependent)] = -np.inf, np.inf
+        return lower, upper, self.ball * (1 - 16 * _TANGENT)
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether all three components of a Cayley vector lie in a ball."""
+        return math.isfinite(self.ball) and len(self._turns) == 3
+
+    @property
+    def _turns(self) -> list[int]:
+        """Indices of the components of the ball."""
+        return [k for k in range(3, 6) if k not in self.dependent]
 
     def holds(self, y: FloatArray) -> NDArray[np.bool_]:
         """Return whether points (..., 6) are surely poses of the workspace, not only of the box rounded outwards."""
         lower, upper, ball = self._inner
         inside = ((y >= lower) & (y <= upper)).all(axis=-1)
-        return np.asarray(inside & (np.square(y[..., 3:]).sum(axis=-1) <= ball))
+        return np.asarray(inside & (np.square(y[..., self._turns]).sum(axis=-1) <= ball))
 
     def rotations(self, points: FloatArray) -> FloatArray:
         """Return the rotation matrices (K, 3, 3) at points (K, 6)."""
@@ -142,12 +157,13 @@ class PoseBox:
         lower, upper = np.array(lower), np.array(upper)
         if not self.ball < np.inf:
             return lower, upper, np.zeros(len(lower), dtype=bool)
-        low, high = lower[:, 3:], upper[:, 3:]
+        turns = self._turns
+        low, high = lower[:, turns], upper[:, turns]
         least = np.where(low > 0, low, np.where(high < 0, -high, 0.0)) ** 2
         whole = least.sum(axis=1, keepdims=True)
         slack = 4 * _ULP * (self.ball + whole)
         most = np.sqrt(np.maximum(self.ball - (whole - least) + slack, 0)) * (1 + _ULP)
-        lower[:, 3:], upper[:, 3:] = np.maximum(low, -most), np.minimum(high, most)
+        lower[:, turns], upper[:, turns] = np.maximum(low, -most), np.minimum(high, most)
         outside = (whole > self.ball + slack)[:, 0] | (lower > upper).any(axis=1)
         return lower, np.maximum(lower, upper), outside
 
@@ -158,15 +174,16 @@ class PoseBox:
         if math.isfinite(ball):
             # A little inside, so that rounding leaves no point outside.
             radius = math.sqrt(ball) * (1 - _TANGENT)
-            sizes = np.sqrt((points[:, 3:] ** 2).sum(axis=1, keepdims=True))
-            points[:, 3:] *= np.minimum(1.0, radius / np.maximum(sizes, radius))
+            turns = self._turns
+            sizes = np.sqrt((points[:, turns] ** 2).sum(axis=1, keepdims=True))
+            points[:, turns] *= np.minimum(1.0, radius / np.maximum(sizes, radius))
         return np.asarray(points)
 
     def random(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Return random points (count, 6) of the workspace, those of rotations within the ball."""
         points = rng.uniform(self.lower, self.upper, (count, 6))
         while math.isfinite(self.ball):
-            outside = np.flatnonzero((points[:, 3:] ** 2).sum(axis=1) > self._inner[2])
+            outside = np.flatnonzero((points[:, self._turns] ** 2).sum(axis=1) > self._inner[2])
             if not outside.size:
                 break
             points[outside] = rng.uniform(self.lower, self.upper, (outside.size, 6))
@@ -188,10 +205,12 @@ def pose_box(workspace: Workspace) -> PoseBox:
             for low, high in angles
         ]
         ends += [(0.0, 0.0)] * (6 - len(ends))
-    lower, upper = np.array(ends).T
-    return PoseBox(
-        turns.kind, frozen_array(turns.axis, (3,)), frozen_array(lower, (6,)), frozen_array(upper, (6,)), ball
-    )
+    for each in workspace.dependent:
+        is_turn = each.index >= 3
+        ends[each.index] = (math.tan(each.lower / 2), math.tan(each.upper / 2)) if is_turn else (each.lower, each.upper)
+    lower, upper = frozen_array(np.array(ends).T, (2, 6))
+    dependent = tuple(each.index for each in workspace.dependent)
+    return PoseBox(turns.kind, frozen_array(turns.axis, (3,)), lower, upper, ball, dependent=dependent)
 
 
 def pose_coordinates(box: PoseBox) -> PoseCoordinates:
@@ -204,15 +223,14 @@ def pose_coordinates(box: PoseBox) -> PoseCoordinates:
 
 
 def scaled(workspace: Workspace, factor: float) -> Workspace:
-    """Return a workspace that is larger by a factor about its centre, ranges of angles too."""
-    turns = workspace.turns
-    return replace(
-        workspace,
-        position=tuple(_scaled(value, factor) for value in workspace.position),
-        turns=replace(
-            turns, angles=tuple(_scaled(value, factor, turns.kind is TurnKind.ANY_AXIS) for value in turns.angles)
-        ),
-    )
+    """Return a workspace that is larger by a factor about its centre, ranges of angles too; dependent ones are kept."""
+    turns, dependent = workspace.turns, [each.index for each in workspace.dependent]
+    is_ball = turns.kind is TurnKind.ANY_AXIS
+    values = [
+        value if k in dependent and not (is_ball and k >= 3) else _scaled(value, factor, is_ball and k >= 3)
+        for k, value in enumerate((*workspace.position, *turns.angles))
+    ]
+    return replace(workspace, position=tuple(values[:3]), turns=replace(turns, angles=tuple(values[3:])))
 
 
 def _scaled(value: Value, factor: float, about_zero: bool = False) -> Value:

@@ -32,11 +32,12 @@ import numpy as np
 from casadi import SX
 
 from .....models import Actuator, FloatArray, Member, Model, Substitution, Wrench, WrenchKind, jacobian, rate_relations
-from .....models.instance import homogenised, sizes_at
+from .....models.instance import homogenised
 from .....models.member import scaled_twists
 from ....case.case import Case
 from ....case.pose import Free
 from ....evidence.closed_loops import Loops
+from ....evidence.dependent import loop_system
 from .pose_box import PoseBox, polynomial_rotation, rotation_of
 
 
@@ -277,14 +278,11 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
     numbers = ca.vertcat(SX(0, 1), *values, errors)
     own = Substitution.identity(model)
     given = replace(own, parameters=numbers, unknowns=z[len(free) :], position=position)
-    every = (*model.closure, *model.loops)
     outputs = [
         *[part for row in model.wrenches for part in (row.force, row.moment, row.square)],
         *[part for member in model.members for part in (member.centre, member.screws)],
         *[part for each in model.actuators for part in (each.screws, each.relations)],
         *[each.loops[:, each.passive] for each in model.nested],
-        *[each.value for each in model.signs],
-        *[each.expression for each in every],
     ]
     following = iter(ca.Function("model", own.all, outputs).call(given.all))
     rows = [
@@ -292,17 +290,14 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
     ]
     members = [replace(each, centre=next(following), screws=next(following), slide=None) for each in model.members]
     driven = [replace(each, screws=next(following), relations=next(following)) for each in model.actuators]
-    nested, signs = ([next(following) for _ in each] for each in (model.nested, model.signs))
+    nested = [next(following) for _ in model.nested]
     limbs = Limbs(rows, members, driven, nested, position, 1.0)
-    ones = SX.ones(len(every) + len(model.unknowns))
-    sizes = sizes_at(model, (*every, *model.unknowns), (*values, *[0.0] * errors.numel()), ones)
-    scaled = [next(following) / sizes[k] for k in range(len(every))]
-    ranges = (0.5 * (box.upper - box.lower))[list(free)]
-    size = np.concatenate([ranges, np.array(ca.DM(sizes[len(every) :, :])).ravel()])
+    system = loop_system(model, given, (*values, *[0.0] * errors.numel()))
+    size = np.concatenate([(0.5 * (box.upper - box.lower))[list(free)], system.sizes])
     turned = rotation_of(box, turn), *polynomial_rotation(box, turn)
-    whole, positive = (ca.substitute(ca.vertcat(SX(0, 1), *each), own.rotation, turned[0]) for each in (scaled, signs))
+    every, positive = (ca.substitute(each, own.rotation, turned[0]) for each in (system.every, system.signs))
     return PosedModel(
-        loops=Loops(z, whole[: len(model.closure)], whole, positive, size),
+        loops=Loops(z, every[: len(model.closure), :], every, positive, size),
         free=free,
         limbs=limbs,
         characteristic_length=case.characteristic_length,

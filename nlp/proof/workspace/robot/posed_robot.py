@@ -11,6 +11,7 @@ the error of a centre, a vector, changes it by at most the vector's length times
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import casadi as ca
@@ -67,7 +68,7 @@ class Problem:
         design: the design alone, of all machines.
         cover: of the path that is meant; None for the whole box.
         rates: indices of the coordinates that are rates, by seconds, of the pose's numbers in the path's motion: of
-            positions and angles. There is one for each free number, or none.
+            positions and angles. There is one for each free number that is independent, or none.
         resting: the design without rates, of a design with them.
     """
 
@@ -96,7 +97,12 @@ class Problem:
     @property
     def has_following(self) -> bool:
         """Whether numbers of the pose follow from others, so that each machine has its own."""
-        return any(k < len(self.free) for k in self.dependent)
+        return bool(self.box.dependent)
+
+    @property
+    def stated(self) -> list[int]:
+        """Indices of the coordinates that are independent ones of the pose."""
+        return [j for j, k in enumerate(self.free) if k not in self.box.dependent]
 
     @property
     def length(self) -> float:
@@ -132,14 +138,14 @@ class Problem:
     @property
     def of_path(self) -> list[int]:
         """Indices of the coordinates that a place of a path determines."""
-        return [*range(len(self.free)), *self.rates]
+        return [*self.stated, *self.rates]
 
     def path_boxes(self, cover: PathCover, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the ends (B, c) of these coordinates over pieces (B, 3) of a path."""
-        free = list(self.free)
-        low, high = (each[:, free] for each in cover.boxes(pieces))
+        chosen = [self.free[j] for j in self.stated]
+        low, high = (each[:, chosen] for each in cover.boxes(pieces))
         if self.rates:
-            slow, fast = (each[:, free] for each in cover.rates(pieces))
+            slow, fast = (each[:, chosen] for each in cover.rates(pieces))
             low, high = np.hstack([low, slow]), np.hstack([high, fast])
         return low, high
 
@@ -203,9 +209,7 @@ def build_problem(case: Case, model: Model, box: PoseBox, at: FloatArray | None 
         raise NotJudgedError("the loops could not be closed in the assembly of home in the middle of the workspace")
     needed = _needed(loops, start, count)
     loops = loops.some(needed)
-    dependent = _dependent(loops, start, count)
-    if count and set(range(count)) <= set(dependent):
-        raise NotJudgedError("the platform cannot move in the numbers of the pose that the workspace frees")
+    dependent = _dependent(loops, start, posed.free, box)
     # Where numbers of the pose follow from others, the closed loops that were found may be beside a narrow box.
     middle[list(dependent)] = start[list(dependent)]
     moved = loops.all_closed(middle[:, None], dependent)[:, 0]
@@ -325,25 +329,30 @@ def _needed(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
     return tuple(sorted(independent_rows(slopes)))
 
 
-def _dependent(loops: Loops, start: FloatArray, count: int) -> tuple[int, ...]:
-    """Return the coordinates that the equations determine: all unknowns, then numbers of the pose.
+def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBox) -> tuple[int, ...]:
+    """Return the coordinates that the equations determine: dependent ones of the pose, and all unknowns.
 
     Raises:
-        NotJudgedError: the equations leave an unknown free.
+        NotJudgedError: the equations leave an unknown free, or determine other coordinates of the pose.
     """
+    count = len(free)
     unknowns, k = list(range(count, len(start))), loops.count
+    following = [j for j, index in enumerate(free) if index in box.dependent]
     if k < len(unknowns):
         raise NotJudgedError("the loops leave a passive joint free")
+    if k != len(unknowns) + len(following):
+        raise NotJudgedError("the platform cannot choose all coordinates of the pose that are stated")
     if not k:
         return ()
     slopes = loops.slopes(start[:, None])[0] * loops.size
-    left = slopes[:, :count]
     if unknowns:
-        basis, values, _ = np.linalg.svd(slopes[:, unknowns])
+        values = np.linalg.svd(slopes[:, unknowns], compute_uv=False)
         if not values[-1] > _ZERO * values[0]:
             raise NotJudgedError("the loops leave a passive joint free in the middle of the workspace")
-        left = basis[:, len(unknowns) :].T @ left
-    return (*_independent(left.T, k - len(unknowns), "the loops"), *unknowns)
+    values = np.linalg.svd(slopes[:, [*following, *unknowns]], compute_uv=False)
+    if not values[-1] > _ZERO * values[0]:
+        raise NotJudgedError("the loops are singular in the middle of the workspace")
+    return (*following, *unknowns)
 
 
 def _chosen(posed: PosedModel, model: Model, start: FloatArray, needed: tuple[int, ...], otherwise: float) -> Chosen:

@@ -23,10 +23,11 @@ from .....models.arrays import values_at
 from .....models.joints.closedform import ClosedForm
 from ....case.case import Case
 from ....case.task import Sense
+from ....case.workspace import Workspace
 from ....errors import UncoveredError
 from ...boxes.search import some
 from ...enclosure.forms import Encloser
-from ...statement.claims import Claim, searched_claims
+from ...statement.claims import Claim, dependent_claims, searched_claims
 from ...statement.motors import motor_claims
 from ..numbers.bound_search import Number
 from ..numbers.clearance import Clearance
@@ -36,7 +37,7 @@ from ..numbers.motors import Motors
 from ..numbers.searched import Subject
 from ..ranks.krawczyk import Coordinates, Relation, relation_of, with_relation
 from ..ranks.loop_boxes import LoopBoxes
-from ..robot.pose_box import PoseBox
+from ..robot.pose_box import pose_box
 from ..robot.posed_robot import NotJudgedError, build_problem
 from ..verdict import slack_of
 
@@ -80,7 +81,7 @@ class SliceLimits:
     Args:
         case: with fixed dimensions.
         closed: its robot without unknowns in closed form.
-        box: the workspace.
+        workspace: with the robot's dependent coordinates.
 
     Attributes:
         problem: the robot over the workspace.
@@ -92,11 +93,12 @@ class SliceLimits:
         UncoveredError: a loop equation, or the reach of a limb, holds an operation without a rule.
     """
 
-    def __init__(self, case: Case, closed: ClosedForm, box: PoseBox) -> None:
+    def __init__(self, case: Case, closed: ClosedForm, workspace: Workspace) -> None:
         case = replace(case, joint_centre_tolerance=None)
-        self.problem = problem = build_problem(case, closed.model, box)
+        self.problem = problem = build_problem(case, closed.model, pose_box(workspace))
         alone = Machines(case, closed, problem)
         reaches, claims = alone.symbols.claims((), with_objective=False)
+        claims += dependent_claims(alone.symbols.layout.robots[0], workspace)
         known = [claim for claim in claims if claim.limit is not None and alone.is_covered(claim)]
         uncovered = dict.fromkeys(each.key for each in claims if each.limit is not None and each not in known)
         limits: dict[str, SliceLimit] = {}

@@ -20,7 +20,7 @@ from .....models import FloatArray, frozen_array
 from .....models.joints.closedform import closed_form
 from ....case.case import Case
 from ....case.limits.legs import Actuator
-from ....case.workspace import TurnKind
+from ....case.workspace import TurnKind, Workspace
 from ....errors import CaseError, UncoveredError
 from ...boxes.search import Boxes, Order, Search, Verdicts, bisected, joined, some
 from ...statement.machine import workspace_of_case
@@ -102,7 +102,7 @@ def slices_of(case: Case) -> tuple[Slice, ...]:
     workspace = workspace_of_case(case)
     # A slice shows the square around the ball of rotations.
     wide = replace(pose_box(scaled(workspace, min(_WIDER, largest_factor(workspace)))), ball=np.inf)
-    robot = _Robot(case, pose_box(workspace))
+    robot = _Robot(case, workspace)
     turning, moving = [k for k in robot.free if k > 2], [k for k in robot.free if k < 3]
     pairs = [*itertools.combinations(moving, 2), *itertools.combinations(turning, 2)]
     if not pairs:
@@ -123,7 +123,7 @@ class _Robot:
 
     Args:
         case: with fixed dimensions.
-        box: its workspace.
+        workspace: with its dependent coordinates.
 
     Attributes:
         problem: the robot over the workspace.
@@ -137,10 +137,10 @@ class _Robot:
         CaseError: the loops are not closed in the middle of the workspace, or have an operation without a rule.
     """
 
-    def __init__(self, case: Case, box: PoseBox) -> None:
+    def __init__(self, case: Case, workspace: Workspace) -> None:
         closed = closed_form(case.model)
         try:
-            self.limits = SliceLimits(case, closed, box)
+            self.limits = SliceLimits(case, closed, workspace)
             self.problem = problem = self.limits.problem
             matrices = [problem.locked, *([] if problem.unactuated is None else [problem.unactuated])]
             tests = [RankTest(each, problem.z, problem.start) for each in matrices]
