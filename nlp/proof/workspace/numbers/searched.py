@@ -191,7 +191,10 @@ def _motor_answers(
             raise NotJudgedError(subject.reason)
         number, problem = Motors(subject.machines, subject.case, claims), subject.machines.problem
         z = np.tile(subject.machines.start, (2 * _POINTS, 1))
-        z[:, problem.of_path] = _points_of_path(problem, problem.cover) if problem.cover else _free_points(problem)
+        if problem.cover:
+            z[:, problem.of_path] = _points_of_path(problem, problem.cover)
+        else:
+            z[:, problem.stated] = _free_points(problem)[:, problem.stated]
         closed = number.closed(z)
         values = np.nan_to_num(number.values(closed), posinf=0.0, neginf=0.0)
         kinds = [claim.motor and claim.motor.number for claim in claims]
