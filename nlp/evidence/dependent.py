@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import FloatArray, Model, Substitution
+from ...models import Dimension, FloatArray, Model, Substitution
 from ...models.arrays import values_at
 from ...models.instance import sizes_at
 from ...models.rotation import matrix_from_cayley, turn_about
@@ -40,7 +40,7 @@ _MOVES = 1e-6
 _POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
 #: Part of the computed range of a dependent coordinate by which its working range is wider on each side, and parts of
 #: the robot's size, or angle, that it is wider by at least.
-_WIDER, _LEAST = 0.5, 1e-3
+_WIDER, _LEAST = 0.5, 1e-2
 #: Volumes that differ by less than this part are equal: the first is taken. Of fixed coordinates those of the position
 #: come first, and are taken where they have this part of the largest volume.
 _TIE, _ENOUGH = 1e-9, 0.2
@@ -108,7 +108,8 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
         workspace: a box of poses.
 
     Raises:
-        CaseError: a rotation about one axis is stated, and the platform turns about others too.
+        CaseError: a coordinate that never changes is stated otherwise, or a rotation about one axis is stated, and the
+            platform turns about others too.
     """
     if not _may_depend(case.model):
         return workspace
@@ -118,10 +119,15 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
         return workspace
     before = [each.index for each in workspace.dependent]
     independent = [k for k in range(6) if k not in before] if before else chart.independent(middle)
-    points = chart.points(middle, independent)
-    if points is None:
+    closed = chart.points(middle, independent)
+    if closed is None:
         return workspace
+    points = closed[:, :6]
     fixed = np.abs(points - chart.middle[:6]) <= _STILL * chart.size[:6]
+    is_still = chart.is_still(closed)
+    for k in (k for k in range(6) if k not in (*independent, *chart.ranged, *before) and is_still[k]):
+        if not fixed[:, k].all():
+            raise _misstated(case, workspace, k, *(float(chart.ends(each)[k]) for each in (chart.middle, points[0])))
     found = [
         k for k in range(6) if k not in independent and (k in before or k in chart.ranged or not fixed[:, k].all())
     ]
@@ -149,6 +155,14 @@ def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
     points = np.array(function(np.array(parts), np.zeros(len(model.unknowns)), np.eye(3), np.array(at))).T
     size = float(np.linalg.norm(points[:, None] - points[None], axis=2).max())
     return size if 0 < size < np.inf else 1.0
+
+
+def _misstated(case: Case, workspace: Workspace, k: int, stated: float, true: float) -> CaseError:
+    """Return the error of a coordinate that this robot keeps at another number than the stated one."""
+    dimension, units = (Dimension.LENGTH if k < 3 else Dimension.ANGLE), case.units
+    one, other = (f"{units.shown(each, dimension):.6g} {units.label(dimension)}".rstrip() for each in (stated, true))
+    key = f"workspace.position[{k}]" if k < 3 else "workspace.rotation"
+    return CaseError(key, f"{workspace.names[k]} = {one}: this robot keeps it at {other}", source=case.source)
 
 
 def independent_coordinates(case: Case, workspace: Workspace) -> list[int] | None:
@@ -269,7 +283,7 @@ class _Chart:
 
     def ends(self, y: FloatArray) -> FloatArray:
         """Return coordinates (6,) as lengths and angles, radians."""
-        return np.concatenate([y[:3], 2 * np.arctan(y[3:])])
+        return np.concatenate([y[:3], 2 * np.arctan(y[3:6])])
 
     def closed_middle(self) -> FloatArray | None:
         """Return closed loops (6 + u,) in the home assembly mode near the middle of the workspace; None without."""
@@ -286,7 +300,7 @@ class _Chart:
         return sorted(_largest(moves, others, chosen, count, enough=_ENOUGH))
 
     def points(self, z: FloatArray, independent: list[int]) -> FloatArray | None:
-        """Return the pose (P, 6) of closed loops at the middle, corners and random points of the workspace.
+        """Return closed loops (P, 6 + u) at the middle, corners and random points of the workspace; None without.
 
         Args:
             z: a closed point near the middle.
@@ -298,7 +312,7 @@ class _Chart:
         parts = np.vstack([np.zeros((1, len(ranged))), sides, inside])
         to = np.tile(self.middle, (len(parts), 1))
         to[:, ranged] += parts * self.half[ranged]
-        found = self.reached(z, independent, to)[:, :6]
+        found = self.reached(z, independent, to)
         return found[np.isfinite(found).all(axis=1)] if np.isfinite(found[0]).all() else None
 
     def reached(self, z: FloatArray, independent: list[int], to: FloatArray) -> FloatArray:

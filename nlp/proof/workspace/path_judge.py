@@ -22,7 +22,7 @@ from ...case.motors import MotorNumber
 from ...case.pose import Free, Value, ends_of
 from ...case.task import Sense
 from ...case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
-from ...errors import InputError, UncoveredError
+from ...errors import CaseError, InputError, UncoveredError
 from ...evidence.dependent import dependent_of, robot_size
 from ...interruption import is_requested, one_call, one_search, within
 from ...path.arcs import PLANES
@@ -331,7 +331,10 @@ def _with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[Pos
     """
     if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
         return box, workspace
-    found = dependent_of(case, workspace)
+    try:
+        found = dependent_of(case, workspace)
+    except CaseError as error:
+        raise NotJudgedError(error.fault) from None
     places = [each.index for each in found.dependent]
     if not places:
         return box, workspace

@@ -197,7 +197,7 @@ def _machine(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Proble
     opened = replace(workspace, position=free[:3], turns=replace(workspace.turns, angles=tuple(free[3:])))
     # Independent ones are those that the path moves, and not those with the narrowest rooms.
     chosen = independent_coordinates(case, workspace) or range(6)
-    others = (DependentCoordinate(k, *ends[k]) for k in range(6) if k not in chosen)
+    others = (DependentCoordinate(k, free[k].lower, free[k].upper) for k in range(6) if k not in chosen)
     opened = with_dependent(case, replace(opened, dependent=tuple(others)))
     case = replace(case, workspace=opened, joint_centre_tolerance=None)
     closed, first = closed_form(case.model), cover.points(cover.pieces[:1], 0.0)[0]
