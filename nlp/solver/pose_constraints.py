@@ -375,7 +375,9 @@ class PoseConstraints:
             return
         stated = [each for each in self._of_dependent(closed.robot) if each.name == binding.name]
         if stated:
-            low, high = (next((each.limit for each in stated if each.sense is sense), None) for sense in Sense)
+            low, high = (
+                next((each.limit for each in stated if each.sense is sense), None) for sense in (Sense.MIN, Sense.MAX)
+            )
             constraint = Constraint(name, stated[0].expression, stated[0].reading)
             ends = (-math.inf if low is None else low), (math.inf if high is None else high)
             yield _tightened(BoundedConstraint(constraint, *ends), name)
