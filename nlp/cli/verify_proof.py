@@ -75,6 +75,7 @@ def _verify(
     from ..proof.checker.check import check_proof
     from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
     from ..proof.checker.proof_file import ProofError
+    from ..results.objective import unit_of_objective
     from ..results.text import Line
 
     try:
@@ -86,7 +87,8 @@ def _verify(
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
-    holds = Line(f"holds: {claim_words(case, statement, claim.bound)}")
+    bound = None if claim.bound is None else checked.bound
+    holds = Line(f"holds: {claim_words(case, statement, bound, unit_of_objective(case))}")
     return [holds, Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")]
 
 
