@@ -41,6 +41,9 @@ from .table import case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
 
+#: Tables of robot files, one of which each has.
+_OF_ROBOT_FILES = frozenset(("limb", "links", "joint"))
+
 
 class CaseFile(NamedTuple):
     """A case as it was read from a file.
@@ -159,6 +162,9 @@ def case_from_tables(
     """
     origins = TableOrigins()
     try:
+        if "robot" not in tables and not _OF_ROBOT_FILES.isdisjoint(tables):
+            fault = f'is a robot file, and not a case; [robot] file = "{source}" in a case reads it, and screwsynth new'
+            raise CaseError("the file", f"{fault} writes such a case")
         check_version(CASE_FILES, tables)
         origins = insert_rows(tables, folder or Path())
         robot_file = insert_robot_file(tables, folder or Path())

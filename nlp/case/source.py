@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from ... import cases
+from ...models import model_names
 from ..errors import InputError, nearest
 from ..system.reading import read_limited, text_of_bytes
+from ..system.slips import toml_fault
 from .csvrows import named_csv_files
 
 #: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
@@ -38,6 +40,8 @@ def find_case(name: str) -> Path:
         path = _file_of(name)
     except OSError as error:  # such as a name that is too long
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    if path is None and name in model_names():
+        raise InputError(f"{name}: is a robot, not a case; screwsynth new {name} > my-{name}.toml writes a case of it")
     if path is None and name.endswith(".toml"):
         stem = Path(name).stem
         hint = f"; did you mean {stem!r}? this case comes with screwsynth" if stem in shipped_cases() else ""
@@ -87,7 +91,7 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
+        raise InputError(f"{path}: {toml_fault(text, error)}") from None
 
 
 def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
