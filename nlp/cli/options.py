@@ -220,8 +220,9 @@ def _read_setting(text: str) -> tuple[str, float | list[float]]:
         numbers = [float(part) for part in value.split(",")]
     except ValueError:
         numbers = []
-    # No number of a case is a pair: two are one with a decimal comma.
-    if not (name and equals and numbers) or len(numbers) == 2:
+    # No number of a case is a pair: two are one with a decimal comma, but for an axis that lacks a part.
+    is_pair = len(numbers) == 2 and not name.endswith("axis")
+    if not (name and equals and numbers) or is_pair:
         raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z{hint_of(value)}")
     return name, numbers[0] if len(numbers) == 1 else numbers
 

@@ -77,7 +77,7 @@ class Limits:
         for limit in self.items:
             if not limit.exists_for(case.model):
                 known = _measures(case.model)
-                hint = did_you_mean(limit.name, known, _SLIP)
+                hint = did_you_mean(limit.name, known, _SLIP) if limit.name not in known else ""
                 fault = f"is nothing that {case.model.name!r} has; {hint}it has {listing(known)}"
                 raise CaseError(f"limits.{limit.name}", fault)
         for limit in self.items:
