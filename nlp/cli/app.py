@@ -118,6 +118,7 @@ class Commands(TyperGroup):
 
 def _meant(args: list[str]) -> str:
     """Return what may be meant by arguments whose first one is no command, as a clause."""
+    import shlex
     from pathlib import Path
 
     from ...models import model_names
@@ -132,7 +133,7 @@ def _meant(args: list[str]) -> str:
     if word in model_names():
         return f"this is a robot: screwsynth models {word} shows it, screwsynth new {word} writes a case of it"
     if word in shipped_cases() or word.endswith(".toml") or Path(word).is_file():
-        return f"a case stands behind a command, as in screwsynth solve {word}"
+        return f"a case stands behind a command, as in screwsynth solve {shlex.quote(word)}"
     return nearest(word, SUMMARIES)
 
 
