@@ -169,7 +169,9 @@ def time(left_out: str, end: str = "shows its results") -> Any:  # noqa: ANN401 
     return typer.Option("--time", parser=Number("--time"), metavar="SECONDS", callback=_begin, help=words)
 
 
-CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
+CaseName = Annotated[
+    str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case; - is stdin.")
+]
 SettingTexts = Annotated[
     list[str] | None, several("--set", "NAME=VALUE", "Replace a number of the case: x4=20, p_z=40, axis=0,0,1")
 ]

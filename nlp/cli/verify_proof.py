@@ -21,7 +21,8 @@ def verify_proof(
         str, typer.Argument(metavar="PROOF", help="A proof that certify --proof or workspace --proof wrote.")
     ],
     case: Annotated[
-        str | None, typer.Argument(metavar="[CASE]", help="The case to be proved; that in the proof if left out.")
+        str | None,
+        typer.Argument(metavar="[CASE]", help="The case to be proved, - is stdin; that in the proof if left out."),
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
