@@ -102,11 +102,22 @@ def nearest(name: str, allowed: Iterable[str], others: Iterable[str] = ()) -> st
         allowed: names that are listed.
         others: allowed names that are too many to be listed.
     """
+    names = list(allowed)
+    return f"{did_you_mean(name, [*names, *others])}allowed: {listing(names)}"
+
+
+def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.6) -> str:
+    """Return a question with the most similar allowed name, and a space; empty where none is so similar.
+
+    Args:
+        name: that is not allowed.
+        allowed: allowed names.
+        likeness: least likeness, 1 for equal names.
+    """
     import difflib  # noqa: PLC0415 - only messages need it
 
-    names = list(allowed)
-    close = difflib.get_close_matches(name, [*names, *others], n=1)
-    return f"{f'did you mean {close[0]!r}? ' if close else ''}allowed: {listing(names)}"
+    close = difflib.get_close_matches(name, list(allowed), n=1, cutoff=likeness)
+    return f"did you mean {close[0]!r}? " if close else ""
 
 
 def _text_of(value: object) -> str:

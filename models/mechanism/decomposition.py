@@ -253,7 +253,7 @@ def _still(mechanism: Mechanism, couplings: Sequence[Collection[int]]) -> set[in
 
 
 def _members(
-    mechanism: Mechanism, classes: Classes, joints: Sequence[int], couplings: Sequence[Collection[int]]
+    mechanism: Mechanism, classes: Classes[str], joints: Sequence[int], couplings: Sequence[Collection[int]]
 ) -> list[list[int]]:
     """Return the groups of joints between classes of links that join base and platform."""
     roots = classes.find(mechanism.base), classes.find(mechanism.platform)

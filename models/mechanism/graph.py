@@ -150,7 +150,8 @@ def check_mechanism(mechanism: Mechanism) -> None:
         _check_joint(joint, links)
     _check_couplings(mechanism)
     edges = [(joint.inner, joint.outer) for joint in mechanism.joints]
-    loose = [name for name in links if name not in reached(mechanism.base, edges)]
+    joined = reached(mechanism.base, edges)
+    loose = [name for name in links if name not in joined]
     if loose:
         raise MechanismError(f"link {loose[0]}", "is joined to the base by no joint, directly or through other links")
     if not any(joint.actuated for joint in mechanism.joints):

@@ -14,6 +14,7 @@ import numpy as np
 from ..arrays import FloatArray
 from .decomposition import Decomposition, GraphJoint, LimbPaths, Network, Step, decompose
 from .graph import Mechanism, MechanismError, MechanismJoint, check_mechanism
+from .topology import incident
 
 #: Entries of an axis, and distances and differences of directions that show a parallelogram, in parts of its rods: only
 #: rounding is less, as a robot file states an exact one.
@@ -205,8 +206,9 @@ class _Rod(NamedTuple):
 def _rods(mechanism: Mechanism) -> list[_Rod]:
     """Return the links that have two passive hinges and no other joint, with their ends in alphabetical order."""
     found = []
+    of_link = incident((joint.inner, joint.outer) for joint in mechanism.joints)
     for link in mechanism.links:
-        own = [joint for joint in mechanism.joints if link.name in (joint.inner, joint.outer)]
+        own = [mechanism.joints[k] for k, _ in of_link.get(link.name, ())]
         if len(own) != 2 or link.name in (mechanism.base, mechanism.platform):
             continue
         if any(joint.kind != "R" or joint.actuated for joint in own):
@@ -240,11 +242,13 @@ def _numbers(vector: FloatArray) -> list[float]:
 def _names(names: Sequence[str]) -> dict[str, str]:
     """Return names that a robot file may have, each once."""
     found: dict[str, str] = {}
+    taken: set[str] = set()
     for name in names:
         word = _NO_NAME.sub("_", name)
         word = word if word and not word[0].isdigit() else f"j{word}"
         number, unique = 2, word
-        while unique in found.values():
+        while unique in taken:
             unique, number = f"{word}_{number}", number + 1
         found[name] = unique
+        taken.add(unique)
     return found

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 Node = TypeVar("Node", bound=Hashable)
 Edge = tuple[Node, Node]
 
 
-class Classes:
+class Classes(Generic[Node]):
     """Links that move as one: the sets of a partition, by a name that stands for each (union and find).
 
     Args:
@@ -17,32 +17,39 @@ class Classes:
         pairs: of those that move as one.
     """
 
-    def __init__(self, names: Iterable[str], pairs: Iterable[tuple[str, str]] = ()) -> None:
+    def __init__(self, names: Iterable[Node], pairs: Iterable[Edge[Node]] = ()) -> None:
         self._parents = {name: name for name in names}
         for pair in pairs:
             self.merge(*pair)
 
-    def find(self, name: str) -> str:
+    def find(self, name: Node) -> Node:
         """Return the name that stands for the set of a name."""
         while self._parents[name] != name:
             self._parents[name] = self._parents[self._parents[name]]
             name = self._parents[name]
         return name
 
-    def merge(self, one: str, other: str) -> None:
+    def merge(self, one: Node, other: Node) -> None:
         """Make one set of the sets of two names."""
         self._parents[self.find(one)] = self.find(other)
 
 
+def incident(edges: Iterable[Edge[Node]]) -> dict[Node, list[tuple[int, Node]]]:
+    """Return for each node its edges in their order: the index, and the other end."""
+    found: dict[Node, list[tuple[int, Node]]] = {}
+    for k, (one, other) in enumerate(edges):
+        found.setdefault(one, []).append((k, other))
+        if other != one:
+            found.setdefault(other, []).append((k, one))
+    return found
+
+
 def reached(start: Node, edges: Iterable[Edge[Node]]) -> set[Node]:
     """Return the nodes that edges join to a start, with the start itself."""
-    neighbours: dict[Node, list[Node]] = {}
-    for one, other in edges:
-        neighbours.setdefault(one, []).append(other)
-        neighbours.setdefault(other, []).append(one)
+    neighbours = incident(edges)
     found, waiting = {start}, [start]
     while waiting:
-        for node in neighbours.get(waiting.pop(), ()):
+        for _, node in neighbours.get(waiting.pop(), ()):
             if node not in found:
                 found.add(node)
                 waiting.append(node)
@@ -81,45 +88,90 @@ def bridges_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> Brid
     path = path_between(start, end, edges)
     if path is None:
         return Bridges([], is_open=False)
-    bridges = [k for k in path if end not in reached(start, [edge for j, edge in enumerate(edges) if j != k])]
+    on_path = set(path)
+    places = {start: 0}
+    node = start
+    for k in path:
+        node = edges[k][1] if edges[k][0] == node else edges[k][0]
+        places[node] = len(places)
+    # Without the path's edges, what still joins two of its nodes is a way around all edges between them.
+    classes = Classes([start, *(node for edge in edges for node in edge)])
+    for k, edge in enumerate(edges):
+        if k not in on_path:
+            classes.merge(*edge)
+    last = [0] * (len(path) + 1)
+    firsts: dict[Node, int] = {}
+    for node, place in places.items():
+        last[firsts.setdefault(classes.find(node), place)] = place
+    bridges, behind = [], 0
+    for place, k in enumerate(path):
+        behind = max(behind, last[place])
+        if behind <= place:
+            bridges.append(k)
     return Bridges(bridges, is_open=len(bridges) == len(path))
 
 
 def path_between(start: Node, end: Node, edges: Sequence[Edge[Node]]) -> list[int] | None:
     """Return the indices of the edges of a shortest path, in order; None where there is no path."""
+    neighbours = incident(edges)
     came: dict[Node, tuple[Node, int] | None] = {start: None}
     layer = [start]
     while layer and end not in came:
         following = []
         for node in layer:
-            for k, edge in enumerate(edges):
-                if node in edge:
-                    other = edge[1] if edge[0] == node else edge[0]
-                    if other not in came:
-                        came[other] = node, k
-                        following.append(other)
+            for k, other in neighbours.get(node, ()):
+                if other not in came:
+                    came[other] = node, k
+                    following.append(other)
         layer = following
     if end not in came:
         return None
     found: list[int] = []
     step = came[end]
     while step is not None:
-        found.insert(0, step[1])
+        found.append(step[1])
         step = came[step[0]]
-    return found
+    return found[::-1]
 
 
 def between(edges: Sequence[Edge[Node]], first: Node, last: Node) -> list[int]:
     """Return the indices of the edges that lie on paths from one node to another that pass each node once.
 
-    No single node separates such an edge from one that joins the two nodes: they are in one biconnected component.
+    No single node separates such an edge from one that joins the two nodes: they are in one biconnected component,
+    which a search in depth finds (R. Tarjan, *Depth-first search and linear graph algorithms*, 1972).
     """
-    kept = list(range(len(edges)))
-    for node in dict.fromkeys(each for edge in [(first, last), *edges] for each in edge):
-        rest = [edge for edge in [(first, last), *(edges[k] for k in kept)] if node not in edge]
-        beside = reached(last if node == first else first, rest)
-        kept = [k for k in kept if beside.intersection({*edges[k]} - {node})]
-    return kept
+    # Edge 0 joins the two nodes.
+    neighbours = incident([(first, last), *edges])
+    order = {first: 0}
+    lowest = {first: 0}
+    passed: list[int] = []
+    walk = [(first, -1, 0, iter(neighbours[first]))]
+    while walk:
+        node, came, begin, rest = walk[-1]
+        following = next(rest, None)
+        if following is None:
+            walk.pop()
+            if not walk:
+                break
+            parent = walk[-1][0]
+            lowest[parent] = min(lowest[parent], lowest[node])
+            if lowest[node] >= order[parent]:
+                component = passed[begin:]
+                del passed[begin:]
+                if 0 in component:
+                    return sorted(k - 1 for k in component if k)
+            continue
+        k, other = following
+        if k == came or other == node:
+            continue
+        if other not in order:
+            order[other] = lowest[other] = len(order)
+            walk.append((other, k, len(passed), iter(neighbours[other])))
+            passed.append(k)
+        elif order[other] < order[node]:
+            passed.append(k)
+            lowest[node] = min(lowest[node], order[other])
+    return []
 
 
 class Branch(NamedTuple):
@@ -159,16 +211,13 @@ def spanning_tree(
             chosen.add(k)
     branches: list[Branch] = []
     known = set(roots)
-    waiting = list(roots)
-    while waiting:
-        node = waiting.pop(0)
-        for k in sorted(chosen):
-            if node in edges[k]:
-                other = edges[k][1] if edges[k][0] == node else edges[k][0]
-                if other not in known:
-                    known.add(other)
-                    branches.append(Branch(k, node, other))
-                    waiting.append(other)
+    waiting, neighbours = list(roots), incident(edges)
+    for node in waiting:  # which grows
+        for k, other in neighbours.get(node, ()):
+            if k in chosen and other not in known:
+                known.add(other)
+                branches.append(Branch(k, node, other))
+                waiting.append(other)
     used = {branch.edge for branch in branches}
     chords = [k for k, edge in enumerate(edges) if k not in used and edge[0] in known]
     return SpanningTree(branches, chords)

@@ -7,7 +7,7 @@ once, in the words of a case file, so that every other module can rely on it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any, Literal
@@ -28,6 +28,7 @@ from .loads import NO_LOADING, Loading
 from .names import parameter_name, pose_prefixes
 from .pathfile import PathFile
 from .pose import HERE, LARGEST, MAX_FREE_ROTATION, Free, OverPoses, Pose, Rotation, Value
+from .radians import angles_of, check_radians, with_radians
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Sense, Task
 from .workspace import Workspace
@@ -94,6 +95,25 @@ class Case(Whole, Shown):
     source: str | None = None
 
     def __post_init__(self) -> None:
+        try:
+            self._check()
+            if self.source is None:
+                check_radians(self._angles(), self.units)
+        except CaseError as error:
+            # The numbers of a file are in its own unit.
+            raise (error if self.source is not None else with_radians(error, self._angles())) from None
+
+    def _angles(self) -> Iterator[tuple[str, float]]:
+        """Yield the angles of a case, whose numbers may not be checked yet, with their dotted keys."""
+        rotations = [self.rotation, *(pose.rotation for pose in self.further)]
+        return angles_of(self.model, self.parameters, rotations, self.limits, self.workspace)
+
+    def _check(self) -> None:
+        """Check every number, and keep values in one form.
+
+        Raises:
+            CaseError: as for the case.
+        """
         store = object.__setattr__
         store(self, "parameters", MappingProxyType(_check_parameters(self)))
         store(self, "position", _check_position(self, self.position, "pose"))

@@ -36,10 +36,13 @@ from .pose import (
 from .robots import insert_robot_file, model_of_table
 from .schema import Document, ExpectTable, Listed, PoseTable, PublishedTable, Range, RotationTable, TaskTable
 from .settings import Expectation, ExpectedValue, Published, Search
-from .source import find_case, inputs_of, named_files, read_text, tables_of
+from .source import find_case, inputs_of, named_files, read_text, source_name, tables_of
 from .table import case_error
 from .task import Method, Sense, Task, unit_twist
 from .toml import toml_document
+
+#: Tables of robot files, one of which each has.
+_OF_ROBOT_FILES = frozenset(("limb", "links", "joint"))
 
 
 class CaseFile(NamedTuple):
@@ -61,7 +64,7 @@ def load_case(name: str, settings: Settings | None = None) -> Case:
     """Read a case from its file.
 
     Args:
-        name: path of a TOML file, or the bare name of a shipped case.
+        name: path of a TOML file, the bare name of a shipped case, or ``-`` for standard input.
         settings: numbers by name that replace those of the file, in the file's units: a parameter or one of its
             components (``base_1_x``), ``p_x``, ``p_y``, ``p_z``, ``angle``, or ``axis`` with three numbers. A
             parameter with the name of a number of the pose is called ``robot.p_x`` and the like. ``p_z.max`` is an end
@@ -80,7 +83,8 @@ def read_case(name: str, settings: Settings | None = None) -> CaseFile:
     tables = tables_of(path, text)
     # The names of files leave the tables when a case is made of these.
     inputs, named = inputs_of(path, tables), named_files(tables, path.parent)
-    case = case_from_tables(tables, name=path.stem, source=path.name, settings=settings or {}, folder=path.parent)
+    source = Path(source_name(path))
+    case = case_from_tables(tables, name=source.stem, source=source.name, settings=settings or {}, folder=path.parent)
     return CaseFile(case, toml_document(tables) if named or settings else text, inputs)
 
 
@@ -159,6 +163,9 @@ def case_from_tables(
     """
     origins = TableOrigins()
     try:
+        if "robot" not in tables and not _OF_ROBOT_FILES.isdisjoint(tables):
+            fault = f'is a robot file, and not a case; [robot] file = "{source}" in a case reads it, and screwsynth new'
+            raise CaseError("the file", f"{fault} writes such a case")
         check_version(CASE_FILES, tables)
         origins = insert_rows(tables, folder or Path())
         robot_file = insert_robot_file(tables, folder or Path())

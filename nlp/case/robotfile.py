@@ -20,6 +20,7 @@ from ...models.joints import RobotError
 from ...models.joints.words import GRAPH_KEYS, MOST_LIMBS, NESTED_BRANCH
 from ..errors import CaseError, InputError
 from ..system.reading import check_version, read_limited
+from ..system.slips import toml_fault
 from .table import Table, Vector, case_error
 
 Name = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
@@ -178,6 +179,8 @@ def check_form(tables: dict[str, Any]) -> None:
     Raises:
         CaseError: the first fault, with limb and joint in words.
     """
+    if "robot" in tables and "task" in tables:
+        raise CaseError("the file", "is a case, and not a robot file; screwsynth solve takes it")
     check_version(ROBOT_FILES, tables)
     given = [key for key in GRAPH_KEYS if key in tables]
     if given and "limb" in tables:
@@ -270,9 +273,13 @@ def read_definition(name: str, folder: Path) -> dict[str, Any]:
     except InputError as error:
         raise CaseError("robot.file", str(error).removeprefix(f"{path}: "), name) from None
     try:
-        tables = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
-    except (ValueError, RecursionError) as error:
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
+    except ValueError as error:
         raise CaseError("the file", f"is not valid TOML: {error}", source=name) from None
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise CaseError("the file", toml_fault(text, error), source=name) from None
     try:
         check_form(tables)
     except CaseError as error:

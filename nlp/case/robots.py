@@ -13,6 +13,7 @@ from pydantic import ConfigDict, PydanticSchemaGenerationError, TypeAdapter, Val
 from ...models import AmbiguousModelError, Model, RobotFunction, UnknownModelError, model_names, robot_function
 from ..errors import CaseError, listing, nearest
 from .schema import RobotTable
+from .source import shipped_cases
 from .toml import option_text
 
 
@@ -151,6 +152,15 @@ def _signature(name: str, function: RobotFunction) -> tuple[Mapping[str, inspect
     return declared, hints
 
 
+def _hint(name: str) -> str:
+    """Return what may be meant by the name of a robot that does not exist."""
+    if name.endswith(".toml"):
+        return f'a robot file is named by file = "{name}", in the place of model'
+    if name in shipped_cases():
+        return "this is a case"
+    return nearest(name, model_names())
+
+
 def _find_function(name: str) -> RobotFunction:
     """Return the function of a robot.
 
@@ -160,7 +170,7 @@ def _find_function(name: str) -> RobotFunction:
     try:
         function = robot_function(name)
     except UnknownModelError:
-        raise CaseError("robot.model", f"no such robot; {nearest(name, model_names())}", name) from None
+        raise CaseError("robot.model", f"no such robot; {_hint(name)}", name) from None
     except AmbiguousModelError as error:
         raise CaseError("robot.model", f"is ambiguous: {error}", name) from None
     except (Exception, SystemExit) as error:  # importing another package may raise anything

@@ -1,23 +1,31 @@
 """Files of cases: found by name, read as text and as tables, with the CSV and robot files that they name.
 
-A case is named by its path; a shipped case also by its bare name.
+A case is named by its path; a shipped case also by its bare name; ``-`` is standard input, which is read once for all
+readings of a command.
 """
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ... import cases
+from ...models import model_names
 from ..errors import InputError, nearest
 from ..system.reading import read_limited, text_of_bytes
+from ..system.slips import toml_fault
 from .csvrows import named_csv_files
 
 #: Largest case file, bytes. The largest that a person writes is a thousand times smaller; a device has no end.
 _LARGEST_FILE = 4 * 2**20
 _SHIPPED = Path(cases.__file__).parent
+#: Standard input as a path, and its name in results and messages. A file with this name has a folder before it.
+_STDIN, _STDIN_NAME = Path("-"), "stdin"
+#: Standard input that was read, and its content.
+_read: list[tuple[object, bytes]] = []
 
 
 def shipped_cases() -> tuple[str, ...]:
@@ -29,15 +37,19 @@ def find_case(name: str) -> Path:
     """Return the file of a case.
 
     Args:
-        name: path of the file, or the bare name of a shipped case.
+        name: path of the file, the bare name of a shipped case, or ``-`` for standard input.
 
     Raises:
         InputError: there is no such file.
     """
+    if name == str(_STDIN):
+        return _STDIN
     try:
         path = _file_of(name)
     except OSError as error:  # such as a name that is too long
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
+    if path is None and name in model_names():
+        raise InputError(f"{name}: is a robot, not a case; screwsynth new {name} > my-{name}.toml writes a case of it")
     if path is None and name.endswith(".toml"):
         stem = Path(name).stem
         hint = f"; did you mean {stem!r}? this case comes with screwsynth" if stem in shipped_cases() else ""
@@ -61,7 +73,7 @@ def _file_of(name: str) -> Path | None:
     if name and path.is_dir():
         raise InputError(f"{name}: is a folder, not a case file")
     if name and path.exists():
-        return path
+        return path.absolute() if path == _STDIN else path
     return _SHIPPED / f"{name}.toml" if name in shipped_cases() else None
 
 
@@ -71,11 +83,36 @@ def read_text(path: Path) -> str:
     Raises:
         InputError: the file cannot be read, is too large, or is no UTF-8 text.
     """
-    content = read_limited(path, _LARGEST_FILE)
+    name = source_name(path)
+    content = _read_stdin() if path == _STDIN else read_limited(path, _LARGEST_FILE)
     try:
         return text_of_bytes(content)
     except UnicodeDecodeError:
-        raise InputError(f"{path}: cannot be read: it is not UTF-8 text") from None
+        raise InputError(f"{name}: cannot be read: it is not UTF-8 text") from None
+
+
+def source_name(path: Path) -> str:
+    """Return the name of a case's file for messages."""
+    return _STDIN_NAME if path == _STDIN else str(path)
+
+
+def _read_stdin() -> bytes:
+    """Return what standard input holds, which can be read once.
+
+    Raises:
+        InputError: it cannot be read, or is too large.
+    """
+    stream = sys.stdin
+    if _read and _read[-1][0] is stream:
+        return _read[-1][1]
+    try:
+        content = stream.buffer.read(_LARGEST_FILE + 1)
+    except (AttributeError, OSError, ValueError):  # a closed stream, or none of bytes
+        raise InputError(f"{_STDIN_NAME}: cannot be read") from None
+    if len(content) > _LARGEST_FILE:
+        raise InputError(f"{_STDIN_NAME}: cannot be read: it is larger than {_LARGEST_FILE // 2**20} MB")
+    _read[:] = [(stream, content)]
+    return content
 
 
 def tables_of(path: Path, text: str) -> dict[str, Any]:
@@ -87,7 +124,7 @@ def tables_of(path: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not valid TOML: {error}") from None
+        raise InputError(f"{source_name(path)}: {toml_fault(text, error)}") from None
 
 
 def named_files(tables: Mapping[str, Any], folder: Path) -> tuple[Path, ...]:
@@ -128,4 +165,4 @@ def case_inputs(name: str) -> Mapping[Path, str]:
         InputError: the file cannot be read, or is not valid TOML.
     """
     path = find_case(name)
-    return inputs_of(path, tables_of(path, read_text(path)) if path.is_file() else {})
+    return inputs_of(path, tables_of(path, read_text(path)) if path == _STDIN or path.is_file() else {})

@@ -103,9 +103,9 @@ class Commands(TyperGroup):
             InputError: there is no such command.
         """
         if args[0] not in SUMMARIES:
-            from ..errors import InputError, nearest
+            from ..errors import InputError
 
-            raise InputError(f"{args[0]}: no such command; {nearest(args[0], SUMMARIES)}")
+            raise InputError(f"{args[0]}: no such command; {_meant(args)}")
         return args[0], command_of(args[0]), args[1:]
 
     def format_commands(self, _: Any, formatter: Any) -> None:  # noqa: ANN401 - of typer or of click
@@ -114,6 +114,27 @@ class Commands(TyperGroup):
         for title, group in GROUPS.items():
             with formatter.section(title):
                 formatter.write_dl([(name.ljust(width), summary) for name, (summary, _) in group.items()])
+
+
+def _meant(args: list[str]) -> str:
+    """Return what may be meant by arguments whose first one is no command, as a clause."""
+    import shlex
+    from pathlib import Path
+
+    from ...models import model_names
+    from ..case.source import shipped_cases
+    from ..errors import nearest
+
+    word, *others = args
+    if word == "help":
+        return f"write screwsynth {others[0] if others and others[0] in SUMMARIES else ''} --help".replace("  ", " ")
+    if word == "version":
+        return "write screwsynth --version"
+    if word in model_names():
+        return f"this is a robot: screwsynth models {word} shows it, screwsynth new {word} writes a case of it"
+    if word in shipped_cases() or word.endswith(".toml") or Path(word).is_file():
+        return f"a case stands behind a command, as in screwsynth solve {shlex.quote(word)}"
+    return nearest(word, SUMMARIES)
 
 
 def command_of(name: str) -> Any:  # noqa: ANN401 - of typer or of click

@@ -12,7 +12,9 @@ from . import options
 def check(
     cases: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[CASE]...", help="Case files or names of shipped cases; all of these if left out."),
+        typer.Argument(
+            metavar="[CASE]...", help="Case files or names of shipped cases, - is stdin; all shipped ones if left out."
+        ),
     ] = None,
     json_file: options.JsonFile = None,
     junit: Annotated[str | None, options.file("--junit", "Write JUnit XML for a CI; - is stdout")] = None,

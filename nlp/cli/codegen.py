@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -39,7 +40,8 @@ def codegen(
     if not no_measure:
         files = _measured(files, identifier(loaded.name))
     write_folder(out, files, force=force)
-    typer.echo(f"{len(files)} files in {one_line(out)}; make -C {one_line(out)} test compiles and tests them")
+    command = f"make -C {shlex.quote(one_line(out))} test"
+    typer.echo(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")
 
 
 def _measured(files: dict[str, str], prefix: str) -> dict[str, str]:

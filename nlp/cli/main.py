@@ -76,8 +76,6 @@ def run() -> int:
         status = 2
     except KeyboardInterrupt:
         status = INTERRUPTED
-    except BrokenPipeError:  # nobody reads any more
-        status = 1
     except OSError as error:
         _say(f"standard output: cannot be written: {error.strerror or error}")
         status = 2
@@ -110,27 +108,40 @@ def _say(sentence: str) -> None:
 class _Lenient(io.FileIO):
     """A file that loses what cannot be written."""
 
+    lost: type[OSError] = OSError
+
     def write(self, content: Buffer) -> int:
         """Write bytes, or lose them."""
         try:
             return super().write(content)
-        except OSError:
+        except self.lost:
             return memoryview(content).nbytes
+
+
+class _Unread(_Lenient):
+    """A file that loses what nobody reads any more, as behind ``head``."""
+
+    lost = BrokenPipeError
 
 
 def _open_standard_streams() -> None:
     """Open closed standard streams, and make standard error one that never fails.
 
     A file that is opened later would otherwise become a standard stream. Writing to a closed standard output is an
-    error, as for a full one; what is written to a closed standard error is lost.
+    error, as for a full one; what is written to a closed standard error is lost. A standard output that nobody reads
+    any more is none: the command goes on, writes its files, and ends with its own status.
     """
     for descriptor, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, flags)
-    if sys.stdout is None:
-        sys.stdout = io.TextIOWrapper(io.BufferedWriter(io.FileIO(1, "w", closefd=False)), encoding="utf-8")
+    output = sys.stdout  # None where it was closed
+    sys.stdout = io.TextIOWrapper(
+        io.BufferedWriter(_Unread(1, "w", closefd=False)),
+        encoding="utf-8" if output is None else output.encoding,
+        line_buffering=output is not None and bool(output.line_buffering),
+    )
     encoding = "utf-8" if sys.stderr is None else sys.stderr.encoding
     raw = io.BufferedWriter(_Lenient(2, "w", closefd=False))
     sys.stderr = io.TextIOWrapper(raw, encoding=encoding, errors="backslashreplace", line_buffering=True)

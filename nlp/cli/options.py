@@ -79,11 +79,12 @@ class Number:
             InputError: the text is no number, or the number is not allowed.
         """
         from ..errors import InputError
+        from ..system.slips import hint_of
 
         try:
             number = float(text)
         except ValueError:
-            raise InputError(f"{self.option} {text}: must be a number") from None
+            raise InputError(f"{self.option} {text}: must be a number{hint_of(str(text))}") from None
         if self.least is not None and not self.least <= number < 1:
             raise InputError(f"{self.option} {number:g}: must be at least {self.least:g} and below 1")
         return number
@@ -168,7 +169,9 @@ def time(left_out: str, end: str = "shows its results") -> Any:  # noqa: ANN401 
     return typer.Option("--time", parser=Number("--time"), metavar="SECONDS", callback=_begin, help=words)
 
 
-CaseName = Annotated[str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case.")]
+CaseName = Annotated[
+    str, typer.Argument(metavar="CASE", help="A case file, or the bare name of a shipped case; - is stdin.")
+]
 SettingTexts = Annotated[
     list[str] | None, several("--set", "NAME=VALUE", "Replace a number of the case: x4=20, p_z=40, axis=0,0,1")
 ]
@@ -212,14 +215,17 @@ def read_settings(texts: list[str] | None) -> Settings:
 def _read_setting(text: str) -> tuple[str, float | list[float]]:
     """Return the name and the number or numbers of one setting; the error is that of :func:`read_settings`."""
     from ..errors import InputError
+    from ..system.slips import hint_of
 
     name, equals, value = (part.strip() for part in text.partition("="))
     try:
         numbers = [float(part) for part in value.split(",")]
     except ValueError:
         numbers = []
-    if not (name and equals and numbers):
-        raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z")
+    # No number of a case is a pair: two are one with a decimal comma, but for an axis that lacks a part.
+    is_pair = len(numbers) == 2 and not name.endswith("axis")
+    if not (name and equals and numbers) or is_pair:
+        raise InputError(f"--set {text}: must be NAME=NUMBER, or axis=X,Y,Z{hint_of(value)}")
     return name, numbers[0] if len(numbers) == 1 else numbers
 
 

@@ -147,6 +147,7 @@ def _words(claim: CheckedClaim, case: Case) -> str:
     """Return what is shown of a claim."""
     from ..proof.checker.premises import outward
     from ..proof.statement.claims import CONSTRAINTS
+    from ..results.objective import unit_of_claim
 
     if claim.by_machine:
         return "refuted, at the pose given J is singular for a machine within the tolerance"
@@ -157,7 +158,7 @@ def _words(claim: CheckedClaim, case: Case) -> str:
         return f"{whose} rank at every pose"
     is_most = claim.sense != "min"
     bound = outward(case.units.shown(claim.bound, claim.dimension), up=is_most)
-    text = f"{'at most' if is_most else 'at least'} {bound} {case.units.label(claim.dimension)}".rstrip()
+    text = f"{'at most' if is_most else 'at least'} {bound} {unit_of_claim(case, claim.name, claim.dimension)}".rstrip()
     if claim.limit is None:
         return text
     return f"{text}, within the limit {case.units.shown(claim.limit, claim.dimension):.10g}"

@@ -77,7 +77,7 @@ def _sentence(error: Any, command: str, params: Sequence[Any]) -> str:  # noqa: 
         is_option = param.param_type_name == "option"
         return f"{param.opts[0] if is_option else param.metavar}: is missing: {f'{param.metavar}, ' * is_option}{words}"
     if hasattr(error, "possibilities"):
-        return f"{name}: no such option of {command}; {nearest(str(name), options)}"
+        return f"{name}: no such option of {command}; {nearest(str(name), [*options, '--help'])}"
     if name is not None:
         is_flag = name not in options or options[name].is_flag
         return f"{name}: {'takes no value' if is_flag else f'needs a value, {options[name].metavar}'}"

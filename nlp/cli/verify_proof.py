@@ -21,7 +21,8 @@ def verify_proof(
         str, typer.Argument(metavar="PROOF", help="A proof that certify --proof or workspace --proof wrote.")
     ],
     case: Annotated[
-        str | None, typer.Argument(metavar="[CASE]", help="The case to be proved; that in the proof if left out.")
+        str | None,
+        typer.Argument(metavar="[CASE]", help="The case to be proved, - is stdin; that in the proof if left out."),
     ] = None,
     settings: options.SettingTexts = None,
     of: options.ResultFile = None,
@@ -75,6 +76,7 @@ def _verify(
     from ..proof.checker.check import check_proof
     from ..proof.checker.premises import claim_words, hold_statement, program_of, root_below
     from ..proof.checker.proof_file import ProofError
+    from ..results.objective import unit_of_objective
     from ..results.text import Line
 
     try:
@@ -86,7 +88,8 @@ def _verify(
     except ProofError as error:
         typer.echo(f"rejected: {error}", err=True)
         raise typer.Exit(1) from None
-    holds = Line(f"holds: {claim_words(case, statement, claim.bound)}")
+    bound = None if claim.bound is None else checked.bound
+    holds = Line(f"holds: {claim_words(case, statement, bound, unit_of_objective(case))}")
     return [holds, Line(f"{checked.leaves:,} leaves, shown on {checked.pieces:,} boxes")]
 
 

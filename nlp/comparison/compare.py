@@ -30,9 +30,10 @@ TIME_LIMIT = 60.0
 #: Measures of actuators and of legs whose strokes are told.
 _MEASURES = ("actuator_length", "actuator_angle", "leg_length")
 
-#: Parts of a table, in order: robots whose F can be compared, those that cannot make a motion, those without an answer.
-Part: TypeAlias = Literal["ranked", "no freedom", "no answer"]
-_PARTS: tuple[Part, ...] = ("ranked", "no freedom", "no answer")
+#: Parts of a table, in order: robots whose F can be compared, those that do not keep every limit of the case, those
+#: that cannot make a motion, those without an answer.
+Part: TypeAlias = Literal["ranked", "limits not kept", "no freedom", "no answer"]
+_PARTS: tuple[Part, ...] = ("ranked", "limits not kept", "no freedom", "no answer")
 
 #: Called before each robot with its label, the number of robots done, and of all.
 CompareProgress = Callable[[str, int, int], None]
@@ -47,7 +48,8 @@ class Comparison:
         size: to which the robots are scaled, length; None where they are not scaled.
         part: of a typical dimension by which a design may differ from it.
         characteristic_length: by which couples count beside forces, length.
-        entries: the ranked ones first, the best first; then those without the freedom, then those without an answer.
+        entries: the ranked ones first, the best first; then those that do not keep every limit of the case, then those
+            without the freedom, then those without an answer.
         seconds: wall time.
     """
 
@@ -64,7 +66,7 @@ class Comparison:
 
     @property
     def ranked(self) -> tuple[Entry, ...]:
-        """The robots whose F can be compared: with an answer, and not without the freedom for a task."""
+        """The robots whose F can be compared: with an answer, every limit, and not without the freedom for a task."""
         return tuple(each for each in self.entries if part_of(each) == "ranked")
 
 
@@ -263,11 +265,14 @@ def part_of(entry: Entry) -> Part:
     """Return the part of the table that a robot stands in."""
     if not entry.has_answer:
         return "no answer"
-    return "no freedom" if entry.can_move is False else "ranked"
+    if entry.can_move is False:
+        return "no freedom"
+    # Without a limit F can be better, and is no answer to the case.
+    return "ranked" if entry.keeps_limits else "limits not kept"
 
 
 def _in_order(entries: Sequence[Entry]) -> tuple[Entry, ...]:
-    """Return robots in the order of a table: with fewer limits left out first, then by F.
+    """Return robots in the order of a table: by part, with fewer limits left out first, then by F.
 
     Robots without a common value stay in the order in which they are given.
     """

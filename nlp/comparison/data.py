@@ -148,12 +148,6 @@ def _rules(found: Comparison) -> list[str]:
 def _cautions(found: Comparison) -> list[str]:
     """Return sentences about what makes F of ranked robots differ beside the robots themselves."""
     case, ranked, lines = found.case, found.ranked, []
-    kept = {len(each.placed.case.limits) for each in ranked if each.placed is not None}
-    if len(kept) > 1:
-        lines.append(
-            "The ranked robots keep different numbers of the limits. Those that keep more come first: fewer limits let "
-            "F be better."
-        )
     sizes = [each.final_size for each in ranked if each.final_size is not None]
     turns = any(np.any(np.asarray(task.twist, dtype=np.float64)[:3]) for task in case.tasks)
     if turns and sizes and max(sizes) > (1 + _SAME_SIZE) * min(sizes):
@@ -181,6 +175,8 @@ def _conventions(found: Comparison) -> list[str]:
     if any(each.contender.model.has_couples for each in entries):
         length = case.units.text(found.characteristic_length, Dimension.LENGTH)
         lines.append(f"Couples count beside forces by the characteristic length {length}.")
+    if any(part_of(each) == "limits not kept" for each in entries):
+        lines.append("A robot that does not keep every limit of the case is not ranked: fewer limits let F be better.")
     if any(part_of(each) == "no freedom" for each in entries):
         lines.append(
             "F of a robot without the freedom for a task has a constraint part: it is not ranked, as the motion does "

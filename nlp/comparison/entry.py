@@ -117,6 +117,12 @@ class Entry:
         return self.solution is not None and self.solution.status.is_answer
 
     @property
+    def keeps_limits(self) -> bool:
+        """Whether the answer keeps every limit of the case: the robot can have them all, and none is violated."""
+        is_whole = self.placed is not None and not self.placed.left_out
+        return is_whole and self.solution is not None and self.solution.keeps_limits
+
+    @property
     def can_move(self) -> bool | None:
         """Whether the platform can make every task's motion; None where that is not known."""
         if not self.tasks:

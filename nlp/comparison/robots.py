@@ -25,6 +25,7 @@ from ..case.pose import Free, Pose, Value
 from ..case.robotfile import model_of_definition, read_definition
 from ..case.robots import build_model
 from ..case.settings import Expectation
+from ..case.source import shipped_cases
 from ..case.task import Task
 from ..errors import CaseError, InputError, nearest
 from ..evidence.kkt import close_equations
@@ -96,7 +97,7 @@ def _read(given: str | Path | Model, case: Case) -> Contender:
             raise (error if error.source else error.within(text)) from None
     if text.endswith(".toml"):
         raise InputError(f"compare: {text}: no such robot file")
-    hint = nearest(text, [*names, OWN])
+    hint = "this is a case" if text in shipped_cases() else nearest(text, [*names, OWN])
     raise InputError(f"compare: {text or 'an empty name'}: no such robot, and no such robot file; {hint}")
 
 

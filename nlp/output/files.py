@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..interruption import WRITING, unfinished, wrote
+from ..system.locks import held_folder
 from ..system.reading import read_limited, text_of_bytes
 
 #: Name of the file that lists what was written into a folder; only a folder with it is written into again.
@@ -21,6 +22,8 @@ MANIFEST = "screwsynth-files.txt"
 _WRITABLE = stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH
 #: Largest file that is read, bytes: above every proof that fits into memory as a tree; a device has no end.
 LARGEST_FILE = 256 * 2**20
+#: Beginning of names of files and folders that are not complete.
+_WAITING = ".screwsynth."
 _MANIFEST_HEAD = "# Written by screwsynth, which may replace these files:"
 
 
@@ -67,7 +70,7 @@ def write_whole(target: str) -> Iterator[Path]:
         InputError: the file cannot be written.
     """
     path = Path(target).resolve()
-    waiting = path.with_name(f".screwsynth.{path.name}")
+    waiting = path.with_name(f"{_WAITING}{path.name}")
     try:
         waiting.unlink(missing_ok=True)
         with unfinished(waiting):
@@ -86,7 +89,7 @@ def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) 
     """Write texts by file name into a folder, which is made when missing.
 
     All of them are complete before the first appears under its name; other files in the folder stay. A manifest in the
-    folder lists what was written.
+    folder lists what was written. Of two runs at once, one writes after the other.
 
     Args:
         target: the folder.
@@ -101,13 +104,16 @@ def write_folder(target: str, files: Mapping[str, str], *, force: bool = False) 
     folder = Path(target)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        listed = sorted({*files, *(name for name in _written_before(folder) or () if (folder / name).exists())})
-        every = {**files, MANIFEST: "\n".join([_MANIFEST_HEAD, *listed]) + "\n"}
-        with WRITING, tempfile.TemporaryDirectory(dir=folder, prefix=".screwsynth.") as waiting:
-            for name, text in every.items():
-                (Path(waiting) / name).write_text(text, encoding="utf-8")
-            for name in every:
-                (Path(waiting) / name).replace(folder / name)
+        with held_folder(folder):
+            if not force:
+                _refuse_foreign(folder, target, files)
+            listed = sorted({*files, *(name for name in _written_before(folder) or () if (folder / name).exists())})
+            every = {**files, MANIFEST: "\n".join([_MANIFEST_HEAD, *listed]) + "\n"}
+            with WRITING, tempfile.TemporaryDirectory(dir=folder, prefix=_WAITING) as waiting:
+                for name, text in every.items():
+                    (Path(waiting) / name).write_text(text, encoding="utf-8")
+                for name in every:
+                    (Path(waiting) / name).replace(folder / name)
         wrote(target)
     except OSError as error:
         raise _cannot_be_written(target, error) from None
@@ -129,10 +135,17 @@ def check_folder(target: str, files: Iterable[str] = ()) -> None:
             return
         if not folder.is_dir():
             raise InputError(f"{target}: cannot be written: it is a file, not a folder")
-        written = _written_before(folder)
-        present = sorted(each.name for each in folder.iterdir())
+        with held_folder(folder):
+            _refuse_foreign(folder, target, files)
     except OSError as error:
         raise _cannot_be_written(target, error) from None
+
+
+def _refuse_foreign(folder: Path, target: str, files: Iterable[str]) -> None:
+    """Refuse a folder with files of another origin; the arguments and errors are those of :func:`check_folder`."""
+    written = _written_before(folder)
+    # What a killed run left is nobody's.
+    present = sorted(each.name for each in folder.iterdir() if not each.name.startswith(_WAITING))
     foreign = [name for name in present if written is None or (name in set(files) and name not in written)]
     if foreign:
         raise InputError(
@@ -226,7 +239,7 @@ def _replace(path: Path, content: bytes) -> None:
 
 def _write_and_rename(path: Path, content: bytes) -> None:
     """Write a temporary file and give it the name of the result."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".screwsynth.")
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=_WAITING)
     with unfinished(Path(temporary)):
         _fill_and_rename(handle, temporary, path, content)
 

@@ -98,7 +98,8 @@ class ComparedRobotData(JsonObject):
         name: in tables.
         model: name of the robot.
         description: of the robot.
-        part: of the table: ``ranked``, ``no freedom`` where the platform cannot make a task's motion, or ``no answer``.
+        part: of the table: ``ranked``, ``limits not kept`` where the robot does not keep every limit of the case,
+            ``no freedom`` where the platform cannot make a task's motion, or ``no answer``.
         factor: by which typical lengths are multiplied.
         size: largest distance between two points at home, typical dimensions times the factor.
         final_size: largest distance between two points of the design; null without an answer.
@@ -124,7 +125,7 @@ class ComparedRobotData(JsonObject):
     name: str
     model: str
     description: str
-    part: Literal["ranked", "no freedom", "no answer"]
+    part: Literal["ranked", "limits not kept", "no freedom", "no answer"]
     factor: float
     size: float
     final_size: float | None

@@ -124,6 +124,19 @@ def unit_of_objective(case: Case, task: int | None = None) -> str:
     return objective_unit([frozen_array(each.twist, (6,)) for each in tasks], case.units)
 
 
+def unit_of_claim(case: Case, name: str, dimension: Dimension) -> str:
+    """Return the unit of a claim's number over a workspace or along a path: that of F for F of a task.
+
+    Args:
+        case: the case.
+        name: of the claim.
+        dimension: of its number.
+    """
+    tasks = [k for k, task in enumerate(case.tasks) if name in ("F", f"F of {task.name}")]
+    is_of_F = dimension is Dimension.NUMBER and tasks and not case.tasks[0].measure
+    return unit_of_objective(case, tasks[0]) if is_of_F else case.units.label(dimension)
+
+
 def objective_label(case: Case, task: int | None = None) -> str:
     """Return F with its unit, for an axis; arguments are those of :func:`unit_of_objective`."""
     unit = unit_of_objective(case, task)

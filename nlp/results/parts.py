@@ -195,12 +195,14 @@ class ViolationData(JsonObject):
         bound: side of it.
         value: at the point.
         limit: that it must keep.
+        unit: of both; absent for a plain number.
     """
 
     name: str
     bound: Bound
     value: float
     limit: float
+    unit: Absent[str]
 
 
 class MarginData(JsonObject):

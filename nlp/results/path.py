@@ -14,6 +14,7 @@ from ..proof.statement.claims import ACTUATED
 from ..proof.workspace.numbers.extremes import Extreme
 from ..proof.workspace.verdict import Outcome
 from .jsondata import Absent, Inline, JsonObject
+from .objective import unit_of_claim
 from .parts import HeadData, VersionsData
 from .pathtable import knot_motion
 from .point import head_data, versions
@@ -281,7 +282,7 @@ def _number_data(each: "Extreme", judged: "PathJudgement") -> PathClaimData:
     return _claim_data(
         each,
         judged,
-        unit=units.label(each.dimension),
+        unit=unit_of_claim(judged.case, each.name, each.dimension),
         sense=each.sense,
         limit=shown(each.limit),
         bound=shown(each.bound),

@@ -20,6 +20,7 @@ from ..evidence.loads import loads_at
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
+from .design import unit_of_side
 from .jointdata import joints_data, motion_data
 from .jsondata import Vector, matrix, vector
 from .loaddata import loading_data
@@ -229,5 +230,6 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
             reading = nlp.program.constraints[side.constraint].reading
             dimension, value, limit = reading.dimension, reading.from_value(value), reading.from_value(limit)
         shown, allowed = units.shown(value, dimension), units.shown(limit, dimension)
-        rows.append(ViolationData(name=side.name, bound=side.bound, value=shown, limit=allowed))
+        unit = unit_of_side(nlp.case, side.name, dimension) or None
+        rows.append(ViolationData(name=side.name, bound=side.bound, value=shown, limit=allowed, unit=unit))
     return tuple(rows)

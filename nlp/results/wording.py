@@ -235,8 +235,8 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
         yield Line(f"{len(sides)} limits are violated; the first {_VIOLATIONS}:", tone=Tone.FAULT)
     for side in sides[:_VIOLATIONS]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side.bound]
-        text = f"violated: {side.name} = {side.value:.6g}, must be {wanted} {side.limit:.6g}"
-        yield Line(text, tone=Tone.FAULT)
+        value, limit = (f"{each:.6g} {side.unit or ''}".rstrip() for each in (side.value, side.limit))
+        yield Line(f"violated: {side.name} = {value}, must be {wanted} {limit}", tone=Tone.FAULT)
 
 
 def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator[Line]:

@@ -14,6 +14,7 @@ from ..proof.statement.machine import has_straight_legs
 from ..proof.workspace.verdict import Outcome
 from ..units import Units
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
+from .objective import unit_of_claim
 from .parts import HeadData, VersionsData
 from .point import head_data, versions
 
@@ -416,7 +417,7 @@ def _extreme_data(each: "Extreme", case: "Case") -> ExtremeData:
 
     return ExtremeData.of(
         each,
-        unit=units.label(each.dimension),
+        unit=unit_of_claim(case, each.name, each.dimension),
         bound=shown(each.bound),
         reached=shown(each.reached),
         key=each.key or None,

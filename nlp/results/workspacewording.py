@@ -40,8 +40,10 @@ def verdict_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
     yield from machine_lines(case, result.joint_centre)
     yield from _dependent_lines(result)
     for low, high in zip(result.extremes, result.extremes[1:], strict=False):
-        if low.name == high.name and low.name.partition(" ")[0] == "F" and low.bound and high.bound:
-            ends = f"{number(low.bound)} to {number(high.bound)}"
+        if low.bound is None or high.bound is None:
+            continue
+        if low.name == high.name and low.name.partition(" ")[0] == "F":
+            ends = f"{number(low.bound)} to {number(high.bound)} {low.unit}".rstrip()
             yield Line(ends, label=low.name, after=", at no pose smaller or larger")
 
 

@@ -22,7 +22,6 @@ from ..proof.certificate.certificate import Certificate, CertificateStatus
 from ..proof.checker.premises import check_minimum, fingerprint, has_both_senses, has_modes, program_of
 from ..proof.checker.proof_file import OPTIMUM, Proof, ProofClaim, Statement
 from ..proof.enclosure.engine import ENGINE, kernel
-from ..proof.statement.form import power_of
 from ..proof.statement.standard_form import is_in_home_mode, standard_form
 from .certified_choices import prove_choices
 from .choices import solve_choices
@@ -318,7 +317,7 @@ def proof_of(certified: Certified, text: str) -> Proof:
         raise OptionError("proof: nothing was proved, so nothing is written")
     nlp = certificate.nlp
     is_empty = certificate.status is CertificateStatus.INFEASIBLE
-    bound = None if is_empty else -nlp.sign * certificate.bound ** power_of(nlp)
+    bound = None if is_empty else certificate.bound_of_tree
     graph = fingerprint(program_of(nlp.case, certified.statement))
     claim = ProofClaim(OPTIMUM, "", "program", bound, graph, certified.tree)
     return Proof(text, nlp.case.name, certified.statement, (claim,))

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..evidence.optimality import Evidence
 from ..interruption import WRITING
 from ..results.jsondata import finite_or_none
+from ..system.locks import hold
 from ..system.strictjson import json_tree, value_of
 from ..units import Units
 
@@ -108,11 +109,6 @@ def row_kinds() -> tuple[tuple[str, object], ...]:
     """Return the fields of a row with their types."""
     return tuple(get_type_hints(Row).items())
 
-
-try:
-    import fcntl
-except ImportError:  # a system without locks of files
-    fcntl = None  # type: ignore[assignment]
 
 #: Ending of a journal's name behind that of the table.
 ENDING = ".journal"
@@ -214,12 +210,8 @@ class Journal:
         Raises:
             InputError: another process holds it.
         """
-        if fcntl is None:
-            return
-        try:
-            fcntl.flock(self._file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(f"{self.path}: another run of this sweep is writing it; wait for its end") from None
+        if not hold(self._file.fileno()):
+            raise InputError(f"{self.path}: another run of this sweep is writing it; wait for its end")
 
     def _read(self) -> int:
         """Read the places of the rows, cut off an incomplete last line, and return the file's end.

@@ -17,6 +17,7 @@ from ..case.case import Case
 from ..case.overrides import Settings
 from ..case.reader import CaseFile, case_from_tables
 from ..errors import InputError
+from ..system.slips import hint_of
 
 #: Largest number of points: their numbers and places in the journal then take less than a gigabyte.
 MOST_POINTS = 10_000_000
@@ -177,7 +178,7 @@ def _number(text: str, where: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{where} = {text.strip()!r}: must be a finite number")
+        raise InputError(f"{where} = {text.strip()!r}: must be a finite number{hint_of(text)}")
     return value
 
 

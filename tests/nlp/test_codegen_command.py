@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
 import subprocess
 import tomllib
@@ -21,6 +22,18 @@ from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.embedding.measure import CORTEX_M7, NOT_MEASURED, X86_64, measure, stack_bound, with_figures
 
 
+def test_the_command_that_is_offered_is_one_for_a_shell(tmp_path: Path, cli: Run) -> None:
+    folder = tmp_path / "it's a folder; touch x"
+    out = output_of(cli("codegen", "paper-4.1-helical", "--no-measure", "--out", str(folder)))
+    (command,) = re.findall(r"; (make -C .* test) compiles and tests them$", out, re.MULTILINE)
+    assert shlex.split(command) == ["make", "-C", str(folder), "test"]
+    # The folder's own rules take its name, too.
+    ended = subprocess.run(
+        ["sh", "-c", f"{command} --dry-run"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
 def test_the_command_line_writes_the_folder_and_its_size(
     tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -29,7 +42,7 @@ def test_the_command_line_writes_the_folder_and_its_size(
     files = [path for path in (tmp_path / "made").iterdir() if path.suffix in {".c", ".h"}]
     assert int(size) == pytest.approx(sum(path.stat().st_size for path in files) / 1000, abs=1)
     assert words == "kB of C"
-    assert "make -C" in out
+    assert f"make -C {tmp_path / 'made'} test" in out
     names = {path.name for path in (tmp_path / "made").iterdir()}
     assert {"case.toml", "Makefile", "CMakeLists.txt", "README.md", "selftest.c", "bench.c"} <= names
     assert not [name for name in names if name.startswith(".")]

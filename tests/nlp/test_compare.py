@@ -28,6 +28,7 @@ from screwsynth.nlp import (
     load_case,
     load_result,
 )
+from screwsynth.nlp.comparison.data import comparison_sentences
 from screwsynth.nlp.comparison.robots import placed, read_robots
 from screwsynth.nlp.output.pictures.comparisons import comparison_drawings, comparison_figure, comparison_pictures
 from screwsynth.nlp.results.schema import result_schema
@@ -159,6 +160,9 @@ def test_dimensions_ranges_and_certificates() -> None:
     for each in found.entries:
         assert each.value is not None
         assert each.certificate.bound >= each.value * (1 - 1e-9)
+    # With wider ranges the sizes differ; the case's robot keeps its ranges with --part 0 too.
+    sentences = comparison_sentences(compare(case(), ["6-sps", "case"], part=0.2, starts=1))
+    assert any("--part 0 for one size of all but the case's robot" in each for each in sentences)
 
 
 def test_strokes_over_several_poses() -> None:
@@ -217,15 +221,17 @@ def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
         compare(case(), ["case", build_model("6-ups"), "case"])
 
 
-def test_robots_that_keep_more_limits_come_first_and_what_others_lack_is_said(cli: Run) -> None:
-    names = ["6-pus", "delta", "case", "6-ups"]
-    result = json.loads(output_of(cli("compare", "hexapod-machining", *names, "--starts", "2", "--json", "-")))
+def test_robots_that_do_not_keep_every_limit_have_no_rank_and_what_they_lack_is_said(cli: Run, tmp_path: Path) -> None:
+    names, page, data = ["6-pus", "delta", "case", "6-ups"], tmp_path / "page.html", tmp_path / "result.json"
+    words = ("--starts", "2", "--json", str(data), "--html", str(page))
+    output_of(cli("compare", "hexapod-machining", *names, *words))
+    result = json.loads(data.read_text())
     kept = {each["name"]: (each["part"], each["limits_kept"], each["value"]) for each in result["robots"]}
     # The six rods on rails resist the motion more, without all limits but one.
     assert kept["6-pus"][2] > kept["case"][2]
     assert [(each["name"], each["part"]) for each in result["robots"]] == [
         ("case", "ranked"),
-        ("6-pus", "ranked"),
+        ("6-pus", "limits not kept"),
         ("delta", "no freedom"),
         ("6-ups", "no answer"),
     ]
@@ -241,5 +247,10 @@ def test_robots_that_keep_more_limits_come_first_and_what_others_lack_is_said(cl
     answered = [each for each in result["robots"] if each["name"] != "6-ups"]
     units = {each["name"]: {rate["unit"] for rate in each["tasks"][0]["rates"]} for each in answered}
     assert units == {"case": {"in/rad"}, "6-pus": {"in/rad"}, "delta": {"rad/rad"}}
-    # The case's robot keeps its ranges with --part 0 too.
-    assert any("--part 0 for one size of all but the case's robot" in each for each in result["sentences"])
+    assert any("not ranked: fewer limits let F be better" in each for each in result["sentences"])
+    # The headline names the best of those that keep every limit, and counts those that do not.
+    best = f"case has the best value, {kept['case'][2]:.7g} (in/rad)²; 1 of 4 robots can be compared, "
+    assert f"{best}1 does not keep every limit." in page.read_text()
+    # Without a robot that keeps them all, none is ranked.
+    status, out, _ = cli("compare", "hexapod-machining", "6-pus", "6-rus", "--starts", "1")
+    assert (status, out.count("limits not kept")) == (1, 2)

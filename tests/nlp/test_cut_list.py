@@ -3,6 +3,7 @@
 import io
 import math
 from itertools import combinations
+from typing import Any
 
 import ezdxf
 import numpy as np
@@ -61,11 +62,15 @@ def test_every_link_is_listed_with_the_distances_of_its_centres_and_drawn_with_t
     assert any(int(row["quantity"]) > 1 for row in rows_of(files["cut-list.csv"]))
 
 
+def moves() -> list[dict[str, list[Any]]]:
+    """Three poses: the stated one, a higher one, and one that is turned too."""
+    turned = [[math.cos(0.2), 0, math.sin(0.2)], [0, 1, 0], [-math.sin(0.2), 0, math.cos(0.2)]]
+    return [{"translation": [0, 0, 0]}, {"translation": [0, 0, 4]}, {"rotation": turned, "translation": [1, 0, 2]}]
+
+
 def test_legs_have_their_strokes_over_all_poses_and_within_their_limits() -> None:
     tables = starter_tables("hexapod")
-    raised = {"translation": [0, 0, 4]}
-    turned = {"rotation": [[math.cos(0.2), 0, math.sin(0.2)], [0, 1, 0], [-math.sin(0.2), 0, math.cos(0.2)]]}
-    tables["pose"]["displacements"] = [{"translation": [0, 0, 0]}, raised, {**turned, "translation": [1, 0, 2]}]
+    tables["pose"]["displacements"] = moves()
     tables["limits"] = {"leg_length": {"min": 3, "max": 400}}
     nlp = formulate(case_from(tables, "hexapod"))
     unit, x = nlp.case.units.length, closed_start(nlp)
@@ -87,3 +92,42 @@ def test_legs_have_their_strokes_over_all_poses_and_within_their_limits() -> Non
     np.testing.assert_allclose(found[:, 2], np.ptp(lengths, axis=0), atol=1e-12)
     np.testing.assert_allclose(found[:, 3:], [[3, 400, 397]] * 6, rtol=1e-12)
     assert np.ptp(lengths, axis=0).min() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "largest", "dead"),
+    [
+        (None, None, 5.5, None), (3, 400, 5.5, None), (3, 400, 500, None), (None, None, None, 2),
+        (3, 30, None, 2), (10, 22, 500, 9), (10, 14, None, 9), (None, 24, 500, 4), (None, 24, 9, 4),
+        (None, 24, None, None),
+    ],
+)  # fmt: skip
+def test_the_stroke_allowed_is_the_largest_one_within_all_limits(
+    least: float | None, most: float | None, largest: float | None, dead: float | None
+) -> None:
+    tables = starter_tables("hexapod")
+    tables["pose"]["displacements"] = moves()
+    given = {
+        "leg_length": {"min": least, "max": most},
+        "actuator": {"stroke_max": largest, "dead_length": dead},
+    }
+    limits = {name: {key: value for key, value in table.items() if value is not None} for name, table in given.items()}
+    tables["limits"] = {name: table for name, table in limits.items() if table}
+    nlp = formulate(case_from(tables, "hexapod"))
+    files = files_at(nlp, closed_start(nlp), ["csv"], 1)
+    rows = [row for row in rows_of(files["cut-list.csv"]) if row["item"] == "length of a leg"]
+    assert len(rows) > 1
+    unit = nlp.case.units.length
+    for row in rows:
+        (shortest,) = lengths_of(row, unit, "smallest used")
+        # Each retracted length up to the shortest one used, and the longest stroke that the limits leave from there.
+        retracted = np.linspace(0 if least is None else least, max(shortest, least or 0), 200_001)
+        ends = [np.full(retracted.size, np.inf if largest is None else largest)]
+        ends += [] if most is None else [most - retracted]
+        ends += [] if dead is None else [retracted - dead]
+        stroke = float(np.minimum.reduce(ends).max())
+        found = row[f"stroke allowed [{unit}]"]
+        if largest is None and dead is None and least is None:
+            assert found == ""
+        else:
+            assert float(found) == pytest.approx(stroke, abs=1e-3)

@@ -1,6 +1,8 @@
 """The command ``export``: its files, cases that it takes and refuses, and results instead of a solve."""
 
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -30,6 +32,18 @@ def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Pat
     assert again["robot.xml"].encode() == files["robot.xml"]
     tree = Tree(again["robot.xml"], 50.0)
     assert tree.open <= 1e-9
+
+
+def test_files_are_the_same_bytes_whatever_the_seed_of_hashes(tmp_path: Path) -> None:
+    found = []
+    for seed in ("1", "4"):  # which order the sets of ezdxf differently
+        out = tmp_path / seed
+        words = ("export", "paper-4.4-max", "--starts", "2", "--format", "all", "--out", str(out))
+        command, seeded = [sys.executable, "-P", "-m", "screwsynth.nlp", *words], os.environ | {"PYTHONHASHSEED": seed}
+        subprocess.run(command, env=seeded, check=True, capture_output=True)
+        found.append({path.name: path.read_bytes() for path in out.iterdir()})
+    assert found[0] == found[1]
+    assert sum(name.endswith(".dxf") for name in found[0]) > 2
 
 
 @pytest.mark.parametrize("name", ["paper-4.2", "free-wrist", "drilling-spindle"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -21,7 +22,7 @@ from screwsynth.nlp import InputError, load_case
 from screwsynth.nlp.formats.frames import Frame, rotation_from_roll_pitch_yaw
 from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.newton import close, gap_of
-from screwsynth.nlp.formats.reading.reduction import Ends
+from screwsynth.nlp.formats.reading.reduction import Ends, _extent
 from screwsynth.nlp.formats.reading.robotfile import check_text, robot_file_text
 from screwsynth.nlp.formats.reading.urdf import read_urdf
 from screwsynth.nlp.formats.reading.xmltext import read_xml
@@ -374,3 +375,42 @@ def test_a_loop_that_cannot_close_is_named_with_its_least_gap(tmp_path: Path) ->
     size = float(words.partition("robot's size ")[2].split()[0])
     assert float(words.partition("shut by ")[2].split(";")[0]) * size == pytest.approx(0.25, rel=0.02)
     assert "correct the frames" in words
+
+
+def calls_of_import(count: int, folder: Path) -> int:
+    """Number of calls, also of built-in functions, in the import of a chain of links; it is refused as an open one."""
+    kinds = ("revolute", "planar", "fixed")
+    chain = "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="{kinds[k % 3]}"><parent link="l{k - 1}"/><child link="l{k}"/>'
+        f'<origin xyz="{k % 2} 0 0.01"/><axis xyz="0 1 {k % 2}"/></joint>'
+        for k in range(1, count)
+    )
+    path = saved(folder / f"{count}.urdf", f'<robot name="chain"><link name="l0"/>{chain}</robot>')
+    calls = 0
+
+    def count_call(_frame: object, event: str, _argument: object) -> None:
+        nonlocal calls
+        calls += event in ("call", "c_call")
+
+    request = Request(path, Ends(f"l{count - 1}"))
+    sys.setprofile(count_call)
+    try:
+        with pytest.raises(InputError, match="at the end of an open chain"):
+            import_robot(request)
+    finally:
+        sys.setprofile(None)
+    return calls
+
+
+def test_import_of_a_chain_takes_a_time_that_grows_linearly(tmp_path: Path) -> None:
+    assert calls_of_import(600, tmp_path) < 2.2 * calls_of_import(300, tmp_path)
+
+
+def test_the_size_of_a_robot_is_the_largest_distance_of_its_joints() -> None:
+    rng = np.random.default_rng(2)
+    clouds = [rng.normal(size=(200, 3)) * scale for scale in ([1, 1, 1], [9, 1, 0], [0, 0, 1e-7])]
+    clouds += [each / np.linalg.norm(each, axis=1, keepdims=True) + 1e6 for each in clouds[:1]]
+    for cloud in clouds:
+        apart = max(float(np.linalg.norm(cloud - each, axis=1).max()) for each in cloud)
+        assert _extent(list(cloud)) == apart
+    assert _extent([np.ones(3)] * 3) == 1.0

@@ -1,6 +1,7 @@
 """Streams, files and values that go wrong in ways of their own: a sentence and a status, never a traceback."""
 
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable
@@ -54,6 +55,27 @@ def test_standard_error_that_takes_nothing(arguments: str, status: int, stream: 
     ended = shell(f"{PROGRAM} {arguments} {stream}", tmp_path)
     assert ended.returncode == status, ended
     assert (ended.stdout == "") == (status != 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        ("models", 0),
+        ("--help", 0),
+        ("evaluate drilling-spindle --set x1=300 --json result.json", 1),
+        ("codegen paper-4.1-helical --no-measure --out folder", 0),
+    ],
+)
+def test_standard_output_that_nobody_reads_any_more(arguments: str, status: int, tmp_path: Path) -> None:
+    # The reader has ended before the first word; the command writes its files, and has its own exit status.
+    begin, end = os.pipe()
+    os.close(begin)
+    command = [*shlex.split(PROGRAM), *arguments.split()]
+    ended = subprocess.run(command, cwd=tmp_path, stdout=end, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(end)
+    assert (ended.returncode, ended.stderr) == (status, "")
+    expected = [word for word in arguments.split() if word in ("result.json", "folder")]
+    assert [each.name for each in tmp_path.iterdir()] == expected
 
 
 def test_no_standard_stream_at_all(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import re
 import subprocess
 import sys
@@ -202,3 +203,35 @@ def test_a_solve_loads_nothing_that_shows() -> None:
     )
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+# A font that stands in for letters of other scripts, and has no bold letters, as those of some systems.
+DRAWING = """
+import sys
+from fontTools.ttLib import TTFont
+from matplotlib import get_data_path
+from matplotlib.font_manager import fontManager
+font = TTFont(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf")
+for record in font["name"].names:
+    if record.nameID in (1, 4, 16):
+        record.string = "Droid Sans Fallback"
+font.save(sys.argv[1])
+fontManager.addfont(sys.argv[1])
+from screwsynth.models import stewart_gough
+from screwsynth.nlp.output.pictures.fonts import families
+assert "Droid Sans Fallback" in families()
+assert "svg" in stewart_gough()._repr_html_()
+"""
+
+
+@pytest.mark.parametrize("folder", ["", "/dev/null/none"])
+def test_advice_of_matplotlib_on_fonts_and_folders_is_not_on_stderr(folder: str, tmp_path: Path) -> None:
+    folders = {"MPLCONFIGDIR": folder} if folder else {}
+    if folder:  # one that cannot be made, of which Matplotlib has much to say as it is imported
+        command = ["-m", "screwsynth.nlp", "models", "6-rus", "--plot", str(tmp_path / "robot.svg")]
+    else:
+        command = ["-c", DRAWING, str(tmp_path / "font.ttf")]
+    ended = subprocess.run(
+        [sys.executable, "-P", *command], env=os.environ | folders, capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")

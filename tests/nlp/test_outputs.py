@@ -2,13 +2,15 @@
 
 import os
 from pathlib import Path
+from threading import Thread
 
 import pytest
 from builders import Run, output_of, saved
 
 from screwsynth.nlp import InputError
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.output.files import MANIFEST, write_folder
+from screwsynth.nlp.output.files import MANIFEST, check_folder, write_folder
+from screwsynth.nlp.system.locks import held_folder
 
 TEXT = find_case("paper-4.1-helical").read_text(encoding="utf-8")
 # Each command with an output in the place of OUT.
@@ -185,6 +187,32 @@ def test_a_folder_written_before(tmp_path: Path) -> None:
     write_folder(str(folder), {"b.c": "5", "mine.c": "5"}, force=True)
     assert (folder / "mine.c").read_text(encoding="utf-8") == "5"
     assert {"a.c", "b.c", "mine.c"} <= set((folder / MANIFEST).read_text(encoding="utf-8").splitlines())
+
+
+def test_two_runs_write_one_folder_one_after_the_other(tmp_path: Path) -> None:
+    folder = tmp_path / "made"
+    write_folder(str(folder), {"a.c": "1"})
+    second = Thread(target=write_folder, args=(str(folder), {"b.c": "2"}))
+    with held_folder(folder):
+        # The first run is in the middle of its writing: files without a manifest, in a folder that is not its own yet.
+        (folder / MANIFEST).unlink()
+        (folder / ".screwsynth.begun").mkdir()
+        second.start()
+        second.join(0.2)
+        assert second.is_alive()
+        (folder / ".screwsynth.begun").rmdir()
+        (folder / MANIFEST).write_text(
+            "# Written by screwsynth, which may replace these files:\na.c\n", encoding="utf-8"
+        )
+    second.join()
+    assert (folder / MANIFEST).read_text(encoding="utf-8").splitlines()[1:] == ["a.c", "b.c"]
+    assert sorted(each.name for each in folder.iterdir()) == ["a.c", "b.c", MANIFEST]
+    # What a killed run left refuses no other one.
+    (folder / ".screwsynth.left").mkdir()
+    (folder / MANIFEST).unlink()
+    (folder / "a.c").unlink()
+    (folder / "b.c").unlink()
+    check_folder(str(folder))
 
 
 @pytest.mark.parametrize("text", ["", "something else\n"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -86,3 +87,19 @@ def test_rounding_of_wrenches_and_displacements_of_a_load_is_shown_as_zero() -> 
     rows = [[row.split() for row in lines if row.startswith("part ")] for lines in tables_of.values()]
     assert [row[2:] for row in rows[0][:3]] == [["0"] * 6] * 3
     assert rows[1][0][-3:] == ["0"] * 3
+
+
+def test_violated_limits_have_units(cli: Run) -> None:
+    settings = ("p_x=0", "p_y=0", "p_z=700", "limits.platform_joint_angle.max=10", "limits.actuator_rate.max=0.5")
+    arguments = ("evaluate", "drilling-spindle", *(word for each in settings for word in ("--set", each)))
+    rows = json.loads(cli(*arguments, "--json", "-")[1])["violated"]
+    units = {"joint_spacing": "mm", "leg_length": "mm", "platform_joint_angle": "deg", "actuator_rate": "mm/mm"}
+    assert {(row["name"].split()[0], row["unit"]) for row in rows} == set(units.items())
+    status, out, _ = cli(*arguments)
+    shown = re.findall(r"^violated: (\S+)[^=]* = (.*?), must be at (?:most|least) (.*)$", unbroken(out), re.MULTILINE)
+    assert (status, len(shown) > 5) == (1, True)
+    for name, *numbers in shown:
+        assert all(re.fullmatch(rf"[\d.]+ {units[name]}", each) for each in numbers), name
+    # A plain number has none.
+    _, out, _ = cli("evaluate", "hexapod-machining", "--set", "limits.radius_ratio.max=0.1")
+    assert re.search(r"^violated: radius_ratio = 0\.43\d+, must be at most 0\.1$", out, re.MULTILINE)

@@ -126,7 +126,13 @@ def _slope(part: float, value: float) -> float:  # noqa: ARG001 - a slope is a f
     return part
 
 
+def _at_least_zero(value: float) -> float:
+    return max(value, 0.0) + 0.0  # no minus zero
+
+
 LENGTH, NUMBER = Reading(Dimension.LENGTH), Reading(Dimension.NUMBER)
+#: A sum of squares: a bound below 0 that a search of boxes has says no more than 0 does.
+NOT_NEGATIVE = Reading(Dimension.NUMBER, from_value=_at_least_zero)
 POSITIVE_LENGTH = Reading(Dimension.LENGTH, above=0.0)
 SQUARED_LENGTH, SQUARED_NUMBER = squared(Dimension.LENGTH), squared(Dimension.NUMBER)
 

@@ -302,6 +302,10 @@ class JointCone(LimitOnJoint):
             return cls(joint, largest)
         return cls(joint, largest, triple(table.axis))
 
+    def angles(self, model: Model) -> Mapping[str, float | None]:  # noqa: ARG002 - angles need no robot
+        """Return the cone's half angle."""
+        return {self.name: self.max}
+
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
         """Return the keys of ``[limits]`` that state this limit."""
         cone: dict[str, TomlValue] = {"cone": units.written(self.max, Dimension.ANGLE)}

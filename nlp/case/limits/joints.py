@@ -181,6 +181,11 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
                 flat = [part for part in axes if not isinstance(part, list)]
                 return cls(largest, tuple(triple(row) for row in rows or [flat]))
 
+    def angles(self, model: Model) -> Mapping[str, float | None]:  # noqa: ARG002 - angles need no robot
+        """Return the cones' half angle, and the angle of the pose that they are about."""
+        found: dict[str, float | None] = {f"{self.key}.max": self.max}
+        return {**found, "home.angle": self.about.angle} if isinstance(self.about, MountingPose) else found
+
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:  # noqa: ARG002 - angles need no robot
         """Return the keys of ``[limits]`` that state this limit, with the home pose that its cones are about."""
         largest = units.written(self.max, Dimension.ANGLE)

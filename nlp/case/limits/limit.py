@@ -266,6 +266,12 @@ class Limit(abc.ABC, Generic[TableT]):
         """Return the range of each number of this limit on a robot."""
         return self.numbers
 
+    def angles(self, model: Model) -> Mapping[str, float | None]:
+        """Return the angles among the numbers of this limit, radians, by their dotted keys below ``limits``."""
+        ranges = self.ranges(model).items()
+        names = [name for name, allowed in ranges if allowed.dimension is Dimension.ANGLE]
+        return {f"{self.name}.{name}": getattr(self, name) for name in names}
+
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:
         """Return the keys of ``[limits]`` that state this limit, the inverse of :meth:`from_table`.
 

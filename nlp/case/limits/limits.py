@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ....models import Model
-from ...errors import CaseError, listing
+from ...errors import CaseError, did_you_mean, listing
 from ...units import Units
 from .limit import Limit, LimitedCase
 
 if TYPE_CHECKING:
     from ..table import Table
+
+#: Likeness of names from which on one is a slip for the other, and no measure of another robot.
+_SLIP = 0.85
 
 LimitT = TypeVar("LimitT", bound=Limit[Any])
 
@@ -73,7 +76,9 @@ class Limits:
         """
         for limit in self.items:
             if not limit.exists_for(case.model):
-                fault = f"is nothing that {case.model.name!r} has; it has {listing(_measures(case.model))}"
+                known = _measures(case.model)
+                hint = did_you_mean(limit.name, known, _SLIP) if limit.name not in known else ""
+                fault = f"is nothing that {case.model.name!r} has; {hint}it has {listing(known)}"
                 raise CaseError(f"limits.{limit.name}", fault)
         for limit in self.items:
             limit.check(case)

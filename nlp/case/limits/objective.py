@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
-from .constraint import NUMBER, BoundedConstraint, between
+from .constraint import NOT_NEGATIVE, BoundedConstraint, between
 from .interval import IntervalLimit
 from .limit import PosedRobot
 
@@ -20,4 +20,6 @@ class ObjectiveLimit(IntervalLimit):
 
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return F."""
-        yield between(f"{self.key}{pose.where}", pose.robot.F[0], NUMBER, self.key, lower=self.min, upper=self.max)
+        yield between(
+            f"{self.key}{pose.where}", pose.robot.F[0], NOT_NEGATIVE, self.key, lower=self.min, upper=self.max
+        )

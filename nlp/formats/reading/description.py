@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from itertools import takewhile
 
 from ....models.mechanism import Coupling, MechanismJoint
@@ -100,7 +101,12 @@ class Description:
 
     def place_of(self, name: str) -> Frame:
         """Return the place of a body in the world; of one without size between two joints, the world's own."""
-        return next((body.place for body in self.bodies if body.name == name), Frame())
+        return self._places.get(name) or Frame()
+
+    @cached_property
+    def _places(self) -> dict[str, Frame]:
+        """The places of all bodies."""
+        return {body.name: body.place for body in self.bodies}
 
 
 def unique_name(wanted: str, taken: Mapping[str, object] | set[str]) -> str:

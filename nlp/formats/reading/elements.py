@@ -56,10 +56,10 @@ def _closing_joints(given: Description, closure: LoopClosure) -> list[MechanismJ
 
 def rigid_groups(joints: Sequence[MechanismJoint], bodies: list[str]) -> dict[str, str]:
     """Return for each body the first one of those to which welds fix it."""
-    groups = Classes(bodies)
+    groups, order = Classes(bodies), {name: k for k, name in enumerate(bodies)}
     for each in joints:
         if each.kind == "weld":
-            one, other = sorted((groups.find(each.inner), groups.find(each.outer)), key=bodies.index)
+            one, other = sorted((groups.find(each.inner), groups.find(each.outer)), key=order.__getitem__)
             groups.merge(other, one)
     return {name: groups.find(name) for name in bodies}
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ....models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink
-from ....models.mechanism.topology import between
+from ....models.mechanism.topology import between, incident
 from ...errors import InputError, listing, nearest
 from ..frames import Frame
 from .description import LARGEST, Description
@@ -17,6 +17,8 @@ from .newton import Gap, gap_of, gap_of_coupling
 
 #: Most names that a message lists.
 _MOST_NAMES = 12
+#: Rounding of a distance, as a part of it.
+_UP = 1e-12
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,16 @@ def _extent(points: Sequence[np.ndarray]) -> float:
     if len(points) < 2:
         return 1.0
     cloud = np.array(points)
-    return float(max(np.linalg.norm(cloud - each, axis=1).max() for each in cloud)) or 1.0
+    # Two points are no farther apart than both from the middle: the farthest ones decide, but for clouds like a sphere.
+    away = np.linalg.norm(cloud - (cloud.min(axis=0) + cloud.max(axis=0)) / 2, axis=1)
+    order = np.argsort(-away, kind="stable")
+    cloud, away, largest = cloud[order], away[order] * (1 + _UP), 0.0
+    for k, each in enumerate(cloud):
+        if 2 * away[k] < largest:
+            break
+        count = int(np.searchsorted(-away, away[k] - largest, side="right"))
+        largest = max(largest, float(np.linalg.norm(cloud[:count] - each, axis=1).max(initial=0.0)))
+    return largest or 1.0
 
 
 def reduce(given: Description, ends: Ends) -> Reduced:
@@ -128,8 +139,9 @@ def _holds(
 ) -> bool:
     """Return whether a coupling ties joints that are kept, or fixes a joint within a link that is kept."""
     tied = [name for name, _ in coupling.factors]
-    bodies = [joint.outer for joint in given.joints if joint.name in tied]
-    return own.issuperset(tied) if len(tied) > 1 else all(leader[body] in names for body in bodies)
+    if len(tied) > 1:
+        return own.issuperset(tied)
+    return all(leader[joint.outer] in names for joint in given.joints if joint.name in tied)
 
 
 def check_names(given: Description) -> None:
@@ -194,11 +206,11 @@ def _refuse_open(
 
 def _driven(given: Description, ends: Ends, kept: list[MechanismJoint]) -> tuple[set[str], list[str]]:
     """Return the actuated joints of the mechanism, and notes about actuators elsewhere."""
-    own = [each.name for each in kept]
+    own = {each.name: None for each in kept}
     if ends.actuated:
         for name in ends.actuated:
             if name not in own:
-                hint = nearest(name, own[:_MOST_NAMES])
+                hint = nearest(name, list(own)[:_MOST_NAMES])
                 fault = "is no joint between base and platform"
                 raise InputError(f"{given.source}: --actuated {name}: {fault}; {hint}")
     wanted = set(ends.actuated) or set(given.driven)
@@ -207,23 +219,24 @@ def _driven(given: Description, ends: Ends, kept: list[MechanismJoint]) -> tuple
             raise InputError(
                 f"{given.source}: the ball joint {each.name} has an actuator; hinges and slides may have one"
             )
-    outside = sorted(wanted - set(own) - _leading(given, own))
+    leading = _leading(given, own.keys())
+    outside = sorted(wanted - own.keys() - leading)
     notes = [f"actuators outside the mechanism were left out: {listing(outside[:_MOST_NAMES])}"] if outside else []
-    driven = wanted & set(own)
-    if not driven and not (wanted & _leading(given, own)):
+    driven = wanted & own.keys()
+    if not driven and not wanted & leading:
         able = [each.name for each in kept if each.kind in ("R", "P")]
         fault = "no joint between base and platform has an actuator; name them by --actuated, of"
         raise InputError(f"{given.source}: {fault} {listing(able[:_MOST_NAMES])}")
     return driven, notes
 
 
-def _leading(given: Description, own: Sequence[str]) -> set[str]:
+def _leading(given: Description, own: Set[str]) -> set[str]:
     """Return the joints outside the mechanism to which couplings tie joints of it."""
     found: set[str] = set()
     for each in given.couplings:
         names = {name for name, _ in each.factors}
-        if names & set(own):
-            found |= names - set(own)
+        if names & own:
+            found |= names - own
     return found
 
 
@@ -270,15 +283,12 @@ def _oriented(
     The motion of the first body relative to the second about the opposite axis has the same coordinate.
     """
     depth = {start: 0}
-    waiting = [start]
-    for node in waiting:
-        for each in kept:
-            ends = leader[each.inner], leader[each.outer]
-            if node in ends:
-                other = ends[1] if ends[0] == node else ends[0]
-                if other not in depth:
-                    depth[other] = depth[node] + 1
-                    waiting.append(other)
+    waiting, neighbours = [start], incident([(leader[each.inner], leader[each.outer]) for each in kept])
+    for node in waiting:  # which grows
+        for _, other in neighbours[node]:
+            if other not in depth:
+                depth[other] = depth[node] + 1
+                waiting.append(other)
     joints = []
     for each in kept:
         first, second = leader[each.inner], leader[each.outer]

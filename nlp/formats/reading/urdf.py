@@ -141,7 +141,7 @@ class _Reader:
         for k, (part, local) in enumerate(parts):
             last = k == len(parts) - 1
             moved = child if last else unique_name(f"{child} behind {name} {k + 1}", self.links)
-            own = name if last else unique_name(f"{name} {k + 1}", set(self.elements))
+            own = name if last else unique_name(f"{name} {k + 1}", self.elements)
             axis = at.rotation @ local if part in ("R", "P") else np.zeros(3)
             limits = self._limits(element, kind, where) if len(parts) == 1 and part in ("R", "P") else None
             self.joints.append(MechanismJoint(own, part, parent, moved, at.position, axis, range=limits))

@@ -78,7 +78,7 @@ def mechanism_of(nlp: Nlp, x: FloatArray, pose: int = 1) -> Exported:
         joints.append(replace(joint, range=_range_of(joint, words, limits, found.size)))
         key = (words.label, words.part) if length is None else (leg, "length")
         if joint.kind == "P" and all(key in each for each in at_poses):
-            travels.append(_travel(joint.name, length, [each[key] for each in at_poses], pose, limits))
+            travels.append(_travel(nlp.case, joint.name, length, [each[key] for each in at_poses], pose, limits))
     mechanism = replace(found.mechanism, joints=tuple(joints))
     return Exported(mechanism, found.joints, found.size, found.notes, nlp.case, pose, tuple(travels))
 
@@ -112,11 +112,12 @@ def _ends_of_legs(nlp: Nlp, x: FloatArray, pose: int) -> tuple[FloatArray, Float
 
 
 def _travel(
-    joint: str, length: float | None, values: Sequence[float], pose: int, limits: tuple[float, float]
+    case: Case, joint: str, length: float | None, values: Sequence[float], pose: int, limits: tuple[float, float]
 ) -> Travel:
     """Return the travel of a slide.
 
     Args:
+        case: with its limits.
         joint: name of the slide.
         length: of the leg that it drives at the exported pose, negative where it shortens it; None for another slide.
         values: its length or its coordinate from home at every pose.
@@ -125,8 +126,33 @@ def _travel(
     """
     at, (lower, upper) = values[pose - 1], limits
     ends = (at - upper, at - lower) if length is not None and length < 0 else (at + lower, at + upper)
-    least, most = (None if math.isinf(end) else end for end in ends)
-    return Travel(joint, length is not None, at, (min(values), max(values)), (least, most))
+    stroke = _largest_stroke(case, ends, min(values), is_leg=length is not None)
+    least, most, largest = (None if math.isinf(each) else each for each in (*ends, stroke))
+    return Travel(joint, length is not None, at, (min(values), max(values)), (least, most), largest)
+
+
+def _largest_stroke(case: Case, ends: tuple[float, float], shortest: float, *, is_leg: bool) -> float:
+    """Return the largest stroke within the limits of a case from a length of at most the shortest one used.
+
+    Args:
+        case: with its limits.
+        ends: smallest and largest value of the slide within them, infinite without a limit.
+        shortest: smallest value used.
+        is_leg: whether the values are lengths of a leg, of which limits on telescoping legs speak.
+    """
+    (least, most), stroke, dead = ends, math.inf, -math.inf
+    if is_leg and case.limits:
+        from ...case.limits.legs import Actuator  # noqa: PLC0415 - see :func:`_limits_of_joint`
+
+        for limit in case.limits:
+            if isinstance(limit, Actuator):
+                stroke = min(stroke, math.inf if limit.stroke_max is None else limit.stroke_max)
+                dead = max(dead, -math.inf if limit.dead_length is None else limit.dead_length)
+    if math.isinf(dead):
+        return min(stroke, most - least)
+    # The stroke is at most the way up to the largest length, and the retracted length beside the dead one.
+    retracted = shortest if math.isinf(most) else max(least, min(shortest, (most + dead) / 2))
+    return min(stroke, most - retracted, retracted - dead)
 
 
 def _legs(nlp: Nlp, x: FloatArray, pose: int, state: RobotState) -> list[PosedLeg]:

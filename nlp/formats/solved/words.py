@@ -55,6 +55,7 @@ class Travel:
         value: at the exported pose, length.
         used: smallest and largest value over all poses of the case.
         allowed: smallest and largest value within the limits of the case; None for a side without one.
+        stroke: largest stroke within the limits of the case; None without one.
     """
 
     joint: str
@@ -62,6 +63,7 @@ class Travel:
     value: float
     used: tuple[float, float]
     allowed: tuple[float | None, float | None]
+    stroke: float | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,16 +80,7 @@ def _distances(mechanism: Mechanism, link: str, size: float) -> list[_Row]:
 
 def _stroke(travel: Travel) -> _Row:
     """Return the row of a slide: its length or way at the pose, over all poses, and as its limits allow it."""
-    least, most = travel.allowed
-    is_held = least is not None and most is not None
-    lengths = (
-        travel.value,
-        *travel.used,
-        travel.used[1] - travel.used[0],
-        least,
-        most,
-        most - least if is_held and least is not None and most is not None else None,
-    )
+    lengths = (travel.value, *travel.used, travel.used[1] - travel.used[0], *travel.allowed, travel.stroke)
     return _Row("length of a leg" if travel.is_leg else "way from home", travel.joint, ("", ""), "", lengths)
 
 

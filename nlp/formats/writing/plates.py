@@ -121,7 +121,7 @@ def required_dxf() -> Any:  # noqa: ANN401 - a module
 
 
 def dxf_text(plate: Plate, unit: str) -> str:
-    """Return the drawing of a plate: the same text for the same plate, but for the order of entries in sets of ezdxf.
+    """Return the drawing of a plate: the same text for the same plate.
 
     Args:
         plate: the plate.
@@ -155,6 +155,9 @@ def dxf_text(plate: Plate, unit: str) -> str:
             space.add_line((0.0, 0.0), end, dxfattribs={"layer": "FRAME"})
             letter = space.add_text(name, height=_LETTERS * extent, dxfattribs={"layer": "FRAME"})
             letter.set_placement(end, align=alignment.BOTTOM_LEFT)
+        # ezdxf would add the classes of a set, whose order differs from process to process.
+        for name in sorted(document.entitydb.dxf_types_in_use()):
+            document.classes.add_class(name)
         stream = io.StringIO()
         document.write(stream)
     finally:

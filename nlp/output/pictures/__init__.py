@@ -7,3 +7,9 @@ numbers (``curves``, ``sweeps``, ``workspaces``, and ``paths`` after ``pathpanel
 ``comparisons`` of several robots; at last ``plot``, which is public. ``style``, ``requirements`` and ``fonts`` stand
 alone.
 """
+
+import logging
+
+# Matplotlib's advice, on fonts without a weight and folders of its own, would go to standard error, and so into
+# notebooks; a program that sets up logging still gets it.
+logging.getLogger("matplotlib").addHandler(logging.NullHandler())

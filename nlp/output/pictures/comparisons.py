@@ -182,6 +182,8 @@ def _write_heading(figure: Figure, left: float, top: float, found: Comparison, e
         words += f", size {entry.final_size:.4g} {units.length}"
     if entry.can_move is False:
         words += ", cannot make the motion"
+    elif not entry.keeps_limits:
+        words += ", does not keep every limit"
     heading = f"{legible(entry.contender.label)}"
     figure.text(left, top, heading, fontsize=12, color=INK, fontweight="bold", va="top", parse_math=False)
     figure.text(left, top - 0.24 / figure.get_figheight(), words, fontsize=9.5, color=MUTED, va="top", parse_math=False)

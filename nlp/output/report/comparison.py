@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...comparison.compare import Comparison
+from ...proof.workspace.verdict import Outcome
 from ...results.comparison import ComparedRobotData, ComparisonResult, comparison_table
 from ...results.text import TextTable
 from ..pictures.comparisons import comparison_drawings, comparison_pictures
@@ -19,9 +20,14 @@ def comparison_page(found: Comparison, result: ComparisonResult) -> str:
     title = result.title or result.case
     ranked = [each for each in result.robots if each.part == "ranked"]
     words = f"{len(ranked)} of {len(result.robots)} robots can be compared"
+    if others := sum(each.part == "limits not kept" for each in result.robots):
+        words += f", {others} {'does' if others == 1 else 'do'} not keep every limit"
     if ranked and ranked[0].value is not None:
         unit = ranked[0].tasks[0].unit if len(ranked[0].tasks) == 1 else ""
-        words = f"{ranked[0].name} has the best value, {f'{ranked[0].value:.7g} {unit}'.rstrip()}; {words}"
+        best = f"{ranked[0].name} has the best value, {f'{ranked[0].value:.7g} {unit}'.rstrip()}"
+        if ranked[0].workspace is Outcome.REFUTED:
+            best += ", and is refuted over the workspace"
+        words = f"{best}; {words}"
     names = ", ".join(each.name for each in result.robots)
     return whole_page(
         f"{title} - comparison",

@@ -206,13 +206,20 @@ class _Search:
     @property
     def _bound(self) -> float:
         """Upper bound of the maximum, at this state of the search."""
+        bound = self._bound_of_tree
+        # Signs of a long expression take a while, and matter to few searches.
+        return min(bound, self._form.ceiling) if 0 < bound < math.inf else bound
+
+    @property
+    def _bound_of_tree(self) -> float:
+        """The same as the boxes show it, which may be above 0 for minus a sum of squares."""
         known = max(self._method.bound, self.incumbent.value)
         return known + _FOLDED * abs(known) if math.isfinite(known) else known
 
     def _is_met(self) -> bool:
         """Return whether the bound is as good as asked for, once no box is open."""
         if self._above is not None:
-            return self._bound < self._form.value_of(self._above)
+            return self._bound_of_tree < self._form.value_of(self._above)
         return self._method.bound <= self._threshold + _GAP_ROUNDING * self._allowed_gap()[0]
 
     def _ending(self) -> str | None:
@@ -274,5 +281,6 @@ class _Search:
             seconds=seconds,
             reason=reason,
             history=tuple(self._history),
+            bound_of_tree=self._bound_of_tree,
             in_other_mode=not nlp.in_home_mode and x is not None and is_in_home_mode(nlp, x) is False,
         )

@@ -50,6 +50,8 @@ class Certificate(Whole, Shown):
         seconds: wall time.
         reason: for stopping before every box was closed, or for refusing the claim; else empty.
         history: (seconds, bound, incumbent) during the search, finite numbers only.
+        bound_of_tree: upper bound that the search's boxes show of the value that is maximised in standard form; above 0
+            for a sum of squares whose ``bound`` is 0.
         in_other_mode: whether the incumbent is in another working mode than home's.
         scope: dimensions that the bound holds for, as words such as ``with the rounded dimensions``; empty where the
             box has them all.
@@ -70,6 +72,7 @@ class Certificate(Whole, Shown):
     seconds: float
     reason: str
     history: tuple[tuple[float, float, float], ...]
+    bound_of_tree: float = math.inf
     in_other_mode: bool = False
     scope: str = ""
 

@@ -36,7 +36,8 @@ class VerifiedProof:
     Attributes:
         leaves: number of leaves and faces of the tree.
         pieces: number of boxes that were evaluated to show them.
-        bound: upper bound of the maximised value over the feasible part of the root; -inf without a feasible point.
+        bound: upper bound of the maximised value over the feasible part of the root, 0 at most where that is minus a
+            sum of squares; -inf without a feasible point.
     """
 
     leaves: int
@@ -62,7 +63,7 @@ def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
     kinds = {bytes([Node.LIMBS]): _of_limbs, bytes([Node.SHARED]): _of_shared_limbs}
     leaves, every = kinds.get(claim.tree[:1], _of_tree)(claim.tree, form, bound)
     pieces = sum(show(rule_of(each), each.lower, each.upper) for each in every)
-    return VerifiedProof(leaves, pieces, bound)
+    return VerifiedProof(leaves, pieces, min(bound, form.ceiling) if bound > 0 else bound)
 
 
 def _of_tree(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:

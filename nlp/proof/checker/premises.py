@@ -153,13 +153,14 @@ def hold_statement(case: Case, statement: Statement, *, above: float | None, all
         raise ProofError("the proof is for home's working mode, and the robot has none")
 
 
-def claim_words(case: Case, statement: Statement, bound: float | None) -> str:
+def claim_words(case: Case, statement: Statement, bound: float | None, unit: str = "") -> str:
     """Return a proven claim as a sentence without a full stop.
 
     Args:
         case: the case.
         statement: of the proof.
         bound: upper bound of the maximised value, minus F for a minimum; None where there is no feasible point.
+        unit: of what is optimised.
     """
     where = f"within the limits of {case.name}"
     if case.limits_over:
@@ -173,9 +174,11 @@ def claim_words(case: Case, statement: Statement, bound: float | None) -> str:
         words, count = measure.replace("_", " "), case.pose_count
         over = f"over all actuators{' and loads' if measure != 'actuator_speed' else ''}"
         over += f", at {count} poses" if count > 1 else ""
-        return f"the largest {words} {over} is at least {outward(root_below(-bound), up=False)} {where}"
+        side = f"at least {outward(root_below(-bound), up=False)} {unit}".rstrip()
+        return f"the largest {words} {over} is {side} {where}"
     is_minimum = _has_minimum(case, statement)
-    side = f"at least {outward(-bound, up=False)}" if is_minimum else f"at most {outward(bound, up=True)}"
+    side = f"at least {outward(-bound + 0.0, up=False)}" if is_minimum else f"at most {outward(bound, up=True)}"
+    side = f"{side} {unit}".rstrip()
     return f"F is {side} {where}, F being {_objective_words(case, statement)}{_pose_words(case)}"
 
 

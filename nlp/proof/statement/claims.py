@@ -15,7 +15,7 @@ from ....models import Dimension
 from ....models.instance import RobotInstance
 from ...case.case import Case
 from ...case.limits.clearance import LegClearance
-from ...case.limits.constraint import LENGTH, NUMBER, SQUARED_LENGTH, Reading
+from ...case.limits.constraint import LENGTH, NOT_NEGATIVE, NUMBER, SQUARED_LENGTH, Reading
 from ...case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from ...case.limits.legs import Actuator, LegLength
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
@@ -248,4 +248,4 @@ def _of_tasks(layout: Layout) -> Iterator[Claim]:
             continue  # F of its motion is not what the case is about
         name = "F" if len(layout.case.tasks) == 1 else f"F of {task.name}"
         for sense in (Sense.MIN, Sense.MAX):
-            yield Claim(name, sense, layout.robots[0].F[j], Reading(Dimension.NUMBER))
+            yield Claim(name, sense, layout.robots[0].F[j], NOT_NEGATIVE)

@@ -25,6 +25,7 @@ from ....models import FloatArray
 from ...errors import UncoveredError
 from ...program.nlp import Nlp
 from ...program.program import Kernel, single_output
+from .signs import is_nowhere_positive
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -132,7 +133,7 @@ class StandardForm:
 
     def objective_of(self, value: float) -> float:
         """Return the program's objective of a value that is maximised, no larger than it is where that is a square."""
-        found = self.sign * value
+        found = self.sign * value + 0.0  # no minus zero
         if self.power == 1 or not math.isfinite(found):
             return found
         return math.nextafter(math.sqrt(max(found, 0.0)), 0.0)
@@ -140,6 +141,11 @@ class StandardForm:
     def value_of(self, objective: float) -> float:
         """Return the value that is maximised of the program's objective."""
         return self.sign * objective**self.power
+
+    @cached_property
+    def ceiling(self) -> float:
+        """A bound of the value that is maximised without a search: 0 for minus a sum of squares, else infinite."""
+        return 0.0 if any(is_nowhere_positive(each, self.x) for each in self.functions) else math.inf
 
     @property
     def names(self) -> tuple[str, ...]:

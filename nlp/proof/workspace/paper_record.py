@@ -55,8 +55,9 @@ class PaperRecord:
         is_bounded = found.status in (CertificateStatus.PROVED, CertificateStatus.INCOMPLETE)
         sign = claim.sense.sign
         most = math.inf if claim.limit is None else sign * claim.limit + slack_of(claim.limit)
-        if is_bounded and math.isfinite(found.bound) and sign * found.bound <= most:
-            self._keep(claim, found.nlp, -found.nlp.sign * found.bound, tree.tree(with_open=True))
+        bound = found.bound_of_tree
+        if is_bounded and math.isfinite(bound) and sign * -found.nlp.sign * bound <= most:
+            self._keep(claim, found.nlp, bound, tree.tree(with_open=True))
 
     def followed(self, claim: Claim, bound: float, reached: float, tree: TreeRecord) -> None:
         """Record a search of boxes in which the loops are followed: the bound of a number, and its best value known."""

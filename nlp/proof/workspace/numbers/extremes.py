@@ -206,7 +206,7 @@ def _search(
         if sign * more.bound <= sign * found.bound:
             found, writer = more, finer_writer
         else:
-            found = replace(more, bound=found.bound)
+            found = replace(more, bound=found.bound, bound_of_tree=found.bound_of_tree)
     if found.status is CertificateStatus.INFEASIBLE:
         return Minimum(boxes=boxes, seconds=seconds, reason="the robot has no pose there"), None
     if paper is not None and writer is not None:

@@ -1,0 +1,79 @@
+"""Angles of a case that is made in Python: degrees in the place of radians, which their size tells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from ...models import Dimension, Model
+from ..errors import CaseError
+from ..units import Units
+from .limits.limits import Limits
+from .pose import Free, Rotation
+from .workspace import TURNS, Workspace
+
+#: Size from which on an angle is one in degrees: every angle of a case has a smaller one of the same direction.
+_TURN = 2 * math.pi
+#: Rounding of a whole turn.
+_ROUNDING = 1e-9
+
+
+def angles_of(
+    model: Model,
+    parameters: Mapping[str, object],
+    rotations: Sequence[Rotation],
+    limits: Limits,
+    workspace: Workspace | None,
+) -> Iterator[tuple[str, float]]:
+    """Yield the angles of a case with their dotted keys, radians; values that are no numbers are left out."""
+    for item in model.parameters:
+        if item.dimension is Dimension.ANGLE and item.name in parameters:
+            yield from _ends(f"robot.parameters.{item.name}", parameters[item.name])
+    for k, rotation in enumerate(rotations):
+        yield from _ends(f"pose{f'[{k}]' if k else ''}.rotation.angle", rotation.angle)
+    for limit in limits:
+        try:
+            angles = limit.angles(model) if limit.exists_for(model) else {}
+        except CaseError:  # a limit that contradicts itself has a fault of its own
+            continue
+        for key, angle in angles.items():
+            yield from _ends(f"limits.{key}", angle)
+    if workspace is not None:
+        turns = workspace.turns.angles
+        for name, value in zip(("angle",) if len(turns) == 1 else TURNS, turns, strict=False):
+            yield from _ends(f"workspace.rotation.{name}", value)
+
+
+def check_radians(angles: Iterable[tuple[str, float]], units: Units) -> None:
+    """Refuse an angle of more than a whole turn.
+
+    Raises:
+        CaseError: there is one.
+    """
+    for key, angle in angles:
+        if abs(angle) > _TURN * (1 + _ROUNDING):
+            fault = f"must be at most {units.text(_TURN, Dimension.ANGLE)} in size"
+            raise CaseError(key, fault, units.shown(angle, Dimension.ANGLE))
+
+
+def with_radians(error: CaseError, angles: Iterable[tuple[str, float]]) -> CaseError:
+    """Return an error about one of some angles with it in radians and degrees; another error unchanged."""
+    angle = next((angle for key, angle in angles if key == error.key), None)
+    if angle is None or error.value is None:
+        return error
+    words = f"{angle:.6g} rad = {math.degrees(angle):.1f} deg; angles are radians in Python"
+    return CaseError(error.key, f"{error.fault}; {words}", error.value, error.source)
+
+
+def _ends(key: str, value: object) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a value, which may be free or a sequence, with their dotted keys."""
+    if isinstance(value, Free):
+        for name, end in (("min", value.lower), ("max", value.upper), ("start", value.start)):
+            yield from _ends(f"{key}.{name}", end)
+        for k, each in enumerate(value.values):
+            yield from _ends(f"{key}.values[{k}]", each)
+    elif isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        for k, each in enumerate(value):
+            yield from _ends(key if len(value) == 1 else f"{key}[{k}]", each)
+    elif isinstance(value, int | float):
+        yield key, float(value)
