@@ -13,7 +13,7 @@ import ast
 import math
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
@@ -47,6 +47,18 @@ class UnknownNameError(ExpressionError):
     def __init__(self, name: str, hint: str) -> None:
         super().__init__(f"has the name {name!r}, which is unknown; {hint}")
         self.name = name
+
+
+class NoValueError(ExpressionError):
+    """Error of an expression whose value is a constant that is not finite.
+
+    Attributes:
+        values: values of the names in the operation that has no value, one number or three each.
+    """
+
+    def __init__(self, fault: str, values: Mapping[str, tuple[float, ...]]) -> None:
+        super().__init__(fault)
+        self.values = values
 
 
 def _only(function: Callable[..., SX], *, scalars: bool, fault: str) -> Callable[..., SX]:
@@ -96,10 +108,57 @@ def evaluate(written: str | float, names: Mapping[str, SX]) -> SX:
     Raises:
         ExpressionError: the text is no expression, or its value is a constant that is not finite.
     """
-    value = _LANGUAGE.value(_tree(written), {**CONSTANTS, **names}) if isinstance(written, str) else _number(written)
+    if not isinstance(written, str):
+        return _number(written)
+    tree, known = _tree(written), {**CONSTANTS, **names}
+    value = _LANGUAGE.value(tree, known)
     if value.is_constant() and not value.is_regular():
-        raise ExpressionError("has no finite value")
+        raise _no_value(tree, known)
     return ca.densify(value)
+
+
+#: What arguments must be where a function of constants has no finite value.
+_ALLOWED = {"sqrt": "must be at least 0", "unit": "must not be 0"}
+
+
+def _no_value(tree: ast.expr, names: Mapping[str, SX]) -> NoValueError:
+    """Return the error of an expression without a finite value: it names the first operation that has none."""
+    node = next((each for each in _operations(tree) if not _LANGUAGE.value(each, names).is_regular()), tree)
+    parts, fault = [node], f"{_written(node)} is not finite"
+    match node:
+        case ast.BinOp(op=ast.Div(), right=divisor) if _LANGUAGE.value(divisor, names).is_zero():
+            parts, fault = [divisor], f"the divisor {_with_value(divisor, names)} must not be 0"
+        case ast.BinOp(op=ast.Pow(), left=base, right=power):
+            parts = [base, power]
+            fault = f"{_with_value(base, names)} has no power {_with_value(power, names)}"
+        case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _ALLOWED:
+            parts, fault = [argument], f"the argument of {name}, {_with_value(argument, names)}, {_ALLOWED[name]}"
+    used = dict.fromkeys(each.id for part in parts for each in ast.walk(part) if isinstance(each, ast.Name))
+    given = [name for name in used if name in names and name not in CONSTANTS]
+    values = {name: tuple(ca.DM(names[name]).full().ravel().tolist()) for name in given}
+    return NoValueError(f"has no finite value: {fault}", values)
+
+
+def _operations(node: ast.expr) -> Iterator[ast.expr]:
+    """Yield the operations of an expression, each after those of its arguments."""
+    for each in ast.iter_child_nodes(node):
+        if isinstance(each, ast.expr):
+            yield from _operations(each)
+    if isinstance(node, ast.BinOp | ast.Call):
+        yield node
+
+
+def _written(node: ast.expr) -> str:
+    """Return an expression as a robot file writes it."""
+    return ast.unparse(node).replace(" ** ", "^")
+
+
+def _with_value(node: ast.expr, names: Mapping[str, SX]) -> str:
+    """Return an expression with its value, ``rod^2 - dr^2 = -3599.09``."""
+    written = _written(node)
+    numbers = ", ".join(f"{number:.7g}" for number in ca.DM(_LANGUAGE.value(node, names)).full().ravel())
+    value = numbers if "," not in numbers else f"({numbers})"
+    return written if written == value else f"{written} = {value}"
 
 
 def _tree(text: str) -> ast.expr:

@@ -5,6 +5,7 @@ The tree::
     ScrewsynthError
     ├── InputError          wrong input by the user; the command line exits with status 2
     │   └── CaseError       wrong input in a case, with the file, the dotted key, the value and the allowed values
+    │       └── NoRobotError    dimensions with which the robot does not exist
     ├── EvaluationError     the robot does not exist at a point: a limb of zero length, a joint out of reach
     └── UncoveredError      a proof needs bounds of an operation that has no rule
 
@@ -65,7 +66,11 @@ class CaseError(InputError):
 
     def within(self, source: str) -> CaseError:
         """Return the same error with the name of the file in which it is."""
-        return CaseError(self.key, self.fault, self.value, source)
+        return type(self)(self.key, self.fault, self.value, source)
+
+
+class NoRobotError(CaseError):
+    """Error of dimensions, each of which is allowed, with which a case's robot does not exist."""
 
 
 #: Spaces of typography that Python does not call printable: without a break, thin, and as wide as a character.

@@ -10,18 +10,19 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import casadi as ca
 import numpy as np
 from casadi import SX
 
 from ..arrays import FloatArray
-from ..expression import ExpressionError, UnknownNameError, evaluate
+from ..expression import ExpressionError, NoValueError, UnknownNameError, evaluate
 from ..mechanism.decomposition import GraphJoint, LimbPaths, Step, decompose
 from ..mechanism.topology import bridges_between, reached
 from ..parts import Dimension
 from ..screws import Displacement, Screw, screw_displacement, unit_vector
-from .forms import RobotError, VectorExpression
+from .forms import RobotError, UndefinedError, VectorExpression
 from .motion import UNIT_VECTORS, AxisKind, JointAxis
 from .words import GraphWords, JointWords, LimbWords, RepeatWords, RobotWords
 
@@ -151,14 +152,19 @@ class HomeRobot:
         return [joint for limb in self.limbs for path in limb.paths for joint in path]
 
 
-def home_of(words: RobotWords) -> HomeRobot:
+def home_of(words: RobotWords, values: Mapping[str, float] = MappingProxyType({})) -> HomeRobot:
     """Return a robot at home, given by limbs or by links and joints.
 
+    Args:
+        words: the robot as it is written.
+        values: of dimensions that are numbers, radians for angles; the others are symbols.
+
     Raises:
-        RobotError: an expression has a fault, or the graph is no robot.
+        UndefinedError: an expression has no finite value with these dimensions.
+        RobotError: an expression has another fault, or the graph is no robot.
     """
     dimensions = words.dimensions.items()
-    symbols = {name: SX.sym(name) for name in words.dimensions}
+    symbols = {name: SX(values[name]) if name in values else SX.sym(name) for name in words.dimensions}
     typical = [math.radians(item.typical) if item.kind is Dimension.ANGLE else item.typical for _, item in dimensions]
     names: dict[str, SX] = dict(symbols)
     for name, text in words.derived.items():
@@ -283,7 +289,7 @@ def _direction(place: str, written: VectorExpression, names: Mapping[str, SX]) -
     if vector.is_constant():
         numbers = np.array(ca.DM(vector)).ravel()
         if not numbers.any():
-            raise RobotError(place, f"is {written!r}, which is zero; a direction is needed")
+            raise UndefinedError(place, f"is {written!r}, which is zero; a direction is needed", {})
         return SX(unit_vector(numbers).tolist())
     return vector / ca.norm_2(vector)
 
@@ -314,6 +320,8 @@ def _evaluated(place: str, written: str | float, names: Mapping[str, SX], later:
             raise RobotError(place, f"is {_shown(written)}, which {error}") from None
         fault = f"is {_shown(written)}, which needs {error.name!r} before it is given; allowed are names given above"
         raise RobotError(place, fault) from None
+    except NoValueError as error:
+        raise UndefinedError(place, f"is {_shown(written)}, which {error}", error.values) from None
     except ExpressionError as error:
         raise RobotError(place, f"is {_shown(written)}, which {error}") from None
 

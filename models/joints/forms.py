@@ -32,6 +32,18 @@ class RobotError(ModelError):
         self.place, self.fault = place, fault
 
 
+class UndefinedError(RobotError):
+    """Error of a place that has no finite value, or of a direction that is zero, with these dimensions.
+
+    Attributes:
+        values: values of the names in the operation that has none, one number or three each.
+    """
+
+    def __init__(self, place: str, fault: str, values: Mapping[str, tuple[float, ...]]) -> None:
+        super().__init__(place, fault)
+        self.values = values
+
+
 def plain(value: object) -> object:
     """Return a value with lists and dicts in the place of other sequences and mappings, as TOML has them."""
     if isinstance(value, Mapping):

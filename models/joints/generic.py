@@ -13,8 +13,8 @@ from casadi import SX
 
 from ..arrays import FloatArray
 from ..rows import rank_of
-from .chain import HomeRobot, Joint
-from .forms import RobotError
+from .chain import HomeRobot, Joint, home_of
+from .forms import RobotError, UndefinedError
 from .motion import AxisKind, Motion
 
 #: Number of random points at which ranks are measured; the largest rank counts.
@@ -33,8 +33,13 @@ def sampled_dimensions(robot: HomeRobot) -> FloatArray:
     """Return values (SAMPLES, d) of the dimensions around the typical ones, at which the robot's home is finite.
 
     Raises:
-        RobotError: the home has no finite value at the typical dimensions.
+        UndefinedError: an expression of the robot has no finite value at the typical dimensions.
+        RobotError: the home has none.
     """
+    try:
+        home_of(robot.words, dict(zip(robot.words.dimensions, robot.typical.tolist(), strict=False)))
+    except UndefinedError as error:
+        raise UndefinedError(error.place, f"{error.fault}, at the typical dimensions", error.values) from None
     joints = robot.joints
     parts = [
         ca.veccat(*[part for axis in joint.axes for part in (axis.axis, axis.point, axis.rod, axis.pitch)])

@@ -19,9 +19,10 @@ from ...models.shown import Shown
 from ...models.statics import driven_joints
 from ...models.values import dataclass
 from ...models.whole import Whole
-from ..errors import CaseError, listing, nearest
+from ..errors import CaseError, NoRobotError, listing, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_statics, check_value, check_vector
+from .existence import fault_of_dimensions
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
@@ -116,6 +117,8 @@ class Case(Whole, Shown):
         """
         store = object.__setattr__
         store(self, "parameters", MappingProxyType(_check_parameters(self)))
+        if fault := fault_of_dimensions(self.model, self.parameters, self.units):
+            raise NoRobotError("robot.parameters", fault, source=self.source)
         store(self, "position", _check_position(self, self.position, "pose"))
         store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
         store(self, "further", _check_further_poses(self))

@@ -40,7 +40,7 @@ def workspace(
     whole: options.ShowAll = False,
 ) -> None:
     """Prove regular poses and limits over a whole workspace."""
-    from ..interruption import Milestone, answer_after
+    from ..interruption import Milestone, answer_after, seconds_left, within
     from ..proof.statement.machine import workspace_of_case
     from ..results.posewording import evaluate_command
     from ..results.workspace import scale_data, workspace_of
@@ -53,12 +53,14 @@ def workspace(
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)
     files.check(inputs)
     slices = _slices(loaded, files)
-    judged = _judge_with_progress(loaded, quantities or [], gap, time, leg_error, jobs, record)
+    # With two searches in one time, the first takes at most half of it.
+    with within(seconds_left() / 2 if scale else None):
+        judged = _judge_with_progress(loaded, quantities or [], gap, time, leg_error, jobs, record)
     largest = None
     if scale:
         from ..proof.workspace.scale import largest_scale
 
-        largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs), loaded.units)
+        largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs, judged=judged), loaded.units)
     result = workspace_of(judged, largest)
 
     def command(pose: WorkspacePose) -> str:

@@ -6,6 +6,8 @@ loops are therefore closed along a path from home. The other starting points tak
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ...models import FloatArray
@@ -16,9 +18,23 @@ from .kkt import close_equations
 from .state import CLOSED, evaluate, loops_are_closed
 
 
-def closed_start(nlp: Nlp) -> FloatArray:
-    """Return the first starting point (n,) of a program, with the robot's loops closed along a path from home."""
-    return close_equations(nlp, _with_unknowns_from_home(nlp, nlp.start))
+def closed_start(nlp: Nlp, others: Iterable[FloatArray] = ()) -> FloatArray:
+    """Return the first starting point (n,) of a program, with the robot's loops closed along a path from home.
+
+    Args:
+        nlp: the program.
+        others: (n,) points of which the first takes its place at which the robot exists, where it does not.
+
+    Raises:
+        EvaluationError: the robot does not exist at any of these points.
+    """
+    fault: EvaluationError | None = None
+    for x in (nlp.start, *others):
+        try:
+            return close_equations(nlp, _with_unknowns_from_home(nlp, x))
+        except EvaluationError as error:
+            fault = fault or error
+    raise fault or EvaluationError("there is no starting point")
 
 
 def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:

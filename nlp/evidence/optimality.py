@@ -150,10 +150,17 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
         complementarity=float(np.max(np.abs(mu * at.slack), initial=0.0)),
         active=tuple(_active_side(nlp, at, j, mu[j]) for j in active),
         violated=tuple(dict.fromkeys(at.sides[j].name for j in active if at.slack[j] < -FEASIBLE)),
-        licq=bool(np.linalg.matrix_rank(normals, tol=1e-9) == len(active)) if active else True,
+        licq=_is_independent(normals),
         eigenvalues=frozen_array(eigenvalues, eigenvalues.shape),
         flat=tuple(_changes_by_name(nlp, direction) for direction in flat),
     )
+
+
+def _is_independent(normals: FloatArray) -> bool:
+    """Return whether gradients (k, n) of active sides are linearly independent; those without finite values are not."""
+    if not len(normals):
+        return True
+    return bool(np.isfinite(normals).all() and np.linalg.matrix_rank(normals, tol=1e-9) == len(normals))
 
 
 def _active_side(nlp: Nlp, at: Linearisation, j: int, mu: float) -> ActiveSide:

@@ -19,6 +19,7 @@ from ...models import (
 from ...models.basis import settled_basis
 from ...models.values import dataclass
 from ..case.case import Case
+from ..case.existence import fault_of_dimensions
 from ..errors import EvaluationError
 from ..program.nlp import Nlp
 from ..program.places import HeldRotation
@@ -116,10 +117,16 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     where = f"{case.source}: " if case.source else ""
     numbers = nlp.program.kernels.robot_states[pose](x, nlp.arguments)
     rotation, position = numbers.rotation, numbers.position
+    sizes = [len(parameter.typical) for parameter in model.parameters]
+    parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
+    if not all(np.isfinite(each).all() for each in (numbers.squares, numbers.jacobian, numbers.rates, rotation)):
+        dimensions = {item.name: part for item, part in zip(model.parameters, parts, strict=True)}
+        if fault := fault_of_dimensions(model, dimensions, case.units):
+            raise EvaluationError(f"{where}{fault}")
     for row, square in zip(model.wrenches, numbers.squares.ravel(), strict=True):
-        if not square > 0:
+        if square == 0:
             raise EvaluationError(f"{where}{reason_for_zero_row(row)}, at this point")
-    if not all(np.isfinite(each).all() for each in (numbers.jacobian, numbers.rates, rotation)):
+    if not all(np.isfinite(each).all() for each in (numbers.squares, numbers.jacobian, numbers.rates, rotation)):
         raise EvaluationError(f"{where}the robot's equations give no finite Jacobian at this point")
     reporting = reporting_matrix(model, velocities_at(nlp, x, numbers, pose), position)
     jacobian, rates = reporting @ numbers.jacobian, reporting @ numbers.rates
@@ -128,8 +135,6 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     if step.is_identity:
         axis, angle = _stated_axis_angle(nlp, x, stated, rotation)
     rank, free_twists, singular_values = _rank_and_free_twists(jacobian, position.ravel())
-    sizes = [len(parameter.typical) for parameter in model.parameters]
-    parts = np.split(numbers.parameters.ravel(), np.cumsum(sizes)[:-1]) if sizes else []
     return RobotState(
         parameters=MappingProxyType(
             {item.name: frozen_array(part, part.shape) for item, part in zip(model.parameters, parts, strict=True)}

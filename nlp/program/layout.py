@@ -396,7 +396,7 @@ def assemble(
 
 
 def _check_limbs(nlp: Nlp) -> None:
-    """Refuse a limb whose direction is zero at every point of the box.
+    """Refuse a limb whose direction is zero, or has no finite value, at every point of the box.
 
     Raises:
         CaseError: there is such a limb.
@@ -407,4 +407,6 @@ def _check_limbs(nlp: Nlp) -> None:
         free = ca.which_depends(robot.squares, program.x, 1, True) if nlp.n else [False] * len(values)
         for row, value, varies in zip(program.model.wrenches, values, free, strict=True):
             if not varies and not value > 0:
-                raise CaseError("robot.parameters", reason_for_zero_row(row), source=nlp.case.source)
+                undefined = f"limb {row.limb!r} has no finite wrench at any pose with these dimensions"
+                reason = undefined if np.isnan(value) else reason_for_zero_row(row)
+                raise CaseError("robot.parameters", reason, source=nlp.case.source)

@@ -179,16 +179,18 @@ class ScaleData(JsonObject):
     """The largest factor by which the box of poses can grow about its centre with everything proved.
 
     Attributes:
-        factor: everything is proved for the box that is larger by this factor.
+        factor: everything is proved for the box that is larger by this factor; null where no such factor was found.
         refuted: the smallest factor known at which something is refuted; null where there is none.
         claim: the claim that is refuted there, or that stays open; empty without one.
         pose: at which it is refuted; null without one.
+        reason: why the search ended before the factor was known to 1 %; absent where it is.
     """
 
-    factor: float
+    factor: float | None
     refuted: float | None
     claim: str
     pose: WorkspacePose | None
+    reason: Absent[str]
 
 
 class WorkspaceResult(JsonObject):
@@ -368,6 +370,7 @@ def scale_data(found: "Scale", units: Units) -> ScaleData:
         found,
         refuted=found.failed if found.refuted else None,
         pose=None if found.pose is None else pose_data(found.pose, units),
+        reason=found.reason or None,
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..case.case import Case
 from ..case.motors import MotorNumber
 from ..case.task import Sense
+from ..interruption import STOPPED
 from ..proof.workspace.verdict import Outcome
 from .posewording import pose_words
 from .rounding import number, ordered
@@ -320,7 +321,13 @@ def _table(case: Case, name: str, title: str, rows: list[ExtremeData]) -> TextTa
 
 def _scale_lines(case: Case, scale: ScaleData) -> Iterator[Line]:
     """Yield the largest box."""
-    yield Line(f"{scale.factor:.4g}", label="scale", tone=Tone.ANSWER, after=" times the box is proved")
+    ended = f"; the search ended early: {scale.reason}" if scale.reason else ""
+    if scale.factor is not None:
+        yield Line(f"{scale.factor:.4g}", label="scale", tone=Tone.ANSWER, after=f" times the box is proved{ended}")
+    else:
+        within = "the search was interrupted" if scale.reason == STOPPED else "none found within the time"
+        words = within if scale.reason else "none found; not even the smallest box that is tried is proved"
+        yield Line(f"largest proved box: {words}", label="scale", tone=Tone.NO_ANSWER)
     if scale.claim:
         beyond = "" if scale.refuted is None else f"at {scale.refuted:.4g} times: "
         at = "" if scale.pose is None else f", at {pose_words(case, scale.pose)}"

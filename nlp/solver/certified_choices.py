@@ -17,7 +17,7 @@ from ..case.case import Case
 from ..case.choices import Ranges, listed_numbers, within_ranges
 from ..interruption import is_requested, seconds_left, why_stopped, within
 from ..proof.certificate.certificate import Certificate, CertificateStatus
-from .choices import combinations_of
+from .choices import combinations_of, exists
 from .solution import Choice, ChoicePart
 
 #: Gaps of parts: as a part of the one asked for, so that a part as good as the best combination is not divided; and the
@@ -83,6 +83,8 @@ def prove_choices(
             unknown = why_stopped()
             break
         part = parts.pop()
+        if _is_one(part) and not exists(case, numbers, part.ranges):
+            continue
         is_better = part.cost is not None and part.cost < _cost(known, known.incumbent) - known.allowed
         if is_better and not _is_one(part):  # as an earlier end of the solve may leave one
             parts += _combinations_in(part, choice.chosen)

@@ -8,13 +8,14 @@ solve is local, from the case's starting points, so that this is no proof: :mod:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..case.case import Case
 from ..case.choices import ListedNumber, Ranges, all_values, listed_numbers, within_ranges
+from ..errors import EvaluationError, NoRobotError
 from ..interruption import is_requested
 from .solution import Choice, ChoicePart, Solution
 from .status import Status
@@ -50,12 +51,15 @@ def cost_of(solution: Solution) -> float:
 
 
 class _Part:
-    """A part of the combinations that is open: ranges of values, and its solve with the numbers free between them."""
+    """A part of the combinations that is open: ranges of values, and its solve with the numbers free between them.
 
-    def __init__(self, ranges: Ranges, relaxed: Solution) -> None:
+    There is no solve where the robot does not exist at any starting point of it.
+    """
+
+    def __init__(self, ranges: Ranges, relaxed: Solution | None) -> None:
         self.ranges, self.relaxed = ranges, relaxed
         # Without an answer, nothing is known.
-        self.bound = cost_of(relaxed) if relaxed.status.is_answer else -math.inf
+        self.bound = cost_of(relaxed) if relaxed is not None and relaxed.status.is_answer else -math.inf
 
     @property
     def open_numbers(self) -> int:
@@ -94,7 +98,7 @@ class _Search:
 
     def _solve_all(self, everything: Ranges) -> list[Ranges]:
         """Solve every combination; return those that are not solved."""
-        left = list(combinations_of(everything))
+        left = [each for each in combinations_of(everything) if self._exists(each)]
         while left and not is_requested():
             self._solve_combination(left[0])
             self._closed.append(left.pop(0))
@@ -104,7 +108,8 @@ class _Search:
         """Divide the combinations until all are solved or left out; return the parts that are neither."""
         root = self._relax(everything)
         # Rounding is a first answer, which leaves out much.
-        self._solve_combination(self._nearest(root))
+        if self._exists(nearest := self._nearest(root)):
+            self._solve_combination(nearest)
         parts = [root]
         while parts and not is_requested() and len(self._solved) + self._relaxed < self._most:
             # Without an answer, those parts first that are nearest to a combination.
@@ -116,15 +121,21 @@ class _Search:
                 continue
             for ranges in self._divided(part):
                 if all(behind - first == 1 for first, behind in ranges):
+                    if not self._exists(ranges):
+                        continue
                     self._solve_combination(ranges)
                     self._closed.append(ranges)
                     continue
                 child = self._relax(ranges)
-                if child.relaxed.status is Status.INFEASIBLE:
+                if child.relaxed is not None and child.relaxed.status is Status.INFEASIBLE:
                     self._closed.append(ranges)
                 else:
                     parts.append(child)
         return [each.ranges for each in parts]
+
+    def _exists(self, ranges: Ranges) -> bool:
+        """Return whether there is a robot with the values of a combination."""
+        return exists(self._case, self._numbers, ranges)
 
     def _is_no_better(self, part: _Part) -> bool:
         """Return whether a part holds no combination that is known to be better than the best one."""
@@ -134,7 +145,10 @@ class _Search:
     def _relax(self, ranges: Ranges) -> _Part:
         """Solve a case with the listed numbers free between the ends of their values."""
         self._relaxed += 1
-        return _Part(ranges, self._solve_within(ranges))
+        try:
+            return _Part(ranges, self._solve_within(ranges))
+        except EvaluationError:
+            return _Part(ranges, None)
 
     def _solve_combination(self, ranges: Ranges) -> Solution:
         """Solve a combination once, and keep it where it is the best so far."""
@@ -179,6 +193,15 @@ class _Search:
         return low, high
 
 
+def exists(case: Case, numbers: Sequence[ListedNumber], ranges: Ranges) -> bool:
+    """Return whether a case has a robot with the values of a combination of its listed numbers."""
+    try:
+        within_ranges(case, numbers, ranges)
+    except NoRobotError:
+        return False
+    return True
+
+
 def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
     """Yield every combination within ranges, the last number's values first."""
     counts = [behind - first for first, behind in ranges]
@@ -186,9 +209,9 @@ def combinations_of(ranges: Ranges) -> Iterator[Ranges]:
         yield tuple((first + k, first + k + 1) for (first, _), k in zip(ranges, index, strict=True))
 
 
-def _value_of(solution: Solution, number: ListedNumber) -> float:
+def _value_of(solution: Solution | None, number: ListedNumber) -> float:
     """Return the value of a listed number at a solution's point: the middle of its values where the robot has none."""
-    state = solution.outcomes[0].state
+    state = None if solution is None else solution.outcomes[0].state
     if state is None:
         return (number.values[0] + number.values[-1]) / 2
     return float(np.ravel(state.parameters[number.parameter])[number.component])

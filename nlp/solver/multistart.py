@@ -192,7 +192,7 @@ def _search_within(
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     if nlp.program.model.unknowns:
         # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
-        home = closed_start(nlp)
+        home = closed_start(nlp, points)
         points = np.array([close_near(nlp, home, x) for x in points])
     nlp = with_pairs_at(nlp, points)
     found: dict[int, Start] = {}

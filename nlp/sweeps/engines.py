@@ -21,7 +21,7 @@ from ...models import Dimension, FloatArray
 from ..case.task import Sense
 from ..embedding.codegen import generate_c
 from ..embedding.library import CompiledCase, CompiledSolutions, load_compiled
-from ..errors import CaseError, InputError, UncoveredError
+from ..errors import CaseError, EvaluationError, InputError, UncoveredError
 from ..evidence.many import Verdicts, judge_many
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..interruption import within
@@ -33,7 +33,7 @@ from ..solver.solution import Solution
 from ..solver.solve import solve
 from ..solver.status import Status
 from .journal import REFUSED, Row, with_evidence
-from .places import Block, NotPlacedError, Places, place
+from .places import Block, NotPlacedError, Places, existing_cases, place
 from .points import CaseSource, PointBlock, Points
 
 
@@ -64,7 +64,7 @@ def solve_point(
         if at_stated_pose:
             case = case.at_stated_poses()
         solution = solve(case, starts=starts, seed=seed, jobs=1)
-    except CaseError as error:
+    except (CaseError, EvaluationError) as error:  # also a robot that does not exist there
         return Row(index, REFUSED, None, seconds=time.perf_counter() - began, note=str(error))
     if proof_seconds is None:
         return row_of_solution(solution, index, time.perf_counter() - began)
@@ -310,6 +310,11 @@ class Job(NamedTuple):
     kind: EngineKind
     certified: bool = False
 
+    @property
+    def points(self) -> Points:
+        """The points at which programs are compared."""
+        return Points(self.names, np.array(self.chosen))
+
 
 class Choice(NamedTuple):
     """A kind of engine, and the reason why it is not the compiled one; empty where it is, or was asked for."""
@@ -333,7 +338,7 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
     if job.certified and wanted is EngineKind.COMPILED:
         raise InputError("--engine compiled: has no certificates; leave it out, or leave out --certify")
     if wanted is EngineKind.IPOPT or job.certified:
-        cases = [job.source.case_at(dict(zip(job.names, values, strict=True))) for values in job.chosen]
+        cases = [case for _, case in existing_cases(job.source, job.points)]
         if job.certified or any(each.limits_over for each in cases):
             kernel()  # before any solve where it is missing
         return Choice(EngineKind.IPOPT, "" if wanted else "a certificate is of one solve by Ipopt")
@@ -344,8 +349,8 @@ def choose_engine(job: Job, wanted: EngineKind | None, threads: int | None) -> C
     except (NotPlacedError, InputError) as error:
         if wanted is EngineKind.COMPILED:
             raise InputError(f"--engine compiled: {error}") from None
-        for values in job.chosen:
-            job.source.case_at(dict(zip(job.names, values, strict=True)))
+        for _ in existing_cases(job.source, job.points):
+            pass
         return Choice(EngineKind.IPOPT, str(error))
     return Choice(EngineKind.COMPILED, "")
 
@@ -365,8 +370,7 @@ def answer(job: Job, block: PointBlock) -> list[Row]:
 
 @lru_cache(maxsize=2)
 def _engine(job: Job, threads: int | None) -> CompiledEngine:
-    chosen = Points(job.names, np.array(job.chosen))
-    return CompiledEngine(job.source, chosen, job.starts, job.seed, threads)
+    return CompiledEngine(job.source, job.points, job.starts, job.seed, threads)
 
 
 def compiled_engine(job: Job, threads: int | None) -> CompiledEngine:

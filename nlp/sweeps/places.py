@@ -8,7 +8,8 @@ sweep does not use them.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,7 +20,7 @@ from ..case.case import Case
 from ..case.overrides import task_numbers
 from ..case.task import unit_twist
 from ..embedding.runtimelimits import RunTimeLimits, run_time_limits
-from ..errors import CaseError
+from ..errors import CaseError, NoRobotError
 from ..evidence.many import Numbers
 from ..program.formulation import formulate
 from ..program.layout import WIDENING
@@ -145,6 +146,17 @@ class Places:
                 numbers.lower[:, widened.variable], numbers.upper[:, widened.variable] = -bound, bound
 
 
+def existing_cases(source: CaseSource, points: Points) -> Iterator[tuple[int, Case]]:
+    """Yield indices and cases of points; where the robot does not exist there is none, and only that row is refused.
+
+    Raises:
+        CaseError: the case has no number of a name, or does not allow a value.
+    """
+    for k in range(len(points)):
+        with suppress(NoRobotError):
+            yield k, source.case_at(points.settings(k))
+
+
 def place(source: CaseSource, chosen: Points) -> Places:
     """Return the places of a sweep's numbers, after they have been compared with cases read anew.
 
@@ -157,8 +169,10 @@ def place(source: CaseSource, chosen: Points) -> Places:
         CaseError: the case has no number of a name, or does not allow a value.
     """
     tables = tomllib.loads(source.text)
-    programs = [_program(source.case_at(chosen.settings(k))) for k in range(len(chosen))]
-    nlp = programs[0]
+    programs = {k: _program(case) for k, case in existing_cases(source, chosen)}
+    if not programs:
+        raise NotPlacedError("the robot does not exist at the points at which programs are compared")
+    nlp = next(iter(programs.values()))
     program = nlp.program
     limits = run_time_limits(nlp, "sweep")
     arguments: dict[int, tuple[int, float]] = {}
@@ -192,7 +206,7 @@ def place(source: CaseSource, chosen: Points) -> Places:
         else:
             raise NotPlacedError(f"{name} changes the program itself")
     found = Places(nlp, limits, arguments, bounds, limited, task, written)
-    for k, other in enumerate(programs):
+    for k, other in programs.items():
         _compare(found, other, chosen.values[[k]])
     return found
 
