@@ -145,6 +145,7 @@ def combined_result(
         ),
         combined=CombinedData.of(
             combination,
+            value=combination.value if solution.all_solved else None,
             method_point=point if solution.all_solved else None,
             reached=None if solution.all_solved else point,
             tasks=tuple(_outcome(outcome, is_answer=solution.all_solved) for outcome in solution.outcomes),

@@ -64,7 +64,7 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     robot = result.robot
     yield from heading_lines(case, result)
     yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
-    yield from fault_lines(result)
+    yield from fault_lines(result, case)
     if result.F is None:
         yield from starts_lines(result.starts, robot)
     yield from _proof_lines(case, result)

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..case.case import Case
 from ..case.choices import ListedNumber, Ranges, all_values, listed_numbers, within_ranges
-from ..interruption import is_requested
-from .solution import Choice, ChoicePart, Solution
+from ..interruption import is_requested, one_call
+from .solution import Choice, ChoicePart, Solution, interrupted
 from .status import Status
 
 #: So many combinations are all solved: bounds of parts would need about as many solves.
@@ -26,6 +26,7 @@ _FEW = 16
 _BETTER = 1e-9
 
 
+@one_call
 def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: float = math.inf) -> Solution:
     """Solve a case for the best combination of values of its listed numbers.
 
@@ -70,6 +71,7 @@ class _Search:
         self._case, self._solve, self._most = case, solve_fixed, most
         self._numbers = listed_numbers(case)
         self._solved: dict[Ranges, Solution] = {}
+        self._cut: dict[Ranges, Solution] = {}
         self._relaxed = 0
         self._costs: dict[Ranges, float] = {}
         self._closed: list[Ranges] = []
@@ -84,11 +86,12 @@ class _Search:
         best = self._best
         if best is None:
             # No combination has an answer; one of those solved says why, with the limits that would have to move.
-            self._chosen = next(iter(self._solved), next(combinations_of(everything)))
-            best = self._solve_combination(self._chosen)
+            known = {**self._solved, **self._cut}
+            self._chosen = next(iter(known), next(combinations_of(everything)))
+            best = known[self._chosen] if known else self._solve_combination(self._chosen)
         parts = tuple(ChoicePart(ranges, self._costs.get(ranges)) for ranges in [*self._closed, *open_parts])
-        if open_parts and is_requested() and best.status.is_answer:
-            best = _interrupted(best)
+        if open_parts and (self._cut or is_requested()):
+            best = interrupted(best)
         choice = Choice(count, len(self._solved), self._relaxed, not open_parts, parts, self._chosen)
         return replace(best, case=self._case, choice=choice)
 
@@ -97,6 +100,8 @@ class _Search:
         left = list(combinations_of(everything))
         while left and not is_requested():
             self._solve_combination(left[0])
+            if left[0] not in self._solved:
+                break
             self._closed.append(left.pop(0))
         return left
 
@@ -105,7 +110,7 @@ class _Search:
         root = self._relax(everything)
         # Rounding is a first answer, which leaves out much.
         self._solve_combination(self._nearest(root))
-        parts = [root]
+        parts, cut = [root], list[Ranges]()
         while parts and not is_requested() and len(self._solved) + self._relaxed < self._most:
             # Without an answer, those parts first that are nearest to a combination.
             is_first = self._best is None
@@ -117,14 +122,14 @@ class _Search:
             for ranges in self._divided(part):
                 if all(behind - first == 1 for first, behind in ranges):
                     self._solve_combination(ranges)
-                    self._closed.append(ranges)
+                    (self._closed if ranges in self._solved else cut).append(ranges)
                     continue
                 child = self._relax(ranges)
                 if child.relaxed.status is Status.INFEASIBLE:
                     self._closed.append(ranges)
                 else:
                     parts.append(child)
-        return [each.ranges for each in parts]
+        return [*cut, *(each.ranges for each in parts)]
 
     def _is_no_better(self, part: _Part) -> bool:
         """Return whether a part holds no combination that is known to be better than the best one."""
@@ -137,14 +142,20 @@ class _Search:
         return _Part(ranges, self._solve_within(ranges))
 
     def _solve_combination(self, ranges: Ranges) -> Solution:
-        """Solve a combination once, and keep it where it is the best so far."""
-        if ranges not in self._solved:
-            found = self._solved[ranges] = self._solve_within(ranges)
-            # A limit over a workspace or along a path that stays without proof is not kept.
-            is_possible = found.keeps_limits and math.isfinite(cost_of(found))
-            if is_possible and (self._best is None or cost_of(found) < cost_of(self._best)):
-                self._best, self._chosen = found, ranges
-        return self._solved[ranges]
+        """Solve a combination once, and keep it where it is the best so far.
+
+        An interrupted solve is not complete: it may be the best one, and its combination stays open.
+        """
+        if ranges in self._solved:
+            return self._solved[ranges]
+        found = self._solve_within(ranges)
+        if found.status is Status.INTERRUPTED:
+            self._cut[ranges] = found
+            return found
+        self._solved[ranges] = found
+        if math.isfinite(cost_of(found)) and (self._best is None or cost_of(found) < cost_of(self._best)):
+            self._best, self._chosen = found, ranges
+        return found
 
     def _solve_within(self, ranges: Ranges) -> Solution:
         """Solve a case with the listed numbers within ranges, and note its objective."""
@@ -192,12 +203,3 @@ def _value_of(solution: Solution, number: ListedNumber) -> float:
     if state is None:
         return (number.values[0] + number.values[-1]) / 2
     return float(np.ravel(state.parameters[number.parameter])[number.component])
-
-
-def _interrupted(best: Solution) -> Solution:
-    """Return the best combination so far as a solution that is no answer: the others are not searched."""
-    outcomes = best.outcomes
-    if best.combination is None:
-        (outcome,) = outcomes
-        outcomes = (replace(outcome, own=replace(outcome.own, status=Status.INTERRUPTED)),)
-    return replace(best, status=Status.INTERRUPTED, outcomes=outcomes)

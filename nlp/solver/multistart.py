@@ -167,7 +167,8 @@ def _search(
     solution = _search_within(nlp, search, first, jobs, progress, solver, phase)
     while (wider := with_wider_level(solution.nlp, solution.x)) is not None and not is_requested():
         solution = _search_within(wider, search, [*first, solution.x], jobs, progress, solver, phase)
-    return solution
+    # A level on its bound is no answer.
+    return solution if wider is None else replace(solution, status=Status.INTERRUPTED)
 
 
 def _search_within(

@@ -8,7 +8,11 @@ from typing import TypeAlias
 
 
 class Status(enum.Enum):
-    """Status of a solve; each value is the word in results; interrupted is also one whose time was over."""
+    """Status of a solve; each value is the word in results.
+
+    ``interrupted`` also stands for a solve whose time was over, and ``not proved`` for a design whose limits over a
+    workspace or along a path are refuted or open.
+    """
 
     OPTIMAL = "optimal"
     AVERAGED = "averaged"
@@ -17,6 +21,7 @@ class Status(enum.Enum):
     LIMB_SINGULAR = "singular limb"
     NOT_CONVERGED = "not converged"
     INFEASIBLE = "infeasible"
+    NOT_PROVED = "not proved"
     INTERRUPTED = "interrupted"
 
     @property
