@@ -113,6 +113,7 @@ def starts_data(solution: ProgramSolution) -> StartsData:
         converged=ended[StartStatus.CONVERGED],
         failed=MappingProxyType({status.value: ended[status] for status in reasons}),
         optima=tuple(_optimum_data(found) for found in solution.optima),
+        better=solution.better,
     )
 
 

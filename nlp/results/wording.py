@@ -94,10 +94,9 @@ def headline(result: SolveResult, case: Case) -> Line:
     unit = "" if task is None else f" {objective_unit([task.motion.twist], case.units)}"
     unit = unit if measured is None else f" {measured.unit}"
     if result.status is Status.INTERRUPTED:
-        reached = result.reached
-        is_known = reached is not None and reached.F is not None and not reached.violated
-        best = f": best F so far = {number(reached.F)}{unit}" if is_known else ", without a design within the limits"
-        return Line(f"stopped before the end{best}{_not_proved(result, case, ', ')}", tone=Tone.NO_ANSWER)
+        best = None if result.reached is None or result.reached.violated else result.reached.F
+        words = ", without a design within the limits" if best is None else f": best F so far = {number(best)}{unit}"
+        return Line(f"stopped before the end{words}{_not_proved(result, case, ', ')}", tone=Tone.NO_ANSWER)
     if result.status is Status.NOT_PROVED:
         found = "" if result.reached is None or result.reached.F is None else number(result.reached.F) + unit
         return Line(f"{_not_proved(result, case)}: the best design found has F = {found}", tone=Tone.NO_ANSWER)
@@ -109,7 +108,9 @@ def headline(result: SolveResult, case: Case) -> Line:
     over = "" if several is None else f", {how} over {len(several.poses)} poses"
     word, status = "fixed point:", result.status.value
     is_compared = result.choice is not None or result.rounding is not None
-    if result.status is Status.OPTIMAL or is_compared:
+    if result.status is Status.LOCAL:
+        word = "local maximum" if result.sense is Sense.MAX else "local minimum"
+    elif result.status is Status.OPTIMAL or is_compared:
         word = "largest" if result.sense is Sense.MAX else "smallest"
     if result.status is Status.EVALUATED and is_compared:
         status = "chosen" if result.rounding is None else "rounded"
@@ -256,6 +257,15 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side.bound]
         text = f"violated: {side.name} = {side.value:.6g}, must be {wanted} {side.limit:.6g}"
         yield Line(text, tone=Tone.FAULT)
+
+
+def better_line(starts: StartsData) -> Line | None:
+    """Return the caution that a search reached a better point than the best optimum; None where none did."""
+    if starts.better is None or not starts.optima:
+        return None
+    reached = f"a search that did not converge reached {number(starts.better)} within the limits"
+    best = f"{starts.converged} of {starts.run} searches converged, the best at F = {number(starts.optima[0].F)}"
+    return Line(f"{best}; {reached}: raise solve.max_iterations or solve.starts", label="note", tone=Tone.CAUTION)
 
 
 def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator[Line]:

@@ -55,8 +55,9 @@ class _Part:
 
     def __init__(self, ranges: Ranges, relaxed: Solution) -> None:
         self.ranges, self.relaxed = ranges, relaxed
-        # Without an answer, nothing is known.
-        self.bound = cost_of(relaxed) if relaxed.status.is_answer else -math.inf
+        # Without an answer, or where a better point is known, nothing is known.
+        is_best = relaxed.status.is_answer and relaxed.status is not Status.LOCAL
+        self.bound = cost_of(relaxed) if is_best else -math.inf
 
     @property
     def open_numbers(self) -> int:

@@ -52,7 +52,7 @@ class ProgramSolution(Whole):
     """Outcome of a search of one program.
 
     Attributes:
-        status: how it ended; only :attr:`Status.OPTIMAL` is an optimum.
+        status: how it ended; only :attr:`Status.OPTIMAL` is the best point found.
         nlp: the program.
         x: (n,) the best point: optimal, or merely reached when the status says so.
         state: the robot there, or None where its equations have no value.
@@ -63,6 +63,8 @@ class ProgramSolution(Whole):
         seconds: wall time.
         relaxation: for an infeasible program, the smallest movement of its limits found that makes it feasible; empty
             where none was found.
+        better: objective of a point within the limits that is better than every optimum found, and at which a search
+            did not converge; None for none.
     """
 
     status: Status
@@ -75,6 +77,7 @@ class ProgramSolution(Whole):
     seed: int
     seconds: float
     relaxation: tuple[RelaxedLimit, ...] = ()
+    better: float | None = None
 
     def __repr__(self) -> str:
         found = f", F = {self.F:.7g}" if self.status.is_answer else ""
@@ -218,13 +221,18 @@ def _search_within(
     done = [found[k] for k in sorted(found)]
     starts, optima = distinct_optima(nlp, done, phase)
     better = _find_better_start(nlp, starts, optima)
-    if optima and better is None:
+    if optima and not (interrupted and better):
         x, evidence = optima[0].x, optima[0].evidence
     else:
         x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
         evidence = examine(nlp, x)
-    status = Status.INTERRUPTED if interrupted else _status(evidence, bool(optima) and better is None)
-    return replace(_outcome(status, nlp, x, evidence, search, began), starts=tuple(starts), optima=tuple(optima))
+    status = Status.INTERRUPTED if interrupted else _status(evidence, bool(optima), better)
+    return replace(
+        _outcome(status, nlp, x, evidence, search, began),
+        starts=tuple(starts),
+        optima=tuple(optima),
+        better=None if better is None else better.F,
+    )
 
 
 def _outcome(
@@ -252,7 +260,7 @@ def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
 def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
     """Return a feasible start that did not converge and is better than every optimum found, or None.
 
-    With such a start, the best optimum found is not the global one, and must not be reported as the answer.
+    With such a start, the best optimum found is not the global one, and must not be reported as such.
     """
     others = (StartStatus.CONVERGED, StartStatus.OPEN)  # a robot with open loops is no point of the case
     feasible = [start for start in starts if start.status not in others and start.violation <= FEASIBLE]
@@ -263,10 +271,10 @@ def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optim
     return best if gain > _BETTER * nlp.objective_scale else None
 
 
-def _status(evidence: Evidence, converged: bool) -> Status:
-    """Return the status of a search from the evidence at its best point."""
+def _status(evidence: Evidence, converged: bool, better: Start | None) -> Status:
+    """Return the status of a search from the evidence at its best point, and a better start that did not converge."""
     if converged and evidence.kind.is_optimum:
-        return Status.OPTIMAL
+        return Status.OPTIMAL if better is None else Status.LOCAL
     if evidence.kind is PointKind.INFEASIBLE:
         return Status.INFEASIBLE
     if evidence.kind is PointKind.LIMB_SINGULAR:
