@@ -9,7 +9,7 @@ more equations than variables.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from ..evidence.kkt import FEASIBLE, close_equations, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate, loops_are_closed
 from ..interruption import Milestone, is_requested, reached
+from ..program.blocks import Blocks
 from ..program.epigraph import with_exact_level, with_wider_level
 from ..program.nlp import Nlp, PairPlace
 from ..program.pairs import violated_pairs, with_pairs, with_pairs_at
@@ -35,6 +36,7 @@ from ..program.relaxation import (
     unrelaxed_pairs,
 )
 from ..program.sampling import starting_points
+from .by_blocks import from_best_blocks, searched_starts
 from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
 from .screened import search_each
@@ -193,32 +195,23 @@ def _search_within(
         return _evaluate_fixed(nlp, search, began)
     if nlp.is_overdetermined:
         solver = closing
+    blocks = Blocks(nlp)
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     if nlp.program.model.unknowns:
         # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
         home = closed_start(nlp)
         points = np.array([close_near(nlp, home, x) for x in points])
+    points, found = searched_starts(nlp, blocks, points, search, solver, jobs)
     nlp = with_pairs_at(nlp, points)
-    found: dict[int, Start] = {}
-    left = list(range(len(points)))
-    while left and not is_requested():
-        phase(Phase.STARTS, len(found), len(points))
-        # Interrupted searches end before the last point.
-        for k, start in zip(left, search_each(nlp, points[left], search, jobs, solver), strict=False):
-            if not found and start.status is StartStatus.CONVERGED:
-                _ = nlp.program.kernels.hessian  # the evidence needs it: at hand when the search is interrupted
-            found[k] = start
-            reached(Milestone.START)
-            if progress is not None:
-                progress(len(found), len(points), _best_value(nlp, found.values()))
-        missing = {k: violated_pairs(nlp, start.x) for k, start in found.items()}
-        nlp = with_pairs(nlp, [place for places in missing.values() for place in places])
-        left = [k for k, places in sorted(missing.items()) if places]
-        found = {k: start for k, start in found.items() if k not in left}
+    nlp, found = _searched(nlp, points, found, search, jobs, progress, solver, phase)
     interrupted = is_requested()
     if not found:  # interrupted before the first start was done
         return _outcome(Status.INTERRUPTED, nlp, nlp.start, examine(nlp, nlp.start), search, began)
     done = [found[k] for k in sorted(found)]
+    together = from_best_blocks(nlp, blocks, [start.x for start in done], _best_value(nlp, done), _BETTER)
+    if together is not None and not interrupted:
+        done += search_each(nlp, together[None], search, 1, solver)
+        interrupted = is_requested()
     starts, optima = distinct_optima(nlp, done, phase)
     better = _find_better_start(nlp, starts, optima)
     if optima and not (interrupted and better):
@@ -233,6 +226,39 @@ def _search_within(
         optima=tuple(optima),
         better=None if better is None else better.F,
     )
+
+
+def _searched(
+    nlp: Nlp,
+    points: FloatArray,
+    known: Mapping[int, Start],
+    search: Search,
+    jobs: int | None,
+    progress: Progress | None,
+    solver: Solver,
+    phase: PhaseProgress,
+) -> tuple[Nlp, dict[int, Start]]:
+    """Return a program with the pairs that bind, and the searches from points (k, n) but for those that are known.
+
+    Interrupted searches end before the last point.
+    """
+    found, left = dict(known), [k for k in range(len(points)) if k not in known]
+    if found:
+        reached(Milestone.START)
+    while left and not is_requested():
+        phase(Phase.STARTS, len(found), len(points))
+        for k, start in zip(left, search_each(nlp, points[left], search, jobs, solver), strict=False):
+            if not found and start.status is StartStatus.CONVERGED:
+                _ = nlp.program.kernels.hessian  # the evidence needs it: at hand when the search is interrupted
+            found[k] = start
+            reached(Milestone.START)
+            if progress is not None:
+                progress(len(found), len(points), _best_value(nlp, found.values()))
+        missing = {k: violated_pairs(nlp, start.x) for k, start in found.items()}
+        nlp = with_pairs(nlp, [place for places in missing.values() for place in places])
+        left = [k for k, places in sorted(missing.items()) if places]
+        found = {k: start for k, start in found.items() if k not in left}
+    return nlp, found
 
 
 def _outcome(
