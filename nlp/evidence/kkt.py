@@ -21,7 +21,7 @@ from ...models import FloatArray
 from ...models.values import dataclass
 from ..program.nlp import Nlp, Side
 from .equations import gradient_sizes, linearise_equations
-from .linalg import nonnegative_least_squares
+from .linalg import least_squares, nonnegative_least_squares
 
 #: Largest slack of an active side, in scaled variables: well above the rounding error of a corrected point, well below
 #: any distance that matters in a design.
@@ -238,7 +238,7 @@ def _residual(at: Linearisation, active_set: list[int]) -> tuple[FloatArray, flo
         A = at.normals[active_set]
         # Normals of variables' bounds are orthonormal, and most active sets consist of such bounds alone.
         orthonormal = np.array_equal(A @ A.T, np.eye(len(active_set)))
-        mu[active_set] = -A @ at.gradient if orthonormal else np.linalg.lstsq(A.T, -at.gradient, rcond=None)[0]
+        mu[active_set] = -A @ at.gradient if orthonormal else least_squares(A.T, -at.gradient)
     left = at.gradient + at.normals.T @ mu
     off = float(np.max(np.abs(at.residual[active_set]), initial=0.0)) if active_set else 0.0
     return mu, max(float(np.max(np.abs(left), initial=0.0)), off, at.violation)
@@ -276,7 +276,7 @@ def _newton_step(
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
     for rcond in _NEWTON_RCOND:
-        step = np.linalg.lstsq(matrix, right, rcond=rcond)[0][:n]
+        step = least_squares(matrix, right, rcond)[:n]
         if np.max(np.abs(step), initial=0.0) > _LONGEST_STEP:
             continue
         towards = at.normals @ step

@@ -1,17 +1,71 @@
-"""Linear algebra that NumPy lacks: non-negative least squares and reduced echelon form."""
+"""Linear algebra that NumPy lacks: least squares by blocks, non-negative ones, and reduced echelon form."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...models import FloatArray
 from ...models.arrays import first_largest
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 #: An entry of a basis below this part of the largest is rounding error.
 _NEGLIGIBLE = 1e-9
+#: Numbers of rows and columns, together, from which on a matrix is taken apart into blocks.
+_LARGE = 160
+
+
+def least_squares(A: FloatArray, b: FloatArray, rcond: float | None = None) -> FloatArray:
+    """Return the shortest of ``argmin |A y - b|``, (k,); of a large matrix block by block, where it has blocks.
+
+    Args:
+        A: (n, k) matrix, possibly rank deficient.
+        b: (n,) vector.
+        rcond: part of the largest singular value, of a block, below which others count as zero; rounding for None.
+    """
+    found = np.zeros(A.shape[1])
+    for rows, columns in _blocks(A):
+        found[columns] = np.linalg.lstsq(A[np.ix_(rows, columns)], b[rows], rcond=rcond)[0]
+    return found
 
 
 def nonnegative_least_squares(A: FloatArray, b: FloatArray) -> FloatArray:
+    """Return ``argmin |A y - b|`` over ``y >= 0``, (k,); of a large matrix block by block, where it has blocks.
+
+    Args:
+        A: (n, k) matrix, possibly rank deficient.
+        b: (n,) vector.
+    """
+    found = np.zeros(A.shape[1])
+    for rows, columns in _blocks(A):
+        found[columns] = _nonnegative(A[np.ix_(rows, columns)], b[rows])
+    return found
+
+
+def _blocks(A: FloatArray) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Return rows and columns of the blocks of a matrix, to which other rows and columns have zeros alone.
+
+    A small matrix is one block: taking it apart would take longer than it saves.
+    """
+    n, k = A.shape
+    if n + k < _LARGE:
+        return [(np.arange(n), np.arange(k))]
+    filled = A != 0
+    columns = np.arange(k)
+    while True:
+        # Each row takes the least number of its columns, and each column that of its rows.
+        rows = np.where(filled, columns, k).min(axis=1, initial=k)
+        following = np.minimum(columns, np.where(filled, rows[:, None], k).min(axis=0, initial=k))
+        if np.array_equal(following, columns):
+            break
+        columns = following
+    return [(np.flatnonzero(rows == number), np.flatnonzero(columns == number)) for number in np.unique(columns)]
+
+
+def _nonnegative(A: FloatArray, b: FloatArray) -> FloatArray:
     """Return ``argmin |A y - b|`` over ``y >= 0``, (k,).
 
     The method is the active-set method of C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems*, 1974,

@@ -196,6 +196,17 @@ def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
         nlp: a program with a level.
         points: (n, k) one point a column.
     """
+    levels = slack_levels(nlp, points)
+    return np.asarray(levels.min(axis=0) if nlp.sense is Sense.MAX else levels.max(axis=0))
+
+
+def slack_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
+    """Return the level (c, k) that each of the c objectives of a worst case has at each of several points.
+
+    Args:
+        nlp: a program with a level.
+        points: (n, k) one point a column.
+    """
     epigraph = nlp.program.places.epigraph
     own = [each.expression for each in nlp.program.constraints if epigraph and each in epigraph.constraints]
     slacks = ca.Function("slacks", [nlp.program.x, nlp.program.p], [ca.vertcat(*own)])
@@ -207,8 +218,7 @@ def exact_levels(nlp: Nlp, points: FloatArray) -> FloatArray:
         ends.append(slacks(at, nlp.arguments).full())
     with np.errstate(all="ignore"):  # where the robot has no value
         levels = ends[0] / (ends[0] - ends[1])
-        levels = np.sqrt(levels) if epigraph and epigraph.power == 2 else levels
-    return np.asarray(levels.min(axis=0) if nlp.sense is Sense.MAX else levels.max(axis=0))
+        return np.asarray(np.sqrt(levels) if epigraph and epigraph.power == 2 else levels)
 
 
 def above_level(numbers: SX, is_mean: bool) -> SX:

@@ -67,9 +67,9 @@ def without_repeated(
     alike: dict[tuple[str, str], list[list[int]]] = {}
     for i, row in enumerate(values):
         groups = alike.setdefault(constraints[i].keys, [])
-        near = (each for each in groups if np.isclose(values[each[0]], row, rtol=_DIFFERENT, equal_nan=True).all())
-        found = next(near, None)
-        groups.append([i]) if found is None else found.append(i)
+        firsts = values[[each[0] for each in groups]]
+        near = np.flatnonzero(np.isclose(firsts, row, rtol=_DIFFERENT, equal_nan=True).all(axis=1))
+        groups[near[0]].append(i) if len(near) else groups.append([i])
     several = [group for groups in alike.values() for group in groups if len(group) > 1]
     asked = [i for group in several for i in group]
     if not asked:

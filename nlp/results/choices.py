@@ -4,8 +4,8 @@ import math
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
-from ..case.case import Case
 from ..case.choices import chosen_settings, listed_numbers
+from ..solver.status import Status
 from .jsondata import Absent, JsonObject, Vector
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def choice_data(solution: "Solution") -> ChoiceData | None:
         choice,
         numbers=numbers,
         complete=choice.is_complete,
-        statement=_statement(choice, _starts(solution), is_answer=solution.status.is_answer),
+        statement=_statement(choice, _starts(solution), solution.status),
     )
 
 
@@ -107,8 +107,9 @@ def _starts(solution: "Solution") -> int:
     return len(solution.outcomes[0].own.starts)
 
 
-def _statement(choice: "Choice", starts: int, *, is_answer: bool) -> str:
+def _statement(choice: "Choice", starts: int, status: Status) -> str:
     """Return what a search over combinations found."""
+    is_answer = status.is_answer
     count = f"{choice.combinations:,} combinations of values"
     how = f"solved from {starts} starts" if starts else "solved"
     if choice.solved == choice.combinations:
@@ -116,6 +117,8 @@ def _statement(choice: "Choice", starts: int, *, is_answer: bool) -> str:
         return f"the best of {searched}" if is_answer else f"none of {searched}, gave an answer"
     if not choice.is_complete:
         some = f"{choice.solved:,} of {count}, {how}"
+        if status is Status.INTERRUPTED:
+            return f"stopped after {some}; the others are not all searched"
         return f"the best of {some}; the others are not all searched" if is_answer else f"no answer in {some}"
     # The solves of ranges began from as many starts.
     ranges = f"{choice.solved:,} {how}, and the others left out by solves of {choice.relaxed:,} ranges of values"
@@ -152,20 +155,24 @@ def rounding_data(solution: "Solution") -> RoundingData | None:
         combinations=1 if choice is None else choice.combinations,
         solved=1 if choice is None else choice.solved,
         complete=choice is None or choice.is_complete,
-        statement=_rounding_statement(case, rounding, _starts(solution), is_answer=is_answer),
+        statement=_rounding_statement(solution, rounding),
     )
 
 
-def _rounding_statement(case: Case, rounding: "Rounding", starts: int, *, is_answer: bool) -> str:
+def _rounding_statement(solution: "Solution", rounding: "Rounding") -> str:
     """Return what rounding found, in words."""
+    case, starts, status = solution.case, _starts(solution), solution.status
     kinds = {each.dimension for each in rounding.numbers}
     names = [f"{rounding.step:g} {case.units.length}"] if Dimension.LENGTH in kinds else []
     names += [f"{rounding.step:g} deg"] if Dimension.ANGLE in kinds else []
     what = f"to multiples of {' and '.join(names)}"
-    if not is_answer:
+    if status is Status.INTERRUPTED:
+        stopped = "" if rounding.choice is None else _statement(rounding.choice, starts, status)
+        return f"{what}: {stopped or 'stopped before the end'}"
+    if not status.is_answer:
         return f"{what}: no multiples within {rounding.farther + 1} steps were found that keep all limits"
     if all(abs(each.value - each.before) <= _SAME * abs(each.value) for each in rounding.numbers):
         return f"{what}: the numbers were round already"
     if rounding.choice is None:
         return f"{what}: each number has one of them near it within its bounds"
-    return f"{what}: {_statement(rounding.choice, starts, is_answer=True)}"
+    return f"{what}: {_statement(rounding.choice, starts, status)}"

@@ -112,12 +112,14 @@ class StartsData(JsonObject):
         converged: number of those that converged.
         failed: number of the others, by reason.
         optima: distinct optima, best first.
+        better: F within the limits that a search reached without converging, better than every optimum; else absent.
     """
 
     run: int
     converged: int
     failed: Mapping[str, int]
     optima: tuple[OptimumData, ...]
+    better: Absent[float]
 
 
 class CertificateData(JsonObject):

@@ -265,7 +265,7 @@ class RelaxationData(JsonObject):
     Attributes:
         key: dotted key, below limits, of the number.
         limit: as it is.
-        needed: as it would have to be.
+        needed: as it would have to be; where limits hold over a workspace or along a path, at least so far from it.
         unit: of both.
     """
 

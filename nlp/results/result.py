@@ -113,6 +113,7 @@ def starts_data(solution: ProgramSolution) -> StartsData:
         converged=ended[StartStatus.CONVERGED],
         failed=MappingProxyType({status.value: ended[status] for status in reasons}),
         optima=tuple(_optimum_data(found) for found in solution.optima),
+        better=solution.better,
     )
 
 
@@ -145,6 +146,7 @@ def combined_result(
         ),
         combined=CombinedData.of(
             combination,
+            value=combination.value if solution.all_solved else None,
             method_point=point if solution.all_solved else None,
             reached=None if solution.all_solved else point,
             tasks=tuple(_outcome(outcome, is_answer=solution.all_solved) for outcome in solution.outcomes),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import TYPE_CHECKING
 
 from ...models import Dimension
@@ -26,6 +27,8 @@ STATED = 1e-14
 _RESIDUAL = 1e-12
 #: Significant digits by which numbers are put in an order: rounding decides on no order.
 _ORDERED = 6
+#: Significant digits of a number that a search has found: the others are rounding error.
+_SOLVED = 9
 #: A rotation by less than this, radians, has no axis that means anything.
 TURNED = 1e-9
 
@@ -47,6 +50,13 @@ def number(value: float, size: float = 0.0, *, digits: int = 7, signed: bool = F
     """
     value = settled(value, size, part)
     return Figure(f"{value:{'+' if signed and value else ''}.{digits}g}", value)
+
+
+def rounded_to(value: float, digits: int, *, up: bool) -> str:
+    """Return the text of a number, rounded up or down where it has more digits than rounding error leaves of it."""
+    settled_value = Context(prec=_SOLVED).create_decimal(value)
+    context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
+    return f"{float(context.plus(settled_value)):.{digits}g}"
 
 
 def listed(values: Iterable[float]) -> str:

@@ -26,6 +26,7 @@ from .rounding import listed, number, robot_size, size_of_F
 from .tables import limit_table, limits_title, margin_table, outcome_table, principal_table
 from .text import Line, TextTable, Tone, in_part
 from .wording import (
+    better_line,
     certificate_lines,
     check_lines,
     choice_lines,
@@ -64,9 +65,11 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     robot = result.robot
     yield from heading_lines(case, result)
     yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
-    yield from fault_lines(result)
+    yield from fault_lines(result, case)
     if result.F is None:
         yield from starts_lines(result.starts, robot)
+    elif (caution := better_line(result.starts)) is not None:
+        yield caution
     yield from _proof_lines(case, result)
     if robot is not None:
         yield solved_design_table(case, result, robot)
@@ -139,6 +142,8 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
     yield from combined_lines(result)
     yield outcome_table(combined, result.tasks)
     yield from choice_lines(result.choice, result.rounding, is_answer=point is not None)
+    if combined.starts is not None and (caution := better_line(combined.starts)) is not None:
+        yield caution
     yield from _proof_lines(case, result)
     if robot is not None:
         yield combined_design_table(case, combined, robot)

@@ -13,16 +13,18 @@ from ..solver.status import Status
 from ..units import Units, objective_unit, slope_unit
 from .jointwording import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
 from .objective import objective_words
-from .rounding import number, ordered, residual, robot_size, settled, task_F
+from .rounding import number, ordered, residual, robot_size, rounded_to, settled, task_F
 from .text import Line, Tone
 
 if TYPE_CHECKING:
     from .choices import ChoiceData, RoundingData
     from .data import CertificateData, CombinedData, CombinedResult, OptimalityData, SolveResult, StartsData
-    from .parts import LimitData, RelaxationData, RobotData, TaskData, ToleranceData, ViolationData
+    from .parts import LimitData, RobotData, TaskData, ToleranceData, ViolationData
 
 #: So many violated limits, and so many optima, are shown.
 _VIOLATIONS, _OPTIMA = 8, 5
+#: Digits of a number that a limit would have to have.
+_DIGITS = 6
 #: Part of an objective by which rounding changes it by no more than two solves of one program differ.
 _UNCHANGED = 1e-9
 #: An optimum is a set when its points lie apart by more than this part of the ranges.
@@ -92,12 +94,12 @@ def headline(result: SolveResult, case: Case) -> Line:
     unit = "" if task is None else f" {objective_unit([task.motion.twist], case.units)}"
     unit = unit if measured is None else f" {measured.unit}"
     if result.status is Status.INTERRUPTED:
-        best = (
-            ""
-            if result.reached is None or result.reached.F is None
-            else f": best F so far = {number(result.reached.F)}{unit}"
-        )
-        return Line(f"stopped before the end{best}", tone=Tone.NO_ANSWER)
+        best = None if result.reached is None or result.reached.violated else result.reached.F
+        words = ", without a design within the limits" if best is None else f": best F so far = {number(best)}{unit}"
+        return Line(f"stopped before the end{words}{_not_proved(result, case, ', ')}", tone=Tone.NO_ANSWER)
+    if result.status is Status.NOT_PROVED:
+        found = "" if result.reached is None or result.reached.F is None else number(result.reached.F) + unit
+        return Line(f"{_not_proved(result, case)}: the best design found has F = {found}", tone=Tone.NO_ANSWER)
     if result.F is None:
         return Line(f"{result.status.value}: this is not an optimum", tone=Tone.NO_ANSWER)
     several = None if robot is None else robot.several
@@ -106,7 +108,9 @@ def headline(result: SolveResult, case: Case) -> Line:
     over = "" if several is None else f", {how} over {len(several.poses)} poses"
     word, status = "fixed point:", result.status.value
     is_compared = result.choice is not None or result.rounding is not None
-    if result.status is Status.OPTIMAL or is_compared:
+    if result.status is Status.LOCAL:
+        word = "local maximum" if result.sense is Sense.MAX else "local minimum"
+    elif result.status is Status.OPTIMAL or is_compared:
         word = "largest" if result.sense is Sense.MAX else "smallest"
     if result.status is Status.EVALUATED and is_compared:
         status = "chosen" if result.rounding is None else "rounded"
@@ -118,6 +122,12 @@ def headline(result: SolveResult, case: Case) -> Line:
     # What is left of an F that nothing resists is rounding.
     F = 0.0 if robot is not None and robot.task_is_free and several is None else task_F(robot, result.F)
     return Line(number(F), tone=tone, before=f"{word} F = ", after=f"{unit}   ({status}{over})")
+
+
+def _not_proved(result: SolveResult, case: Case, before: str = "") -> str:
+    """Return words after a text for limits over a workspace or along a path that are not proved; empty for others."""
+    proof = result.workspace or result.path
+    return "" if proof is None or proof.proved else f"{before}not proved {case.limits_where}"
 
 
 def is_unasked_singularity(robot: RobotData | None, case: Case) -> bool:
@@ -151,12 +161,12 @@ def objective_lines(case: Case) -> Iterator[Line]:
         yield Line(words, label="F is")
 
 
-def evidence_lines(result: SolveResult) -> Iterator[Line]:
+def evidence_lines(result: SolveResult, case: Case) -> Iterator[Line]:
     """Yield the verdict, the evidence for it, and the limits that a failed solve violates or that must be moved."""
     if result.optimality is not None:
         yield verdict_line(result.optimality)
     yield from check_lines(result)
-    yield from fault_lines(result)
+    yield from fault_lines(result, case)
 
 
 def check_lines(result: SolveResult) -> Iterator[Line]:
@@ -176,11 +186,11 @@ def check_lines(result: SolveResult) -> Iterator[Line]:
             yield Line(checks + (smallest if result.reached is None else ""), label="evidence")
 
 
-def fault_lines(result: SolveResult) -> Iterator[Line]:
+def fault_lines(result: SolveResult, case: Case) -> Iterator[Line]:
     """Yield the limits that a failed solve violates, or that must be moved."""
     yield from violation_lines(() if result.reached is None else result.reached.violated)
-    for row in result.relaxation or ():
-        yield Line(f"would be {relaxation_words(row)}")
+    for sentence in relaxation_sentences(result, case):
+        yield Line(sentence)
 
 
 def verdict_line(evidence: OptimalityData) -> Line:
@@ -188,10 +198,20 @@ def verdict_line(evidence: OptimalityData) -> Line:
     return Line(evidence.kind.value, label="verdict")
 
 
-def relaxation_words(row: RelaxationData) -> str:
-    """Return the movement of a limit that makes an infeasible case feasible."""
-    unit = f" {row.unit}" if row.unit else ""
-    return f"feasible with {row.key} = {row.needed:.6g}{unit} instead of {row.limit:g}{unit}"
+def relaxation_sentences(result: SolveResult, case: Case) -> Iterator[str]:
+    """Yield the movement of each limit with which an infeasible case would be feasible.
+
+    Over a workspace or along a path it is known from a few poses, and so as one that is needed at least.
+    """
+    for row in result.relaxation or ():
+        unit, is_upper = f" {row.unit}" if row.unit else "", row.needed > row.limit
+        # Rounded to the side where the sentence is true.
+        needed = rounded_to(row.needed, _DIGITS, up=is_upper)
+        if case.limits_over:
+            more = "more" if is_upper else "less"
+            yield f"infeasible {case.limits_where} unless {row.key} = {needed}{unit} or {more}, not {row.limit:g}{unit}"
+        else:
+            yield f"would be feasible with {row.key} = {needed}{unit} instead of {row.limit:g}{unit}"
 
 
 def costliest_words(limits: Sequence[LimitData]) -> str | None:
@@ -237,6 +257,15 @@ def violation_lines(sides: Sequence[ViolationData]) -> Iterator[Line]:
         wanted = {"min": "at least", "max": "at most", "equal": "exactly"}[side.bound]
         value, limit = (f"{each:.6g} {side.unit or ''}".rstrip() for each in (side.value, side.limit))
         yield Line(f"violated: {side.name} = {value}, must be {wanted} {limit}", tone=Tone.FAULT)
+
+
+def better_line(starts: StartsData) -> Line | None:
+    """Return the caution that a search reached a better point than the best optimum; None where none did."""
+    if starts.better is None or not starts.optima:
+        return None
+    reached = f"a search that did not converge reached {number(starts.better)} within the limits"
+    best = f"{starts.converged} of {starts.run} searches converged, the best at F = {number(starts.optima[0].F)}"
+    return Line(f"{best}; {reached}: raise solve.max_iterations or solve.starts", label="note", tone=Tone.CAUTION)
 
 
 def starts_lines(starts: StartsData, robot: RobotData | None = None) -> Iterator[Line]:

@@ -27,9 +27,10 @@ from .certified_choices import prove_choices
 from .choices import solve_choices
 from .compromise import solution_of_one_task
 from .multistart import ProgramSolution, solve_program
-from .pose_constraints import with_stated_limits
-from .solution import Answer, Solution
+from .pose_constraints import with_margin
+from .solution import Answer, Solution, interrupted
 from .solve import solve, solve_programs
+from .status import Status
 
 #: Words of a bound for a design that was rounded: only its pose, and what was not rounded, is free.
 _ROUNDED = "with the rounded dimensions"
@@ -229,8 +230,12 @@ def _certify(
         own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
         writer = TreeRecord() if with_proof and nlp.n else None
         certificate = certify_one(own, case.tasks[0].name, writer)
-        if certificate.was_beaten and certificate.x is not None and not is_requested():
-            own = solve_program(nlp, search, first=[certificate.x], jobs=jobs)
+        if certificate.was_beaten and certificate.x is not None:
+            own = (
+                replace(own, status=Status.INTERRUPTED)  # its best point is beaten, and no time is left
+                if is_requested()
+                else solve_program(nlp, search, first=[certificate.x], jobs=jobs)
+            )
         solution = solution_of_one_task(case, own)
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
@@ -276,6 +281,9 @@ def _certify_choices(
         is_each=options.above is not None,
     )
     chosen = replace(best.solution, case=case, choice=replace(choice, chosen=values))
+    closed = (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
+    if not choice.is_complete and (together is None or together.status not in closed):
+        chosen = interrupted(chosen)  # neither a solve nor a proof has seen all combinations
     if len(case.tasks) > 1:
         return replace(best, solution=chosen, combined=together)
     return replace(best, solution=chosen, tasks=best.tasks if together is None else (together,))
@@ -291,7 +299,7 @@ def _certify_from_poses(
     own = solution.outcomes[0].own
     x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
     certificate = certify_program(
-        with_stated_limits(own.nlp),
+        with_margin(own.nlp, 0.0),
         x,
         claimed=claimed,
         gap=options.gap,

@@ -16,8 +16,8 @@ import numpy as np
 from ..case.case import Case
 from ..case.choices import ListedNumber, Ranges, all_values, listed_numbers, within_ranges
 from ..errors import EvaluationError, NoRobotError
-from ..interruption import is_requested
-from .solution import Choice, ChoicePart, Solution
+from ..interruption import is_requested, one_call
+from .solution import Choice, ChoicePart, Solution, interrupted
 from .status import Status
 
 #: So many combinations are all solved: bounds of parts would need about as many solves.
@@ -27,6 +27,7 @@ _FEW = 16
 _BETTER = 1e-9
 
 
+@one_call
 def solve_choices(case: Case, solve_fixed: Callable[[Case], Solution], most: float = math.inf) -> Solution:
     """Solve a case for the best combination of values of its listed numbers.
 
@@ -58,8 +59,10 @@ class _Part:
 
     def __init__(self, ranges: Ranges, relaxed: Solution | None) -> None:
         self.ranges, self.relaxed = ranges, relaxed
-        # Without an answer, nothing is known.
-        self.bound = cost_of(relaxed) if relaxed is not None and relaxed.status.is_answer else -math.inf
+        # Without an answer, or where a better point is known, nothing is known.
+        self.bound = -math.inf
+        if relaxed is not None and relaxed.status.is_answer and relaxed.status is not Status.LOCAL:
+            self.bound = cost_of(relaxed)
 
     @property
     def open_numbers(self) -> int:
@@ -74,6 +77,7 @@ class _Search:
         self._case, self._solve, self._most = case, solve_fixed, most
         self._numbers = listed_numbers(case)
         self._solved: dict[Ranges, Solution] = {}
+        self._cut: dict[Ranges, Solution] = {}
         self._relaxed = 0
         self._costs: dict[Ranges, float] = {}
         self._closed: list[Ranges] = []
@@ -88,11 +92,12 @@ class _Search:
         best = self._best
         if best is None:
             # No combination has an answer; one of those solved says why, with the limits that would have to move.
-            self._chosen = next(iter(self._solved), next(combinations_of(everything)))
-            best = self._solve_combination(self._chosen)
+            known = {**self._solved, **self._cut}
+            self._chosen = next(iter(known), next(combinations_of(everything)))
+            best = known[self._chosen] if known else self._solve_combination(self._chosen)
         parts = tuple(ChoicePart(ranges, self._costs.get(ranges)) for ranges in [*self._closed, *open_parts])
-        if open_parts and is_requested() and best.status.is_answer:
-            best = _interrupted(best)
+        if open_parts and (self._cut or is_requested()):
+            best = interrupted(best)
         choice = Choice(count, len(self._solved), self._relaxed, not open_parts, parts, self._chosen)
         return replace(best, case=self._case, choice=choice)
 
@@ -101,6 +106,8 @@ class _Search:
         left = [each for each in combinations_of(everything) if self._exists(each)]
         while left and not is_requested():
             self._solve_combination(left[0])
+            if left[0] not in self._solved:
+                break
             self._closed.append(left.pop(0))
         return left
 
@@ -110,7 +117,7 @@ class _Search:
         # Rounding is a first answer, which leaves out much.
         if self._exists(nearest := self._nearest(root)):
             self._solve_combination(nearest)
-        parts = [root]
+        parts, cut = [root], list[Ranges]()
         while parts and not is_requested() and len(self._solved) + self._relaxed < self._most:
             # Without an answer, those parts first that are nearest to a combination.
             is_first = self._best is None
@@ -124,14 +131,14 @@ class _Search:
                     if not self._exists(ranges):
                         continue
                     self._solve_combination(ranges)
-                    self._closed.append(ranges)
+                    (self._closed if ranges in self._solved else cut).append(ranges)
                     continue
                 child = self._relax(ranges)
                 if child.relaxed is not None and child.relaxed.status is Status.INFEASIBLE:
                     self._closed.append(ranges)
                 else:
                     parts.append(child)
-        return [each.ranges for each in parts]
+        return [*cut, *(each.ranges for each in parts)]
 
     def _exists(self, ranges: Ranges) -> bool:
         """Return whether there is a robot with the values of a combination."""
@@ -151,14 +158,20 @@ class _Search:
             return _Part(ranges, None)
 
     def _solve_combination(self, ranges: Ranges) -> Solution:
-        """Solve a combination once, and keep it where it is the best so far."""
-        if ranges not in self._solved:
-            found = self._solved[ranges] = self._solve_within(ranges)
-            # A limit over a workspace or along a path that stays without proof is not kept.
-            is_possible = found.keeps_limits and math.isfinite(cost_of(found))
-            if is_possible and (self._best is None or cost_of(found) < cost_of(self._best)):
-                self._best, self._chosen = found, ranges
-        return self._solved[ranges]
+        """Solve a combination once, and keep it where it is the best so far.
+
+        An interrupted solve is not complete: it may be the best one, and its combination stays open.
+        """
+        if ranges in self._solved:
+            return self._solved[ranges]
+        found = self._solve_within(ranges)
+        if found.status is Status.INTERRUPTED:
+            self._cut[ranges] = found
+            return found
+        self._solved[ranges] = found
+        if math.isfinite(cost_of(found)) and (self._best is None or cost_of(found) < cost_of(self._best)):
+            self._best, self._chosen = found, ranges
+        return found
 
     def _solve_within(self, ranges: Ranges) -> Solution:
         """Solve a case with the listed numbers within ranges, and note its objective."""
@@ -215,12 +228,3 @@ def _value_of(solution: Solution | None, number: ListedNumber) -> float:
     if state is None:
         return (number.values[0] + number.values[-1]) / 2
     return float(np.ravel(state.parameters[number.parameter])[number.component])
-
-
-def _interrupted(best: Solution) -> Solution:
-    """Return the best combination so far as a solution that is no answer: the others are not searched."""
-    outcomes = best.outcomes
-    if best.combination is None:
-        (outcome,) = outcomes
-        outcomes = (replace(outcome, own=replace(outcome.own, status=Status.INTERRUPTED)),)
-    return replace(best, status=Status.INTERRUPTED, outcomes=outcomes)

@@ -9,7 +9,7 @@ more equations than variables.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from ..evidence.kkt import FEASIBLE, close_equations, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate, loops_are_closed
 from ..interruption import Milestone, is_requested, reached
+from ..program.blocks import Blocks
 from ..program.epigraph import with_exact_level, with_wider_level
 from ..program.nlp import Nlp, PairPlace
 from ..program.pairs import violated_pairs, with_pairs, with_pairs_at
@@ -35,6 +36,7 @@ from ..program.relaxation import (
     unrelaxed_pairs,
 )
 from ..program.sampling import starting_points
+from .by_blocks import from_best_blocks, searched_starts
 from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
 from .screened import search_each
@@ -52,7 +54,7 @@ class ProgramSolution(Whole):
     """Outcome of a search of one program.
 
     Attributes:
-        status: how it ended; only :attr:`Status.OPTIMAL` is an optimum.
+        status: how it ended; only :attr:`Status.OPTIMAL` is the best point found.
         nlp: the program.
         x: (n,) the best point: optimal, or merely reached when the status says so.
         state: the robot there, or None where its equations have no value.
@@ -63,6 +65,8 @@ class ProgramSolution(Whole):
         seconds: wall time.
         relaxation: for an infeasible program, the smallest movement of its limits found that makes it feasible; empty
             where none was found.
+        better: objective of a point within the limits that is better than every optimum found, and at which a search
+            did not converge; None for none.
     """
 
     status: Status
@@ -75,6 +79,7 @@ class ProgramSolution(Whole):
     seed: int
     seconds: float
     relaxation: tuple[RelaxedLimit, ...] = ()
+    better: float | None = None
 
     def __repr__(self) -> str:
         found = f", F = {self.F:.7g}" if self.status.is_answer else ""
@@ -167,7 +172,8 @@ def _search(
     solution = _search_within(nlp, search, first, jobs, progress, solver, phase)
     while (wider := with_wider_level(solution.nlp, solution.x)) is not None and not is_requested():
         solution = _search_within(wider, search, [*first, solution.x], jobs, progress, solver, phase)
-    return solution
+    # A level on its bound is no answer.
+    return solution if wider is None else replace(solution, status=Status.INTERRUPTED)
 
 
 def _search_within(
@@ -189,17 +195,58 @@ def _search_within(
         return _evaluate_fixed(nlp, search, began)
     if nlp.is_overdetermined:
         solver = closing
+    blocks = Blocks(nlp)
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     if nlp.program.model.unknowns:
         # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
         home = closed_start(nlp, points)
         points = np.array([close_near(nlp, home, x) for x in points])
+    points, found = searched_starts(nlp, blocks, points, search, solver, jobs)
     nlp = with_pairs_at(nlp, points)
-    found: dict[int, Start] = {}
-    left = list(range(len(points)))
+    nlp, found = _searched(nlp, points, found, search, jobs, progress, solver, phase)
+    interrupted = is_requested()
+    if not found:  # interrupted before the first start was done
+        return _outcome(Status.INTERRUPTED, nlp, nlp.start, examine(nlp, nlp.start), search, began)
+    done = [found[k] for k in sorted(found)]
+    together = from_best_blocks(nlp, blocks, [start.x for start in done], _best_value(nlp, done), _BETTER)
+    if together is not None and not interrupted:
+        done += search_each(nlp, together[None], search, 1, solver)
+        interrupted = is_requested()
+    starts, optima = distinct_optima(nlp, done, phase)
+    better = _find_better_start(nlp, starts, optima)
+    if optima and not (interrupted and better):
+        x, evidence = optima[0].x, optima[0].evidence
+    else:
+        x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
+        evidence = examine(nlp, x)
+    status = Status.INTERRUPTED if interrupted else _status(evidence, bool(optima), better)
+    return replace(
+        _outcome(status, nlp, x, evidence, search, began),
+        starts=tuple(starts),
+        optima=tuple(optima),
+        better=None if better is None else better.F,
+    )
+
+
+def _searched(
+    nlp: Nlp,
+    points: FloatArray,
+    known: Mapping[int, Start],
+    search: Search,
+    jobs: int | None,
+    progress: Progress | None,
+    solver: Solver,
+    phase: PhaseProgress,
+) -> tuple[Nlp, dict[int, Start]]:
+    """Return a program with the pairs that bind, and the searches from points (k, n) but for those that are known.
+
+    Interrupted searches end before the last point.
+    """
+    found, left = dict(known), [k for k in range(len(points)) if k not in known]
+    if found:
+        reached(Milestone.START)
     while left and not is_requested():
         phase(Phase.STARTS, len(found), len(points))
-        # Interrupted searches end before the last point.
         for k, start in zip(left, search_each(nlp, points[left], search, jobs, solver), strict=False):
             if not found and start.status is StartStatus.CONVERGED:
                 _ = nlp.program.kernels.hessian  # the evidence needs it: at hand when the search is interrupted
@@ -211,19 +258,7 @@ def _search_within(
         nlp = with_pairs(nlp, [place for places in missing.values() for place in places])
         left = [k for k, places in sorted(missing.items()) if places]
         found = {k: start for k, start in found.items() if k not in left}
-    interrupted = is_requested()
-    if not found:  # interrupted before the first start was done
-        return _outcome(Status.INTERRUPTED, nlp, nlp.start, examine(nlp, nlp.start), search, began)
-    done = [found[k] for k in sorted(found)]
-    starts, optima = distinct_optima(nlp, done, phase)
-    better = _find_better_start(nlp, starts, optima)
-    if optima and better is None:
-        x, evidence = optima[0].x, optima[0].evidence
-    else:
-        x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
-        evidence = examine(nlp, x)
-    status = Status.INTERRUPTED if interrupted else _status(evidence, bool(optima) and better is None)
-    return replace(_outcome(status, nlp, x, evidence, search, began), starts=tuple(starts), optima=tuple(optima))
+    return nlp, found
 
 
 def _outcome(
@@ -251,7 +286,7 @@ def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
 def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optimum]) -> Start | None:
     """Return a feasible start that did not converge and is better than every optimum found, or None.
 
-    With such a start, the best optimum found is not the global one, and must not be reported as the answer.
+    With such a start, the best optimum found is not the global one, and must not be reported as such.
     """
     others = (StartStatus.CONVERGED, StartStatus.OPEN)  # a robot with open loops is no point of the case
     feasible = [start for start in starts if start.status not in others and start.violation <= FEASIBLE]
@@ -262,10 +297,10 @@ def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optim
     return best if gain > _BETTER * nlp.objective_scale else None
 
 
-def _status(evidence: Evidence, converged: bool) -> Status:
-    """Return the status of a search from the evidence at its best point."""
+def _status(evidence: Evidence, converged: bool, better: Start | None) -> Status:
+    """Return the status of a search from the evidence at its best point, and a better start that did not converge."""
     if converged and evidence.kind.is_optimum:
-        return Status.OPTIMAL
+        return Status.OPTIMAL if better is None else Status.LOCAL
     if evidence.kind is PointKind.INFEASIBLE:
         return Status.INFEASIBLE
     if evidence.kind is PointKind.LIMB_SINGULAR:

@@ -19,7 +19,7 @@ from ..proof.workspace.verdict import Outcome
 from .multistart import ProgramSolution
 from .placement import with_place
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
-from .semi_infinite import GAP, Exchange, Judging, SemiInfinite, design_of, faults_of_numbers, with_objective
+from .semi_infinite import Exchange, Judging, SemiInfinite, design_of, faults_of_numbers, with_objective
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +65,10 @@ def over_path(case: Case, nlp: Nlp) -> SemiInfinite[PathJudgement, PathProof]:
     start = path.poses_at([0], 0.0)
     first = PoseNumbers(start.positions[0], start.rotations[0], *axis_angle_from_matrix(start.rotations[0]))
 
-    def judge(solved: ProgramSolution) -> Judging[PathJudgement]:
+    def judge(solved: ProgramSolution, gap: float) -> Judging[PathJudgement]:
         place = numbers(solved.x)
         along = path if frame is None else placed(path, place.tolist())
-        found = judge_path(with_objective(design_of(case, solved.nlp, solved.x), solved.F), along, gap=GAP)
+        found = judge_path(with_objective(design_of(case, solved.nlp, solved.x), solved.F), along, gap=gap)
         faults = list(_faults(found))
         found = replace(found, case=replace(found.case, limits=case.limits))  # the level is no limit of the case
         if frame is not None:
@@ -79,7 +79,7 @@ def over_path(case: Case, nlp: Nlp) -> SemiInfinite[PathJudgement, PathProof]:
         place, poses = numbers(done.found.x), done.poses
         if frame is not None:
             poses = tuple(_moved(each, partial(in_world, place)) for each in poses)
-        return PathProof(done.judgement, tuple(place.tolist()), poses, done.history)
+        return PathProof(done.judgement, tuple(place.tolist()), poses, done.history, done.tighter)
 
     return SemiInfinite(nlp, PoseConstraints(nlp, case, first, frame), judge, proof)
 

@@ -168,7 +168,7 @@ class PoseConstraints:
 
     @property
     def program(self) -> Nlp:
-        """The program with the claims as constraints."""
+        """The program with the claims as constraints, with limits that are tighter by :data:`TIGHTER`."""
         nlp, program = self._nlp, self._nlp.program
         poses = [pose for claim in self._claims for pose in claim.poses]
         count = sum(len(each.variables) for each in poses)
@@ -194,7 +194,7 @@ class PoseConstraints:
         limits = [item for each in self._claims for item in each.constraints]
         return wide.with_constraints([*equations, *limits, *of_level])
 
-    def added(self, design: Case, fresh: Sequence[BindingPose], x: FloatArray) -> list[BindingPose]:
+    def added(self, design: Case, fresh: Sequence[BindingPose], x: FloatArray, part: float = 1.0) -> list[BindingPose]:
         """Add further claims as constraints, and return those that are added.
 
         Constraints that only repeat another, at the images of a pose in a symmetric robot, are left out: with both a
@@ -205,6 +205,7 @@ class PoseConstraints:
             design: that refutes the claims.
             fresh: the claims.
             x: (n,) the design, and more that does not count.
+            part: of :data:`TIGHTER` by which the limits are tighter.
         """
         # Where a limb does not reach a pose, J and the limits are not defined nearby: the reach comes first.
         first = [each for each in fresh if each.name.startswith(REACH)]
@@ -223,7 +224,7 @@ class PoseConstraints:
             values = self._values(claim, points)
             # Limits of one size on joints of different limbs repeat each other too.
             key = repr([(item.lower, item.upper) for item in (*claim.constraints, *claim.of_level)])
-            if not any(key == one and _are_alike(values, other) for one, other in known):
+            if not any(key == one and _are_alike(values, other, part) for one, other in known):
                 known.append((key, values))
                 kept.append(each)
                 self._claims.append(claim)
@@ -433,11 +434,18 @@ class PoseConstraints:
                         yield BoundedConstraint(replace(item.constraint, name=name), item.lower, item.upper)
 
 
-def with_stated_limits(nlp: Nlp) -> Nlp:
-    """Return a program with the limits of the case in the place of tighter ones."""
+def with_margin(nlp: Nlp, part: float) -> Nlp:
+    """Return a program whose limits at poses are tighter than those of the case by a part of what they are in it.
+
+    With 0 they are those of the case: the program holds for every design of the case, whatever its poses are.
+    """
     stated = [each.stated for each in nlp.program.constraints]
+
+    def moved(own: float, limit: float) -> float:
+        return limit if not (part and math.isfinite(limit)) else limit + part * (own - limit)
+
     lower, upper = (
-        [own if each is None else each[k] for each, own in zip(stated, bounds, strict=True)]
+        [own if each is None else moved(own, each[k]) for each, own in zip(stated, bounds, strict=True)]
         for k, bounds in enumerate((nlp.g_lower.tolist(), nlp.g_upper.tolist()))
     )
     return replace(nlp, g_lower=frozen_vector(lower), g_upper=frozen_vector(upper))
@@ -448,9 +456,10 @@ def _rows(robot: RobotInstance, length: float) -> SX:
     return ca.horzcat(*homogenised(robot.jacobian, robot.position, length))
 
 
-def _are_alike(one: FloatArray, other: FloatArray) -> bool:
+def _are_alike(one: FloatArray, other: FloatArray, part: float) -> bool:
     """Return whether numbers (designs, constraints) are the same but for a small part of their size."""
-    return one.shape == other.shape and bool(np.abs(one - other).max() <= _ALIKE * np.abs(other).max(initial=0.0))
+    most = part * _ALIKE * np.abs(other).max(initial=0.0)
+    return one.shape == other.shape and bool(np.abs(one - other).max() <= most)
 
 
 def _problem(design: Case, workspace: Workspace) -> Problem | None:

@@ -5,7 +5,9 @@ judged over the whole workspace (:mod:`screwsynth.nlp.proof.workspace`), and the
 constraints, each of the one claim that it refutes, until the proof holds.
 
 In these constraints every limit is a little tighter than in the case: a design that lies exactly on a limit at the
-worst of the poses known is beyond it at some pose nearby, and the exchange would never end.
+worst of the poses known is beyond it at some pose nearby, and the exchange would never end. Where no design keeps so
+much, the margin becomes smaller, with closer proofs. A case is infeasible only where no design keeps its limits as they
+are stated at the poses known, which is a program without any margin.
 
 Source: J. W. Blankenship, J. E. Falk, *Infinitely constrained optimization problems*, J. Optim. Theory Appl. 19 (1976).
 """
@@ -40,10 +42,13 @@ from ..proof.workspace.ranks.ranks import not_judged
 from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
 from .multistart import ProgramSolution
-from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
+from .pose_constraints import TIGHTER, BindingPose, PoseConstraints, with_margin
+from .status import Status
 
 #: Gap of the proofs: several of them fit between a limit of the constraints and that of the case.
 GAP = 2e-4
+#: Parts of the margin and of the gap, the next one where no design keeps the margin; the last two have the same gap.
+_PARTS = (1.0, 1e-1, 1e-2, 1e-3, 0.0)
 #: Part of a minimised level by which the same number over the workspace may be larger.
 LEVEL_ROOM = 1e-3
 #: Reason for ranks that are not judged.
@@ -105,6 +110,7 @@ class Exchange(NamedTuple, Generic[Judged]):
         poses: of the constraints, in the order in which they were found.
         history: F, and the number of claims that were not proved, of each design in turn.
         first: judgement of the first design.
+        tighter: part of themselves by which the limits of the constraints are tighter than those of the case.
     """
 
     found: ProgramSolution
@@ -112,6 +118,7 @@ class Exchange(NamedTuple, Generic[Judged]):
     poses: tuple[BindingPose, ...]
     history: tuple[tuple[float, int], ...]
     first: Judged
+    tighter: float
 
 
 class SemiInfinite(NamedTuple, Generic[Judged, Proof]):
@@ -126,7 +133,7 @@ class SemiInfinite(NamedTuple, Generic[Judged, Proof]):
 
     nlp: Nlp
     constraints: PoseConstraints
-    judge: Callable[[ProgramSolution], Judging[Judged]]
+    judge: Callable[[ProgramSolution, float], Judging[Judged]]
     proof: Callable[[Exchange[Judged]], Proof]
 
 
@@ -138,14 +145,14 @@ def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite[Judgement, WorkspacePro
         nlp: its program with limits at the stated poses.
     """
 
-    def judge(solved: ProgramSolution) -> Judging[Judgement]:
+    def judge(solved: ProgramSolution, gap: float) -> Judging[Judgement]:
         design = design_of(case, solved.nlp, solved.x)
-        found = _judged(with_objective(design, solved.F))
+        found = _judged(with_objective(design, solved.F), gap)
         # The level is no limit of the case.
         return Judging(design, replace(found, case=design), _faults(found))
 
     def proof(done: Exchange[Judgement]) -> WorkspaceProof:
-        return WorkspaceProof(done.judgement, done.poses, done.history, done.first)
+        return WorkspaceProof(done.judgement, done.poses, done.history, done.first, done.tighter)
 
     return SemiInfinite(nlp, PoseConstraints(nlp, case), judge, proof)
 
@@ -171,6 +178,9 @@ def exchanged(
 ) -> tuple[ProgramSolution, Proof | None]:
     """Return the solution of a program whose limits hold at every pose of a set, and the proof; None without an answer.
 
+    A design that is not proved at the end of the exchange is no answer. Where the work is to stop, it is the last one
+    that was judged.
+
     Args:
         problem: the program.
         solve_one: solves a program.
@@ -178,20 +188,55 @@ def exchanged(
     """
     nlp, constraints = problem.nlp, problem.constraints
     binding, history, judgements = list[BindingPose](), list[tuple[float, int]](), list[Judged]()
-    found = solve_one(nlp, first)
+    found, parts, done = solve_one(nlp, first), list(_PARTS), None
     while found.status.is_answer:
-        design, judged, faults = problem.judge(found)
+        gap = GAP * (parts[0] or _PARTS[-2])
+        design, judged, faults = problem.judge(found, gap)
         judgements.append(judged)
         history.append((found.F, len(faults)))
         fresh = [each for each in faults if each is not None and not any(map(each.is_same, binding))]
-        fresh = constraints.added(design, fresh, found.x)
+        fresh = constraints.added(design, fresh, found.x, gap / GAP)
+        if faults:
+            found = replace(found, status=Status.INTERRUPTED if is_requested() else Status.NOT_PROVED)
+        done = Exchange(found, judged, tuple(binding), tuple(history), judgements[0], TIGHTER * parts[0])
         if not faults or not fresh or len(history) >= MOST_EXCHANGES or is_requested():
-            done = Exchange(found, judged, tuple(binding), tuple(history), judgements[0])
             return found, problem.proof(done)
         binding += fresh
         nlp = constraints.program
-        found = solve_one(nlp, [np.concatenate([found.x, nlp.start[len(found.x) :]])])
-    return found, None
+        start = np.concatenate([found.x, nlp.start[len(found.x) :]])
+        found, parts = _solve_within(nlp, solve_one, start, parts)
+    if done is None or found.status is not Status.INTERRUPTED:
+        return found, None
+    judged_last = replace(done.found, status=Status.INTERRUPTED)
+    return judged_last, problem.proof(done._replace(found=judged_last))
+
+
+def _solve_within(
+    nlp: Nlp, solve_one: SolveOne, start: FloatArray, parts: Sequence[float]
+) -> tuple[ProgramSolution, list[float]]:
+    """Return the solution of a program with the largest margin that a design keeps, and the margins from it on.
+
+    Args:
+        nlp: the program, with the whole margin.
+        solve_one: solves a program.
+        start: (n,) point to start from.
+        parts: of the margin, in turn.
+
+    Returns:
+        The solution; one without an answer where the limits as the case states them have none either. Then the first
+        of the parts that are left.
+    """
+    found = solve_one(with_margin(nlp, parts[0]), [start])
+    if found.status.is_answer or found.status is Status.INTERRUPTED or not parts[0]:
+        return found, list(parts)
+    stated = solve_one(with_margin(nlp, 0.0), [start, found.x])
+    if not stated.status.is_answer:
+        return stated, [0.0]
+    for k, part in enumerate(parts[1:-1], 1):
+        found = solve_one(with_margin(nlp, part), [stated.x])
+        if found.status.is_answer or found.status is Status.INTERRUPTED:
+            return found, list(parts[k:])
+    return stated, [0.0]
 
 
 def with_objective(design: Case, level: float) -> Case:
@@ -212,16 +257,16 @@ def with_objective(design: Case, level: float) -> Case:
     return replace(design, limits=Limits(*(each for each in design.limits if each is not own), limit))
 
 
-def _judged(case: Case) -> Judgement:
+def _judged(case: Case, gap: float) -> Judgement:
     """Return the verdicts on a design over its workspace; where its limbs do not reach every pose, on these alone."""
     closed, workspace = closed_form(case.model), workspace_of_case(case)
     # Poses that the robot cannot take say nothing of the reach of its limbs.
     if closed.reaches and not workspace.dependent:
         layout, claims = reach_claims(case, closed, workspace)
-        found = tuple(prove_extreme(layout, claim, gap=GAP, jobs=1) for claim in claims)
+        found = tuple(prove_extreme(layout, claim, gap=gap, jobs=1) for claim in claims)
         if any(each.outcome is not Outcome.PROVED for each in found):
             return Judgement(case, workspace, not_judged(pose_box(workspace), _UNREACHED), found)
-    return judge_workspace(case, gap=GAP, jobs=1, with_objective=False)
+    return judge_workspace(case, gap=gap, jobs=1, with_objective=False)
 
 
 def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -254,10 +255,14 @@ class Solution(Whole, Shown, Answer):
 
     @property
     def all_solved(self) -> bool:
-        """Whether every program that the method needs is solved, so that the point is an answer of the method."""
+        """Whether every program that the method needs is solved, so that the point is an answer of the method.
+
+        An interrupted search, as among the values of a catalogue, is no answer, though its best program is solved.
+        """
         alone = all(outcome.own.status.is_answer for outcome in self.outcomes)
         decisive = self.decided_by
-        return alone and (decisive is None or decisive.status.is_answer)
+        is_whole = self.status is not Status.INTERRUPTED
+        return is_whole and alone and (decisive is None or decisive.status.is_answer)
 
     @property
     def F(self) -> float:  # noqa: N802 - the objective's name
@@ -314,3 +319,14 @@ class Solution(Whole, Shown, Answer):
         if self.decided_by is None:
             raise EvaluationError("no single program gave this point: see outcomes for each task's own")
         return self.decided_by
+
+
+def interrupted(solution: Solution) -> Solution:
+    """Return the best solution so far of an interrupted search, which is no answer."""
+    if not solution.status.is_answer:
+        return solution
+    outcomes = solution.outcomes
+    if solution.combination is None:
+        (outcome,) = outcomes
+        outcomes = (replace(outcome, own=replace(outcome.own, status=Status.INTERRUPTED)),)
+    return replace(solution, status=Status.INTERRUPTED, outcomes=outcomes)

@@ -21,7 +21,7 @@ from .interface import Solver
 from .ipopt import ipopt
 from .multistart import ProgramSolution, solve_program
 from .solution import Solution
-from .status import Phase, PhaseProgress, no_phase
+from .status import Phase, PhaseProgress, Status, no_phase
 
 if TYPE_CHECKING:
     from .semi_infinite import SemiInfinite
@@ -149,6 +149,7 @@ def solve_programs(
         own.append(solve_everywhere(replace(case, tasks=(task,)), task.name, nlp))
         if any(each is not None and not each.is_proved for each in proof.values()):
             notices.append(f"the optimum of {task.name!r} by itself is not proved {case.limits_where}")
+    proof.clear()  # only that of the combined design counts
     nlps = with_shared_pairs(nlps, [place for solution in own for place in solution.nlp.pairs])
     polish = partial(solve_program, search=replace(search, starts=1), jobs=1, solver=solver)
     solve_combined = partial(solve_everywhere, case)
@@ -164,7 +165,9 @@ def _at_stated_poses(found: ProgramSolution, nlp: Nlp) -> ProgramSolution:
     """Return a solution with poses of an exchange as constraints as one of the program without them."""
     starts = tuple(replace(each, x=each.x[: nlp.n]) for each in found.starts)
     optima = tuple(replace(each, x=each.x[: nlp.n], nlp=nlp) for each in found.optima)
-    return replace(found, nlp=nlp, x=found.x[: nlp.n], starts=starts, optima=optima)
+    # A proof is of the combined design: an optimum that is not proved is combined too, and a notice says so.
+    status = Status.OPTIMAL if found.status is Status.NOT_PROVED else found.status
+    return replace(found, status=status, nlp=nlp, x=found.x[: nlp.n], starts=starts, optima=optima)
 
 
 def _with_exchanged(solution: Solution, own: Sequence[ProgramSolution], notices: Sequence[str]) -> Solution:

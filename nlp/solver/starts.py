@@ -13,6 +13,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property
 from queue import SimpleQueue
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,6 +31,9 @@ from .interface import LocalSearch, Solver, SolverResult, StopReason
 from .ipopt import ipopt
 from .status import Phase, PhaseProgress
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 #: A side farther than this, in half ranges, from the solver's point does not belong to the active set.
 _NEAR = 1e-2
 #: A side is held where its multiplier exceeds this part of its slack. The smallest part, which holds most sides, is
@@ -37,6 +41,8 @@ _NEAR = 1e-2
 #: parts follow.
 _SHARES = (1e-4, 1.0, 1e2)
 _POLISHED = 1e-10
+#: Distance of a unit normal from the space of others below which it depends on them.
+_DEPENDENT = 1e-6
 #: Stationarity, violation and distance from active sides that are rounding error: a correction would change nothing.
 _EXACT = 1e-13
 #: A correction may make the scaled objective worse by this much: the tolerance that Ipopt stops at.
@@ -211,9 +217,27 @@ def _likely_active(nlp: Nlp, at: Linearisation, found: SolverResult, share: floa
     strength = sides.sign * reported * np.where(sides.place < nlp.n, 1.0, 1 / at.per_unit)
     near = (at.slack < _NEAR) & (strength > share * np.maximum(at.slack, 0.0))
     held = np.flatnonzero(sides.equal | near)
-    # n independent sides determine a point: of more, those with the least multipliers beside their slack are left out.
+    if len(held) <= nlp.n:
+        return [int(j) for j in held]
+    # n independent sides determine a point: of more, those with the least multipliers beside their slack are left out,
+    # and those that depend on the others, such as the sides of symmetric limbs.
     order = np.where(sides.equal[held], np.inf, strength[held] / np.maximum(at.slack[held], np.finfo(float).eps))
-    return [int(j) for j in held[np.sort(np.argsort(-order, kind="stable")[: nlp.n])]]
+    return sorted(_independent(at.normals, held[np.argsort(-order, kind="stable")]))
+
+
+def _independent(normals: FloatArray, order: NDArray[np.intp]) -> list[int]:
+    """Return sides, in an order, whose unit normals (n,) are independent of those before."""
+    kept = list[int]()
+    basis = np.zeros((0, normals.shape[1]))
+    for j in order:
+        left = normals[j]
+        for _ in range(2):  # once more for the rounding of the first
+            left = left - basis.T @ (basis @ left)
+        length = float(np.linalg.norm(left))
+        if length > _DEPENDENT:
+            kept.append(int(j))
+            basis = np.vstack([basis, left / length])
+    return kept
 
 
 #: Two optima have the same F when it differs by less than this part of F's scale.

@@ -8,21 +8,28 @@ from typing import TypeAlias
 
 
 class Status(enum.Enum):
-    """Status of a solve; each value is the word in results; interrupted is also one whose time was over."""
+    """Status of a solve; each value is the word in results.
+
+    ``locally optimal`` stands for the best optimum found where a search that did not converge reached a better point;
+    ``interrupted`` also stands for a solve whose time was over, and ``not proved`` for a design whose limits over a
+    workspace or along a path are refuted or open.
+    """
 
     OPTIMAL = "optimal"
+    LOCAL = "locally optimal"
     AVERAGED = "averaged"
     EVALUATED = "evaluated"
     SADDLE = "saddle"
     LIMB_SINGULAR = "singular limb"
     NOT_CONVERGED = "not converged"
     INFEASIBLE = "infeasible"
+    NOT_PROVED = "not proved"
     INTERRUPTED = "interrupted"
 
     @property
     def is_answer(self) -> bool:
-        """Whether the point is an answer: optimal, averaged, or evaluated."""
-        return self in (Status.OPTIMAL, Status.AVERAGED, Status.EVALUATED)
+        """Whether the point is an answer: optimal, locally optimal, averaged, or evaluated."""
+        return self in (Status.OPTIMAL, Status.LOCAL, Status.AVERAGED, Status.EVALUATED)
 
 
 class Phase(enum.Enum):

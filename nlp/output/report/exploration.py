@@ -60,6 +60,11 @@ def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str, u
     yield from (tag("p", f"{count}: {status.value}.") for status, count in failed.items())
     if not solution.optima:
         return
+    if solution.better is not None:
+        reached = f"{number(task_F(robot, solution.better))} {unit}".rstrip()
+        yield tag(
+            "p", f"A search that did not converge reached F = {reached} within the limits, better than any optimum."
+        )
     best = solution.optima[0]
     F = f"{number(task_F(robot, best.F))} {unit}".rstrip()
     times = "once" if best.count == 1 else f"{best.count} times"

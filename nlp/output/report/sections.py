@@ -25,7 +25,7 @@ from ...results.wording import (
     evidence_lines,
     headline,
     is_unasked_singularity,
-    relaxation_words,
+    relaxation_sentences,
     singularity_lines,
     task_words,
     tolerance_line,
@@ -42,10 +42,10 @@ def evidence_section(report: Report) -> Markup:
     """Return the evidence of optimality, from the program alone."""
     result = report.result
     if isinstance(result, SolveResult):
-        return join_markup(_evidence_of(result))
+        return join_markup(_evidence_of(report.case, result))
     parts: list[Markup] = []
     for part, own in zip(report.parts, result.tasks, strict=True):
-        parts += [tag("h3", f"“{part.name}” by itself"), *_evidence_of(own)]
+        parts += [tag("h3", f"“{part.name}” by itself"), *_evidence_of(report.case, own)]
     optimality = result.combined.optimality
     if optimality is not None:
         parts += [tag("h3", "The combined program"), tag("p", f"Verdict: {optimality.kind.value}.")]
@@ -55,9 +55,9 @@ def evidence_section(report: Report) -> Markup:
     return join_markup(parts)
 
 
-def _evidence_of(result: SolveResult) -> Iterator[Markup]:
+def _evidence_of(case: Case, result: SolveResult) -> Iterator[Markup]:
     """Yield the evidence about one program's point."""
-    yield paragraphs(evidence_lines(result))
+    yield paragraphs(evidence_lines(result, case))
     optimality = result.optimality
     if optimality is None:
         return
@@ -258,7 +258,7 @@ def _result(report: Report) -> Markup:
     result = report.result
     if isinstance(result, CombinedResult):
         return _combined_result(report, result)
-    sentences = [f"It would be {relaxation_words(row)}." for row in result.relaxation or ()]
+    sentences = [f"It would be {each.removeprefix('would be ')}." for each in relaxation_sentences(result, report.case)]
     chosen = paragraphs(choice_lines(result.choice, result.rounding, is_answer=report.is_answer))
     return join_markup([chosen, *_task_tables(report.case, result, "design"), paragraphs(sentences)])
 
