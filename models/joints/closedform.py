@@ -65,20 +65,23 @@ class ClosedForm:
 
     Attributes:
         model: the robot; its drawing is left out.
-        reaches: one for each unknown that is left out.
+        reaches: one for each unknown that has a closed form.
+        has_angles: whether angles are replaced by their closed forms too, which jump after half a turn.
     """
 
     model: Model
     reaches: tuple[Reach, ...]
+    has_angles: bool = True
 
 
-def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
+def closed_form(model: Model, *, extended: bool = False, with_angles: bool = True) -> ClosedForm:
     """Return a robot without those of its unknowns that follow from dimensions and pose in closed form.
 
     Args:
         model: the robot.
         extended: whether the expressions have values out of reach too, for searches that pass through it: the square
             root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
+        with_angles: whether angles are replaced too. As unknowns, they have no jump where a joint turns all round.
     """
     depends = [
         [k for k, each in enumerate(model.unknowns) if ca.depends_on(equation.expression, each.symbol)]
@@ -86,6 +89,7 @@ def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
     ]
     found: dict[int, Solved] = {}
     dropped: set[int] = set()
+    followed: set[int] = set()
     reaches: list[Reach] = []
     for k, unknown in enumerate(model.unknowns):
         for e, equation in enumerate(model.closure):
@@ -93,14 +97,17 @@ def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
                 continue
             solved = _solved(model, unknown, equation, extended)
             if solved is not None:
-                found[k] = solved
                 dropped.add(e)
                 reaches.append(Reach(limb_of(equation.name), solved.reach))
+                if with_angles or unknown.dimension is not Dimension.ANGLE:
+                    found[k] = solved
+                else:
+                    followed.add(e)
                 break
     if not found:
-        return ClosedForm(model, ())
-    kept = tuple(each for e, each in enumerate(model.closure) if e not in dropped)
-    return ClosedForm(_rewritten(model, found, kept), tuple(reaches))
+        return ClosedForm(model, tuple(reaches), with_angles)
+    kept = tuple(each for e, each in enumerate(model.closure) if e not in dropped - followed)
+    return ClosedForm(_rewritten(model, found, kept), tuple(reaches), with_angles)
 
 
 def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:

@@ -229,8 +229,8 @@ class _Machine:
             inverse_rates(self._model, robot).T,
             _margin(rows_about(robot.jacobian, position)),
             every,
-            robot.signs[[k for k, mode in enumerate(is_mode) if not mode]],
-            robot.signs[[k for k, mode in enumerate(is_mode) if mode]],
+            robot.signs[[k for k, mode in enumerate(is_mode) if not mode], :],
+            robot.signs[[k for k, mode in enumerate(is_mode) if mode], :],
         ]
         self._function = ca.Function("inverse", [z], [ca.densify(each) for each in outputs])
         # CasADi finds a mapped function again as long as it is held: making it takes as long as evaluating it.

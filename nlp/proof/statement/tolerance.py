@@ -57,19 +57,20 @@ class BuiltModel(NamedTuple):
     reaches: tuple[Reach, ...]
 
 
-def built_model(model: Model, *, extended: bool = False) -> BuiltModel:
+def built_model(model: Model, *, extended: bool = False, with_angles: bool = True) -> BuiltModel:
     """Return a robot with errors of its joint centres.
 
     Args:
         model: the robot.
         extended: whether closed forms have values out of reach too.
+        with_angles: whether angles have closed forms.
 
     Raises:
         RobotError: its joint centres are not known, or it cannot be assembled with errors.
     """
     displaced = _displaced(model)
-    closed = closed_form(displaced.model, extended=extended)
-    if _kinds_of(closed_form(model).model) != _kinds_of(closed.model):
+    closed = closed_form(displaced.model, extended=extended, with_angles=with_angles)
+    if _kinds_of(closed_form(model, with_angles=with_angles).model) != _kinds_of(closed.model):
         raise RobotError("", "errors of joint centres take freedoms from the robot: its limbs or loops change")
     return BuiltModel(closed.model, tuple(each.name for each in displaced.centres), closed.reaches)
 

@@ -12,8 +12,8 @@ from ...case.task import Sense
 from ..statement.claims import Claim
 from .numbers.bound_search import Number
 from .numbers.extremes import Extreme, goal_of
-from .ranks.loop_boxes import closed_along
-from .robot.path_cover import PathCover, Place
+from .ranks.followed import closed_along
+from .robot.path_cover import PathCover, Place, place_in
 from .robot.pose_box import PoseNumbers
 from .robot.posed_robot import Problem
 from .verdict import Outcome
@@ -126,4 +126,4 @@ class _Sampled:
             half = 0.5 * (low + high)
             there = float(self._values_at(self._closed(z, piece, half))[0, k])
             low, high, value = (low, half, there) if there < least else (half, high, value)
-        return Place(int(piece[0, 0]), high), value
+        return place_in(piece[0], high), value

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ....models.joints.closedform import ClosedForm, closed_form
+from ....models.joints.closedform import ClosedForm
 from ...case.case import Case
 from ...case.motors import MotorNumber
 from ...case.pose import Free, Value, ends_of
@@ -39,14 +39,15 @@ from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject, motor_extremes, searched_extremes
 from .numbers.strokes import with_strokes
+from .path_closing import closed_form_along, unknowns_at
 from .path_faults import Fault, first_faults, pose_at, refuted
 from .path_knots import Knots, Sampling, knots_of
 from .path_motion import speeds_on_path
 from .ranks.loop_boxes import APART, LoopBoxes, loop_boxes_of
 from .ranks.ranks import RankRule
 from .ranks.singular_pose import DeterminantSigns, SingularPose
-from .robot.path_cover import PathCover, Place
-from .robot.path_turns import turns_of_path
+from .robot.long_turns import turns_of_path
+from .robot.path_cover import PathCover, Place, place_in
 from .robot.pose_box import PoseBox, PoseNumbers, pose_box
 from .robot.posed_model import RankMatrix
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
@@ -65,7 +66,7 @@ _STILL = 1e-9
 _SINGULAR, _STEPS, _FAR = 1e-9, 80, 16
 #: Parts of a way over which rows must have values.
 _PARTS = 64
-#: Parameters of points of each segment at which a change of sign is looked for.
+#: Parts of each segment at which a change of sign is looked for.
 _SAMPLES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -152,7 +153,7 @@ def judge_path(
         InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
             robot of which the positions of actuators are not known.
     """
-    cover, box, workspace = _covered(path)
+    cover, box, workspace = covered(path)
     case = replace(case, workspace=workspace)
     case.fixed_parameters("a path is judged with fixed dimensions")
     if not path.is_timed:
@@ -165,7 +166,7 @@ def judge_path(
         if sampling is not None:
             report("knots")
             knots = knots_of(case, path, cover, workspace, sampling)
-        closed = closed_form(case.model)
+        closed = closed_form_along(case, path)
         try:
             box, workspace = _with_dependent(case, box, workspace)
             stated, case = replace(stated, workspace=workspace), replace(case, workspace=workspace)
@@ -275,7 +276,7 @@ def _finer(
     return machines.searched([claim], gap, is_enough=False)[0]
 
 
-def _covered(path: ProgrammedPath) -> tuple[PathCover, PoseBox, Workspace]:
+def covered(path: ProgrammedPath) -> tuple[PathCover, PoseBox, Workspace]:
     """Return the boxes of a path, the box of all its poses, and a workspace about it.
 
     Raises:
@@ -298,8 +299,8 @@ def _covered(path: ProgrammedPath) -> tuple[PathCover, PoseBox, Workspace]:
     box = PoseBox(
         turns.kind,
         frozen_array((0, 0, 1), (3,)),
-        frozen_array(low, (6,)),
-        frozen_array(high, (6,)),
+        frozen_array(low, low.shape),
+        frozen_array(high, high.shape),
         math.inf,
         turns.reference,
     )
@@ -316,7 +317,8 @@ def _design(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover) -> P
         NotJudgedError: it is not judged, or its loops are not closed at the first point.
     """
     first = cover.points(cover.pieces[:1], 0.0)[0]
-    design = replace(build_problem(case, closed.model, box, first), cover=cover)
+    near = partial(unknowns_at, case, closed, box.pose(first))
+    design = replace(build_problem(case, closed.model, box, first, near), cover=cover)
     # An equation of a number that hardly changes counts as one that follows from others, but must hold.
     if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
         raise NotJudgedError("its loops could not be closed at the first point of the path")
@@ -404,18 +406,19 @@ def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Plac
         points = [cover.points(pieces, part)[:, free] for part in _SAMPLES]
         values = np.stack([np.sign(signs.computed(each)) for each in points], axis=1)
         for k, j in np.argwhere(values[:, :-1] * values[:, 1:] < 0).tolist():
-            segment, low, high = int(pieces[k, 0]), _SAMPLES[j], _SAMPLES[j + 1]
+            low, high = _SAMPLES[j], _SAMPLES[j + 1]
             if signs.proved(points[j][k]) * signs.proved(points[j + 1][k]) >= 0:
                 continue
             ends = np.linspace(low, high, _PARTS + 1)
-            boxes = cover.boxes(np.stack([np.full(_PARTS, segment), ends[:-1], ends[1:]], axis=1))
+            ends = pieces[k, 1] + ends * (pieces[k, 2] - pieces[k, 1])
+            boxes = cover.boxes(np.stack([np.full(_PARTS, pieces[k, 0]), ends[:-1], ends[1:]], axis=1))
             if not signs.has_values(*(each[:, free] for each in boxes)):
                 continue
             for _ in range(_STEPS):
                 middle = 0.5 * (low + high)
                 sign = np.sign(signs.computed(cover.points(pieces[k : k + 1], middle)[:, free])[0])
                 low, high = (middle, high) if sign == values[k, j] else (low, middle)
-            return Place(segment, high)
+            return place_in(pieces[k], high)
     return None
 
 

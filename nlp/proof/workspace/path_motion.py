@@ -68,9 +68,7 @@ def _wider(number: PathSpeeds, cover: PathCover) -> FloatArray:
     problem = number.problem
     if not problem.names or problem.problem.dependent:
         return np.zeros(number.count)
-    rng = np.random.default_rng(_SEED)
-    k, s = rng.integers(0, len(cover.pieces), _POINTS), rng.random(_POINTS)
-    z = problem.path_points(cover, np.stack([k, s, s], axis=1), 0.0)
+    z = problem.path_points(cover, cover.random(_POINTS, np.random.default_rng(_SEED)), 0.0)
     beyond = number.values(problem.exact(z)) - number.bounds(z, z)
     return np.asarray(np.nan_to_num(beyond, posinf=0.0).max(axis=0))
 

@@ -16,10 +16,11 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, axis_angle_from_matrix
-from ....models.joints.closedform import ClosedForm, closed_form
+from ....models.joints.closedform import ClosedForm
 from ...case.case import Case
 from ...case.motors import Motor, MotorNumber
 from ...case.task import Sense
+from ...case.workspace import TurnKind
 from ...errors import InputError, UncoveredError
 from ...evidence.inverse import InversePoses, inverse
 from ...path.path import Poses
@@ -30,7 +31,8 @@ from .numbers.expressions import Expressions
 from .numbers.machines import Machines
 from .numbers.motors import Motors
 from .numbers.searched import Subject
-from .path_judge import PathJudgement
+from .path_closing import closed_form_along
+from .path_judge import PathJudgement, covered
 from .robot.path_cover import Place
 from .robot.pose_box import PoseNumbers, pose_box
 from .robot.posed_robot import NotJudgedError, build_problem
@@ -151,16 +153,17 @@ def _numbers(
     judged: PathJudgement, poses: Poses, joints: InversePoses | None
 ) -> tuple[tuple[SampledNumber, ...], tuple[str, ...]]:
     """Return the numbers of claims at poses, and the keys of limits without values."""
-    case, closed = judged.case, closed_form(judged.case.model)
+    case, closed = judged.case, closed_form_along(judged.case, judged.path)
     motors, lost = list(motor_claims(case)), list[Claim]()
     if judged.path.is_timed:  # then speeds are those of the path, and powers of [motion] are not asked for
         lost = [each for each in motors if each.motor and each.motor.number is MotorNumber.POWER]
         motors = [each for each in motors if each.motor and each.motor.number is MotorNumber.FORCE]
     claims = [*searched_claims(case), *motors]
     keys = [each.key for each in (*claims, *lost) if each.limit is not None]
-    if case.workspace is None or (joints is None and closed.model.unknowns):
+    if joints is None and closed.model.unknowns:
         return (), tuple(dict.fromkeys(keys))
-    box = pose_box(case.workspace)
+    is_rpy = case.workspace is not None and case.workspace.turns.kind is TurnKind.ROLL_PITCH_YAW
+    box = pose_box(case.workspace) if case.workspace is not None and is_rpy else covered(judged.path)[1]
     turns = [axis_angle_from_matrix(each) for each in poses.rotations]
     pairs = zip(poses.positions, poses.rotations, turns, strict=True)
     at = np.array([box.coordinates(PoseNumbers(p, R, *turn)) for p, R, turn in pairs])

@@ -291,9 +291,10 @@ class SmallestValues(LoopRule):
             self._best = _Best(np.where(better, least, known), np.where(better[:, None], z[first], at), places)
 
     def is_one_assembly(self) -> bool:
-        """Return whether all boxes surely have the assembly of the middle."""
-        if not self._roots:
-            return True
+        """Return whether all boxes surely have the assembly of the middle, or of the first point of a path."""
+        # A path may come back to a pose with other joints, such as those that have turned all round.
+        if not self._roots or self._problem.cover is not None:
+            return super().is_one_assembly()
         roots, start = joined(self._roots), self._problem.start
         inside = (roots.lower <= start) & (roots.upper >= start)
         here, same = (inside[:, list(which)].all(axis=1) for which in (self._independent, self._problem.dependent))
@@ -312,15 +313,21 @@ class SmallestValues(LoopRule):
 
         reason = effort.run(search, ending)
         bounds = np.min([self._closed, *(each.more.more.min(axis=0) for each in search.state.left)], axis=0)
-        if np.isfinite(bounds).any() and not self.is_one_assembly():
+        values, until = self._best.value, self.assembled_until()
+        if self._problem.cover is None and np.isfinite(bounds).any() and not self.is_one_assembly():
             reason, bounds = APART, np.full(len(bounds), -np.inf)
+        elif until < (math.inf, 0.0):
+            # Joints beyond may be those of another assembly, and so are numbers.
+            reason, bounds = reason or APART, np.full(len(bounds), -np.inf)
+            is_beyond = [tuple(where) > until for where in self._best.where.tolist()]
+            values = np.where(is_beyond, np.inf, values)
         return [
             Minimum(
                 min(bound, value) if bound < math.inf else -math.inf,
                 *(value, at, search.boxes, search.left, effort.seconds, reason),
                 None if self._problem.cover is None else Place(int(where[0]), float(where[1])),
             )
-            for bound, value, at, where in zip(bounds.tolist(), self._best.value.tolist(), *self._best[1:], strict=True)
+            for bound, value, at, where in zip(bounds.tolist(), values.tolist(), *self._best[1:], strict=True)
         ]
 
 

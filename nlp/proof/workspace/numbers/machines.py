@@ -83,7 +83,8 @@ class Machines:
         self.case, self._model, self._at = case, closed.model, pose_coordinates(design.box)
         tolerance = case.joint_centre_tolerance or 0.0
         try:
-            self.built = built_model(case.model) if tolerance else BuiltModel(closed.model, (), closed.reaches)
+            bare = BuiltModel(closed.model, (), closed.reaches)
+            self.built = built_model(case.model, with_angles=closed.has_angles) if tolerance else bare
         except RobotError as error:
             raise NotJudgedError(str(error)) from None
         self.family: Problem = family_of(case, self.built, design, tolerance)

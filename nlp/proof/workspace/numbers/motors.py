@@ -236,7 +236,7 @@ def _parts_of(case: Case, claim: Claim) -> list[_Part]:
 
 
 def path_twist(problem: Problem) -> SX:
-    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its numbers in the motion of a path.
+    """Return the platform's twist ``(v, length omega)`` (6, 1) by the rates of its pose in the motion of a path.
 
     Raises:
         NotJudgedError: some follow from others.
@@ -244,12 +244,10 @@ def path_twist(problem: Problem) -> SX:
     if problem.box.dependent:
         raise NotJudgedError("the platform's twist along the path has dependent components")
     rates = SX(6, 1)
-    rates[list(problem.free)] = problem.z[list(problem.rates), :]
-    turn = problem.box.symbols(problem.z)[3:]
+    rates[problem.rated] = problem.z[list(problem.rates), :]
     if problem.box.kind is not TurnKind.ROLL_PITCH_YAW:
-        omega = 2 * (rates[3:] + ca.cross(turn, rates[3:])) / (1 + ca.sumsqr(turn))
-        return ca.vertcat(rates[:3], problem.length * omega)
-    _, b, c = (2 * ca.atan(t) for t in ca.vertsplit(turn))
+        return ca.vertcat(rates[:3], problem.length * rates[3:])
+    _, b, c = (2 * ca.atan(t) for t in ca.vertsplit(problem.box.symbols(problem.z)[3:]))
     about_x = ca.vertcat(ca.cos(c) * ca.cos(b), ca.sin(c) * ca.cos(b), -ca.sin(b))
     about_y = ca.vertcat(-ca.sin(c), ca.cos(c), 0)
     omega = about_x * rates[3] + about_y * rates[4] + ca.vertcat(0, 0, rates[5])

@@ -1,7 +1,8 @@
 """Speeds of actuators along a path whose motion is known: coordinates of actuators by rates of the pose's numbers.
 
-The rates w of the free numbers of the pose are coordinates of the search, which a piece of the path determines. With
-the loop equations ``L(X, u) = 0`` for the passive joints u that have no closed form, and ``X' = X'(X, w)``,
+The rates w of the pose, of its free numbers or its angular velocity, are coordinates of the search, which a piece of
+the path determines. With the loop equations ``L(X, u) = 0`` for the passive joints u that have no closed form, and
+``X' = X'(X, w)``,
 
     L_u u' = -L_X X',        q' = q_X X' + q_u u'
 
@@ -28,20 +29,20 @@ from .quadratic_forms import Quadratics, solved
 
 
 def with_rates(problem: Problem, cover: PathCover) -> Problem:
-    """Return the same machines along a path, with rates of the pose's free numbers as further coordinates."""
-    return _with(problem, cover, ca.vertcat(SX(0, 1), *[SX.sym(f"rate{problem.free[j]}") for j in problem.stated]))
+    """Return the same machines along a path, with rates of the pose as further coordinates."""
+    return _with(problem, cover, ca.vertcat(SX(0, 1), *[SX.sym(f"rate{k}") for k in problem.rated]))
 
 
 def _with(problem: Problem, cover: PathCover, rates: SX) -> Problem:
-    """Return the same machines with symbols (f, 1) of the rates."""
-    free, n = [problem.free[j] for j in problem.stated], len(problem.start) - len(problem.of_errors)
-    ends = [each[:, free] for each in cover.rates(cover.pieces)]
+    """Return the same machines with symbols of the rates."""
+    rated, n = problem.rated, len(problem.start) - len(problem.of_errors)
+    ends = [each[:, rated] for each in cover.rates(cover.pieces)]
     largest = np.abs(np.concatenate(ends)).max(axis=0)
-    first = [each[0, free] for each in cover.rates(np.zeros((1, 3)))]
+    first = [each[0, rated] for each in cover.rates(np.zeros((1, 3)))]
     (start, size), loops = (problem.start, problem.size), problem.loops
     z = ca.vertcat(problem.z[:n, :], rates, problem.z[n:, :])
     whole = np.concatenate([size[:n], np.where(largest > 0, largest, 1.0), size[n:]])
-    own = tuple(range(n, n + len(free)))
+    own = tuple(range(n, n + len(rated)))
     # Errors stay the last coordinates.
     return replace(
         problem,
@@ -104,13 +105,13 @@ def pose_rates(problem: Problem) -> SX:
 
     Dependent coordinates have 0: their rates follow from the loops.
     """
-    rates = iter(ca.vertsplit(problem.z[list(problem.rates), :]))
-    has_angles = problem.box.kind is TurnKind.ROLL_PITCH_YAW
-    angles = [problem.z[j] if k >= 3 and has_angles else None for j, k in enumerate(problem.free)]
-    return ca.vertcat(
-        SX(0, 1),
-        *[
-            SX(0) if j not in problem.stated else next(rates) if t is None else 0.5 * (1 + t * t) * next(rates)
-            for j, t in enumerate(angles)
-        ],
-    )
+    rates, y = SX(6, 1), problem.box.symbols(problem.z)
+    rates[problem.rated] = problem.z[list(problem.rates), :]
+    velocity, turn, w = rates[:3], y[3:], rates[3:]
+    if problem.box.kind is TurnKind.ROLL_PITCH_YAW:
+        turned = 0.5 * (1 + turn * turn) * w
+    elif turn.numel() > 3:  # a quaternion of any size, which may change along itself
+        turned = 0.5 * ca.vertcat(-ca.dot(w, turn[1:]), turn[0] * w + ca.cross(w, turn[1:]))
+    else:
+        turned = 0.5 * (w + ca.cross(w, turn) + ca.dot(w, turn) * turn)
+    return ca.vertcat(velocity, turned)[list(problem.free), :]

@@ -250,9 +250,7 @@ def _asked_gap(subject: Subject, number: SingularValues | Clearance, gap: float)
 
 def _points_of_path(problem: Problem, cover: PathCover) -> FloatArray:
     """Return coordinates (P, c) at random places of a path."""
-    rng = np.random.default_rng(_SEED)
-    k, s = rng.integers(0, len(cover.pieces), 2 * _POINTS), rng.random(2 * _POINTS)
-    return problem.path_points(cover, np.stack([k, s, s], axis=1), 0.0)
+    return problem.path_points(cover, cover.random(2 * _POINTS, np.random.default_rng(_SEED)), 0.0)
 
 
 def _free_points(problem: Problem) -> FloatArray:

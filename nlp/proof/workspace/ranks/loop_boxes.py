@@ -8,8 +8,9 @@ pose is that of the other. All boxes have one where each is reached from the fir
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import casadi as ca
@@ -19,13 +20,13 @@ from casadi import SX
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....evidence.closed_loops import inverses
-from ...boxes.engine import MOST_VARIABLES
 from ...boxes.search import Boxes, Order, Rule, Search, bisected, joined, some
 from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Encloser, Forms
 from ..robot.path_cover import PathCover
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
+from .followed import closed_along
 from .krawczyk import Coordinates, Relation, by_centres, no_relation, relation_of, with_relation
 from .rank_rule import EntryChange, RankTest, Tested, is_polynomial, not_regular
 
@@ -45,6 +46,8 @@ _LEAST = 1e-10
 _MOST = 1.0
 #: Part of itself by which an end of a dependent coordinate moves outwards: several roundings.
 _ROUNDING = 1e-14
+#: Factor of a sum that is more than its rounding.
+_UP = 1 + 1e-12
 #: Width of a coordinate along a path, as a part of its size, and of at least 1 of rotations, up to which it is fixed.
 _FIXED = 1e-11
 #: Part of their widths by which computed dependent coordinates may be beyond their ends: rounding of Newton's method.
@@ -53,6 +56,8 @@ _CLOSE = 1e-9
 _CONTRACTIONS = 3
 #: Reason for which nothing is claimed although every box is closed.
 APART = "the assemblies in two neighbouring boxes are not proved to be the same"
+#: Most independent coordinates for which forms of second order are used: those of poses of a path, and their rates.
+_MOST_SECOND = 14
 #: Number of boxes beyond which pairs of them are too many, and number of pairs that are compared at once.
 _MANY, _PAIRS = 6000, 512
 
@@ -140,7 +145,7 @@ class Examiner:
         self.of = Coordinates(list(problem.independent), list(problem.dependent), problem.of_errors)
         self.second: Encloser | None = None
         self._change: EntryChange | None = None
-        is_short = not problem.dependent and len(problem.independent) <= MOST_VARIABLES
+        is_short = not problem.dependent and len(problem.independent) <= _MOST_SECOND
         # With errors, forms of second order are those of the polynomials of a matrix alone.
         is_rank = isinstance(test, RankTest)
         if is_short and (not problem.names or (is_rank and is_polynomial(test.entries, problem.z))):
@@ -251,13 +256,24 @@ class Examiner:
             one: (B,) boxes with known dependent coordinates.
             other: as many, whose independent coordinates overlap those of the first in pairs.
         """
-        own, D, _ = self.of
+        own = self.of.independent
         lower, upper = one.lower.copy(), one.upper.copy()
         place = 0.5 * np.maximum(one.lower, other.lower) + 0.5 * np.minimum(one.upper, other.upper)
         lower[:, own] = upper[:, own] = place[:, own]
+        return self.leads(one._replace(lower=lower, upper=upper), other)
+
+    def leads(self, part: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
+        """Return whether the closed points of parts of boxes are surely between the ends of others.
+
+        Args:
+            part: (B,) boxes with known dependent coordinates, with a smaller range of independent ones.
+            other: (B,) others.
+        """
+        D, (lower, upper) = self.of.dependent, (part.lower.copy(), part.upper.copy())
         for _ in range(_CONTRACTIONS):
             relation = relation_of(self._encloser(lower.T, upper.T).part(slice(0, len(D))), self.of)
-            lower[:, D], upper[:, D] = _parts(lower[:, D], upper[:, D], relation.off, relation.rho + relation.of_errors)
+            reach = np.abs(relation.T).sum(axis=2) * _UP + relation.rho + relation.of_errors
+            lower[:, D], upper[:, D] = _parts(lower[:, D], upper[:, D], relation.off, reach)
         return np.asarray(((lower >= other.lower) & (upper <= other.upper))[:, D].all(axis=1))
 
     def narrowed(self, boxes: LoopBoxes, relation: Relation, sides: FloatArray) -> LoopBoxes:
@@ -324,36 +340,6 @@ def _whole_path(problem: Problem, cover: PathCover) -> LoopBoxes:
     ends[:, :, problem.of_errors] = np.array([[[-problem.tolerance]], [[problem.tolerance]]])
     ends[:, :, list(problem.dependent)] = np.nan
     return LoopBoxes(ends[0], ends[1], closed_along(problem, cover), np.full(count, not problem.dependent))
-
-
-def closed_along(problem: Problem, cover: PathCover) -> FloatArray:
-    """Return closed points (N, n) of the design in the middle of segments, or in one before where one is lost."""
-    near, D = np.repeat(problem.start[None], len(cover.pieces), axis=0), list(problem.dependent)
-    if D:
-        design = problem.problem
-        free, followed = len(problem.free), _followed(design.resting or design, cover)
-        near[:, D], near[:, :free] = followed[:, D], followed[:, :free]
-    return near
-
-
-@lru_cache(maxsize=2)
-def _followed(problem: Problem, cover: PathCover) -> FloatArray:
-    """Return closed points (N, n) in the middle of segments, each from the one before; the start where one is lost.
-
-    The searches of one path share them.
-    """
-    near, D, stated = np.repeat(problem.start[None], len(cover.pieces), axis=0), problem.dependent, problem.stated
-    z = problem.start.copy()
-    points = [cover.points(cover.pieces, part)[:, [problem.free[j] for j in stated]] for part in (0.5, 1.0)]
-    for k, both in enumerate(zip(*points, strict=True)):
-        for point in both:
-            moved = z.copy()
-            moved[stated] = point
-            moved = problem.loops.all_closed(moved[:, None], D)[:, 0]
-            z = moved if np.isfinite(moved).all() else z
-            near[k] = z if point is both[0] else near[k]
-    near.flags.writeable = False
-    return near
 
 
 def contracted_boxes(problem: Problem, boxes: LoopBoxes) -> tuple[LoopBoxes, NDArray[np.bool_]]:
@@ -531,12 +517,7 @@ class LoopRule(Rule[Followed]):
         roots = joined(self._roots)
         count = len(roots.lower)
         if self._problem.cover is not None:
-            # Pieces in the order of the path: each has a point in common with the next one, and the first the start.
-            ordered, start = some(roots, np.lexsort(joined(self._root_pieces).T[[1, 0]])), self._problem.start
-            if not ((ordered.lower[0] <= start) & (start <= ordered.upper[0])).all():
-                return False
-            blocks = [np.arange(k, min(k + _PAIRS, count - 1)) for k in range(0, count - 1, _PAIRS)]
-            return all(bool(self._are_tied(some(ordered, k), some(ordered, k + 1)).all()) for k in blocks)
+            return self.assembled_until() >= (math.inf, 0.0)
         if count > _MANY:
             return False
         lower, upper = roots.lower[:, self._independent], roots.upper[:, self._independent]
@@ -547,13 +528,53 @@ class LoopRule(Rule[Followed]):
         pairs = np.stack([np.repeat(np.arange(count), [len(each) for each in touching]), np.concatenate(touching)])
         return bool(one_assembly(self._examiner, roots, pairs.T, np.arange(count) == 0).all())
 
-    def _are_tied(self, one: LoopBoxes, other: LoopBoxes) -> NDArray[np.bool_]:
-        """Return whether boxes (B,) have a pose in common, and there the same closed point as others."""
-        # Rates may jump from a segment to the next.
-        own = [k for k in self._independent if k not in self._problem.rates]
-        meet = ((one.lower <= other.upper) & (other.lower <= one.upper))[:, own].all(axis=1)
-        # The closed point of a small box is found to be between the ends of a large one, not the other way.
-        return np.asarray(meet & (self._examiner.tied(one, other) | self._examiner.tied(other, one)))
+    def assembled_until(self) -> tuple[float, float]:
+        """Return the place of a path up to which boxes surely belong to the assembly of its start; infinite for all."""
+        cover, start = self._problem.cover, self._problem.start
+        if cover is None or not self._roots:
+            return math.inf, 0.0
+        # Pieces in the order of the path: each holds the first point of the next one, and the first the start.
+        roots, along = joined(self._roots), joined(self._root_pieces)
+        order = np.lexsort(along.T[[1, 0]])
+        ordered, along = some(roots, order), along[order]
+        if not ((ordered.lower[0] <= start) & (start <= ordered.upper[0])).all():
+            return 0.0, 0.0
+        for begin in range(0, len(along) - 1, _PAIRS):
+            k = np.arange(begin, min(begin + _PAIRS, len(along) - 1))
+            tied = self._are_tied(cover, [some(ordered, k + j) for j in (0, 1)], [along[k + j] for j in (0, 1)])
+            if not tied.all():
+                last = along[k[int(np.argmin(tied))]]
+                return float(last[0]), float(last[2])
+        return math.inf, 0.0
+
+    def _are_tied(
+        self, cover: PathCover, boxes: Sequence[LoopBoxes], pieces: Sequence[FloatArray]
+    ) -> NDArray[np.bool_]:
+        """Return whether boxes of a path have the first point of the next ones, and there the same closed point.
+
+        Args:
+            cover: of the path.
+            boxes: (B,) of pieces, and of the next ones.
+            pieces: (B, 3) these.
+        """
+        (one, other), (before, after) = boxes, pieces
+        (k, low, high), (segment, s, _) = before.T, after.T
+        is_next = (segment == k + 1) & (s == 0) & (high == 1)
+        meet = is_next | ((segment == k) & (low <= s) & (s <= high))
+        end = np.stack([k, np.where(is_next, 1.0, s), np.where(is_next, 1.0, s)], axis=1)
+        start = np.stack([segment, s, s], axis=1)
+        # The closed point of a small box is found to be between the ends of a large one, not the other way. In the two
+        # boxes the pose may have other coordinates.
+        parts = self._at(cover, one, end, before), self._at(cover, other, start, after)
+        return np.asarray(meet & (self._examiner.leads(parts[0], other) | self._examiner.leads(parts[1], one)))
+
+    def _at(self, cover: PathCover, boxes: LoopBoxes, points: FloatArray, pieces: FloatArray) -> LoopBoxes:
+        """Return boxes (B,) of pieces (B, 3) of a path with the poses at points of these, pieces without a length."""
+        own = [j for j in self._independent if j < len(self._problem.free)]
+        low, high = (each[:, [self._problem.free[j] for j in own]] for each in cover.boxes(points, pieces))
+        lower, upper = boxes.lower.copy(), boxes.upper.copy()
+        lower[:, own], upper[:, own] = np.maximum(lower[:, own], low), np.minimum(upper[:, own], high)
+        return boxes._replace(lower=lower, upper=upper)
 
 
 def loop_boxes_of(boxes: Boxes[Followed]) -> LoopBoxes:

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .....models import FloatArray
-from .path_turns import TINY, PathTurns
+from .path_turns import TINY, PathTurns, divided
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 #: Part of the sizes of the numbers of a piece by which its ends move outwards: more than the rounding of its formulas.
 _OUTWARDS = 2.0**-48
-#: Number of segments whose points are computed at once.
+#: Number of pieces whose points are computed at once.
 _BLOCK = 2**15
 
 
@@ -29,6 +30,12 @@ class Place(NamedTuple):
 
     segment: int
     parameter: float
+
+
+def place_in(piece: FloatArray, part: float) -> Place:
+    """Return the place at a part, from 0 to 1, of a piece (3,)."""
+    segment, low, high = piece.tolist()
+    return Place(int(segment), low + part * (high - low) if part < 1 else high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,19 +56,27 @@ class PathCover:
     turns: PathTurns
     seconds: FloatArray
 
-    @property
+    @cached_property
     def pieces(self) -> FloatArray:
-        """The whole segments as pieces (N, 3): index, and ends of the parameter."""
+        """The segments as pieces (M, 3): index, and ends of the parameter; those that turn far in equal parts."""
         count = len(self.knots) - 1
-        return np.stack([np.arange(count), np.zeros(count), np.ones(count)], axis=1).astype(float)
+        parts = np.ones(count) if self.turns.counts is None else self.turns.counts.astype(float)
+        rows, ends = divided(np.tile([0.0, 1.0], (count, 1)), parts)
+        found = np.concatenate([rows[:, None], ends], axis=1)
+        found.flags.writeable = False
+        return found
 
     def blocks(self) -> Iterator[slice]:
-        """Yield the places of the segments in blocks, so that a long path needs little memory."""
-        count = len(self.knots) - 1
-        return (slice(begin, begin + _BLOCK) for begin in range(0, count, _BLOCK))
+        """Yield the places of these pieces in blocks, so that a long path needs little memory."""
+        return (slice(begin, begin + _BLOCK) for begin in range(0, len(self.pieces), _BLOCK))
 
-    def boxes(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of boxes that cover pieces (B, 3)."""
+    def boxes(self, pieces: FloatArray, within: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, c) of boxes that cover pieces (B, 3).
+
+        Args:
+            pieces: indices of segments, and ends of the parameter.
+            within: (B, 3) pieces whose references of rotations are used; the pieces themselves if left out.
+        """
         k = pieces[:, 0].astype(int)
         start, change = self.knots[k], self.knots[k + 1] - self.knots[k]
         ends = [start + s[:, None] * change for s in (pieces[:, 1], pieces[:, 2])]
@@ -86,13 +101,13 @@ class PathCover:
             for end, knots in enumerate((start, self.knots[k + 1])):
                 at = arcs[s[:, end] == end]
                 low[at], high[at] = np.minimum(low[at], knots[at]), np.maximum(high[at], knots[at])
-        turns = self.turns.boxes(k, pieces[:, 1:])
+        turns = self.turns.boxes(k, pieces[:, 1:], None if within is None else within[:, 1:])
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def derivatives(self, pieces: FloatArray, order: int = 1) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of derivatives of the pose's numbers by the parameter, over pieces (B, 3).
+        """Return the ends (B, 6) of derivatives of the pose by the parameter, over pieces (B, 3).
 
-        They are of positions, and of Cayley vectors, or of the angles roll, pitch and yaw.
+        They are of positions, and of the angles roll, pitch and yaw, or else angular velocities in the world frame.
 
         Args:
             pieces: indices of segments, and ends of the parameter.
@@ -124,15 +139,22 @@ class PathCover:
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def rates(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, 6) of the rates of the pose's numbers, by seconds, over pieces (B, 3)."""
+        """Return the ends (B, 6) of these derivatives by seconds, over pieces (B, 3)."""
         seconds = self.seconds[pieces[:, 0].astype(int), None]
         low, high = (each / seconds for each in self.derivatives(pieces))
         return low - _OUTWARDS * np.abs(low), high + _OUTWARDS * np.abs(high)
 
+    def random(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """Return random points of the path as pieces (count, 3) without a length."""
+        rows, part = rng.integers(0, len(self.pieces), count), rng.random(count)
+        k, low, high = self.pieces[rows].T
+        s = low + part * (high - low)
+        return np.stack([k, s, s], axis=1)
+
     def points(self, pieces: FloatArray, part: float) -> FloatArray:
-        """Return coordinates (B, 6) of computed points of pieces."""
+        """Return coordinates (B, c) of computed points of pieces."""
         s = pieces[:, 1] + part * (pieces[:, 2] - pieces[:, 1])
-        low, high = self.boxes(np.stack([pieces[:, 0], s, s], axis=1))
+        low, high = self.boxes(np.stack([pieces[:, 0], s, s], axis=1), pieces)
         return 0.5 * low + 0.5 * high
 
 

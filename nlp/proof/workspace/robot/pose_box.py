@@ -1,10 +1,11 @@
-"""A box of poses in the coordinates of the search: three of position, three of rotation.
+"""A box of poses in the coordinates of the search: three of position, three or four of rotation.
 
 Rotations are covered in coordinates in which ``s R``, with a positive number ``s``, is a polynomial:
 
 * any axis: Cayley vector ``tan(angle / 2) axis``, within a ball, of the turn that follows a reference;
 * one axis: ``tan(angle / 2)``, the first of the three coordinates;
-* roll, pitch and yaw: the tangents of half of each.
+* roll, pitch and yaw: the tangents of half of each;
+* all rotations: a quaternion ``(w, x, y, z)`` of any size but zero.
 
 Ends are moved outwards by rounding, so that the box of coordinates holds every pose of the workspace.
 """
@@ -64,7 +65,7 @@ class PoseBox:
     Attributes:
         kind: coordinates of rotations.
         axis: (3,) unit axis of rotations about one axis.
-        lower, upper: (6,) ends of the coordinates: position, then rotation.
+        lower, upper: (c,) ends of the coordinates: position, then rotation. There are six, or seven with quaternions.
         ball: largest squared size of a Cayley vector, rounded up; infinite where rotations are no ball.
         reference: the rotation with the Cayley vector zero.
         dependent: indices of the coordinates that follow from the others: their ends are where a search begins, and
@@ -85,7 +86,7 @@ class PoseBox:
         return tuple(np.flatnonzero(self.upper > self.lower).tolist())
 
     def symbols(self, z: SX) -> SX:
-        """Return the six coordinates (6, 1), of which those that vary are the first symbols of z (n, 1)."""
+        """Return the coordinates (c, 1), of which those that vary are the first symbols of z (n, 1)."""
         y = SX((0.5 * self.lower + 0.5 * self.upper).tolist())
         y[list(self.free)] = z[: len(self.free)]
         return y
@@ -96,7 +97,7 @@ class PoseBox:
 
         Ends of rotations are about 4 roundings outwards; the ball's square as many again.
         """
-        sizes = np.maximum(np.abs(self.lower), np.abs(self.upper)) * np.repeat([0.0, 1.0], 3)
+        sizes = np.maximum(np.abs(self.lower), np.abs(self.upper)) * (np.arange(len(self.lower)) > 2)
         slack = np.where(self.upper > self.lower, 8 * _TANGENT * sizes, 0.0)
         lower, upper = self.lower + slack, self.upper - slack
         lower[list(self.dependent)], upper[list(self.dependent)] = -np.inf, np.inf
@@ -113,31 +114,33 @@ class PoseBox:
         return [k for k in range(3, 6) if k not in self.dependent]
 
     def holds(self, y: FloatArray) -> NDArray[np.bool_]:
-        """Return whether points (..., 6) are surely poses of the workspace, not only of the box rounded outwards."""
+        """Return whether points (..., c) are surely poses of the workspace, not only of the box rounded outwards."""
         lower, upper, ball = self._inner
         inside = ((y >= lower) & (y <= upper)).all(axis=-1)
         return np.asarray(inside & (np.square(y[..., self._turns]).sum(axis=-1) <= ball))
 
     def rotations(self, points: FloatArray) -> FloatArray:
-        """Return the rotation matrices (K, 3, 3) at points (K, 6)."""
-        turn = SX.sym("turn", 3)
+        """Return the rotation matrices (K, 3, 3) at points (K, c)."""
+        turn = SX.sym("turn", points.shape[1] - 3)
         return values_at(ca.Function("rotation", [turn], [ca.densify(rotation_of(self, turn))]), points[:, 3:])[0]
 
     def pose(self, y: FloatArray) -> PoseNumbers:
-        """Return the pose at a point (6,)."""
+        """Return the pose at a point (c,)."""
         rotation = self.rotations(y[None])[0]
         axis, angle = axis_angle_from_matrix(rotation)
         return PoseNumbers(frozen_array(y[:3], (3,)), rotation, axis, angle)
 
     def coordinates(self, pose: PoseNumbers) -> FloatArray:
-        """Return the point (6,) of a pose, which is one of this box: fixed coordinates are those of the box."""
+        """Return the point (c,) of a pose, which is one of this box: fixed coordinates are those of the box."""
         turn = self._turn(pose)
         y = np.concatenate([pose.position, turn])
         return np.asarray(np.where(self.lower == self.upper, self.lower, y))
 
     def _turn(self, pose: PoseNumbers) -> FloatArray:
-        """Return the coordinates (3,) of a pose's rotation."""
+        """Return the coordinates (3,) or (4,) of a pose's rotation."""
         R = pose.rotation
+        if len(self.lower) > 6:
+            return np.append(math.cos(pose.angle / 2), math.sin(pose.angle / 2) * pose.axis)
         if self.kind is not TurnKind.ROLL_PITCH_YAW:
             axis, angle = pose.axis, pose.angle
             if self.reference != UNTURNED:
@@ -153,7 +156,7 @@ class PoseBox:
         return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Return boxes (B, 6) with their ends moved to the ball of rotations, and whether nothing is left, (B,)."""
+        """Return boxes (B, c) with their ends moved to the ball of rotations, and whether nothing is left, (B,)."""
         lower, upper = np.array(lower), np.array(upper)
         if not self.ball < np.inf:
             return lower, upper, np.zeros(len(lower), dtype=bool)
@@ -248,7 +251,10 @@ def _tangent(angle: float, outwards: float) -> float:
 
 
 def rotation_of(box: PoseBox, turn: SX) -> SX:
-    """Return the rotation (3, 3) with coordinates (3, 1) of a box."""
+    """Return the rotation (3, 3) with coordinates (3, 1) or (4, 1) of a box."""
+    if turn.numel() > 3:
+        turned, scale = quaternion_rotation(turn)
+        return turned / scale
     if box.kind is TurnKind.ROLL_PITCH_YAW:
         factors = [2 / (1 + turn[k] * turn[k]) for k in range(3)]
         about = [turn_about(k, factor - 1, factor * turn[k]) for k, factor in enumerate(factors)]
@@ -263,7 +269,9 @@ def rotation_of(box: PoseBox, turn: SX) -> SX:
 
 
 def polynomial_rotation(box: PoseBox, turn: SX) -> tuple[SX, SX]:
-    """Return ``s R`` (3, 3) and ``s`` (1, 1), polynomials of the coordinates (3, 1) of a rotation R, ``s > 0``."""
+    """Return ``s R`` (3, 3) and ``s`` (1, 1), polynomials of the coordinates of a rotation R, ``s > 0``."""
+    if turn.numel() > 3:
+        return quaternion_rotation(turn)
     if box.kind is TurnKind.ROLL_PITCH_YAW:
         turned, scale = SX.eye(3), SX(1)
         for k in range(3):
@@ -284,5 +292,11 @@ def _reference_matrix(reference: Reference) -> tuple[FloatArray, float]:
 
 def cayley_rotation(r: SX) -> tuple[SX, SX]:
     """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a Cayley vector (3, 1)."""
-    square = ca.sumsqr(r)
-    return (1 - square) * SX.eye(3) + 2 * (r @ r.T) + 2 * ca.skew(r), 1 + square
+    return quaternion_rotation(ca.vertcat(1, r))
+
+
+def quaternion_rotation(y: SX) -> tuple[SX, SX]:
+    """Return ``s R`` (3, 3) and ``s`` (1, 1) of the rotation R with a quaternion (4, 1) of any size but zero."""
+    w, v = y[0], y[1:]
+    square = ca.sumsqr(v)
+    return (w * w - square) * SX.eye(3) + 2 * (v @ v.T) + 2 * w * ca.skew(v), w * w + square

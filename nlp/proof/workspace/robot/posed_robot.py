@@ -11,7 +11,7 @@ the error of a centre, a vector, changes it by at most the vector's length times
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import casadi as ca
@@ -22,6 +22,7 @@ from .....models import FloatArray, Model, frozen_array
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
+from ....case.workspace import TurnKind
 from ....evidence.closed_loops import DEPENDENT, Loops, closed_from_home
 from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
@@ -56,7 +57,7 @@ class Problem:
     Attributes:
         box: the poses.
         loops: k equations in the coordinates; errors are the last ones.
-        free: indices of the pose's numbers, among the six of the box, that are the first coordinates.
+        free: indices of the pose's numbers, among those of the box, that are the first coordinates.
         independent, dependent: indices of the coordinates of the design, of which k are dependent.
         start: (n,) closed loops of the design at the middle of the workspace, or near it.
         locked: rows and members with the actuators locked.
@@ -67,8 +68,8 @@ class Problem:
         tolerance: largest size of each error, length.
         design: the design alone, of all machines.
         cover: of the path that is meant; None for the whole box.
-        rates: indices of the coordinates that are rates, by seconds, of the pose's numbers in the path's motion: of
-            positions and angles. There is one for each free number that is independent, or none.
+        rates: indices of the coordinates that are rates, by seconds, of the pose in the path's motion: those of
+            :attr:`rated`, or none.
         resting: the design without rates, of a design with them.
     """
 
@@ -136,28 +137,38 @@ class Problem:
         return self.z[len(self.start) - 3 * len(self.names) :, :]
 
     @property
+    def rated(self) -> list[int]:
+        """Rates that a path has, among those of :meth:`.path_cover.PathCover.rates`."""
+        stated = [self.free[j] for j in self.stated]
+        turns = [k for k in stated if k >= 3]
+        if turns and self.box.kind is not TurnKind.ROLL_PITCH_YAW:
+            turns = [3, 4, 5]
+        return [k for k in stated if k < 3] + turns
+
+    @property
     def of_path(self) -> list[int]:
         """Indices of the coordinates that a place of a path determines."""
         return [*self.stated, *self.rates]
 
-    def path_boxes(self, cover: PathCover, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the ends (B, c) of these coordinates over pieces (B, 3) of a path."""
-        chosen = [self.free[j] for j in self.stated]
-        low, high = (each[:, chosen] for each in cover.boxes(pieces))
+    def path_boxes(
+        self, cover: PathCover, pieces: FloatArray, within: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, c) of these coordinates over pieces (B, 3) of a path; see :meth:`.PathCover.boxes`."""
+        low, high = (each[:, [self.free[j] for j in self.stated]] for each in cover.boxes(pieces, within))
         if self.rates:
-            slow, fast = (each[:, chosen] for each in cover.rates(pieces))
+            slow, fast = (each[:, self.rated] for each in cover.rates(pieces))
             low, high = np.hstack([low, slow]), np.hstack([high, fast])
         return low, high
 
     def path_points(self, cover: PathCover, pieces: FloatArray, part: float) -> FloatArray:
         """Return these coordinates (B, c) at computed points of pieces."""
         s = pieces[:, 1] + part * (pieces[:, 2] - pieces[:, 1])
-        low, high = self.path_boxes(cover, np.stack([pieces[:, 0], s, s], axis=1))
+        low, high = self.path_boxes(cover, np.stack([pieces[:, 0], s, s], axis=1), pieces)
         return 0.5 * low + 0.5 * high
 
     def pose_of(self, z: FloatArray) -> FloatArray:
-        """Return the six coordinates of the pose (..., 6) at points (..., n)."""
-        y = np.broadcast_to(0.5 * self.box.lower + 0.5 * self.box.upper, (*z.shape[:-1], 6)).copy()
+        """Return all coordinates of the pose (..., c) at points (..., n)."""
+        y = np.broadcast_to(0.5 * self.box.lower + 0.5 * self.box.upper, (*z.shape[:-1], len(self.box.lower))).copy()
         y[..., list(self.free)] = z[..., : len(self.free)]
         return y
 
@@ -179,7 +190,8 @@ class Problem:
     def within(self, z: FloatArray) -> FloatArray:
         """Return points (..., n) with the pose moved into the workspace, and the errors into the tolerance."""
         z = z.copy()
-        y = self.box.clipped(self.pose_of(z).reshape(-1, 6)).reshape(*z.shape[:-1], 6)
+        y = self.pose_of(z)
+        y = self.box.clipped(y.reshape(-1, y.shape[-1])).reshape(y.shape)
         z[..., : len(self.free)] = y[..., list(self.free)]
         errors = z[..., self.of_errors].reshape(*z.shape[:-1], len(self.names), 3)
         sizes, most = np.linalg.norm(errors, axis=-1, keepdims=True), INSIDE * self.tolerance
@@ -188,14 +200,22 @@ class Problem:
         return z
 
 
-def build_problem(case: Case, model: Model, box: PoseBox, at: FloatArray | None = None) -> Problem:
+def build_problem(
+    case: Case,
+    model: Model,
+    box: PoseBox,
+    at: FloatArray | None = None,
+    near: Callable[[], FloatArray | None] = lambda: None,
+) -> Problem:
     """Return a robot over a workspace.
 
     Args:
         case: with fixed dimensions.
         model: its robot, some of whose unknowns may have been replaced by expressions.
         box: the poses.
-        at: (6,) coordinates of the pose at which closed loops are looked for; the middle of the workspace if left out.
+        at: (c,) coordinates of the pose at which closed loops are looked for; the middle of the workspace if left out.
+        near: returns positions of the unknowns there, in the assembly of home; None where they are not known. It is
+            called where the straight way from those at home does not lead there.
 
     Raises:
         NotJudgedError: no closed loops are found there, or they leave a joint free.
@@ -205,6 +225,10 @@ def build_problem(case: Case, model: Model, box: PoseBox, at: FloatArray | None 
     at = 0.5 * (box.lower + box.upper) if at is None else at
     middle = np.concatenate([at[list(posed.free)], np.zeros(len(loops.size) - count)])
     start = closed_from_home(loops, middle, count)
+    if start is None and (unknowns := near()) is not None:
+        middle[count:] = unknowns
+        start = loops.all_closed(middle[:, None], range(count, len(middle)), zero=DEPENDENT)[:, 0]
+        start = start if loops.is_closed(start) else None
     if start is None:
         raise NotJudgedError("the loops could not be closed in the assembly of home in the middle of the workspace")
     needed = _needed(loops, start, count)

@@ -1,0 +1,55 @@
+"""Closed forms of the joints of a machine along a path, on which joints may turn all round.
+
+The formula of an angle jumps where the joint has turned by half a turn from home; the joint itself goes on. Where a
+joint comes near to that on a path, all angles are followed as unknowns, which have no jumps.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ....models import Dimension, FloatArray
+from ....models.joints.closedform import ClosedForm, closed_form
+from ...case.case import Case
+from ...errors import InputError
+from ...evidence.inverse import inverse
+from ...path.path import ProgrammedPath
+from ...path.sampling import spread_points
+from .robot.pose_box import PoseNumbers
+
+#: Number of points of a path at which joints are computed, and angle from home from which on they are followed.
+_POINTS, _FAR = 512, math.radians(150)
+
+
+def closed_form_along(case: Case, path: ProgrammedPath) -> ClosedForm:
+    """Return a robot with fixed dimensions without those unknowns that have a closed form all along a path."""
+    closed = closed_form(case.model)
+    left = {each.name for each in closed.model.unknowns}
+    names = [each.name for each in case.model.unknowns if each.dimension is Dimension.ANGLE and each.name not in left]
+    if not names:
+        return closed
+    try:
+        found = inverse(case, *path.poses_at(*spread_points(path, _POINTS)))
+    except InputError:
+        return closed
+    angles = found.unknowns[:, [found.joints.index(name) for name in names]]
+    angles = angles[np.isfinite(angles).all(axis=1)]
+    is_far = (np.abs(angles) > _FAR).any() or (np.abs(np.diff(angles, axis=0)) > np.pi).any()
+    return closed_form(case.model, with_angles=False) if is_far else closed
+
+
+def unknowns_at(case: Case, closed: ClosedForm, pose: PoseNumbers) -> FloatArray | None:
+    """Return the positions of a robot's unknowns at a pose to which a way of poses from home leads; None without one.
+
+    Angles are within half a turn from home.
+    """
+    try:
+        found = inverse(case, pose.position[None], pose.rotation[None])
+    except InputError:
+        return None
+    unknowns = found.unknowns[0, [found.joints.index(each.name) for each in closed.model.unknowns]]
+    angles = np.array([each.dimension is Dimension.ANGLE for each in closed.model.unknowns])
+    unknowns = np.where(angles, np.remainder(unknowns + np.pi, 2 * np.pi) - np.pi, unknowns)
+    return unknowns if np.isfinite(unknowns).all() else None
