@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from legs import Array, turned
-from robots import Chain, Robot, Turn, evaluated
+from robots import Chain, Robot, Turn, cross_matrix, evaluated
 
 Tables = dict[str, Any]
-#: Coordinates of a pose, with the rotation ``Rz(yaw) Ry(pitch) Rx(roll)``.
+#: Coordinates of a pose: with the rotation ``Rz(yaw) Ry(pitch) Rx(roll)``, or with its Cayley vector.
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+BALL = ("x", "y", "z", "cayley_x", "cayley_y", "cayley_z")
 #: Residual of loops, in parts of the robot's size and radians, at which a sample is closed.
 CLOSED = 1e-12
 #: Steps of Newton's method at each point of a path.
@@ -61,7 +62,10 @@ class Mechanism:
         couplings: (c, count) coefficients of couplings between joint coordinates.
         size: length by which lengths are divided.
         owners: limb or name of each actuator, in the order of ``robot.actuated``.
+        is_ball: whether rotations have the components of a Cayley vector in the place of roll, pitch and yaw.
     """
+
+    is_ball = False
 
     def __init__(self, tables: Tables, values: dict[str, float]) -> None:
         dimensions = tables.get("dimensions", {})
@@ -117,16 +121,21 @@ class Mechanism:
         """Return the coordinates (N, 6) of the platform, displaced by T."""
         R = T[:, 0, :3, :3]
         p = np.einsum("nij,j->ni", R, self.robot.home) + T[:, 0, :3, 3]
-        return np.concatenate([p, angles_of(R)], 1)
+        return np.concatenate([p, cayley_of(R) if self.is_ball else angles_of(R)], 1)
 
     def rates(self, T: Array, S: Array) -> Array:
         """Return the derivatives (N, 6, count) of the platform's coordinates."""
         pose, screws = self.poses(T), S[:, 0]
         linear = screws[:, :3] + np.cross(screws[:, 3:], pose[:, :3, None], axis=1)
-        z = turned(np.broadcast_to([0.0, 0.0, 1.0], (len(pose), 3)), pose[:, 5])
-        y = z @ turned(np.broadcast_to([0.0, 1.0, 0.0], (len(pose), 3)), pose[:, 4])
-        axes = np.stack([y[:, :, 0], z[:, :, 1], np.broadcast_to([0.0, 0.0, 1.0], (len(pose), 3))], 2)
-        return np.concatenate([linear, np.linalg.solve(axes, screws[:, 3:])], 1)
+        if self.is_ball:
+            r = pose[:, 3:]
+            turning = (np.eye(3) + r[:, :, None] * r[:, None] - cross_matrix(r)) @ screws[:, 3:] / 2
+        else:
+            z = turned(np.broadcast_to([0.0, 0.0, 1.0], (len(pose), 3)), pose[:, 5])
+            y = z @ turned(np.broadcast_to([0.0, 1.0, 0.0], (len(pose), 3)), pose[:, 4])
+            axes = np.stack([y[:, :, 0], z[:, :, 1], np.broadcast_to([0.0, 0.0, 1.0], (len(pose), 3))], 2)
+            turning = np.linalg.solve(axes, screws[:, 3:])
+        return np.concatenate([linear, turning], 1)
 
     def loops(self, q: Array, T: Array, S: Array) -> tuple[Array, Array]:
         """Return the residuals (N, e) of loops and couplings, and their derivatives (N, e, count)."""
@@ -203,7 +212,9 @@ class Mechanism:
         q, good, pose = np.zeros((n, self.robot.count)), np.zeros(n, bool), np.zeros((n, 6))
 
         def through(which: Any, number: int) -> tuple[Array, Array]:  # noqa: ANN401 - indices
-            at, reached = self.follow(chosen, home, np.repeat(middle[None], len(targets[which]), 0), begin(which), errors[which], number)
+            at, reached = self.follow(
+                chosen, home, np.repeat(middle[None], len(targets[which]), 0), begin(which), errors[which], number
+            )
             end, closed = self.follow(chosen, middle, targets[which], at, errors[which], number)
             return end, reached & closed
 
@@ -261,7 +272,7 @@ class Mechanism:
 
 
 class LinkRobot(Robot):
-    """A robot of a file with links and joints: chains along a spanning tree, one pair for each joint that closes a loop.
+    """A robot of a file with links and joints: chains along a spanning tree, a pair for each joint that closes a loop.
 
     Attributes:
         pairs: pairs of chains whose ends are one link.
@@ -343,6 +354,12 @@ def angles_of(R: Array) -> Array:
     """Return roll, pitch and yaw (N, 3) of rotations."""
     pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 2, 1], R[:, 2, 2]))
     return np.stack([np.arctan2(R[:, 2, 1], R[:, 2, 2]), pitch, np.arctan2(R[:, 1, 0], R[:, 0, 0])], 1)
+
+
+def cayley_of(R: Array) -> Array:
+    """Return the Cayley vectors (N, 3) of rotations, ``tan(angle / 2) axis``."""
+    v = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1)
+    return np.asarray(v / (1 + np.trace(R, axis1=1, axis2=2))[:, None])
 
 
 def rotation_of(angles: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from assemblies import Mechanism, angles_of
+from assemblies import Mechanism, angles_of, cayley_of
 from legs import Array
 
 INERTIA = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
@@ -22,7 +22,9 @@ class Engine:
         trees, factors, coordinates = "", [], []
         for c, chain in enumerate(robot.chains):
             for k, turn in enumerate(chain.turns):
-                place, axis = (" ".join(map(repr, each.tolist())) for each in (robot.points_array[turn.centre], turn.axis))
+                place, axis = (
+                    " ".join(map(repr, each.tolist())) for each in (robot.points_array[turn.centre], turn.axis)
+                )
                 kind = "slide" if turn.slides else "hinge"
                 trees += f'<body name="{c}.{k}"><joint type="{kind}" pos="{place}" axis="{axis}"/>{INERTIA}'
                 factors.append(turn.factor)
@@ -33,7 +35,9 @@ class Engine:
         self.data = mujoco.MjData(self.model)
         self._factors, self._coordinates = np.array(factors), np.array(coordinates)
         ends = [f"{c}.{len(chain.turns) - 1}" for c, chain in enumerate(robot.chains)]
-        self._ends = [self.model.body(each).id if chain.turns else 0 for each, chain in zip(ends, robot.chains, strict=True)]
+        self._ends = [
+            self.model.body(each).id if chain.turns else 0 for each, chain in zip(ends, robot.chains, strict=True)
+        ]
 
     def measured(self, q: Array) -> tuple[Array, Array]:
         """Return poses (N, 6) at joint coordinates (N, count), and how far loops (N,) are open.
@@ -47,7 +51,8 @@ class Engine:
             mujoco.mj_kinematics(self.model, self.data)
             p[k], R[k] = self.data.xpos[self._ends], self.data.xmat[self._ends].reshape(-1, 3, 3)
         home = self.mechanism.robot.home
-        pose = np.concatenate([p[:, 0] + np.einsum("nij,j->ni", R[:, 0], home), angles_of(R[:, 0])], 1)
+        turns = cayley_of(R[:, 0]) if self.mechanism.is_ball else angles_of(R[:, 0])
+        pose = np.concatenate([p[:, 0] + np.einsum("nij,j->ni", R[:, 0], home), turns], 1)
         off = np.zeros(len(q))
         for one, other in self.mechanism.pairs:
             # Near the platform, which may be far from the world's origin.
