@@ -263,7 +263,7 @@ class Mechanism:
         ):
             places = [each.coordinate for each in chain.turns]
             place = places.index(k) if k in places else 0
-            if not (0 < place < len(places) - 1 and chain.turns[place].slides):
+            if not (0 < place < len(places) - 1 and chain.turns[place].slides) or chain.turns[place - 1].slides:
                 continue
             one, other = (self.robot.points_array[chain.turns[place + by].centre] for by in (-1, 1))
             if np.linalg.norm(np.cross(other - one, chain.turns[place].axis)) < 1e-9 * self.size:
@@ -284,6 +284,7 @@ class LinkRobot(Robot):
         for key, text in tables.get("derived", {}).items():
             names[key] = evaluated(text, names)
         self.home = evaluated(tables["home"], names)
+        self.limbs = []
         for key, text in tables.get("points", {}).items():
             names[key] = evaluated(text, names)
         self.points: list[Array] = []

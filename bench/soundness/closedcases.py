@@ -13,9 +13,10 @@ import re
 import tempfile
 import tomllib
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from assemblies import BALL, POSE, Assembly, Mechanism, angles_of, cayley_of, choices
@@ -28,14 +29,14 @@ from screwsynth.nlp import Extreme, Judgement, Outcome, judge_workspace, load_ca
 
 Tables = dict[str, Any]
 BLOCK = 2048
+#: Names of coordinates of a rotation about z, the only axis of workspaces here.
+ABOUT_Z = {"angle": "yaw", "tilt_1": "roll", "tilt_2": "pitch"}
 #: Part by which a value may be beyond a bound: closing and rounding.
 ROUNDING = 1e-9
 #: Distance in parts of the robot's size and radians by which a pose of an answer may be off the closed one.
 SAME = 1e-7
 #: Singular value, in parts of the robot, that a singular pose of an answer has at most.
 SINGULAR = 1e-4
-#: Numbers with the tightest bounds from which ascents begin.
-ASCENTS = 4
 #: Part of a sampled range by which a bound is wide: counted, no fault.
 WIDE = 0.05
 ROOT = Path(__file__).parents[2]
@@ -111,10 +112,14 @@ def samples_of(rng: np.random.Generator, count: int, size: int) -> Array:
     return u
 
 
-def asked_of(tables: Tables, name: str) -> Asked:
+def asked_of(tables: Tables, name: str, chosen: Sequence[str] = ()) -> Asked:
     """Return the workspace of a case's tables, of a robot of :data:`FILES`; angles are degrees.
 
-    Of the sets that the robot can choose the last one with the most ranges is taken; an answer may name another one.
+    Args:
+        tables: of the case.
+        name: of the robot's file.
+        chosen: names of the independent coordinates; if left out, the last ones with the most ranges that the robot can
+            choose. An answer may name other ones.
     """
     file = FILES[name]
     mechanism = Mechanism(tomllib.loads(file.read_text(encoding="utf-8")), tables["robot"]["parameters"])
@@ -126,8 +131,8 @@ def asked_of(tables: Tables, name: str) -> Asked:
         ends[k] = own if k < 3 else np.radians(own)
     ranged = ends[:, 1] > ends[:, 0]
     every = list(choices(mechanism, mechanism.home))
-    chosen = max(reversed(every), key=lambda each: int(ranged[list(each)].sum()))
-    return Asked(tables, mechanism, list(chosen), ends)
+    likely = max(reversed(every), key=lambda each: int(ranged[list(each)].sum()))
+    return Asked(tables, mechanism, [POSE.index(each) for each in chosen] or list(likely), ends)
 
 
 class Values:
@@ -142,7 +147,6 @@ class Values:
         """Return the numbers (N,) of assemblies of robots with errors (N, c, 3) of joint centres."""
         mechanism, robot = self.mechanism, self.mechanism.robot
         values = {name: found.pose[:, k] for k, name in enumerate(self.asked.names)}
-        values |= {f"angle {name}": found.pose[:, k] for k, name in enumerate(self.asked.names)}
         for k, owner in zip(robot.actuated, mechanism.owners, strict=True):
             values[f"actuator_{'length' if robot.slides[k] else 'angle'} limb {owner}"] = found.q[:, k]
         for k, (label, which) in enumerate(robot.labels):
@@ -204,13 +208,32 @@ def name_of(extreme: Extreme) -> str:
     name = re.sub(
         r"(joint\.\S+?)(\.first|\.second)? joint .*", lambda m: m[1] + (m[2] or "").replace(".", " "), extreme.name
     )
-    return "yaw" if name == "angle" else name
+    return ABOUT_Z.get(name, name)
 
 
 def dependent_of(judgement: Judgement) -> set[int] | None:
     """Return the indices of the coordinates that an answer says to follow from the others; None without."""
     found = getattr(judgement.workspace, "dependent", None)
-    return None if found is None else {each.index for each in found}
+    if found is None:
+        return None
+    names = [judgement.workspace.names[each.index] for each in found]
+    return {BALL.index(name) if name in BALL else POSE.index(ABOUT_Z.get(name, name)) for name in names}
+
+
+class Taken(NamedTuple):
+    """The robot at a pose of an answer.
+
+    Attributes:
+        there: the robot at the independent coordinates of the pose; None of a verdict without a pose.
+        errors: (1, c, 3) of its joint centres.
+        at: (6,) the pose's coordinates.
+        away: how far these are off, in parts of the robot's size and radians; infinite where it does not close.
+    """
+
+    there: Assembly | None
+    errors: Array
+    at: Array
+    away: float
 
 
 class Attack:
@@ -221,14 +244,17 @@ class Attack:
         judgement: the answer, whose independent coordinates are taken.
         rng: of the samples.
         count: number of samples.
+        ascents: numbers with the tightest bounds from which ascents begin.
 
     Attributes:
         counts: of verdicts and samples.
         faults: contradictions, in words.
     """
 
-    def __init__(self, asked: Asked, judgement: Judgement, rng: np.random.Generator, count: int) -> None:
-        self.asked, self.judgement, self.rng = asked, judgement, rng
+    def __init__(
+        self, asked: Asked, judgement: Judgement, rng: np.random.Generator, count: int, ascents: int = 4
+    ) -> None:
+        self.asked, self.judgement, self.rng, self.ascents = asked, judgement, rng, ascents
         self.counts, self.faults = Counter[str](), list[str]()
         self._choose()
         self.numbers, self.mechanism = Values(asked), asked.mechanism
@@ -241,6 +267,7 @@ class Attack:
         self.u, self.errors, self.q = (each[found.closed] for each in (u, errors, found.q))
         self.values = {name: each[found.closed] for name, each in values.items()}
         if len(self.u):
+            self.taken = self._taken()
             self._ranks()
             self._extremes()
 
@@ -279,45 +306,50 @@ class Attack:
             at = asked.targets(u[~closed][:1])[0].tolist()
             self.faults.append(f"reach is proved, and {int((~closed).sum())} samples do not close, such as {at}")
 
-    def _taken(self, pose: Any, errors: Array) -> tuple[Assembly, Array, float]:  # noqa: ANN401 - of an answer
-        """Return the robot with errors (1, c, 3) at a pose of the answer, its coordinates, and how far it is off."""
-        asked, R = self.asked, np.asarray(pose.rotation)[None]
+    def _taken(self) -> list[Taken]:
+        """Return the robot at the poses of all verdicts, in their order."""
+        found: list[Taken] = [Taken(None, self.mechanism.exact, np.zeros(6), np.inf)] * len(self.judgement.verdicts)
+        places = [k for k, each in enumerate(self.judgement.verdicts) if each.pose is not None]
+        if not places:
+            return found
+        poses = [self.judgement.verdicts[k].pose for k in places]
+        errors = np.concatenate([self._errors(self.judgement.verdicts[k].errors) for k in places])
+        R = np.array([each.rotation for each in poses if each is not None])
         turns = cayley_of(R) if self.mechanism.is_ball else angles_of(R)
-        at = np.concatenate([np.asarray(pose.position)[None], turns], 1)
-        middle = asked.targets(np.full((1, len(asked.chosen)), 0.5))[0]
-        there = self.mechanism.assembled(asked.chosen, middle, at[:, asked.chosen], errors)
-        away = float(np.abs((there.pose - at) / asked.units).max())
-        return there, at[0], away if there.closed[0] else np.inf
+        at = np.concatenate([[each.position for each in poses if each is not None], turns], 1)
+        middle = self.asked.targets(np.full((1, len(self.asked.chosen)), 0.5))[0]
+        there = self.mechanism.assembled(self.asked.chosen, middle, at[:, self.asked.chosen], errors)
+        away = np.where(there.closed, np.abs((there.pose - at) / self.asked.units).max(1), np.inf)
+        for j, k in enumerate(places):
+            own = Assembly(*(each[j : j + 1] for each in there))
+            found[k] = Taken(own, errors[j : j + 1], at[j], float(away[j]))
+        return found
 
     def _ranks(self) -> None:
         """Attack verdicts on ranks: by all samples, and at the poses that refute them."""
         spectra = self.mechanism.ranks(self.q, self.errors)
-        for word, verdict in zip(("regular", "constraints"), self.judgement.ranks, strict=False):
+        for word, verdict, taken in zip(("regular", "constraints"), self.judgement.ranks, self.taken, strict=False):
             key, last = ("locked", 5) if word == "regular" else ("free", 5 - self.mechanism.freedoms)
             self.counts[f"{self.robot}: {word} {verdict.outcome.value}"] += 1
             least, signs = getattr(spectra, key)[:, last].min(), set(spectra.sign.tolist())
             if verdict.outcome is Outcome.PROVED and (least < ROUNDING or (key == "locked" and len(signs) > 1)):
                 self.faults.append(f"{word} is proved, the least singular value is {least:.2e}, and signs are {signs}")
-            elif verdict.outcome is Outcome.REFUTED and verdict.pose is not None:
-                errors = self._errors(verdict.errors)
-                there, at, away = self._taken(verdict.pose, errors)
-                value = getattr(self.mechanism.ranks(there.q, errors), key)[0, last]
+            elif verdict.outcome is Outcome.REFUTED and taken.there is not None:
+                value = getattr(self.mechanism.ranks(taken.there.q, taken.errors), key)[0, last]
                 # Closing at a singular pose is exact to the square root of rounding.
-                if not self.asked.has(at) or value > SINGULAR:
-                    words = f"inside: {self.asked.has(at)}, off by {away:.1e}"
-                    self.faults.append(f"{word} is refuted at {at.tolist()}, where the value is {value:.2e}, {words}")
+                if not self.asked.has(taken.at) or value > SINGULAR:
+                    words = f"{self._said(taken)}, where the value is {value:.2e}"
+                    self.faults.append(f"{word} is refuted {words}")
 
     def _extremes(self) -> None:
         """Attack bounds and limits of numbers, by all samples and by ascents from the best, and poses of the answer."""
         near = []
-        for each in self.judgement.extremes:
+        for each, taken in zip(self.judgement.extremes, self.taken[len(self.judgement.ranks) :], strict=True):
             name, sign, what = name_of(each), each.sense.sign, f"{each.name} {each.sense.value}"
             kind = re.split(r" limb| actuator |\.", name)[0]
             self.counts[f"{self.robot}: {kind} {each.outcome.value}"] += 1
-            if kind == "reach" and each.outcome is Outcome.REFUTED and self.is_whole and each.pose is not None:
-                _, at, away = self._taken(each.pose, self._errors(each.errors))
-                words = f"inside: {self.asked.has(at)}, off by {away:.1e}"
-                self.faults.append(f"{name} is refuted at {at.tolist()}, and all samples close: {words}")
+            if kind == "reach" and each.outcome is Outcome.REFUTED and self.is_whole:
+                self.faults.append(f"{name} is refuted {self._said(taken)}, and all samples close")
             if name not in self.values:
                 self.counts[f"not judged: {kind}"] += 1
                 continue
@@ -334,12 +366,12 @@ class Attack:
                 and sign * (best - limit) > slack + 1e-9 * abs(limit)
             ):
                 self.faults.append(f"{what}: proved within {limit:.12g}, sampled {best:.12g}")
-            self._pose_of(each, name, f"{what} {each.outcome.value}")
+            self._pose_of(each, name, taken, f"{what} {each.outcome.value}")
         near.sort(key=lambda item: item[:2])
         for room, place, each in near:
             name, sign = name_of(each), each.sense.sign
             self.counts["bounds"] += 1
-            if place in [item[1] for item in near[:ASCENTS]]:
+            if place in [item[1] for item in near[: self.ascents]]:
                 best, self.counts["ascents"] = self._ascended(name, sign), self.counts["ascents"] + 1
                 if sign * (best - each.bound) > ROUNDING * (abs(best) + self._scale(name)):
                     what = f"{each.name} {each.sense.value}"
@@ -347,19 +379,17 @@ class Attack:
             if room * self._scale(name) > WIDE * (np.ptp(self.values[name]) + self._scale(name)):
                 self.counts["wide bounds"] += 1
 
-    def _pose_of(self, each: Extreme, name: str, what: str) -> None:
+    def _said(self, taken: Taken) -> str:
+        return f"at {taken.at.tolist()} (inside: {self.asked.has(taken.at)}, off by {taken.away:.1e})"
+
+    def _pose_of(self, each: Extreme, name: str, taken: Taken, what: str) -> None:
         """Attack the pose of a number: it is in the workspace, the robot takes it, and has the number there."""
-        if each.pose is None:
+        if taken.there is None:
             return
-        errors = self._errors(each.errors)
-        there, at, away = self._taken(each.pose, errors)
-        if not self.asked.has(at):
-            self.faults.append(f"{what}: the pose {at.tolist()} is outside of the workspace")
+        if not self.asked.has(taken.at) or taken.away > SAME:
+            self.faults.append(f"{what}: no pose of the robot in the workspace, {self._said(taken)}")
             return
-        if away > SAME:
-            self.faults.append(f"{what}: the robot cannot take the pose {at.tolist()}: it is off by {away:.2e}")
-            return
-        value = float(self.numbers.of(there, errors)[name][0])
+        value = float(self.numbers.of(taken.there, taken.errors)[name][0])
         if abs(value - each.reached) > 1e-6 * (abs(each.reached) + self._scale(name)):
             self.faults.append(f"{what}: reached {each.reached:.12g}, and {value:.12g} there")
         is_violated = each.limit is None or each.sense.sign * (value - each.limit) > -1e-12 * abs(each.limit)
