@@ -65,8 +65,9 @@ class Robot:
         places: label of each coordinate's joint, balls too.
     """
 
-    def __init__(self, name: str, values: dict[str, float]) -> None:
-        tables = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    def __init__(self, name: str, values: dict[str, float], tables: dict[str, Any] | None = None) -> None:
+        if tables is None:
+            tables = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
         names: dict[str, Any] = dict(values)
         for key, text in tables.get("derived", {}).items():
             names[key] = evaluated(text, names)
@@ -130,6 +131,13 @@ class Robot:
                     if joint.get("actuated"):
                         self.actuated.append(coordinate)
                     found.append(Turn(coordinate, 1.0, centre, a, kind == "P"))
+                    if kind == "H":
+                        found.append(Turn(coordinate, float(evaluated(joint["pitch"], names)), centre, a, True))
+                    if kind == "C":
+                        self.labels.append((f"{prefix}{place}", 1))
+                        self.slides.append(True)
+                        self.places.append(f"{prefix}{place}")
+                        found.append(Turn(coordinate + 1, 1.0, centre, a, True))
                     if kind == "Pa":
                         # The other end of the rods has an error of its own.
                         self.points.append(placed(evaluated(joint["to"], names)))
