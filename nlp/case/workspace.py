@@ -74,6 +74,7 @@ class Workspace:
         has_limits: whether a solve must find a design that is regular and keeps the case's limits at each of the poses.
         dependent: coordinates that the robot of a case cannot choose, as a judgement of it finds them; empty in a case.
             A range stated for one is a limit, and a number the place where its value is looked for.
+        held: indices of fixed coordinates that it chooses beside those with ranges; empty without dependent ones.
 
     Raises:
         CaseError: a number is not allowed; the key is in the words of a case file.
@@ -83,6 +84,7 @@ class Workspace:
     turns: Turns = field(default_factory=Turns)
     has_limits: bool = False
     dependent: tuple[DependentCoordinate, ...] = ()
+    held: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.position) != 3:
@@ -151,6 +153,11 @@ class Workspace:
             dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
             low, high = (digits(units.shown(each, dimension)) for each in ends_of(value))
             groups.setdefault(f"in [{low}, {high}] {units.label(dimension)}", []).append(self.names[k])
+        values: list[Value] = [*self.position, *self.turns.angles, 0.0, 0.0]
+        for k in self.held:
+            dimension = Dimension.LENGTH if k < 3 else Dimension.ANGLE
+            at = f"= {digits(units.shown(ends_of(values[k])[0], dimension))} {units.label(dimension)}"
+            groups.setdefault(at, []).append(self.names[k])
         texts = [f"{', '.join(names)} {ends}".rstrip() for ends, names in groups.items()]
         if is_any:
             most = max(map(abs, ends_of(self.turns.angles[0])))

@@ -3,8 +3,9 @@
 A robot with fewer than six degrees of freedom chooses as many coordinates of its pose as it has freedoms; the others
 follow from the closed loops, as joint positions do. The independent coordinates are chosen at the middle of the
 workspace among those with ranges, by the largest volume of the freedoms' directions in parts of these ranges, so that a
-wide range is more likely a limit than a set; fixed ones complete them. A dependent coordinate that stands still at its
-stated number over the whole workspace, such as the rotation of a Delta, stays a constant.
+wide range is more likely a limit than a set; fixed ones complete them, angles first where an angle has a range. A
+dependent coordinate that stands still at its stated number over the whole workspace, such as the rotation of a Delta,
+stays a constant.
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ _POSES, _MOST_CORNERS, _WAY, _SEED = 12, 32, 8, 0
 #: Part of the computed range of a dependent coordinate by which its working range is wider on each side, and parts of
 #: the robot's size, or angle, that it is wider by at least.
 _WIDER, _LEAST = 0.5, 1e-2
-#: Volumes that differ by less than this part are equal: the first is taken. Of fixed coordinates those of the position
-#: come first, and are taken where they have this part of the largest volume.
+#: Volumes that differ by less than this part are equal: the first is taken. Fixed coordinates that come first are taken
+#: where they have this part of the largest volume.
 _TIE, _ENOUGH = 1e-9, 0.2
 
 
@@ -137,7 +138,7 @@ def dependent_of(case: Case, workspace: Workspace) -> Workspace:
     room = _WIDER * (high - low) + _LEAST * chart.size[:6]
     ends = chart.ends(low - room), chart.ends(high + room)
     dependent = tuple(DependentCoordinate(k, float(ends[0][k]), float(ends[1][k])) for k in found)
-    return replace(workspace, dependent=dependent)
+    return replace(workspace, dependent=dependent, held=tuple(k for k in independent if k not in chart.ranged))
 
 
 def robot_size(case: Case, position: Sequence[float] | None = None) -> float:
@@ -295,7 +296,9 @@ class _Chart:
         ranged, scale = self.ranged, np.ones(6)
         scale[ranged] = self.size[ranged] / self.half[ranged]
         chosen = _largest(moves * scale[:, None], ranged, [], min(_rank(moves[ranged]), self._freedoms))
-        others = [k for k in range(6) if k not in ranged]
+        # A case that asks for tilts asks for all of them, and else for positions.
+        turns_first = any(k >= 3 for k in ranged)
+        others = sorted((k for k in range(6) if k not in ranged), key=lambda k: ((k < 3) == turns_first, k))
         count = min(self._freedoms, _rank(moves)) - len(chosen)
         return sorted(_largest(moves, others, chosen, count, enough=_ENOUGH))
 
