@@ -276,12 +276,19 @@ class Attack:
         asked, follows = self.asked, dependent_of(self.judgement)
         if follows is None:
             return
-        legal = list(choices(asked.mechanism, asked.mechanism.home, 1e-3))
-        mine = sorted({k for each in legal for k in each} - follows)
+        middle = asked.assembled(np.full((1, len(asked.chosen)), 0.5))
+        legal = list(choices(asked.mechanism, middle.q, 1e-4))
+        mine, at_home = (
+            sorted({k for each in legal for k in each} - follows),
+            list(choices(asked.mechanism, asked.mechanism.home)),
+        )
+        words = [", ".join(asked.names[k] for k in each) for each in (sorted(follows), mine)]
         if tuple(mine) not in legal:
-            words = [", ".join(asked.names[k] for k in each) for each in (sorted(follows), mine)]
             self.faults.append(f"{words[0]} are said to follow, and {words[1]} cannot be chosen")
             return
+        if len(at_home) == 1 and tuple(mine) not in at_home:
+            self.faults.append(f"{words[1]} are taken, which the robot cannot choose at home")
+        self.counts["another set"] += tuple(mine) != tuple(asked.chosen)
         asked.chosen = mine
         home = asked.mechanism.poses(asked.mechanism.moved(asked.mechanism.home, asked.mechanism.exact)[0])[0]
         for k in mine:

@@ -73,7 +73,7 @@ def asked(bench: ModuleType, name: str, *, position: Any = None, limits: Any = N
     """A workspace of a robot, some of it stated otherwise."""
     home, place, turns, chosen, allowed = ROBOTS[name]
     file = f"{name}.toml"
-    tables = {
+    tables: dict[str, Any] = {
         "robot": ({"model": name} if name in ("3-rps", "exechon") else {"file": file}) | {"parameters": {}},
         "pose": {"position": home},
         "task": [TASK],
