@@ -40,7 +40,7 @@ class Substitution:
         unknowns: (u, 1) internal unknowns, in the model's order.
         rotation: (3, 3) ``R``, platform to world coordinates.
         position: (3, 1) ``p``, origin of the platform frame in the world frame, length.
-        reference: (n,) values of the parameters at which the sizes of loop equations are taken; empty for the
+        reference: (n,) values of the parameters at which the sizes of loop equations are taken; None for the
             expressions in place of the parameters.
     """
 
@@ -48,7 +48,7 @@ class Substitution:
     unknowns: SX
     rotation: SX
     position: SX
-    reference: tuple[float, ...] = ()
+    reference: tuple[float, ...] | None = None
 
     @classmethod
     def identity(cls, model: Model) -> Substitution:
@@ -110,7 +110,7 @@ class RobotInstance:
         distances: (d, 1) left sides of the equations that follow from those of the loops.
         joints: the joints of the model's limbs.
         links: their links.
-        reference: values of the parameters at which the sizes of the loop equations are taken; empty for none.
+        reference: values of the parameters at which the sizes of the loop equations are taken; None for expressions.
     """
 
     parameters: SX
@@ -133,7 +133,7 @@ class RobotInstance:
     distances: SX
     joints: tuple[LimbJoint, ...]
     links: tuple[LimbLink, ...]
-    reference: tuple[float, ...] = ()
+    reference: tuple[float, ...] | None = None
 
 
 def instantiate(model: Model, substitution: Substitution, length: SX, twists: Sequence[SX]) -> RobotInstance:
@@ -189,16 +189,18 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
     )
 
 
-def sizes_at(model: Model, parts: Sequence[Closure | Unknown], reference: tuple[float, ...], otherwise: SX) -> SX:
+def sizes_at(
+    model: Model, parts: Sequence[Closure | Unknown], reference: tuple[float, ...] | None, otherwise: SX
+) -> SX:
     """Return the sizes (k, 1) of loop equations or unknowns at values of the parameters.
 
     Args:
         model: the model.
         parts: the k equations or unknowns.
-        reference: (n,) values of the parameters; empty for none.
+        reference: (n,) values of the parameters, which a robot of literal numbers has none of; None for no reference.
         otherwise: (k, 1) the sizes where there is no reference, or where a size has no positive value there.
     """
-    if not (reference and parts):
+    if reference is None or not parts:
         return otherwise
     own = Substitution.identity(model).parameters
     function = ca.Function("sizes", [own], [ca.densify(ca.vertcat(*[each.size for each in parts]))])

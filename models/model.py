@@ -152,6 +152,11 @@ class Model(Whole, Shown):
         return tuple(each for each in self.joint_screws if each.is_nested and each.limb in self.limbs)
 
     @property
+    def rank(self) -> int:
+        """Rank of the Jacobian at almost all dimensions and poses: below six, the structure is singular at all of them."""
+        return min(len(self.rows), 6) if self.generic is None else self.generic.jacobian
+
+    @property
     def has_couples(self) -> bool:
         """Whether a row has a couple that counts, so that F depends on a characteristic length."""
         return any(row.kind is not WrenchKind.FORCE for row in self.rows)

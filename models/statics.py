@@ -64,7 +64,7 @@ def statics_hindrance(model: Model) -> str:
     if count < freedoms:
         held = f"{_counted(freedoms, 'freedom')} of its platform"
         return f"its {_counted(count, 'actuator')} {'do' if count > 1 else 'does'} not hold the {held}"
-    if model.generic is not None and model.generic.jacobian < 6:
+    if model.rank < 6:
         return "its platform can move with locked actuators"
     return ""
 

@@ -84,7 +84,7 @@ class RobotValues:
     """
 
     model: Model
-    reference: tuple[float, ...]
+    reference: tuple[float, ...] | None
 
     def __call__(self, inputs: SX) -> SX:
         """Return :func:`robot_values` of a robot from its inputs (k, 1)."""

@@ -2,10 +2,10 @@
 
 A robot with fewer than six degrees of freedom chooses as many coordinates of its pose as it has freedoms; the others
 follow from the closed loops, as joint positions do. The independent coordinates are chosen at the middle of the
-workspace among those with ranges, by the largest volume of the freedoms' directions in parts of these ranges, so that a
-wide range is more likely a limit than a set; fixed ones complete them, angles first where an angle has a range. A
-dependent coordinate that stands still at its stated number over the whole workspace, such as the rotation of a Delta,
-stays a constant.
+workspace among those with ranges, by the largest volume of the freedoms' directions, whatever the widths of the ranges:
+a narrow range of another one is a limit. Fixed ones complete them, angles first where an angle has a range. A dependent
+coordinate that stands still at its stated number over the whole workspace, such as the rotation of a Delta, stays a
+constant.
 """
 
 from __future__ import annotations
@@ -45,6 +45,9 @@ _WIDER, _LEAST = 0.5, 1e-2
 #: Volumes that differ by less than this part are equal: the first is taken. Fixed coordinates that come first are taken
 #: where they have this part of the largest volume.
 _TIE, _ENOUGH = 1e-9, 0.2
+#: Weight of a direction of the position, in parts of the robot's size, beside one of the rotation, radians: a task is more
+#: often one of positions.
+_POSITION = 3.0
 
 
 class LoopSystem(NamedTuple):
@@ -293,14 +296,13 @@ class _Chart:
     def independent(self, z: FloatArray) -> list[int]:
         """Return the indices of as many coordinates of the pose as the robot has freedoms at a closed point."""
         moves = self._moves(z)
-        ranged, scale = self.ranged, np.ones(6)
-        scale[ranged] = self.size[ranged] / self.half[ranged]
-        chosen = _largest(moves * scale[:, None], ranged, [], min(_rank(moves[ranged]), self._freedoms))
+        ranged, weighted = self.ranged, moves * np.repeat([_POSITION, 1.0], 3)[:, None]
+        chosen = _largest(weighted, ranged, [], min(_rank(moves[ranged]), self._freedoms))
         # A case that asks for tilts asks for all of them, and else for positions.
         turns_first = any(k >= 3 for k in ranged)
         others = sorted((k for k in range(6) if k not in ranged), key=lambda k: ((k < 3) == turns_first, k))
         count = min(self._freedoms, _rank(moves)) - len(chosen)
-        return sorted(_largest(moves, others, chosen, count, enough=_ENOUGH))
+        return sorted(_largest(weighted, others, chosen, count, enough=_ENOUGH))
 
     def points(self, z: FloatArray, independent: list[int]) -> FloatArray | None:
         """Return closed loops (P, 6 + u) at the middle, corners and random points of the workspace; None without.

@@ -92,7 +92,7 @@ def mobility_of(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> Mo
     if all(each.kind is not SingularityKind.PASSIVE for each in found):
         generic = model.generic.constraints, model.generic.jacobian
         found += platform_singularities(state, constraints, (constraint_rank, state.rank), generic)
-    if model.generic.jacobian < 6:
+    if model.rank < 6:
         found.append(Singularity(SingularityKind.ARCHITECTURE, gained=state.free_twists))
     return Mobility(
         freedoms=6 - constraint_rank,

@@ -119,7 +119,11 @@ def _statement(choice: "Choice", starts: int, status: Status) -> str:
         some = f"{choice.solved:,} of {count}, {how}"
         if status is Status.INTERRUPTED:
             is_any = choice.solved > 0
-            return f"stopped after {some}; the others are not all searched" if is_any else f"stopped in the first of {count}"
+            return (
+                f"stopped after {some}; the others are not all searched"
+                if is_any
+                else f"stopped in the first of {count}"
+            )
         return f"the best of {some}; the others are not all searched" if is_answer else f"no answer in {some}"
     # The solves of ranges began from as many starts.
     ranges = f"{choice.solved:,} {how}, and the others left out by solves of {choice.relaxed:,} ranges of values"

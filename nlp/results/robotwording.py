@@ -84,7 +84,7 @@ def _member_tables(model: Model) -> Iterator[TextTable]:
 def _freedom_lines(model: Model) -> Iterator[Line]:
     """Yield the freedoms and ranks of a robot given joint by joint."""
     if model.generic is not None:
-        freedoms, rank = 6 - model.generic.constraints, model.generic.jacobian
+        freedoms, rank = 6 - model.generic.constraints, model.rank
         yield Line(f"{freedoms} with free actuators", label="freedoms")
         yield Line(f"{rank} of all wrenches, {model.generic.constraints} of the constraints", label="ranks")
         if model.generic.undetermined:

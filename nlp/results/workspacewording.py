@@ -10,7 +10,7 @@ from ..case.case import Case
 from ..case.motors import MotorNumber
 from ..case.task import Sense
 from ..interruption import STOPPED
-from ..proof.workspace.verdict import Outcome
+from ..proof.workspace.verdict import EVERYWHERE, Outcome
 from .posewording import pose_words
 from .rounding import number, ordered
 from .text import Line, TextTable, Tone, in_part
@@ -274,12 +274,13 @@ def _regular_lines(case: Case, regular: RegularData, label: str = "regular", of:
     """Yield the verdict on a rank: that of J, or of the wrenches that a clause names."""
     share = f"{100 * regular.share:.3g} % of the box"
     found = f", {regular.reason}" if regular.reason and regular.between is None else ""
+    at = "every pose" if regular.reason == EVERYWHERE else "a pose"
     boxes = "box is" if regular.open == 1 else "boxes are"
     words = {
         Outcome.PROVED: ": the constraint wrenches keep their rank at every pose"
         if of
         else ": J has full rank at every pose",
-        Outcome.REFUTED: f": {of} rank at a pose{found}" if of else f": J is singular at a pose{found}",
+        Outcome.REFUTED: f": {of} rank at a pose{found}" if of else f": J is singular at {at}{found}",
         Outcome.OPEN: f": {regular.open:,} {boxes} left, {share} ({regular.reason or ''})",
     }
     yield Line(regular.outcome.value, label=label, tone=TONES[regular.outcome], after=words[regular.outcome])

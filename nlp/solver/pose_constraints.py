@@ -295,7 +295,7 @@ class PoseConstraints:
         if errors is not None:
             model, reaches = self._built.model, self._built.reaches
             parameters = ca.vertcat(parameters, SX(errors.ravel().tolist()))
-            reference = (*reference, *np.zeros(errors.size).tolist()) if reference else ()
+            reference = None if reference is None else (*reference, *np.zeros(errors.size).tolist())
         names = [*(f"number {j + 1} of the pose" for j in places), *(item.name for item in model.unknowns)]
         symbols, coordinates = SX.sym("w", len(names)), SX(y)
         for j, place in enumerate(places):

@@ -160,7 +160,7 @@ def _paint(axes: Axes, case: Case, each: Slice, kinds: Sequence[Kind]) -> None:
             style: dict[str, Any] = {"facecolor": kind.colour, "edgecolor": kind.colour, "linewidth": 0.3}
             if not is_filled:
                 style = {"facecolor": "none", "edgecolor": INK, "linewidth": 0.0, "hatch": kind.hatch}
-            axes.add_patch(PathPatch(_path(_outlines(case, each, each.boxes[members])), gid=kind.words, **style))
+            axes.add_artist(PathPatch(_path(_outlines(case, each, each.boxes[members])), gid=kind.words, **style))
     _frame(axes, case, each)
 
 
@@ -183,6 +183,7 @@ def _kinds(case: Case, slices: Sequence[Slice]) -> list[Kind]:
         *kinds,
         Kind(Region.BEYOND.value, _ORANGE, "////"),
         Kind(Region.OTHER_SIGN.value, _ORANGE, "////"),
+        Kind(Region.SINGULAR.value, _BAND),
         Kind(Region.OPEN.value, _BAND),
         Kind(Region.UNREACHED.value, _FAR),
         Kind(Region.UNKNOWN.value, _EDGE),
@@ -204,7 +205,7 @@ def _layers(each: Slice, kinds: Sequence[Kind]) -> list[_Layer]:
     is_beyond = {region: regions == region.value for region in (Region.BEYOND, Region.OTHER_SIGN)}
     is_here = ~np.any(list(is_beyond.values()), axis=0)
     kept, *limits = kinds[: 1 + len(each.limits)]
-    *opened, beyond, other, band, far, edge = kinds[1 + len(each.limits) :]
+    *opened, beyond, other, singular, band, far, edge = kinds[1 + len(each.limits) :]
     hatched = [(beyond, is_beyond[Region.BEYOND]), (other, is_beyond[Region.OTHER_SIGN])]
     return [
         _Layer(kept, (each.binding == KEPT) & is_here),
@@ -212,6 +213,7 @@ def _layers(each: Slice, kinds: Sequence[Kind]) -> list[_Layer]:
         *(_Layer(kind, (each.binding == UNDECIDED) & is_judged) for kind in opened),
         *(_Layer(kind, (each.binding == KEPT) & members) for kind, members in hatched),
         *(_Layer(kind, members, is_filled=False) for kind, members in hatched),
+        _Layer(singular, regions == Region.SINGULAR.value),
         _Layer(band, regions == Region.OPEN.value),
         _Layer(far, regions == Region.UNREACHED.value),
         _Layer(edge, regions == Region.UNKNOWN.value),

@@ -136,7 +136,7 @@ def judge_workspace(
         ranks = (
             Ranks(not_judged(numbers.box, numbers.reason), None)
             if meant is None
-            else prove_ranks(meant, homes.is_singular, progress=rank_progress, paper=paper)
+            else prove_ranks(meant, homes.is_singular, rank=case.model.rank, progress=rank_progress, paper=paper)
         )
         judged = Judgement(case, workspace, ranks.regular, (), ranks.constraints)
         if not with_limits or (until_fault and not judged.is_regular):

@@ -17,6 +17,7 @@ import numpy as np
 
 from ....models import FloatArray, frozen_array
 from ....models.joints.closedform import ClosedForm
+from ....models.statics import statics_hindrance
 from ...case.case import Case
 from ...case.motors import MotorNumber
 from ...case.pose import Free, Value, ends_of
@@ -51,7 +52,7 @@ from .robot.path_cover import PathCover, Place, place_in
 from .robot.pose_box import PoseBox, PoseNumbers, pose_box
 from .robot.posed_model import RankMatrix
 from .robot.posed_robot import NotJudgedError, Problem, build_problem
-from .verdict import Outcome
+from .verdict import EVERYWHERE, Outcome
 
 #: Seconds after which a judgement stops where the caller does not say.
 TIME_LIMIT = 600.0
@@ -180,7 +181,8 @@ def judge_path(
         for name, matrix in ((REGULAR, family.locked), (CONSTRAINTS, family.unactuated)):
             if matrix is not None:
                 report(name)
-                ranks.append(_rank(family, matrix, name, cover))
+                at_start = case.model.rank < 6 and name == REGULAR
+                ranks.append(_at_start(family, matrix, cover) if at_start else _rank(family, matrix, name, cover))
         report("limits")
         asked = () if limits_alone else (*ACTUATED, "leg_length")
         names = [item.name for item in case.model.quantities if item.name in asked]
@@ -221,7 +223,8 @@ def _of_actuators(
         faults |= _motor_faults(subject, found, cover)
         return found
     # Powers are those in the path's motion, whether the case states another one or none.
-    speeds, moving = speeds_on_path(machines, cover, gap), in_motion(subject.case)
+    speeds, case = speeds_on_path(machines, cover, gap), subject.case
+    moving = case if statics_hindrance(case.model) else in_motion(case)  # forces that are not known have no power
     bounds = {each.motor.actuator: each.bound for each in speeds.extremes if each.motor}
     unknown: list[Extreme] = []
     if speeds.number is not None:
@@ -391,6 +394,14 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
     words = words if math.isfinite(value) else reason
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
     return RankOnPath(name, outcome, place, pose_at(problem, cover, place), search.boxes, effort.seconds, words)
+
+
+def _at_start(problem: Problem, matrix: RankMatrix, cover: PathCover) -> RankOnPath:
+    """Return the verdict on the rank of J of a structure that is singular at every pose, as at the path's first point."""
+    place = Place(int(cover.pieces[0, 0]), 0.0)
+    is_singular = SingularPose(problem, matrix).smallest(problem.start) <= _SINGULAR
+    outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
+    return RankOnPath(REGULAR, outcome, place, pose_at(problem, cover, place), 0, 0.0, EVERYWHERE)
 
 
 def _sign_change(problem: Problem, matrix: RankMatrix, cover: PathCover) -> Place | None:

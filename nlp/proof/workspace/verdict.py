@@ -6,11 +6,14 @@ import enum
 from dataclasses import dataclass
 
 from ....models import FloatArray
+from ...evidence.singularities import SingularityKind
 from ..statement.machine import JointErrors
 from .robot.pose_box import PoseBox, PoseNumbers
 
 #: Part of a limit by which a value may be beyond it and still count as on it: rounding.
 _ON_LIMIT = 1e-9
+#: How a singular pose of a structure is known that is singular at every pose.
+EVERYWHERE = SingularityKind.ARCHITECTURE.value
 
 
 class Outcome(enum.Enum):

@@ -138,6 +138,7 @@ class SingularValues(_RowsNumber):
     ) -> None:
         super().__init__(problem, length, machines)
         self._is_condition, self._change, self._machines = is_condition, change, machines
+        self._has_six = problem.posed.scaled.rows.shape[0] >= 6
         if is_condition:
             self.entries = ca.vertcat(self.entries, ca.vec(ca.densify(problem.posed.scaled.jacobian)))
 
@@ -152,6 +153,8 @@ class SingularValues(_RowsNumber):
     def _worst(self, machines: Problem, z: FloatArray) -> FloatArray:
         """Return the machines that are worst to first order at points (P, n) of the design."""
         z = machines.exact(z)
+        if not self._has_six:
+            return z
         u, s, v = np.linalg.svd(np.nan_to_num(self.jacobian(z)))
         slopes = np.zeros((len(z), len(machines.of_errors)))
         # The logarithm of the condition number falls with that of the smallest one, and grows with that of the largest.
@@ -164,8 +167,10 @@ class SingularValues(_RowsNumber):
         J = self.jacobian(z if self._machines is None else self._worst(self._machines, z))
         known = np.asarray(np.isfinite(J).all(axis=(1, 2)))
         values = np.linalg.svd(np.where(known[:, None, None], J, 0.0), compute_uv=False)
-        with np.errstate(all="ignore"):
-            found = -values[:, 0] / values[:, -1] if self._is_condition else values[:, -1]
+        least = values[:, 5] if self._has_six else np.zeros(len(values))
+        # A singular value that is 0 counts as rounding: the condition number stays a number.
+        rounding = np.maximum(np.finfo(float).eps * values[:, 0], np.finfo(float).tiny)
+        found = -values[:, 0] / np.maximum(least, rounding) if self._is_condition else least
         return np.where(known, found, np.nan)[:, None]
 
     def worst(self, y: FloatArray) -> FloatArray | None:

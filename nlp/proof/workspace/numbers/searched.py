@@ -23,6 +23,7 @@ from ...statement.machine import JointErrors, Legs, has_straight_legs, joint_cen
 from ...statement.motors import motor_claims
 from ..robot.path_cover import PathCover
 from ..robot.posed_robot import NotJudgedError, Problem
+from ..verdict import EVERYWHERE
 from .bound_search import Minimum, smallest_values
 from .clearance import Clearance
 from .extremes import Extreme, extreme_of, goal_of
@@ -125,6 +126,8 @@ def searched_extremes(
 
 def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | None) -> Extreme:
     """Return the extreme of a number; the search of a limit ends as soon as it is decided."""
+    if subject.model.rank < 6 and claim.limit is None and claim.kind is not ClaimKind.CLEARANCE:
+        return extreme_of(claim, Minimum(reason=EVERYWHERE))
     try:
         number, problem = subject.number(claim), subject.problem
         allowed = _asked_gap(subject, number, gap) if claim.limit is None else gap * max(abs(claim.limit), _NEAR_ZERO)

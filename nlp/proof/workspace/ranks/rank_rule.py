@@ -112,7 +112,9 @@ class RankTest:
 
     def examine(self, forms: Forms, f: int, errors: int) -> Tested:
         """Return the verdict on boxes from forms of the entries, as of :class:`~.loop_boxes.Test`."""
-        count, terms, columns = len(forms.c), forms.a.shape[2], self._head[1]
+        count, terms, (rows, columns, *_) = len(forms.c), forms.a.shape[2], self._head
+        if rows < columns:  # singular at every pose
+            return not_regular(np.zeros((count, f)), np.zeros(count))
         is_known = np.asarray((np.isfinite(forms.c) & np.isfinite(forms.r)).all(axis=1))
         M0 = self._middles(np.where(is_known[:, None], forms.c, 0.0))
         with np.errstate(all="ignore"):

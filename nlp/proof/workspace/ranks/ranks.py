@@ -44,13 +44,19 @@ class Ranks(NamedTuple):
 
 
 def prove_ranks(
-    problem: Problem, is_singular: IsSingular, *, progress: RankProgress | None = None, paper: PaperRecord | None = None
+    problem: Problem,
+    is_singular: IsSingular,
+    *,
+    rank: int = 6,
+    progress: RankProgress | None = None,
+    paper: PaperRecord | None = None,
 ) -> Ranks:
     """Prove that J and the constraint wrenches keep their ranks at every pose of a box, or find a pose.
 
     Args:
         problem: the design, or all machines that are meant.
         is_singular: shows single poses, in home's assembly; others refute nothing.
+        rank: of J at almost all dimensions and poses.
         progress: called during them.
         paper: records the searches for a proof.
     """
@@ -64,6 +70,10 @@ def prove_ranks(
                 return is_singular(at.y, at.errors, constraints=constraints)
 
             recorder, search = None if paper is None else paper.own(name), SingularSearch(problem, matrix, is_shown)
+            at_start = search.everywhere() if name == REGULAR and rank < 6 else None
+            if at_start is not None:
+                found.append(_refuted(not_judged(problem.box, at_start.reason), at_start))
+                continue
             verdict = prove_rank(problem, matrix, progress=progress, recorder=recorder, look=search.look)
             if name == REGULAR and verdict.outcome is Outcome.OPEN and not problem.dependent:
                 verdict = _refuted(verdict, search.from_random())

@@ -34,6 +34,7 @@ from ...enclosure.forms import Encloser
 from ...statement.machine import JointErrors
 from ..robot.posed_model import RankMatrix
 from ..robot.posed_robot import Problem
+from ..verdict import EVERYWHERE
 from .krawczyk import ROUNDING
 from .loop_boxes import Examined
 
@@ -118,7 +119,7 @@ class SingularPose:
     def smallest(self, z: FloatArray) -> float:
         """Return the singular value that is 0 at a singular pose, in parts of the largest; infinite without one."""
         M, J, rank = self._values(z).full(), self._jacobian(z).full(), self._rank
-        if not (np.isfinite(M).all() and np.isfinite(J).all()) or rank < 1 or len(M) < rank:
+        if not (np.isfinite(M).all() and np.isfinite(J).all()) or rank < 1:
             return float("inf")
         _, values, right = np.linalg.svd(M)
         if not float(np.abs(right[rank - 1, :6]).max()) > _MOVES:
@@ -126,7 +127,7 @@ class SingularPose:
         if rank == M.shape[1]:
             values = np.linalg.svd(J, compute_uv=False)
             return float(values[5] / values[0]) if len(values) > 5 else 0.0
-        return float(values[rank - 1] / values[0])
+        return float(values[rank - 1] / values[0]) if len(values) >= rank else 0.0
 
     def search(self, z: FloatArray, moving: int | None = None) -> FloatArray | None:
         """Return a singular point (n,) of the workspace near a point (n,); None where none is found.
@@ -362,6 +363,11 @@ class SingularSearch:
             return singular
         self._due = 2 * boxes
         return self._machine(self._middle(found, worst[0]))
+
+    def everywhere(self) -> Singular | None:
+        """Return the pose of the start, of a structure that is singular at every pose."""
+        start = self._problem.start
+        return self._shown(start, EVERYWHERE) if self._newton.smallest(start) <= SINGULAR else None
 
     def from_random(self) -> Singular | None:
         """Return a singular pose near random ones, from those with the smallest singular values."""

@@ -49,6 +49,7 @@ class Region(enum.Enum):
     REGULAR = "proved regular"
     BEYOND = "regular, with a singular pose on the way from the middle"
     OTHER_SIGN = "regular, with the other sign of the determinant"
+    SINGULAR = "singular, as at every pose"
     OPEN = "open: too close to a singular pose"
     UNREACHED = "out of reach, proved"
     UNKNOWN = "open: reach or closed loops are not proved"
@@ -129,6 +130,7 @@ class _Robot:
         problem: the robot over the workspace.
         limits: its limits.
         examiners: of its ranks.
+        is_singular: whether J is singular at every pose.
         sign: of the determinant in the middle; 0 for a matrix that is not square.
         other: region of regular boxes with another sign: of a matrix of polynomials a singular pose is between.
         free: indices of those numbers of the pose, among the six of a box, that the robot can choose.
@@ -147,7 +149,7 @@ class _Robot:
             self.examiners = [Examiner(problem, each) for each in tests]
         except (NotJudgedError, UncoveredError) as error:
             raise CaseError("workspace", f"has no slices: {error}", source=case.source) from None
-        self.sign = tests[0].sign
+        self.is_singular, self.sign = case.model.rank < 6, tests[0].sign
         is_continuous = not problem.dependent and is_polynomial(tests[0].entries, problem.z)
         self.other = Region.BEYOND if is_continuous else Region.OTHER_SIGN
         self.free = tuple(problem.free[k] for k in problem.independent)
@@ -239,12 +241,13 @@ class _SliceRule(LoopRule):
         reached &= inside.is_known
         is_regular = has_ranks & reached
         binding, is_same = self._first.of(self._limits.of_limits(states), low, high)
-        cases = unreached, is_regular & (signs == self._robot.sign), is_regular, reached
-        regions = Region.UNREACHED, Region.REGULAR, self._robot.other, Region.OPEN
+        is_singular = reached & self._robot.is_singular
+        cases = unreached, is_singular, is_regular & (signs == self._robot.sign), is_regular, reached
+        regions = Region.UNREACHED, Region.SINGULAR, Region.REGULAR, self._robot.other, Region.OPEN
         region = np.select(cases, list(map(_REGIONS.index, regions)), _REGIONS.index(Region.UNKNOWN))
         binding[~reached] = UNDECIDED
         is_small = (high - low <= (self._upper - self._lower) / _SIDE).all(axis=1)
-        done = (is_regular & is_same) | unreached | is_small | (is_empty & ~inside.is_known)
+        done = ((is_regular | is_singular) & is_same) | unreached | is_small | (is_empty & ~inside.is_known)
         self._done.append(some((inside, region.astype(np.int8), binding), done))
         columns = Followed(
             inside.near, inside.is_known, relation, (states, has_ranks, signs), np.zeros((len(signs), 0))
