@@ -45,8 +45,8 @@ _WIDER, _LEAST = 0.5, 1e-2
 #: Volumes that differ by less than this part are equal: the first is taken. Fixed coordinates that come first are taken
 #: where they have this part of the largest volume.
 _TIE, _ENOUGH = 1e-9, 0.2
-#: Weight of a direction of the position, in parts of the robot's size, beside one of the rotation, radians: a task is more
-#: often one of positions.
+#: Weight of a direction of the position, in parts of the robot's size, beside one of the rotation, radians: a task is
+#: more often one of positions.
 _POSITION = 3.0
 
 

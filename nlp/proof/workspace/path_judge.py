@@ -397,7 +397,7 @@ def _rank(problem: Problem, matrix: RankMatrix, name: str, cover: PathCover) -> 
 
 
 def _at_start(problem: Problem, matrix: RankMatrix, cover: PathCover) -> RankOnPath:
-    """Return the verdict on the rank of J of a structure that is singular at every pose, as at the path's first point."""
+    """Return the verdict on the rank of J of a structure that is singular everywhere, as at the first point."""
     place = Place(int(cover.pieces[0, 0]), 0.0)
     is_singular = SingularPose(problem, matrix).smallest(problem.start) <= _SINGULAR
     outcome = Outcome.REFUTED if is_singular else Outcome.OPEN
