@@ -75,13 +75,19 @@ class ClosedForm:
 def closed_form(model: Model, *, extended: bool = False) -> ClosedForm:
     """Return a robot without those of its unknowns that follow from dimensions and pose in closed form.
 
+    Free positions of driven joints stay unknowns, from which others may follow too.
+
     Args:
         model: the robot.
         extended: whether the expressions have values out of reach too, for searches that pass through it: the square
             root goes on along its tangent from where the squared sine or cosine of the reach is 1e-4.
     """
     depends = [
-        [k for k, each in enumerate(model.unknowns) if ca.depends_on(equation.expression, each.symbol)]
+        [
+            k
+            for k, each in enumerate(model.unknowns)
+            if not each.is_free and ca.depends_on(equation.expression, each.symbol)
+        ]
         for equation in model.closure
     ]
     found: dict[int, Solved] = {}
