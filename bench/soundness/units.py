@@ -102,7 +102,7 @@ def case_of(name: str, unit: str, scale: float, *, parameters: bool, kind: str) 
     text = starter_of(name)
     tables = tomllib.loads(text)
     # The workspace is commented out, from its heading on.
-    commented = re.sub(r"^# ", "", text[text.index("# [workspace]") :], flags=re.M).partition("\n[solve]")[0]
+    commented = re.sub(r"^# ", "", text[text.index("# [workspace]") :], flags=re.MULTILINE).partition("\n[solve]")[0]
     tables |= tomllib.loads(re.sub(r"#.*", "", commented))
     typical = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))["dimensions"]
     robot = tables["robot"]
@@ -203,7 +203,7 @@ def answers(name: str, unit: str, *, parameters: bool) -> dict[str, Answer]:
         out = folder / "c"
         status, text, err = command("codegen", str(cases["free"]), "--out", str(out), "--no-measure")
         if not status:
-            made = subprocess.run(["make", "-C", str(out), "test"], capture_output=True, text=True, check=False)  # noqa: S603, S607
+            made = subprocess.run(["make", "-C", str(out), "test"], capture_output=True, text=True, check=False)
             status, text, err = made.returncode, "", made.stdout[-2000:] + made.stderr[-2000:]
         found["codegen"] = Answer(status, {}, err)
     return found
@@ -259,8 +259,7 @@ def path_poses(tables: Tables) -> Iterator[list[float]]:
     for place in POINTS:
         position = [at_part(value, part) for value, part in zip(workspace["position"], place, strict=True)]
         angles = [
-            at_part(turns.get(key, 0.0), 0.5 * part)
-            for key, part in zip(("roll", "pitch", "yaw"), place, strict=True)
+            at_part(turns.get(key, 0.0), 0.5 * part) for key, part in zip(("roll", "pitch", "yaw"), place, strict=True)
         ]
         yield [*position, *angles]
 
@@ -337,7 +336,10 @@ def are_same(one: Any, other: Any, scale: float, same: float) -> bool:  # noqa: 
             return True
     pairs = zip(one.ravel().tolist(), other.ravel().tolist(), strict=True)
     return all(
-        any(abs(a * scale**power - b) <= (same * abs(a) + NOISE * max(size, 1.0) * (abs(a) < 1e-7)) * scale**power for power in POWERS)
+        any(
+            abs(a * scale**power - b) <= (same * abs(a) + NOISE * max(size, 1.0) * (abs(a) < 1e-7)) * scale**power
+            for power in POWERS
+        )
         for a, b in pairs
     )
 

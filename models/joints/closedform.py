@@ -77,6 +77,8 @@ class ClosedForm:
 def closed_form(model: Model, *, extended: bool = False, with_angles: bool = True) -> ClosedForm:
     """Return a robot without those of its unknowns that follow from dimensions and pose in closed form.
 
+    Free positions of driven joints stay unknowns, from which others may follow too.
+
     Args:
         model: the robot.
         extended: whether the expressions have values out of reach too, for searches that pass through it: the square
@@ -84,7 +86,11 @@ def closed_form(model: Model, *, extended: bool = False, with_angles: bool = Tru
         with_angles: whether angles are replaced too. As unknowns, they have no jump where a joint turns all round.
     """
     depends = [
-        [k for k, each in enumerate(model.unknowns) if ca.depends_on(equation.expression, each.symbol)]
+        [
+            k
+            for k, each in enumerate(model.unknowns)
+            if not each.is_free and ca.depends_on(equation.expression, each.symbol)
+        ]
         for equation in model.closure
     ]
     found: dict[int, Solved] = {}
@@ -108,6 +114,16 @@ def closed_form(model: Model, *, extended: bool = False, with_angles: bool = Tru
         return ClosedForm(model, tuple(reaches), with_angles)
     kept = tuple(each for e, each in enumerate(model.closure) if e not in dropped - followed)
     return ClosedForm(_rewritten(model, found, kept), tuple(reaches), with_angles)
+
+
+def with_joints_at_home(model: Model) -> Model:
+    """Return a robot whose driven joints that the pose does not determine are held at home; its drawing is left out."""
+    held = {
+        k: Solved.angle(SX(0), SX(1), SX(0)) if each.dimension is Dimension.ANGLE else Solved(SX(0), None, None, SX(0))
+        for k, each in enumerate(model.unknowns)
+        if each.is_free
+    }
+    return _rewritten(model, held, model.closure) if held else model
 
 
 def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:

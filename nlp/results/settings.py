@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TypeAlias
 
+from ...models import Dimension
 from ..case.case import Case
 from ..case.overrides import Settings
 from ..case.pose import Free, Pose, RotationForm
@@ -110,6 +112,11 @@ def dimensions_of(robot: RobotData, case: Case) -> Settings:
 
 def _setting(value: float | Vector) -> float | list[float]:
     return list(value) if isinstance(value, tuple) else value
+
+
+def joints_of(robot: RobotData, case: Case) -> Mapping[str, float]:
+    """Return the free positions of driven joints by the names of their variables, length or radians."""
+    return {each.name: case.units.to_internal(each.value, Dimension(each.kind)) for each in robot.free_joints or ()}
 
 
 def place_of(result: Answer, case: Case) -> Settings:
