@@ -22,6 +22,7 @@ from ...models.whole import Whole
 from ..errors import CaseError, listing, nearest
 from ..units import Units
 from .checks import check_direction, check_real, check_reals, check_statics, check_value, check_vector
+from .excursions import check_excursions, in_world, not_held, refuse_free
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
@@ -107,6 +108,7 @@ class Case(Whole, Shown):
         _check_tolerance(self)
         if self.workspace is not None:
             self.workspace.check(self.units)
+            check_excursions(self.workspace, self.poses[0], self.pose_count, self.units)
         if self.path is not None:
             self.path.check(self.units)
         if not 1 / LARGEST <= check_real(self.characteristic_length, "robot.characteristic_length") <= LARGEST:
@@ -235,6 +237,23 @@ class Case(Whole, Shown):
     def is_optimised_everywhere(self) -> bool:
         """Whether what is optimised is the worst of all poses at which limits hold, beside the stated ones."""
         return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)
+
+    @property
+    def world_workspace(self) -> Workspace | None:
+        """The workspace in world coordinates; None without one.
+
+        Raises:
+            CaseError: the workspace is about the pose of the case, which has a free number.
+        """
+        if self.workspace is None:
+            return None
+        refuse_free(self.workspace, self.poses[0], self.source)
+        return in_world(self.workspace, self.poses[0])
+
+    @property
+    def workspace_notice(self) -> str:
+        """Sentence about a workspace that holds no pose of the case; else empty."""
+        return "" if self.workspace is None else not_held(self.workspace, self.poses, self.units)
 
     @property
     def stated_pose_notice(self) -> str:

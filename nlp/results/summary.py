@@ -67,6 +67,8 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from fault_lines(result)
     if result.F is None:
         yield from starts_lines(result.starts, robot)
+        if case.limits_over == "workspace" and case.workspace_notice:
+            yield Line(case.workspace_notice, label="note")
     yield from _proof_lines(case, result)
     if robot is not None:
         yield solved_design_table(case, result, robot)
