@@ -149,8 +149,6 @@ def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite[Judgement, WorkspacePro
 
     def judge(solved: ProgramSolution) -> Judging[Judgement]:
         design = design_of(case, solved.nlp, solved.x)
-        if frame is not None:
-            design = at_stated_pose(design, solved.nlp, solved.x)
         found = _judged(with_objective(design, solved.F))
         faults = _faults(found)
         if frame is not None:
@@ -244,7 +242,10 @@ def _judged(case: Case) -> Judgement:
 
 
 def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
-    """Return a case with the dimensions of a point (n,) of its program, all fixed."""
+    """Return a case with the dimensions of a point (n,) of its program, all fixed.
+
+    Where the workspace is about the pose, it has the pose of the point too.
+    """
     values = nlp.program.kernels.robot_state(x, nlp.arguments).parameters.ravel().tolist()
     parameters, begin = {}, 0
     for item in case.model.parameters:
@@ -252,14 +253,11 @@ def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
         parts = values[begin : begin + count]
         parameters[item.name] = parts[0] if count == 1 else parts
         begin += count
-    return replace(case, parameters=parameters)
-
-
-def at_stated_pose(case: Case, nlp: Nlp, x: FloatArray) -> Case:
-    """Return a case with the stated pose of a point (n,) of its program, all its numbers fixed."""
+    if case.workspace is None or not case.workspace.about_pose:
+        return replace(case, parameters=parameters)
     pose = stated_poses(nlp, x)[0]
     rotation = Rotation(pose.axis, pose.angle, case.rotation.form)
-    return replace(case, position=tuple(pose.position.tolist()), rotation=rotation)
+    return replace(case, parameters=parameters, position=tuple(pose.position.tolist()), rotation=rotation)
 
 
 def _faults(judged: Judgement) -> list[BindingPose | None]:

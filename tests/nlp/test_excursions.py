@@ -13,7 +13,7 @@ import pytest
 from builders import Array, Run, case_from, output_of, refusal_of, saved, turn_about, unbroken
 from measures import circle_joints
 
-from screwsynth.nlp import Case, CaseError, case_text, judge_workspace, solve
+from screwsynth.nlp import Case, CaseError, case_text, compare, judge_workspace, solve
 from screwsynth.nlp.case.toml import toml_document
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
@@ -347,6 +347,15 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     other = saved(tmp_path / "other.toml", BASE)
     code, out, err = cli("workspace", str(other), "--of", result)
     assert (code, err) == (0, f"--of {result}: has the dimensions and the pose of the case 'base'\n")
+
+
+def test_robots_are_compared_over_workspaces_about_their_own_poses() -> None:
+    found = compare(case_from(tables(limits={"leg_length": {"min": 0.5, "max": 1.5}})), ["case", "6-pus"], jobs=1)
+    for entry in found.entries:
+        assert entry.judgement is not None, entry.workspace_fault
+        (height,) = (float(each) for each in entry.judgement.case.position[2:])  # type: ignore[arg-type]
+        ends = entry.judgement.workspace.position[2]
+        assert (ends.lower + ends.upper) / 2 == pytest.approx(height)  # type: ignore[union-attr]
 
 
 def test_the_schema_has_the_origin(cli: Run) -> None:
