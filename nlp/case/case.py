@@ -253,7 +253,10 @@ class Case(Whole, Shown):
     @property
     def workspace_notice(self) -> str:
         """Sentence about a workspace that holds no pose of the case; else empty."""
-        return "" if self.workspace is None else not_held(self.workspace, self.poses, self.units)
+        if self.workspace is None:
+            return ""
+        follows = self.model.generic is not None and self.model.generic.constraints > 0
+        return not_held(self.workspace, self.poses, self.units, by_ranges=follows)
 
     @property
     def stated_pose_notice(self) -> str:

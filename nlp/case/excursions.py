@@ -115,7 +115,7 @@ def refuse_free(workspace: Workspace, pose: Pose, source: str | None) -> None:
         raise CaseError("pose.rotation.axis", fault, source=source)
 
 
-def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units) -> str:
+def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ranges: bool = False) -> str:
     """Return a sentence where a workspace in world coordinates holds none of a case's poses; else an empty one.
 
     Of a pose with free numbers, any value counts. Rotations are compared where both are fixed or about one axis.
@@ -124,8 +124,10 @@ def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units) -> str:
         workspace: the workspace.
         poses: the stated poses.
         units: units for people.
+        by_ranges: whether ranges of the workspace alone count: those of its fixed numbers that the robot cannot choose
+            follow from others.
     """
-    faults = ["" if workspace.about_pose else _fault(workspace, pose, units) for pose in poses]
+    faults = ["" if workspace.about_pose else _fault(workspace, pose, units, by_ranges=by_ranges) for pose in poses]
     if not all(faults):
         return ""
     first = f"the workspace does not hold the pose{'' if len(poses) == 1 else 's'}: {faults[0]}"
@@ -133,7 +135,7 @@ def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units) -> str:
     return f"{first}; {offer}" if len(poses) == 1 else first
 
 
-def _fault(workspace: Workspace, pose: Pose, units: Units) -> str:
+def _fault(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -> str:
     """Return how a pose is outside of a workspace; empty where it is not, or where that is not known."""
     pairs = [
         (name, stated, own, Dimension.LENGTH)
@@ -143,7 +145,8 @@ def _fault(workspace: Workspace, pose: Pose, units: Units) -> str:
     for name, stated, own, dimension in pairs:
         (low, high), (least, most) = ends_of(stated), ends_of(own)
         slack = _ROUNDING * max(map(abs, (low, high, least, most)))
-        if least > high + slack or most < low - slack:
+        is_meant = isinstance(stated, Free) or not by_ranges
+        if is_meant and (least > high + slack or most < low - slack):
             ranges = [_span(each, units, dimension) for each in (stated, own)]
             return f"{name} is {ranges[0]}, and the pose has {ranges[1]}"
     return ""

@@ -189,7 +189,7 @@ def _about_lines(case: Case) -> Iterator[Line]:
         position, (angle, _) = [ends_of(value)[0] for value in case.position], ends_of(case.rotation.angle)
         words = ", ".join(number(each, max(map(abs, position)), digits=5) for each in position)
         turned = f", turned by {case.units.text(angle, Dimension.ANGLE)}" if angle else ""
-        yield Line(f"excursions about the pose ({words}){turned}", label="poses")
+        yield Line(f"the pose ({words}){turned}", label="about")
 
 
 def outcome_lines(claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:

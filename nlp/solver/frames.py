@@ -70,6 +70,12 @@ class Frame:
         position, rotation = self.at(self.place, nlp, x)
         return self.in_world(at.position - SX(position.tolist()), at.rotation @ SX(rotation.T.tolist()))
 
+    def returned(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
+        """Return a pose as it would be if a frame about it had stayed where it is at a point (n,) of a program."""
+        position, rotation = self.at(self.place, nlp, x)
+        turned = at.rotation @ self.place.rotation.T @ SX(rotation.tolist())
+        return SymbolicPose(at.position - self.place.position + SX(position.tolist()), turned)
+
     @staticmethod
     def at(pose: SymbolicPose, nlp: Nlp, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return position (3,) and rotation (3, 3) of a pose at a point (n,) of a program."""

@@ -371,7 +371,7 @@ class PoseConstraints:
             farthest = int(np.argmin(numbers(x, self._nlp.arguments).full()))
             yield BoundedConstraint(Constraint(name, reaches[farthest], NUMBER, stated=_ABOVE), _REACH, math.inf)
             return
-        stated = [each for each in self._of_dependent(closed.robot) if each.name == binding.name]
+        stated = [each for each in self._of_dependent(closed.robot, x) if each.name == binding.name]
         if stated:
             low, high = (next((each.limit for each in stated if each.sense is sense), None) for sense in Sense)
             constraint = Constraint(name, stated[0].expression, stated[0].reading)
@@ -381,10 +381,14 @@ class PoseConstraints:
         items = self._of_stroke(binding.name, poses) if binding.longest is not None else self._at_pose(closed, where)
         yield from (_tightened(item, name) for item in items if item.constraint.name in (binding.name, name))
 
-    def _of_dependent(self, robot: RobotInstance) -> list[Claim]:
-        """Return the claims about the stated ranges of dependent coordinates of a pose."""
+    def _of_dependent(self, robot: RobotInstance, x: FloatArray) -> list[Claim]:
+        """Return the claims about stated ranges of dependent coordinates of a pose, in the workspace of a design."""
         if self._workspace is None:
             return []
+        if self._frame is not None and not self._frame.is_path:
+            # The range moves with the pose, and is that of the design.
+            at = self._frame.returned(SymbolicPose(robot.position, robot.rotation), self._nlp, x[: self._nlp.n])
+            robot = replace(robot, position=at.position, rotation=at.rotation)
         return [each for each in dependent_claims(robot, self._workspace) if each.limit is not None]
 
     def _regular(self, robot: RobotInstance, name: str) -> BoundedConstraint:

@@ -329,7 +329,7 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
         cli("workspace", str(file), "--of", result, "--proof", proof, *drawn, "--quantity", "condition_number")
     )
     assert "everything is proved for every pose" in unbroken(out)
-    assert f"excursions about the pose (0, 0, {height:.5g})" in unbroken(out)
+    assert f"about  the pose (0, 0, {height:.5g})" in unbroken(out)
     assert all(Path(each).stat().st_size > 1000 for each in pictures)
     out = unbroken(output_of(cli("verify-proof", proof, str(file), "--of", result, "--all")))
     low, high = (float(each) for each in out.partition(", z ")[2].partition(" m;")[0].split(" to "))
