@@ -21,7 +21,7 @@ class ScrewsynthError(Exception):
     """Base class of the errors that this package raises on purpose, with a message of one sentence on one line."""
 
     def __str__(self) -> str:
-        return one_line(super().__str__())
+        return one_line(_shortened(super().__str__()))
 
 
 class InputError(ScrewsynthError):
@@ -62,7 +62,8 @@ class CaseError(InputError):
 
     def __str__(self) -> str:
         where = f"{self.source}: " if self.source else ""
-        return one_line(f"{where}{self.key}{'' if self.value is None else f' = {_text_of(self.value)}'}: {self.fault}")
+        value = "" if self.value is None else f" = {_text_of(self.value)}"
+        return one_line(_shortened(f"{where}{self.key}{value}: {self.fault}"))
 
     def within(self, source: str) -> CaseError:
         """Return the same error with the name of the file in which it is."""
@@ -75,6 +76,16 @@ class NoRobotError(CaseError):
 
 #: Spaces of typography that Python does not call printable: without a break, thin, and as wide as a character.
 _SPACES = "\u00a0\u2009\u202f\u3000"
+
+
+#: Largest number of characters of a message, beyond which its middle is left out; and of a name that is compared.
+_LONGEST, _LONGEST_NAME = 4_000, 200
+
+
+def _shortened(text: str) -> str:
+    """Return a message without its middle where that is long, as the names of a file may be."""
+    half = _LONGEST // 2
+    return text if len(text) <= _LONGEST else f"{text[:half]} ... {text[-half:]}"
 
 
 def check_seconds(seconds: float | None) -> None:
@@ -121,7 +132,7 @@ def did_you_mean(name: str, allowed: Iterable[str], likeness: float = 0.6) -> st
     """
     import difflib  # noqa: PLC0415 - only messages need it
 
-    close = difflib.get_close_matches(name, list(allowed), n=1, cutoff=likeness)
+    close = difflib.get_close_matches(name[:_LONGEST_NAME], list(allowed), n=1, cutoff=likeness)
     return f"did you mean {close[0]!r}? " if close else ""
 
 

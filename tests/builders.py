@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -22,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.nlp import Case, case_from_tables, shipped_cases
 from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofClaim
 from screwsynth.nlp.starter.text import starter_case
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -172,6 +174,15 @@ def commands_in(text: str, label: str) -> list[list[str]]:
 def unbroken(text: str) -> str:
     """An output without the breaks of its lines."""
     return re.sub(r"\n  +(?=\S)", " ", text)
+
+
+def unpacked(proof: Proof) -> Proof:
+    """A proof that was read, with its trees as bytes."""
+
+    def plain(claims: tuple[ProofClaim, ...]) -> tuple[ProofClaim, ...]:
+        return tuple(replace(each, tree=each.unpacked(), packed=None) for each in claims)
+
+    return replace(proof, claims=plain(proof.claims), lemmas=plain(proof.lemmas))
 
 
 def refusal_of(ended: tuple[int, str, str], *words: str) -> str:

@@ -30,6 +30,7 @@ from .checks import (
     check_value,
     check_vector,
 )
+from .excursions import check_excursions, in_world, not_held, refuse_free
 from .existence import fault_of_dimensions
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
@@ -140,6 +141,7 @@ class Case(Whole, Shown):
         _check_tolerance(self)
         if self.workspace is not None:
             self.workspace.check(self.units)
+            check_excursions(self.workspace, self.poses[0], self.pose_count, self.units)
         if self.path is not None:
             self.path.check(self.units)
         if not 1 / LARGEST <= check_real(self.characteristic_length, "robot.characteristic_length") <= LARGEST:
@@ -268,6 +270,26 @@ class Case(Whole, Shown):
     def is_optimised_everywhere(self) -> bool:
         """Whether what is optimised is the worst of all poses at which limits hold, beside the stated ones."""
         return bool(self.limits_over) and (bool(self.tasks[0].measure) or self.worst_everywhere)
+
+    @property
+    def world_workspace(self) -> Workspace | None:
+        """The workspace in world coordinates; None without one.
+
+        Raises:
+            CaseError: the workspace is about the pose of the case, which has a free number.
+        """
+        if self.workspace is None:
+            return None
+        refuse_free(self.workspace, self.poses[0], self.source)
+        return in_world(self.workspace, self.poses[0])
+
+    @property
+    def workspace_notice(self) -> str:
+        """Sentence about a workspace that holds no pose of the case; else empty."""
+        if self.workspace is None:
+            return ""
+        follows = self.model.generic is not None and self.model.generic.constraints > 0
+        return not_held(self.workspace, self.poses, self.units, by_ranges=follows)
 
     @property
     def stated_pose_notice(self) -> str:

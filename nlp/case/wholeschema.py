@@ -71,6 +71,10 @@ class WorkspaceRotationTable(Table):
 class WorkspaceTable(Table):
     """The poses that a machine must reach: every pose of a box."""
 
+    about: Literal["world", "pose"] = Field(
+        default="world",
+        description="origin of the numbers: the world, or the case's pose, for excursions along the axes of the world",
+    )
     position: Annotated[list[Span], Field(min_length=3, max_length=3)] = Field(
         description="origin of the platform frame"
     )
@@ -126,7 +130,8 @@ class WholeDocument(Document):
                 raise CaseError("limits.over", "needs the table [workspace], which states the poses", "workspace")
             return None
         position = [internal_value(value, units, Dimension.LENGTH) for value in self.workspace.position]
-        return Workspace(position, _turns(self.workspace.rotation, units), has_limits)
+        turns, is_about = _turns(self.workspace.rotation, units), self.workspace.about == "pose"
+        return Workspace(position, turns, has_limits, about_pose=is_about)
 
     def read_path(self, folder: str, units: Units) -> PathFile | None:
         """Return the programmed path that the document states, along which its limits may hold."""

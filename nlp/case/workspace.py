@@ -72,6 +72,8 @@ class Workspace:
         position: origin of the platform frame in the world frame, length; fixed or free components.
         turns: rotations.
         has_limits: whether a solve must find a design that is regular and keeps the case's limits at each of the poses.
+        about_pose: whether the numbers are excursions about the stated pose of the case, see :mod:`.excursions`, and
+            not coordinates of the world.
         dependent: coordinates that the robot of a case cannot choose, as a judgement of it finds them; empty in a case.
             A range stated for one is a limit, and a number the place where its value is looked for.
         held: indices of fixed coordinates that it chooses beside those with ranges; empty without dependent ones.
@@ -83,6 +85,7 @@ class Workspace:
     position: Sequence[Value]
     turns: Turns = field(default_factory=Turns)
     has_limits: bool = False
+    about_pose: bool = False
     dependent: tuple[DependentCoordinate, ...] = ()
     held: tuple[int, ...] = ()
 
@@ -203,6 +206,7 @@ class Workspace:
         elif turns.kind is TurnKind.AXIS:
             rotation = {"axis": list(turns.axis), "angle": angles[0]}
         return {
+            "about": "pose" if self.about_pose else None,
             "position": [_written(value, units, Dimension.LENGTH) for value in self.position],
             "rotation": None if turns == Turns() else rotation,
         }

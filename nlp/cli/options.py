@@ -265,10 +265,14 @@ def read_machine(
 
     case, result = read_case(name, settings).case, load_answer(of)
     robot, is_same = robot_of(result, f"--of {of}", case, of_any_case=True), result.head.case == case.name
-    numbers = settings_of(robot, case) if at_pose and is_same else dimensions_of(robot, case)
+    # A workspace about the pose moves with it.
+    moves = case.workspace is not None and case.workspace.about_pose and robot.several is None
+    has_pose = (at_pose and is_same) or moves
+    numbers = settings_of(robot, case) if has_pose else dimensions_of(robot, case)
     chosen = {**numbers, **place_of(result, case), **settings}
     if not is_same:
-        typer.echo(f"--of {one_line(of)}: has the dimensions of the case {one_line(result.head.case)!r}", err=True)
+        what = "dimensions and the pose" if has_pose else "dimensions"
+        typer.echo(f"--of {one_line(of)}: has the {what} of the case {one_line(result.head.case)!r}", err=True)
     return Machine(read_case(name, chosen), chosen)
 
 

@@ -85,6 +85,14 @@ class SolveOutcome(NamedTuple):
     is_proved: bool
 
 
+def tell_workspace(case: Case) -> None:
+    """Say on standard error that the workspace of a case holds no pose of it, where that is so."""
+    from ..errors import one_line
+
+    if case.workspace_notice:
+        sys.stderr.write(f"{one_line(case.workspace_notice)}\n")
+
+
 def solve_with_progress(
     case: Case, jobs: int | None, *, certify: bool = False, gap: float = 1e-4, step: float | None = None
 ) -> SolveOutcome:
@@ -96,6 +104,8 @@ def solve_with_progress(
     """
     from ..solver.solve import solve
 
+    if case.limits_over == "workspace":
+        tell_workspace(case)
     if step is not None:
         from ..solver.rounding import round_design
 

@@ -39,13 +39,13 @@ def verify_proof(
     """
     from .. import __version__
     from ..errors import InputError
-    from ..output.files import read_text
-    from ..proof.checker.proof_file import Statement, read_proof
+    from ..proof.checker.proof_file import LARGEST_PROOF, Statement, read_proof
     from ..results.text import Line
+    from ..system.reading import read_limited
     from .paper import verify_paper
 
     is_given = {"--above": above is not None, "--all-assemblies": all_assemblies, "--leg-error": leg_error != 0}
-    given = read_proof(read_text(proof), proof)
+    given = read_proof(read_limited(proof, LARGEST_PROOF), proof)
     foreign = ("--leg-error",) if isinstance(given.premises, Statement) else ("--above", "--all-assemblies")
     for name in foreign:
         if is_given[name]:

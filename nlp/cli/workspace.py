@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from . import options
-from .progress import spinner
+from .progress import spinner, tell_workspace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +50,7 @@ def workspace(
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = options.read_machine(case, settings, of)
     workspace_of_case(loaded)
+    tell_workspace(loaded)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)
     files.check(inputs)
     slices = _slices(loaded, files)

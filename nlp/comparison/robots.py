@@ -206,7 +206,7 @@ def placed(case: Case, contender: Contender, factor: float, part: float, length:
     parameters = {item.name: _values(item, factor, part) for item in model.parameters}
     first, *further = (_moved_pose(pose, offset) for pose in case.poses)
     workspace = case.workspace
-    if workspace is not None:
+    if workspace is not None and not workspace.about_pose:
         workspace = replace(workspace, position=_moved(workspace.position, offset))
     bare = replace(
         case,

@@ -130,13 +130,14 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
     """
     nlp = with_pairs_at(nlp, [x])
     at = linearise(nlp, x)
-    active = at.active()
+    active, feasibility = at.active(), at.violation
+    violated = tuple(dict.fromkeys(at.sides[j].name for j in active if at.slack[j] < -FEASIBLE))
+    if not math.isfinite(feasibility):
+        nothing = frozen_array((), (0,))
+        return Evidence(PointKind.UNDEFINED, math.inf, feasibility, math.inf, (), violated, True, nothing, ())
     mu, stationarity = multipliers(at, active)
-    feasibility = at.violation
     normals = at.normals[list(active)]
     kind = PointKind.INFEASIBLE if feasibility > FEASIBLE else PointKind.NOT_STATIONARY
-    if not math.isfinite(feasibility):
-        kind = PointKind.UNDEFINED
     eigenvalues: FloatArray = np.zeros(0)
     flat: list[FloatArray] = []
     if feasibility <= FEASIBLE and stationarity <= STATIONARY:
@@ -149,7 +150,7 @@ def examine(nlp: Nlp, x: FloatArray) -> Evidence:
         feasibility=feasibility,
         complementarity=float(np.max(np.abs(mu * at.slack), initial=0.0)),
         active=tuple(_active_side(nlp, at, j, mu[j]) for j in active),
-        violated=tuple(dict.fromkeys(at.sides[j].name for j in active if at.slack[j] < -FEASIBLE)),
+        violated=violated,
         licq=_is_independent(normals),
         eigenvalues=frozen_array(eigenvalues, eigenvalues.shape),
         flat=tuple(_changes_by_name(nlp, direction) for direction in flat),

@@ -6,8 +6,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from ...models import Dimension
 from ..case.case import Case
 from ..case.motors import MotorNumber
+from ..case.pose import ends_of
 from ..case.task import Sense
 from ..interruption import STOPPED
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
@@ -164,6 +166,7 @@ def workspace_summary(
     limited = [each for each in result.extremes if each.limit is not None]
     yield title_line(case)
     yield from verdict_lines(case, result)
+    yield from _about_lines(case)
     yield from _regular_lines(case, result.regular)
     if result.constraints is not None:
         yield from _regular_lines(case, result.constraints, "constraints regular", "the constraint wrenches lose")
@@ -181,6 +184,15 @@ def workspace_summary(
             yield from in_part("searches", _search_lines(case, regular, label))
     yield from in_part("the machine that refutes", _machine_lines(case, result.extremes))
     yield from in_part("every number", _tables(case, result.extremes))
+
+
+def _about_lines(case: Case) -> Iterator[Line]:
+    """Yield the pose about which the workspace of a case with a fixed pose is."""
+    if case.workspace is not None and case.workspace.about_pose:
+        position, (angle, _) = [ends_of(value)[0] for value in case.position], ends_of(case.rotation.angle)
+        words = ", ".join(number(each, max(map(abs, position)), digits=5) for each in position)
+        turned = f", turned by {case.units.text(angle, Dimension.ANGLE)}" if angle else ""
+        yield Line(f"the pose ({words}){turned}", label="about")
 
 
 def outcome_lines(claims: Sequence[ExtremeData | PathClaimData]) -> Iterator[Line]:

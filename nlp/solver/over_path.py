@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-from ...models import FloatArray, axis_angle_from_matrix
 from ..case.case import Case
 from ..case.pose import Free
 from ..path.placing import in_frame, in_world, placed
@@ -14,8 +13,8 @@ from ..path.reader import path_of_case, stated_path
 from ..program.nlp import Nlp
 from ..proof.statement.claims import REGULAR
 from ..proof.workspace.path_judge import PathJudgement, judge_path
-from ..proof.workspace.robot.pose_box import PoseNumbers
 from ..proof.workspace.verdict import Outcome
+from .frames import Frame, pose_of
 from .multistart import ProgramSolution
 from .placement import with_place
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints
@@ -63,7 +62,7 @@ def over_path(case: Case, nlp: Nlp) -> SemiInfinite[PathJudgement, PathProof]:
         # What is not covered after such a turn is refused before any solve.
         placed(path, [0.0] * 3 + [float(isinstance(value, Free) or value != 0) for value in case.path.place[3:]])
     start = path.poses_at([0], 0.0)
-    first = PoseNumbers(start.positions[0], start.rotations[0], *axis_angle_from_matrix(start.rotations[0]))
+    first = pose_of(start.positions[0], start.rotations[0])
 
     def judge(solved: ProgramSolution, gap: float) -> Judging[PathJudgement]:
         place = numbers(solved.x)
@@ -72,26 +71,17 @@ def over_path(case: Case, nlp: Nlp) -> SemiInfinite[PathJudgement, PathProof]:
         faults = list(_faults(found))
         found = replace(found, case=replace(found.case, limits=case.limits))  # the level is no limit of the case
         if frame is not None:
-            faults = [None if each is None else _moved(each, partial(in_frame, place)) for each in faults]
+            faults = [None if each is None else each.moved(partial(in_frame, place)) for each in faults]
         return Judging(found.case, found, faults)
 
     def proof(done: Exchange[PathJudgement]) -> PathProof:
         place, poses = numbers(done.found.x), done.poses
         if frame is not None:
-            poses = tuple(_moved(each, partial(in_world, place)) for each in poses)
+            poses = tuple(each.moved(partial(in_world, place)) for each in poses)
         return PathProof(done.judgement, tuple(place.tolist()), poses, done.history, done.tighter)
 
-    return SemiInfinite(nlp, PoseConstraints(nlp, case, first, frame), judge, proof)
-
-
-def _moved(each: BindingPose, move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]) -> BindingPose:
-    """Return a claim at poses that are moved from one frame to another, from position and rotation."""
-
-    def moved(pose: PoseNumbers) -> PoseNumbers:
-        position, rotation = move(pose.position, pose.rotation)
-        return PoseNumbers(position, rotation, *axis_angle_from_matrix(rotation))
-
-    return each._replace(pose=moved(each.pose), longest=None if each.longest is None else moved(each.longest))
+    constraints = PoseConstraints(nlp, case, first, None if frame is None else Frame(frame, is_path=True))
+    return SemiInfinite(nlp, constraints, judge, proof)
 
 
 def _faults(judged: PathJudgement) -> Iterator[BindingPose | None]:

@@ -10,7 +10,7 @@ claim, and so a separate constraint.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -25,7 +25,6 @@ from ...models import (
     Model,
     RobotInstance,
     Substitution,
-    axis_angle_from_matrix,
     frozen_vector,
     instantiate,
 )
@@ -49,6 +48,7 @@ from ..proof.statement.machine import workspace_of_case
 from ..proof.statement.tolerance import BuiltModel, built_model
 from ..proof.workspace.robot.pose_box import PoseNumbers, pose_box, rotation_of
 from ..proof.workspace.robot.posed_robot import NotJudgedError, Problem, build_problem
+from .frames import Frame, pose_of
 
 #: Part of a limit by which it is tighter in the constraints: several gaps of the proofs fit between.
 TIGHTER = 1e-3
@@ -94,6 +94,11 @@ class BindingPose(NamedTuple):
     def poses(self) -> tuple[PoseNumbers, ...]:
         """The pose, or both poses of a stroke."""
         return (self.pose,) if self.longest is None else (self.pose, self.longest)
+
+    def moved(self, move: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]) -> BindingPose:
+        """Return the claim at poses that are moved from one frame to another, from position and rotation."""
+        poses = [pose_of(*move(each.position, each.rotation)) for each in self.poses]
+        return self._replace(pose=poses[0], longest=None if self.longest is None else poses[1])
 
     def is_same(self, other: BindingPose) -> bool:
         """Return whether another one has the same claim, poses and machine, to the last bit."""
@@ -146,18 +151,16 @@ class PoseConstraints:
         nlp: the program without them.
         case: the case.
         middle: pose by whose determinant of J others are measured; that in the middle of the workspace if left out.
-        place: of the frame in which poses are given, in the program's variables; the world's if left out.
+        frame: in which poses are given; the world if left out.
     """
 
-    def __init__(
-        self, nlp: Nlp, case: Case, middle: PoseNumbers | None = None, place: SymbolicPose | None = None
-    ) -> None:
+    def __init__(self, nlp: Nlp, case: Case, middle: PoseNumbers | None = None, frame: Frame | None = None) -> None:
         if middle is None:
             if case.workspace is None:
                 raise TypeError("a case with limits over its workspace has a workspace")
             box = pose_box(case.workspace)
             middle = box.pose(0.5 * (box.lower + box.upper))
-        self._nlp, self._case, self._middle, self._place = nlp, case, middle, place
+        self._nlp, self._case, self._middle, self._frame = nlp, case, middle, frame
         self._closed = closed_form(case.model, extended=True)
         names = [item.name for item in case.model.unknowns]
         own = nlp.program.places.unknowns[0] if names else ()
@@ -287,7 +290,7 @@ class PoseConstraints:
         y = box.coordinates(self._numbers(pose, x))
         start = _closed_at(problem, y)
         dependent = [j for j in problem.dependent if j < count]
-        if start is None or (dependent and self._place is not None):
+        if start is None or (dependent and self._frame is not None and self._frame.is_path):
             return None
         places = [problem.free[j] for j in dependent]
         model, reaches = self._closed.model, self._closed.reaches
@@ -303,7 +306,8 @@ class PoseConstraints:
         lower, upper = box.lower[places], box.upper[places]
         room, unknowns = _BEYOND * (upper - lower), symbols[len(places) :]
         at = SymbolicPose(coordinates[:3], rotation_of(box, coordinates[3:]))
-        at = at if self._place is None else self._placed(pose)
+        if self._frame is not None:
+            at = self._frame.carried(at, nlp, x[: nlp.n]) if dependent else self._placed(pose)
         given = Substitution(parameters, unknowns, at.rotation, at.position, reference)
         robot = self._robot(model, given)
         values = [each.value for each in reaches]
@@ -323,19 +327,13 @@ class PoseConstraints:
 
     def _placed(self, pose: PoseNumbers) -> SymbolicPose:
         """Return a pose in the world."""
-        position, rotation, place = SX(pose.position.tolist()), SX(pose.rotation.tolist()), self._place
-        if place is None:
-            return SymbolicPose(position, rotation)
-        return SymbolicPose(place.position + place.rotation @ position, place.rotation @ rotation)
+        if self._frame is None:
+            return SymbolicPose(SX(pose.position.tolist()), SX(pose.rotation.tolist()))
+        return self._frame.placed(pose)
 
     def _numbers(self, pose: PoseNumbers, x: FloatArray) -> PoseNumbers:
         """Return a pose in the world at a point (n,)."""
-        if self._place is None:
-            return pose
-        placed, program = self._placed(pose), self._nlp.program
-        function = ca.Function("placed", [program.x, program.p], [ca.densify(each) for each in placed])
-        position, rotation = (each.full() for each in function(x, self._nlp.arguments))
-        return PoseNumbers(position.ravel(), rotation, *axis_angle_from_matrix(rotation))
+        return pose if self._frame is None else pose_of(*Frame.at(self._frame.placed(pose), self._nlp, x))
 
     @cached_property
     def _built(self) -> BuiltModel:
@@ -374,7 +372,7 @@ class PoseConstraints:
             farthest = int(np.argmin(numbers(x, self._nlp.arguments).full()))
             yield BoundedConstraint(Constraint(name, reaches[farthest], NUMBER, stated=_ABOVE), _REACH, math.inf)
             return
-        stated = [each for each in self._of_dependent(closed.robot) if each.name == binding.name]
+        stated = [each for each in self._of_dependent(closed.robot, x) if each.name == binding.name]
         if stated:
             low, high = (
                 next((each.limit for each in stated if each.sense is sense), None) for sense in (Sense.MIN, Sense.MAX)
@@ -386,10 +384,14 @@ class PoseConstraints:
         items = self._of_stroke(binding.name, poses) if binding.longest is not None else self._at_pose(closed, where)
         yield from (_tightened(item, name) for item in items if item.constraint.name in (binding.name, name))
 
-    def _of_dependent(self, robot: RobotInstance) -> list[Claim]:
-        """Return the claims about the stated ranges of dependent coordinates of a pose."""
+    def _of_dependent(self, robot: RobotInstance, x: FloatArray) -> list[Claim]:
+        """Return the claims about stated ranges of dependent coordinates of a pose, in the workspace of a design."""
         if self._workspace is None:
             return []
+        if self._frame is not None and not self._frame.is_path:
+            # The range moves with the pose, and is that of the design.
+            at = self._frame.returned(SymbolicPose(robot.position, robot.rotation), self._nlp, x[: self._nlp.n])
+            robot = replace(robot, position=at.position, rotation=at.rotation)
         return [each for each in dependent_claims(robot, self._workspace) if each.limit is not None]
 
     def _regular(self, robot: RobotInstance, name: str) -> BoundedConstraint:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -28,10 +29,12 @@ from ..case.forces import dimension_of_measure
 from ..case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
 from ..case.limits.limits import Limits
 from ..case.limits.objective import ObjectiveLimit
-from ..case.pose import Free
+from ..case.pose import Free, Rotation
 from ..case.task import Method, Sense
 from ..errors import CaseError
+from ..evidence.state import stated_poses
 from ..interruption import is_requested, one_call
+from ..path.path import SymbolicPose
 from ..program.nlp import Nlp
 from ..proof.enclosure.engine import kernel
 from ..proof.statement.machine import JointErrors, workspace_of_case
@@ -41,6 +44,7 @@ from ..proof.workspace.numbers.extremes import Extreme, prove_extreme
 from ..proof.workspace.ranks.ranks import not_judged
 from ..proof.workspace.robot.pose_box import pose_box
 from ..proof.workspace.verdict import Outcome
+from .frames import Frame, excursion_from, excursion_to
 from .multistart import ProgramSolution
 from .pose_constraints import TIGHTER, BindingPose, PoseConstraints, with_margin
 from .status import Status
@@ -144,17 +148,30 @@ def over_workspace(case: Case, nlp: Nlp) -> SemiInfinite[Judgement, WorkspacePro
         case: the case.
         nlp: its program with limits at the stated poses.
     """
+    frame = None
+    if case.workspace is not None and case.workspace.about_pose:
+        # The workspace moves with the pose, and constraints with it.
+        robot = nlp.program.robot
+        frame = Frame(SymbolicPose(robot.position, robot.rotation))
 
     def judge(solved: ProgramSolution, gap: float) -> Judging[Judgement]:
         design = design_of(case, solved.nlp, solved.x)
         found = _judged(with_objective(design, solved.F), gap)
+        faults = _faults(found)
+        if frame is not None:
+            move = partial(excursion_from, Frame.at(frame.place, nlp, solved.x[: nlp.n]))
+            faults = [None if each is None else each.moved(move) for each in faults]
         # The level is no limit of the case.
-        return Judging(design, replace(found, case=design), _faults(found))
+        return Judging(design, replace(found, case=design), faults)
 
     def proof(done: Exchange[Judgement]) -> WorkspaceProof:
-        return WorkspaceProof(done.judgement, done.poses, done.history, done.first, done.tighter)
+        poses = done.poses
+        if frame is not None:
+            move = partial(excursion_to, Frame.at(frame.place, nlp, done.found.x[: nlp.n]))
+            poses = tuple(each.moved(move) for each in poses)
+        return WorkspaceProof(done.judgement, poses, done.history, done.first, done.tighter)
 
-    return SemiInfinite(nlp, PoseConstraints(nlp, case), judge, proof)
+    return SemiInfinite(nlp, PoseConstraints(nlp, case, frame=frame), judge, proof)
 
 
 def check_exchange(case: Case) -> None:
@@ -270,7 +287,10 @@ def _judged(case: Case, gap: float) -> Judgement:
 
 
 def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
-    """Return a case with the dimensions of a point (n,) of its program, all fixed."""
+    """Return a case with the dimensions of a point (n,) of its program, all fixed.
+
+    Where the workspace is about the pose, it has the pose of the point too.
+    """
     values = nlp.program.kernels.robot_state(x, nlp.arguments).parameters.ravel().tolist()
     parameters, begin = {}, 0
     for item in case.model.parameters:
@@ -278,7 +298,11 @@ def design_of(case: Case, nlp: Nlp, x: FloatArray) -> Case:
         parts = values[begin : begin + count]
         parameters[item.name] = parts[0] if count == 1 else parts
         begin += count
-    return replace(case, parameters=parameters)
+    if case.workspace is None or not case.workspace.about_pose:
+        return replace(case, parameters=parameters)
+    pose = stated_poses(nlp, x)[0]
+    rotation = Rotation(pose.axis, pose.angle, case.rotation.form)
+    return replace(case, parameters=parameters, position=tuple(pose.position.tolist()), rotation=rotation)
 
 
 def _faults(judged: Judgement) -> list[BindingPose | None]:

@@ -1,7 +1,7 @@
 """Strict reading of JSON: plain values first, then typed values by their annotations.
 
-The text is not trusted: its depth is limited, every number is finite, no key stands twice, and every text can be
-written again. A fault is a ``ValueError`` of one sentence.
+The text is not trusted: its depth and its number of values are limited, every number is finite, no key stands twice,
+and every text can be written again. A fault is a ``ValueError`` of one sentence.
 """
 
 from __future__ import annotations
@@ -11,13 +11,15 @@ import enum
 import json
 import math
 from collections.abc import Callable, Iterable
+from functools import cache
 from types import MappingProxyType, NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from ..errors import listing, nearest
 
-#: Largest number of lists and objects within each other.
-_DEPTH = 64
+#: Largest number of lists and objects within each other, and of commas and brackets: each stands for a value that takes
+#: many times its bytes.
+_DEPTH, _MOST = 64, 1_000_000
 #: Integers up to this size are numbers without loss.
 _LARGEST_INTEGER = 2**53
 _WORDS: dict[object, str] = {
@@ -59,11 +61,13 @@ def json_tree(content: str | bytes) -> object:
     """
     try:
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
+        if sum(map(text.count, ",[{")) > _MOST:
+            raise ValueError(f"it has more than {_MOST:,} commas and brackets")
         tree = json.loads(
             text, parse_constant=_number, parse_float=_number, parse_int=_integer, object_pairs_hook=_unique
         )
         # An escape may be half of a character, which no file takes.
-        if "\\ud" in text.lower():
+        if "\\ud" in text or "\\uD" in text:
             json.dumps(tree, ensure_ascii=False).encode()
     except UnicodeEncodeError:
         raise ValueError("a text holds half of a character") from None
@@ -191,6 +195,12 @@ def _one_of(kinds: tuple[object, ...], value: object, key: str, read: ObjectRead
     raise max(faults, key=lambda error: len(error.key))
 
 
+@cache
+def _hints_of(kind: type) -> dict[str, Any]:
+    """Return the annotations of a data class, which are read for each of its objects."""
+    return get_type_hints(kind)
+
+
 def object_of(kind: type[Kind], table: object, key: str = "") -> Kind:
     """Return a data class from an object with the keys of its fields, of which those with defaults may be missing.
 
@@ -200,7 +210,7 @@ def object_of(kind: type[Kind], table: object, key: str = "") -> Kind:
     if not isinstance(table, dict):
         raise WrongValueError(key, "must be an object")
     fields: Any = kind
-    hints = get_type_hints(kind)
+    hints = _hints_of(fields)
     for name in table:
         if name not in hints:
             raise WrongValueError(below(key, name), f"no such key; {nearest(name, hints)}")

@@ -22,7 +22,6 @@ from hexapods import hexapod_text
 
 from screwsynth.nlp import InputError
 from screwsynth.nlp.program.formulation import formulate_each
-from screwsynth.nlp.proof.checker import proof_file
 from screwsynth.nlp.proof.checker.premises import fingerprint, program_of
 from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, Statement
 
@@ -455,15 +454,6 @@ def test_a_malformed_proof_is_refused_in_a_sentence(
         text = words[0].replace('"CLAIM"', words[1])
     file.write_text(text, encoding="utf-8")
     refusal_of(cli("verify-proof", str(file)), str(file))
-
-
-def test_a_tree_that_unpacks_to_too_much_is_refused(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    content = written(cli, folder, "task")
-    monkeypatch.setattr(proof_file, "_LARGEST_TREE", 1000)
-    content["claims"][0]["tree"] = base64.b64encode(zlib.compress(bytes(10**6))).decode()
-    code, out, err = checked(cli, folder, "task", content)
-    assert (code, out) == (2, "")
-    assert "incomplete, or larger" in err
 
 
 def test_proofs_of_machines_with_settings_or_of_a_result(cli: Run, tmp_path: Path) -> None:

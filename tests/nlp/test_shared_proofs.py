@@ -65,7 +65,7 @@ def proof(best: ProgramSolution) -> ProofClaim:
 def middle_leaf(proof: ProofClaim, nlp: Nlp) -> SharedLeaves:
     """The leaf whose box is nearest to home's rotation, in which poses are feasible."""
     _, found = separated(nlp.case)
-    leaves = read_shared(proof.tree, found.common.lower, found.common.upper, len(found.limbs))
+    (leaves,) = read_shared(proof.tree, found.common.lower, found.common.upper, len(found.limbs))
     leaves = leaves.select(np.isfinite(leaves.bounds).all(axis=0))
     away = np.linalg.norm(np.clip(0.0, leaves.lower[3:], leaves.upper[3:]), axis=0)
     return SharedLeaves(*(each[..., away.argmin()] for each in leaves))

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import case_from, output_of, refusal_of, unbroken
+from builders import case_from, output_of, refusal_of, unbroken, unpacked
 from hexapods import clearance, hexapod_text, subject_of, values_of
 
 from screwsynth.models import FloatArray, hexapod, three_upu
@@ -141,7 +141,7 @@ def claim(proof: Proof, name: str, sense: str = "") -> ProofClaim:
 def test_a_proof_with_every_kind_of_claim_holds(proof: Proof, judged: tuple[Judgement, PaperRecord]) -> None:
     assert not proof.unproved
     again = read_proof(proof.as_text(), "again")
-    assert again == proof
+    assert unpacked(again) == proof
     checked = check.check_workspace_proof(again, case_of(), leg_error=LEG_ERROR)
     assert len(checked.claims) == len(proof.claims)
     assert {each.reason for each in proof.claims} == {"regular", "program", "boxes", "lengths"}

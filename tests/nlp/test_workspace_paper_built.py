@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from, output_of, unbroken
+from builders import case_from, output_of, unbroken, unpacked
 from casadi import SX
 from hexapods import hexapod_text
 
@@ -156,7 +156,7 @@ def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Pr
     assert judged.is_proved
     assert not proof.unproved
     assert stated(proof).joint_centre == TOLERANCE
-    assert read_proof(proof.as_text(), "again") == proof
+    assert unpacked(read_proof(proof.as_text(), "again")) == proof
     # Of one leg, or of one pair of legs, and one stroke that takes lengths of one machine.
     strokes = [each.name for each in proof.claims if each.reason == "one machine"]
     others = ("1+", "2-", "2+", "3-", "3+")

@@ -112,7 +112,7 @@ def test_reachy_mini_is_on_paper(reachy: tuple[Case, Proof]) -> None:
 
 def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, Proof]) -> None:
     case, proof = reachy
-    tree = claim(proof, "regular").tree
+    tree = claim(proof, "regular").unpacked()
     assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
     assert "not outside" in rejected(changed(proof, "regular", tree=bytes([Node.OUTSIDE])), case)
     moved = node_bytes(Node.CUT, tree[1], value=2.0) + tree[10:]
@@ -216,7 +216,7 @@ def test_robots_with_loops_are_on_paper() -> None:
     proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
     checked = check_workspace_proof(read_proof(proof.as_text(), "again"), case)
     assert [each.name for each in checked.claims] == ["regular", "constraints regular"]
-    tree = claim(proof, "regular").tree
+    tree = claim(proof, "regular").unpacked()
     assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
     assert "not outside" in rejected(changed(proof, "constraints regular", tree=bytes([Node.OUTSIDE])), case)
 
@@ -235,7 +235,7 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     D = shown.assembly.dependent
     lower[0, D], upper[0, D] = lower[0, D] + 0.5, upper[0, D] + 0.5
     with pytest.raises(ProofError, match="same assembly"):
-        shown.assembly.refuse_apart(replace(whole, lower=lower, upper=upper))
+        shown.assembly.refuse_apart(whole._replace(lower=lower, upper=upper))
 
 
 def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(

@@ -10,7 +10,9 @@ derivatives of them.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -19,14 +21,16 @@ from ..statement.form import refuse_jumps
 from ..statement.limb_separation import separate
 from ..statement.standard_form import StandardForm, standard_form
 from .bisection import show
-from .optimum import Claims, rule_of
+from .optimum import BoundRule, Claims, MonotoneRule, rule_of
 from .polymodels import Tilts
 from .premises import fingerprint, is_same_program
 from .proof_file import ProofClaim, ProofError
-from .tree import FACES, Box, Node, SharedLeaves, TreeReader, read_claims, read_shared
+from .tree import FACES, Box, Node, SharedLeaves, TreeReader, ahead, read_claims, read_shared
 
 #: Rounding of sums of a few numbers, in parts of their sizes: many times the largest possible.
 _SUMS = 1e-13
+#: Number of leaves and faces of a block of a tree, and the claims about them.
+_Block: TypeAlias = "tuple[int, list[Claims]]"
 
 
 @dataclass(frozen=True)
@@ -59,23 +63,33 @@ def check_proof(claim: ProofClaim, nlp: Nlp) -> VerifiedProof:
         raise ProofError("the proof is for other expressions or bounds than this case's")
     form = standard_form(nlp)
     refuse_jumps(form.expressions, form.x)
-    bound = -np.inf if claim.bound is None else claim.bound
+    bound, tree = -np.inf if claim.bound is None else claim.bound, claim.unpacked()
     kinds = {bytes([Node.LIMBS]): _of_limbs, bytes([Node.SHARED]): _of_shared_limbs}
-    leaves, every = kinds.get(claim.tree[:1], _of_tree)(claim.tree, form, bound)
-    pieces = sum(show(rule_of(each), each.lower, each.upper) for each in every)
+    rules: dict[tuple[int, Node, int], BoundRule | MonotoneRule] = {}
+    leaves = pieces = 0
+    blocks = kinds.get(tree[:1], _of_tree)(tree, form, bound)
+    for count, every in ahead(blocks, lambda block: sum(2 * each.lower.size for each in block[1])):
+        leaves += count
+        for each in every:
+            # The rule of one kind of claims serves all blocks of a tree.
+            key = id(each.form), each.kind, each.index
+            rules[key] = rules[key].about(each) if key in rules else rule_of(each)
+            pieces += show(rules[key], each.lower, each.upper)
     return VerifiedProof(leaves, pieces, min(bound, form.ceiling) if bound > 0 else bound)
 
 
-def _of_tree(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
-    """Return the number of claims of a tree of a whole box, and the claims."""
+def _of_tree(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
+    """Yield the claims of a tree of a whole box."""
     reader = TreeReader(tree)
-    claims = read_claims(reader, form)
+    for claims in read_claims(reader, form):
+        yield _claims_of(claims, form, bound)
     reader.finish()
-    return _claims_of(claims, form, bound)
 
 
-def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
-    """Return the number of claims of the trees of limbs that share no variable, and the claims.
+def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
+    """Yield the claims of the trees of limbs that share no variable.
+
+    Of a limb with the bound plus infinity nothing is claimed.
 
     Raises:
         ProofError: the bytes are no tree, or the bounds of limbs do not add up.
@@ -83,20 +97,27 @@ def _of_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[
     separation = separate(form)
     if separation is None or separation.shared:
         raise ProofError("the tree is one of limbs without shared variables, which the case does not have")
-    reader = TreeReader(tree, 1)
-    parts = [(limb.form, reader.number(), read_claims(reader, limb.form)) for limb in separation.limbs]
+    reader, bounds, fault = (
+        TreeReader(tree, 1),
+        list[float](),
+        "the bounds of the limbs are more than the proven one together",
+    )
+    for limb in separation.limbs:
+        bounds.append(reader.number())
+        if math.isnan(bounds[-1]):
+            raise ProofError(fault)
+        for claims in read_claims(reader, limb.form):
+            count, every = _claims_of(claims, limb.form, bounds[-1])
+            yield (0, []) if bounds[-1] == np.inf else (count, every)
     reader.finish()
-    empty = [part for part in parts if part[1] == -np.inf]
-    if not empty:
-        bounds = [*(each for _, each, _ in parts), separation.constant]
+    if -np.inf not in bounds:
+        bounds.append(separation.constant)
         size = sum(map(abs, bounds))
         if not (math.isfinite(size) and math.fsum(bounds) + _SUMS * size <= bound):
-            raise ProofError("the bounds of the limbs are more than the proven one together")
-    read = [_claims_of(claims, limb, least) for limb, least, claims in empty or parts]
-    return sum(leaves for leaves, _ in read), [each for _, some in read for each in some]
+            raise ProofError(fault)
 
 
-def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
+def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: float) -> _Block:
     """Return the number of the boxes of a tree, and the claims about them.
 
     Raises:
@@ -111,8 +132,8 @@ def _claims_of(claims: dict[tuple[Node, int], Box], form: StandardForm, bound: f
     return sum(each.bounds.size for each in every), every
 
 
-def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int, list[Claims]]:
-    """Return the number of leaves of a tree of limbs that share variables, and its claims.
+def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> Iterator[_Block]:
+    """Yield the claims of a tree of limbs that share variables.
 
     Raises:
         ProofError: the bytes are no tree.
@@ -121,16 +142,17 @@ def _of_shared_limbs(tree: bytes, form: StandardForm, bound: float) -> tuple[int
     if separation is None or separation.common is None:
         raise ProofError("the tree is one of limbs that share variables, which the case does not have")
     common, limbs = separation.common, [limb.form for limb in separation.limbs]
-    leaves = read_shared(tree, common.lower, common.upper, len(limbs))
-    # The sums first: they are quick, and without them the limbs' bounds show nothing.
-    every = [_of_sum(leaves.select(leaves.bounds.min(axis=0) > -np.inf), common, bound)]
-    for k, limb in enumerate(limbs):
-        claimed = leaves.select(leaves.bounds[k] < np.inf)
-        own = [np.repeat(ends[common.n :, None], claimed.bounds.shape[1], axis=1) for ends in (limb.lower, limb.upper)]
-        lower, upper = np.concatenate([claimed.lower, own[0]]), np.concatenate([claimed.upper, own[1]])
-        tilts = Tilts.over(claimed.lower, claimed.upper, claimed.g[k], claimed.Q[k])
-        every.append(Claims(limb, Node.BOUNDED, 0, lower, upper, claimed.bounds[k], tilts))
-    return leaves.bounds.shape[1], [each for each in every if each.bounds.size]
+    for leaves in read_shared(tree, common.lower, common.upper, len(limbs)):
+        # The sums first: they are quick, and without them the limbs' bounds show nothing.
+        every = [_of_sum(leaves.select(leaves.bounds.min(axis=0) > -np.inf), common, bound)]
+        for k, limb in enumerate(limbs):
+            claimed = leaves.select(leaves.bounds[k] < np.inf)
+            count = claimed.bounds.shape[1]
+            own = [np.repeat(ends[common.n :, None], count, axis=1) for ends in (limb.lower, limb.upper)]
+            lower, upper = np.concatenate([claimed.lower, own[0]]), np.concatenate([claimed.upper, own[1]])
+            tilts = Tilts.over(claimed.lower, claimed.upper, claimed.g[k], claimed.Q[k])
+            every.append(Claims(limb, Node.BOUNDED, 0, lower, upper, claimed.bounds[k], tilts))
+        yield leaves.bounds.shape[1], [each for each in every if each.bounds.size]
 
 
 def _of_sum(leaves: SharedLeaves, common: StandardForm, bound: float) -> Claims:

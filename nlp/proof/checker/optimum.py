@@ -7,9 +7,10 @@ this.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import casadi as ca
 import numpy as np
@@ -69,6 +70,12 @@ class FormRule:
         self._claims, self._form, self._J, self._equation = claims, form, len(form.functions), form.is_equation
         self.width = form.upper - form.lower
         self.block = min(max(_COEFFICIENTS // places(form.n).total, _FEWEST), _MOST)
+
+    def about(self, claims: Claims) -> Self:
+        """Return the rule of further claims of the same kind about boxes of the same form."""
+        other = copy.copy(self)
+        other._claims = claims
+        return other
 
     def sentence(self, claim: int) -> str:
         """Return the sentence that a claim could not be shown."""

@@ -3,6 +3,7 @@
 A file holds the case as text, the premises as the proof states them, and its claims. A claim has a name, a reason, and
 the data of the reason: a bound, a tree of boxes (compressed, in base64, with its digest), or single points. The check
 takes all premises from the case and from its own arguments; those in the file tell a proof for other ones at once.
+Reading a file unpacks no tree: :mod:`.packed`.
 
 A proof of a program's optimum has one claim. A claim is proved by one of
 
@@ -23,11 +24,8 @@ Lemmas are further claims on which others rest: lengths of ``one machine``, each
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
-import zlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Final, Literal
 
 from ....models.fileversions import PROOF_FILES
@@ -36,10 +34,13 @@ from ...case.workspace import Workspace
 from ...errors import CaseError, InputError
 from ...system.reading import check_version
 from ...system.strictjson import json_tree, object_of
+from .packed import LARGEST_TREES, PackedTree, TreeBudget, digest_of, packed_text
 
 _FORMAT: Final = "screwsynth-proof"
-#: Largest tree in bytes: the proofs of docs/certificate.md have a few million.
-_LARGEST_TREE = 2**28
+#: Largest proof file, bytes, and largest size of the case's text in it, which may hold the files that the case names.
+LARGEST_PROOF, LARGEST_CASE = 2**26, 2**23
+#: Largest number of characters of a name, of a claim's reason, and of a fingerprint; and of claims of each kind.
+_LONGEST, _MOST_CLAIMS = 4_000, 20_000
 #: Name of the only claim of a proof about a program.
 OPTIMUM = "optimum"
 #: Poses of a workspace: ranges of the position, kind, ranges of the angles, axis.
@@ -78,10 +79,11 @@ class ProofClaim:
             of first order for legs that are one unit of length off; None without a number, and for a program without a
             feasible point.
         graph: fingerprint of the program; empty for other reasons.
-        tree: nodes in bytes; empty for a claim without a tree.
+        tree: nodes in bytes; empty for a claim without a tree, and for one with a packed tree.
         sides: two poses (6,) with determinants of opposite signs, after each those of a machine's m joint centres'
             errors (3 m,) where these are not 0; two directions (3,) of a leg, in the world frame and in the platform
             frame; empty for other reasons.
+        packed: tree of a file, which is unpacked where the claim is checked; None for a claim that was not read.
     """
 
     name: str
@@ -91,6 +93,19 @@ class ProofClaim:
     graph: str = ""
     tree: bytes = b""
     sides: tuple[tuple[float, ...], ...] = ()
+    packed: PackedTree | None = None
+
+    def unpacked(self) -> bytes:
+        """Return the nodes in bytes.
+
+        Raises:
+            DamagedProofError: those of a file cannot be unpacked.
+        """
+        return self.tree if self.packed is None or self.tree else self.packed.unpacked()
+
+    def has_tree_of(self, other: ProofClaim) -> bool:
+        """Return whether another claim has the same tree."""
+        return (self.tree, self.packed) == (other.tree, other.packed)
 
 
 @dataclass(frozen=True)
@@ -142,7 +157,17 @@ class Proof:
     unproved: tuple[Unproved, ...] = ()
 
     def as_text(self) -> str:
-        """Return the JSON text."""
+        """Return the JSON text.
+
+        Raises:
+            ProofError: the proof is larger than one that is read.
+        """
+        # Claims of one search have one tree, which is unpacked once.
+        size = sum(map(len, {each.tree for each in (*self.claims, *self.lemmas)}))
+        if size > LARGEST_TREES:
+            raise ProofError(
+                f"the trees of the proof have {size // 2**20} MB, and at most {LARGEST_TREES // 2**20} MB are read"
+            )
         about: Literal["program", "workspace"] = "program" if isinstance(self.premises, Statement) else "workspace"
         claims, lemmas = (tuple(map(_table_of, some)) for some in (self.claims, self.lemmas))
         file = _File(
@@ -188,19 +213,20 @@ class _File:
 
 def _table_of(claim: ProofClaim) -> _ClaimTable:
     """Return a claim with its tree packed."""
-    text = base64.b64encode(zlib.compress(claim.tree, 9)).decode("ascii")
-    return _ClaimTable(**{**vars(claim), "tree": text}, digest=hashlib.sha256(claim.tree).hexdigest())
+    tree = claim.unpacked()
+    own = {each.name: getattr(claim, each.name) for each in fields(claim) if each.name != "packed"}
+    return _ClaimTable(**{**own, "tree": packed_text(tree)}, digest=digest_of(tree))
 
 
-def read_proof(text: str, source: str) -> Proof:
-    """Read a proof from its JSON text.
+def read_proof(text: str | bytes, source: str) -> Proof:
+    """Read a proof from its JSON text; its trees stay packed.
 
     Args:
-        text: the JSON text.
+        text: the JSON text, or its bytes.
         source: its name, for messages.
 
     Raises:
-        ProofError: the text is no proof of a version that is read, a value is not allowed, or a tree is damaged.
+        ProofError: the text is no proof of a version that is read, or a value is not allowed.
     """
     try:
         table = json_tree(text)
@@ -210,31 +236,48 @@ def read_proof(text: str, source: str) -> Proof:
         is_program = found.about == "program"
         kind: type[Statement] | type[Premises] = Statement if is_program else Premises
         premises = object_of(kind, found.premises, "premises")
-        reasons = [each.reason for each in found.claims]
-        if is_program and (reasons != ["program"] or found.lemmas or found.not_on_paper):
-            raise ValueError("a proof about a program has one claim")
+        _check_texts(found, premises.quantities if isinstance(premises, Premises) else ())
+        kinds = [(each.name, each.reason) for each in found.claims]
+        if is_program and (kinds != [(OPTIMUM, "program")] or found.lemmas or found.not_on_paper):
+            raise ValueError(f"a proof about a program has one claim, {OPTIMUM}")
     except CaseError as error:
         raise ProofError(str(error)) from None
     except ValueError as error:
         raise ProofError(f"{source}: is no proof as certify and workspace write it: {error}") from None
-    claims, lemmas = (tuple(_claim_of(each, source) for each in some) for some in (found.claims, found.lemmas))
-    return Proof(found.case, found.name, premises, claims, lemmas, found.not_on_paper)
+    budget, tables = TreeBudget(), (*found.claims, *found.lemmas)
+    every = tuple(_claim_of(each, source, number, budget) for number, each in enumerate(tables))
+    count = len(found.claims)
+    return Proof(found.case, found.name, premises, every[:count], every[count:], found.not_on_paper)
 
 
-def _claim_of(table: _ClaimTable, source: str) -> ProofClaim:
-    """Return a claim with its tree unpacked.
+def _check_texts(found: _File, quantities: tuple[str, ...]) -> None:
+    """Refuse texts that are longer than any that is written, and names that stand twice.
 
     Raises:
-        ProofError: the text is no such tree, or the digest is another.
+        ValueError: there is one.
     """
-    fault = f"{source}: is damaged at '{table.name}'"
-    try:
-        reader = zlib.decompressobj()
-        tree = reader.decompress(base64.b64decode(table.tree, validate=True), _LARGEST_TREE)
-    except (ValueError, zlib.error):
-        raise ProofError(f"{fault}: its tree cannot be unpacked") from None
-    if not reader.eof or reader.unused_data:
-        raise ProofError(f"{fault}: its tree is incomplete, or larger than {_LARGEST_TREE // 2**20} MB")
-    if table.digest != hashlib.sha256(tree).hexdigest():
-        raise ProofError(f"{fault}: its digest is not that of its tree")
-    return ProofClaim(table.name, table.sense, table.reason, table.bound, table.graph, tree, table.sides)
+    if len(found.case) > LARGEST_CASE:
+        raise ValueError(f"case: has {len(found.case)} characters, and at most {LARGEST_CASE} are read")
+    texts = {"name": found.name, **{f"premises.quantities[{k}]": each for k, each in enumerate(quantities)}}
+    if len(set(quantities)) < len(quantities):
+        raise ValueError("premises.quantities: has a name twice")
+    for key in ("claims", "lemmas", "not_on_paper"):
+        tables: tuple[_ClaimTable | Unproved, ...] = getattr(found, key)
+        if len(tables) > _MOST_CLAIMS:
+            raise ValueError(f"{key}: has {len(tables)} entries, and at most {_MOST_CLAIMS} are read")
+        named = set[tuple[str, str]]()
+        for k, each in enumerate(tables):
+            if (each.name, each.sense) in named:
+                raise ValueError(f"{key}[{k}]: has the name and sense of another entry")
+            named.add((each.name, each.sense))
+            parts = ("name", "sense", "reason", *(("graph",) if isinstance(each, _ClaimTable) else ()))
+            texts.update({f"{key}[{k}].{part}": getattr(each, part) for part in parts})
+    for key, text in texts.items():
+        if len(text) > _LONGEST:
+            raise ValueError(f"{key}: has {len(text)} characters, and at most {_LONGEST} are read")
+
+
+def _claim_of(table: _ClaimTable, source: str, number: int, budget: TreeBudget) -> ProofClaim:
+    """Return a claim with its tree packed."""
+    packed = PackedTree(table.tree, table.digest, source, f"{table.name} {table.sense}".rstrip(), number, budget)
+    return ProofClaim(table.name, table.sense, table.reason, table.bound, table.graph, b"", table.sides, packed)

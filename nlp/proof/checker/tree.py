@@ -34,9 +34,11 @@ nothing is claimed of the others, whose bounds must be infinite.
 from __future__ import annotations
 
 import enum
+import itertools
 import struct
-from collections.abc import Iterator, Set
-from typing import TYPE_CHECKING, NamedTuple
+from collections import deque
+from collections.abc import Callable, Iterator, Set
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -68,6 +70,12 @@ class Node(enum.IntEnum):
     OUTSIDE = 12
 
 
+#: Largest number of parts of boxes that wait while others are read: the depth of a tree. Bisections of a search end at
+#: least widths, so that those of hundreds of variables are not as deep.
+_DEEPEST = 10_000
+#: Numbers in a block of a tree, with those that stand for the objects of each leaf, least number of leaves in it, and
+#: number of ends that are read ahead.
+_BLOCK, _OBJECTS, _FEWEST, _AHEAD = 2**20, 32, 64, 2**20
 #: Kinds whose node has the faces of a box.
 FACES = (Node.FACE_UPPER, Node.FACE_LOWER)
 
@@ -75,6 +83,7 @@ FACES = (Node.FACE_UPPER, Node.FACE_LOWER)
 Box = tuple["FloatArray", "FloatArray"]
 #: Kind of a leaf or face, its variable (-1 for a leaf), and the ends (n,) of its box.
 Leaf = tuple[int, int, "FloatArray", "FloatArray"]
+Block = TypeVar("Block")
 
 
 def node_bytes(kind: Node, *indices: int, value: float | None = None) -> bytes:
@@ -150,6 +159,8 @@ class TreeReader:
         """
         waiting = [(np.array(lower), np.array(upper))]
         while waiting:
+            if len(waiting) > _DEEPEST:
+                raise ProofError(f"the tree is deeper than {_DEEPEST} bisections")
             low, high = waiting.pop()
             (kind,) = self.read(1)
             if kind not in inner:
@@ -179,29 +190,64 @@ class TreeReader:
                 waiting += [rest] if (value <= high[i] if kind == Node.BELOW else value >= low[i]) else []
 
 
-def read_claims(reader: TreeReader, form: StandardForm) -> dict[tuple[Node, int], Box]:
-    """Read the claims of a tree, by kind of node and condition or variable (or 0): ends (n, L) of their boxes.
+def ahead(blocks: Iterator[Block], size: Callable[[Block], int]) -> Iterator[Block]:
+    """Yield blocks of a tree after reading on, as far as their ends of boxes are not too many.
 
-    The boxes cover the form's.
+    So nothing is shown of a tree of usual size that ends too early or too late.
+
+    Args:
+        blocks: the blocks.
+        size: returns the number of ends of a block.
+    """
+    waiting, kept = deque[Block](), 0
+    for block in blocks:
+        waiting.append(block)
+        kept += size(block)
+        while kept > _AHEAD:
+            kept -= size(waiting[0])
+            yield waiting.popleft()
+    yield from waiting
+
+
+def read_claims(reader: TreeReader, form: StandardForm) -> Iterator[dict[tuple[Node, int], Box]]:
+    """Yield the claims of a tree, in blocks, by kind of node and condition or variable (or 0): ends (n, L) of boxes.
+
+    The boxes of all blocks cover the form's.
 
     Raises:
         ProofError: the bytes are no tree.
     """
-    claims: dict[tuple[Node, int], list[Box]] = {}
     conditions = range(len(form.functions), len(form.functions) + len(form.conditions))
     inner = frozenset({Node.HALF, Node.ABOVE, Node.BELOW, *FACES})
-    for kind, i, lower, upper in reader.walk(form.lower, form.upper, inner):
-        index = max(i, 0)
-        if kind == Node.INFEASIBLE:
-            index = reader.index(conditions, "row")
-        elif kind == Node.MONOTONE:
-            index = reader.index(range(form.n), "variable")
-        elif kind not in (Node.BOUNDED, *FACES) or (kind in FACES) != (i >= 0):
-            raise ProofError(f"the tree holds {kind} where a reason must stand")
-        claims.setdefault((Node(kind), index), []).append((lower, upper))
-    return {
-        key: (np.array([low for low, _ in some]).T, np.array([up for _, up in some]).T) for key, some in claims.items()
-    }
+    for block in blocks_of(reader.walk(form.lower, form.upper, inner), form.n):
+        claims: dict[tuple[Node, int], list[Box]] = {}
+        for kind, i, lower, upper in block:
+            index = max(i, 0)
+            if kind == Node.INFEASIBLE:
+                index = reader.index(conditions, "row")
+            elif kind == Node.MONOTONE:
+                index = reader.index(range(form.n), "variable")
+            elif kind not in (Node.BOUNDED, *FACES) or (kind in FACES) != (i >= 0):
+                raise ProofError(f"the tree holds {kind} where a reason must stand")
+            claims.setdefault((Node(kind), index), []).append((lower, upper))
+        yield {
+            key: (np.array([low for low, _ in some]).T, np.array([up for _, up in some]).T)
+            for key, some in claims.items()
+        }
+
+
+def blocks_of(leaves: Iterator[Leaf], numbers: int) -> Iterator[Iterator[Leaf]]:
+    """Yield the leaves of a tree in blocks, each to be taken whole before the next one.
+
+    A few bytes of a tree are a leaf, and all leaves of a large tree are more than a memory holds.
+
+    Args:
+        leaves: the leaves.
+        numbers: that are kept of each.
+    """
+    count = max(_BLOCK // (numbers + _OBJECTS), _FEWEST)
+    for first in leaves:
+        yield itertools.chain([first], itertools.islice(leaves, count - 1))
 
 
 class SharedLeaves(NamedTuple):
@@ -236,19 +282,22 @@ def leaf_bytes(bounds: FloatArray, g: FloatArray, Q: FloatArray) -> bytes:
     return b"".join(parts)
 
 
-def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -> SharedLeaves:
-    """Return the leaves of a tree of shared variables, whose boxes cover that with ends (m,).
+def read_shared(tree: bytes, lower: FloatArray, upper: FloatArray, limbs: int) -> Iterator[SharedLeaves]:
+    """Yield the leaves of a tree of shared variables in blocks, whose boxes together cover that with ends (m,).
 
     Raises:
         ProofError: the bytes are no such tree, or a number is NaN or infinite where it must not be.
     """
-    reader, leaves = TreeReader(tree, 1), []
-    for kind, _, low, high in reader.walk(lower, upper, frozenset({Node.HALF})):
-        if kind not in (Node.INFEASIBLE, Node.BOUNDED):
-            raise ProofError(f"the tree holds {kind} where a node of shared variables must stand")
-        leaves.append((low, high, *_numbers_of_leaf(reader if kind == Node.BOUNDED else None, limbs, len(low))))
+    reader, m = TreeReader(tree, 1), len(lower)
+    every = reader.walk(lower, upper, frozenset({Node.HALF}))
+    for block in blocks_of(every, 2 * m + limbs * (1 + m + m * m)):
+        leaves = []
+        for kind, _, low, high in block:
+            if kind not in (Node.INFEASIBLE, Node.BOUNDED):
+                raise ProofError(f"the tree holds {kind} where a node of shared variables must stand")
+            leaves.append((low, high, *_numbers_of_leaf(reader if kind == Node.BOUNDED else None, limbs, m)))
+        yield SharedLeaves(*(np.stack(each, axis=-1) for each in zip(*leaves, strict=True)))
     reader.finish()
-    return SharedLeaves(*(np.stack(each, axis=-1) for each in zip(*leaves, strict=True)))
 
 
 def _numbers_of_leaf(reader: TreeReader | None, K: int, m: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -52,18 +52,19 @@ class JointErrors(NamedTuple):
 
 
 def workspace_of_case(case: Case) -> Workspace:
-    """Return a case's workspace, with the coordinates that its robot cannot choose.
+    """Return a case's workspace in world coordinates, with those that its robot cannot choose.
 
     Raises:
-        CaseError: the case has none, a dimension of its robot is free, limits need a motion that it does not state, or
-            the pose does not determine its driven joints; or as :func:`~...evidence.dependent.with_dependent`.
+        CaseError: the case has none, a dimension of its robot is free, limits need a motion that it does not state, a
+            number of the pose is free that the workspace is about, or the pose does not determine its driven joints;
+            or as :func:`~...evidence.dependent.with_dependent`.
     """
     if case.workspace is None:
         raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
     case.fixed_parameters("a workspace is judged with fixed dimensions")
     case.require_motion()
     check_determined_joints(case.model, "workspace", case.source)
-    return with_dependent(case, case.workspace)
+    return with_dependent(case, case.world_workspace or case.workspace)
 
 
 def check_leg_error(case: Case, leg_error: float) -> None:

@@ -198,7 +198,7 @@ class _Writer:
 
     def lemmas(self) -> Iterator[ProofClaim]:
         """Yield the claims that those about every machine rest on."""
-        machines = [name for (name, _), each in self.proved.items() if each.reason == "one machine"]
+        machines = dict.fromkeys(name for (name, _), each in self.proved.items() if each.reason == "one machine")
         lengths = [(one_machine_name(name), sense) for name in machines for sense in ("min", "max")]
         yield from (self._record.programs[key] for key in lengths if key in self._record.programs)
         for name, sense in [key for key, each in self.proved.items() if each.reason == "program"] + lengths:

@@ -43,7 +43,14 @@ from .number_claims import (
 )
 from .pose_boxes import COORDINATES, BoxClaim, pose_root, show_on_leaves
 from .ranks import rank_claim
-from .statement import Machines, expected_claims, hold_premises, leg_error_of, robot_claims
+from .statement import (
+    Machines,
+    expected_claims,
+    hold_premises,
+    leg_error_of,
+    refuse_other_lemmas,
+    robot_claims,
+)
 
 #: Part of itself by which a root, or a sum of two lengths, is moved outwards: more than its rounding.
 _ROUNDING = 1e-15
@@ -122,6 +129,7 @@ def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -
         wrong = [*(set(expected) - set(named)), *(set(given) - set(expected))]
         name = " ".join(min(wrong)).strip() if wrong else "one of them"
         raise ProofError(f"the claims are not those of the case, each once: see {name}")
+    refuse_other_lemmas(proof.lemmas, checker.expected)
     claims = []
     for key in (each for each in expected if each in given):
         try:
@@ -204,7 +212,7 @@ class _Checker:
         if is_refuted:
             claim.show_sign_change(self._root, given.sides)
         else:
-            self._show(claim, given.tree)
+            self._show(claim, given.unpacked())
             claim.finish()
         return CheckedClaim(*each.label, is_refuted=is_refuted, by_machine=by_machine)
 
@@ -302,7 +310,7 @@ class _Checker:
         """Return the bound of a distance between two legs, which are nearer by twice the tolerance."""
         bound, nearer = _stated(given), 2 * self._tolerance
         least = bound + nearer + _ROUNDING * (abs(bound) + nearer) if nearer else bound
-        self._show(ClearanceClaim(self._posed, each.legs, least), given.tree)
+        self._show(ClearanceClaim(self._posed, each.legs, least), given.unpacked())
         return bound
 
     def _singular(self, each: Claim, given: ProofClaim) -> float:
@@ -312,7 +320,9 @@ class _Checker:
             legs, shortest = self._of_legs()
             change = change_of_jacobian(legs, self._tolerance, each.length, shortest)
         is_condition = each.sense is Sense.MAX
-        self._show(SingularClaim(self._posed, each.length, bound, is_condition=is_condition, change=change), given.tree)
+        self._show(
+            SingularClaim(self._posed, each.length, bound, is_condition=is_condition, change=change), given.unpacked()
+        )
         return bound
 
     def _error(self, each: Claim, given: ProofClaim) -> float:
@@ -321,7 +331,7 @@ class _Checker:
             raise ProofError("one of the two errors has no proof")
         position, rotation = (self._firsts[name] for name in _FIRSTS)
         is_rotation = each.reading is not LENGTH
-        self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.tree)
+        self._show(ErrorClaim(self._posed, self._firsts[each.name], is_rotation=is_rotation), given.unpacked())
         legs, shortest = self._of_legs()
         # That of the design.
         shortest = (shortest + 2 * self._tolerance) * (1 - _ROUNDING)
@@ -342,10 +352,10 @@ class _Checker:
                 one.label: (motor, one.sense, _stated(self._given[one.label]))
                 for one, motor in motors
                 if motor and each.motor and motor.whose == each.motor.whose
-                if self._given[one.label].tree == given.tree
+                if self._given[one.label].has_tree_of(given)
             }
             claims = MotorClaims(self._case, self._loops, self._root, list(same.values()))
-            self._show(claims, given.tree)
+            self._show(claims, given.unpacked())
             claims.finish()
             self._shown |= same.keys()
         return _stated(given)

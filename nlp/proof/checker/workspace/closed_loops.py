@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -45,8 +46,8 @@ _POINTS, _SPREAD, _SEED = 4, 0.5, 1
 _WIDER, _ATTEMPTS = 1.2, 4
 #: Smallest and largest half width of a dependent coordinate, in parts of its size.
 _LEAST, _MOST = 1e-9, 1.0
-#: Number of pairs of boxes that are compared at once.
-_BLOCK = 512
+#: Number of pairs of boxes that are compared at once, and of ends among which touching ones are looked for.
+_BLOCK, _ENDS = 512, 2**22
 
 
 class LoopPoints:
@@ -158,6 +159,23 @@ class Enclosed:
         """Return those over some boxes."""
         return Enclosed(*(each[which] for each in vars(self).values()))
 
+    def boxes(self, which: NDArray[np.bool_]) -> ClosedBoxes:
+        """Return some of the boxes, with what tells whether they are of one assembly."""
+        return ClosedBoxes(self.lower[which], self.upper[which], self.near[which])
+
+
+class ClosedBoxes(NamedTuple):
+    """B boxes with one closed point at each value of the independent coordinates.
+
+    Attributes:
+        lower, upper: (B, n) ends of all coordinates.
+        near: (B, n) closed points at the centres, computed.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    near: FloatArray
+
 
 class Assembly:
     """The closed loops of a robot that change continuously from those at a start (n,), by k equations that count.
@@ -260,14 +278,14 @@ class Assembly:
         found.is_known[kept] = True
         return np.asarray(np.maximum(_WIDER * reach * radius, _LEAST * self._size[D]))
 
-    def holds(self, boxes: Enclosed, which: NDArray[np.int64], near: FloatArray) -> NDArray[np.bool_]:
+    def holds(self, boxes: ClosedBoxes, which: NDArray[np.int64], near: FloatArray) -> NDArray[np.bool_]:
         """Return whether boxes hold a closed point (N, n), which is shown in a small box about it."""
         D, at = self.dependent, near[:, self.independent]
         small = self.enclosed(at, at, near)
         inside = (small.lower >= boxes.lower[which])[:, D] & (small.upper <= boxes.upper[which])[:, D]
         return np.asarray(small.is_known & inside.all(axis=1))
 
-    def refuse_apart(self, boxes: Enclosed) -> None:
+    def refuse_apart(self, boxes: ClosedBoxes) -> None:
         """Refuse boxes whose closed loops are not shown to be those of one assembly, that of the start.
 
         Over each box the closed point changes continuously. A small box about one, which surely holds it, ties two
@@ -279,20 +297,30 @@ class Assembly:
         at = start[:, self.independent]
         is_reached = ((lower <= at) & (at <= upper)).all(axis=1) & self.holds(boxes, np.arange(len(lower)), start)
         border = np.flatnonzero(is_reached)
+        rows = max(_ENDS // max(lower.size, 1), 1)
         while border.size:
-            touches = ((lower[border, None] <= upper) & (upper[border, None] >= lower)).all(axis=2) & ~is_reached
-            pairs, before = np.argwhere(touches), is_reached.copy()
-            for begin in range(0, len(pairs), _BLOCK):
-                block = pairs[begin : begin + _BLOCK]
-                first, second = block[~is_reached[block[:, 1]]].T
-                first = border[first]
-                common = middles(np.maximum(lower[first], lower[second]), np.minimum(upper[first], upper[second]))
-                near = self.moved(boxes.near[first], common[0])
-                tied = self.holds(boxes, first, near) & self.holds(boxes, second, near)
-                is_reached[second[tied]] = True
+            before = is_reached.copy()
+            for first in range(0, len(border), rows):
+                some = border[first : first + rows, None]
+                touches = ((lower[some] <= upper) & (upper[some] >= lower)).all(axis=2) & ~is_reached
+                self._reach(boxes, is_reached, border[first : first + rows], np.argwhere(touches))
             border = np.flatnonzero(is_reached & ~before)
         if not is_reached.all():
             box = box_words(lower[~is_reached][0], upper[~is_reached][0])
             raise ProofError(
                 f"the loops closed in the box {box} are not shown to be of the same assembly as the others"
             )
+
+    def _reach(
+        self, boxes: ClosedBoxes, is_reached: NDArray[np.bool_], border: NDArray[np.intp], pairs: NDArray[np.intp]
+    ) -> None:
+        """Mark boxes that are tied to touching ones, by pairs of the numbers of a box of the border and of another."""
+        lower, upper = boxes.lower[:, self.independent], boxes.upper[:, self.independent]
+        for begin in range(0, len(pairs), _BLOCK):
+            block = pairs[begin : begin + _BLOCK]
+            first, second = block[~is_reached[block[:, 1]]].T
+            first = border[first]
+            common = middles(np.maximum(lower[first], lower[second]), np.minimum(upper[first], upper[second]))
+            near = self.moved(boxes.near[first], common[0])
+            tied = self.holds(boxes, first, near) & self.holds(boxes, second, near)
+            is_reached[second[tied]] = True

@@ -18,7 +18,7 @@ from ....case.case import Case
 from ....errors import UncoveredError
 from ...statement.tolerance import BuiltModel
 from ..proof_file import ProofError
-from .closed_loops import Assembly, Enclosed, needed_equations, start_of
+from .closed_loops import Assembly, ClosedBoxes, Enclosed, needed_equations, start_of
 from .forms import FormArithmetic, Values
 from .motion_matrix import PosedRobot
 from .pose_boxes import COORDINATES, Attempt, PoseRoot
@@ -31,6 +31,8 @@ _ZERO = 1e-9
 #: Parts of a length, or radians, by which a number of the pose is moved to test equations that were left out, the
 #: largest change of their left sides then, and the number of coordinates of positions.
 _SHORT, _ROUNDING, _POSITION = 1e-3, 1e-12, 3
+#: Largest number of coordinates of boxes with closed loops that are kept of a claim.
+_MOST_KEPT = 2**24
 
 
 class PosedLoops(NamedTuple):
@@ -132,7 +134,7 @@ class LoopClaim(ABC):
         robot, _, self.assembly, self.tolerance = loops
         # Independent coordinates as those of poses.
         self.free = [robot.free[j] for j in self.assembly.independent if j < len(robot.free)]
-        self.errors, self._shown = robot.errors, list[Enclosed]()
+        self.errors, self._shown, self._kept = robot.errors, list[ClosedBoxes](), 0
         try:
             self._entries = FormArithmetic(robot.z, expressions)
         except UncoveredError as error:
@@ -151,7 +153,7 @@ class LoopClaim(ABC):
                 is_wrong[holds] = found.is_wrong
             shares[holds], holds[holds] = found.shares, found.holds
             if self.assembly.dependent:
-                self._shown.append(known.only(found.holds))
+                self._keep(known.boxes(found.holds))
         return Attempt(holds, shares, is_wrong)
 
     @abstractmethod
@@ -161,8 +163,16 @@ class LoopClaim(ABC):
     def finish(self) -> None:
         """Refuse boxes with closed loops that are not shown to be those of one assembly, after all were shown."""
         if self._shown:
-            every = zip(*(vars(each).values() for each in self._shown), strict=True)
-            self.assembly.refuse_apart(Enclosed(*map(np.concatenate, every)))
+            every = zip(*self._shown, strict=True)
+            self.assembly.refuse_apart(ClosedBoxes(*map(np.concatenate, every)))
+
+    def _keep(self, boxes: ClosedBoxes) -> None:
+        """Keep boxes whose closed loops must be those of one assembly."""
+        self._shown.append(boxes)
+        self._kept += sum(each.size for each in boxes)
+        if self._kept > _MOST_KEPT:
+            most = _MOST_KEPT // sum(each.shape[1] for each in boxes)
+            raise ProofError(f"the claim takes more than {most:,} boxes with closed loops, and no more are kept")
 
     def closed(self, lower: FloatArray, upper: FloatArray) -> Enclosed:
         """Return the closed loops over boxes (B, 6) for all errors, or over boxes (B, 6 + e) of poses and errors."""

@@ -7,6 +7,7 @@ rotations about any axis are a ball in it. Nodes of a tree are ``cut``, ``bounde
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple, Protocol
@@ -20,7 +21,7 @@ from ....case.workspace import TurnKind, Workspace
 from ..bisection import Shown, show
 from ..fractions import tangent_ends
 from ..proof_file import ProofError
-from ..tree import Node, TreeReader
+from ..tree import Node, TreeReader, ahead, blocks_of
 
 #: Number of coordinates of a pose.
 COORDINATES = 6
@@ -163,17 +164,29 @@ class BoxClaim(Protocol):
 
 def show_on_leaves(claim: BoxClaim, root: PoseRoot, tree: bytes) -> tuple[int, int]:
     """Show a claim on the leaves of a tree of a workspace, and return the numbers of leaves and of boxes examined."""
+    leaves = pieces = 0
+    for count, boxes in ahead(_read_boxes(root, tree), lambda block: int(block[1].size)):
+        rule = _PoseRule(claim, root, *boxes)
+        leaves += count
+        pieces += show(rule, rule.lower, rule.upper)
+    return leaves, pieces
+
+
+def _read_boxes(root: PoseRoot, tree: bytes) -> Iterator[tuple[int, FloatArray]]:
+    """Yield the leaves of a tree of a workspace in blocks: their number, and ends (2, 6, L) of those with poses."""
     reader = TreeReader(tree)
-    leaves = list(reader.walk(root.lower, root.upper, frozenset({Node.CUT})))
+    for block in blocks_of(reader.walk(root.lower, root.upper, frozenset({Node.CUT})), 2 * COORDINATES):
+        count, boxes = 0, list[tuple[FloatArray, FloatArray]]()
+        for kind, _, low, high in block:
+            count += 1
+            if kind == Node.BOUNDED:
+                boxes.append((low, high))
+            elif kind != Node.OUTSIDE:
+                raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
+            elif root.contracted(low[None], high[None])[2][0]:
+                raise ProofError(f"the box {box_words(low, high)} is not outside of the workspace")
+        yield count, np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0)
     reader.finish()
-    for kind, _, low, high in leaves:
-        if kind not in (Node.BOUNDED, Node.OUTSIDE):
-            raise ProofError(f"the tree holds {kind} where a box must be closed or cut")
-        if kind == Node.OUTSIDE and root.contracted(low[None], high[None])[2][0]:
-            raise ProofError(f"the box {box_words(low, high)} is not outside of the workspace")
-    boxes = [box for kind, _, *box in leaves if kind == Node.BOUNDED]
-    rule = _PoseRule(claim, root, *np.array(boxes).reshape(-1, 2, COORDINATES).transpose(1, 2, 0))
-    return len(leaves), show(rule, rule.lower, rule.upper)
 
 
 class _PoseRule:

@@ -27,6 +27,7 @@ from ...statement.claims import (
     claims_of,
     dependent_claims,
     length_claims,
+    one_machine_name,
     searched_claims,
 )
 from ...statement.machine import Legs, legs_of
@@ -39,9 +40,10 @@ from ...statement.tolerance import (
     built_model,
     design_layout,
     machine_layout,
+    second_order_name,
 )
 from ..premises import exact
-from ..proof_file import Premises, ProofError, workspace_numbers
+from ..proof_file import Premises, ProofClaim, ProofError, workspace_numbers
 from .motion_matrix import turned_rotation
 from .pose_boxes import PoseRoot, pose_root
 
@@ -198,6 +200,16 @@ def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], l
     if robot.legs is None:
         return [each for each in every if each.kind is not ClaimKind.SPECTRUM]
     return [*every, *(ERRORS if leg_error_of(case, leg_error) > 0 else ())]
+
+
+def refuse_other_lemmas(lemmas: Sequence[ProofClaim], expected: Sequence[Claim]) -> None:
+    """Refuse lemmas on which no claim of a case can rest."""
+    claims = [each.label for each in expected]
+    strokes = [(one_machine_name(each.name), sense.value) for each in expected for sense in Sense]
+    allowed = {*strokes, *((second_order_name(name), sense) for name, sense in claims + strokes)}
+    for each in lemmas:
+        if (each.name, each.sense) not in allowed:
+            raise ProofError(f"no claim rests on the lemma {each.name} {each.sense}".rstrip())
 
 
 def _has_constraints(model: Model) -> bool:

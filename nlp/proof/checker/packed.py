@@ -1,0 +1,93 @@
+"""Trees as proof files have them: compressed, in base64, with a digest; unpacked only where their claim is checked.
+
+A few bytes can unpack to thousands of times as many, and a file may hold many trees. So all trees of a file share one
+budget, and one tree at a time is in memory.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import zlib
+from dataclasses import dataclass, field
+
+from ...errors import InputError
+
+#: Largest number of bytes of all unpacked trees of a file together: a hundred times the proofs of docs/certificate.md.
+LARGEST_TREES = 2**27
+
+
+class DamagedProofError(InputError):
+    """A proof file with a tree that is damaged, or with trees that are too large."""
+
+
+class TreeBudget:
+    """Bytes of unpacked trees that a file may still have; each tree counts once, however often it is unpacked."""
+
+    def __init__(self) -> None:
+        self.left = LARGEST_TREES
+        self._counted: dict[int, int] = {}
+
+    def most_of(self, number: int) -> int:
+        """Return the largest size of a tree, by its number in the file."""
+        return self._counted.get(number, self.left)
+
+    def count(self, number: int, size: int) -> None:
+        """Count the size of a tree."""
+        if number not in self._counted:
+            self._counted[number] = size
+            self.left -= size
+
+
+@dataclass(frozen=True)
+class PackedTree:
+    """A tree as a file has it.
+
+    Attributes:
+        text: compressed bytes in base64.
+        digest: SHA-256 of the unpacked bytes, in hexadecimal digits.
+        source, claim: file, and claim of the tree, for messages.
+        number: number of the tree in its file.
+        budget: of the file.
+    """
+
+    text: str
+    digest: str
+    source: str = field(compare=False)
+    claim: str = field(compare=False)
+    number: int = field(compare=False)
+    budget: TreeBudget = field(compare=False, repr=False)
+
+    def unpacked(self) -> bytes:
+        """Return the nodes in bytes.
+
+        Raises:
+            DamagedProofError: the text is no compressed tree, the digest is another one, or the trees of the file are
+                larger together than they may be.
+        """
+        most, reader = self.budget.most_of(self.number), zlib.decompressobj()
+        damaged = f"{self.source}: is damaged at '{self.claim}'"
+        try:
+            # One byte more than allowed tells a tree that is too large.
+            tree = reader.decompress(base64.b64decode(self.text, validate=True), most + 1)
+        except (ValueError, zlib.error):
+            raise DamagedProofError(f"{damaged}: its tree cannot be unpacked") from None
+        if len(tree) > most:
+            size = f"{LARGEST_TREES // 2**20} MB, which all trees of a file may have together"
+            raise DamagedProofError(f"{self.source}: the trees up to that of '{self.claim}' unpack to more than {size}")
+        if not reader.eof or reader.unused_data:
+            raise DamagedProofError(f"{damaged}: its tree is incomplete")
+        if self.digest != hashlib.sha256(tree).hexdigest():
+            raise DamagedProofError(f"{damaged}: its digest is not that of its tree")
+        self.budget.count(self.number, len(tree))
+        return tree
+
+
+def packed_text(tree: bytes) -> str:
+    """Return the compressed bytes of a tree in base64."""
+    return base64.b64encode(zlib.compress(tree, 9)).decode("ascii")
+
+
+def digest_of(tree: bytes) -> str:
+    """Return the digest of the bytes of a tree."""
+    return hashlib.sha256(tree).hexdigest()

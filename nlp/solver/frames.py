@@ -1,0 +1,85 @@
+"""Frames of the poses of an exchange in the variables of its program: the place of a path, and the pose of a case.
+
+A path's frame turns positions too. A workspace about a pose has excursions in the axes of the world, which turn the
+platform of that pose: see :mod:`screwsynth.nlp.case.excursions`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+from casadi import SX
+
+from ...models import FloatArray, axis_angle_from_matrix
+from ..path.path import SymbolicPose
+from ..program.nlp import Nlp
+from ..proof.workspace.robot.pose_box import PoseNumbers
+
+
+def pose_of(position: FloatArray, rotation: FloatArray) -> PoseNumbers:
+    """Return a pose from its position (3,) and its rotation matrix (3, 3)."""
+    return PoseNumbers(position, rotation, *axis_angle_from_matrix(rotation))
+
+
+def excursion_to(
+    stated: tuple[FloatArray, FloatArray], position: FloatArray, rotation: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return position and rotation in the world of an excursion about a stated pose."""
+    return stated[0] + position, rotation @ stated[1]
+
+
+def excursion_from(
+    stated: tuple[FloatArray, FloatArray], position: FloatArray, rotation: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return position and rotation of the excursion from a stated pose to a pose in the world."""
+    return position - stated[0], rotation @ stated[1].T
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """A frame in which poses are given.
+
+    Attributes:
+        place: of the frame in the world, as expressions of a program.
+        is_path: whether it is that of a path, and not the pose about which a workspace is.
+    """
+
+    place: SymbolicPose
+    is_path: bool = False
+
+    def in_world(self, position: SX, rotation: SX) -> SymbolicPose:
+        """Return a pose in the world, from its position (3, 1) and its rotation (3, 3) in this frame."""
+        origin, R = self.place
+        if self.is_path:
+            return SymbolicPose(origin + R @ position, R @ rotation)
+        return SymbolicPose(origin + position, rotation @ R)
+
+    def placed(self, pose: PoseNumbers) -> SymbolicPose:
+        """Return a pose of this frame in the world."""
+        return self.in_world(SX(pose.position.tolist()), SX(pose.rotation.tolist()))
+
+    def carried(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
+        """Return an expression of a pose in the world at a point (n,) of a program, carried along by a frame about it.
+
+        Args:
+            at: the pose, of whose expressions none is a variable of the frame.
+            nlp: the program.
+            x: the point.
+        """
+        position, rotation = self.at(self.place, nlp, x)
+        return self.in_world(at.position - SX(position.tolist()), at.rotation @ SX(rotation.T.tolist()))
+
+    def returned(self, at: SymbolicPose, nlp: Nlp, x: FloatArray) -> SymbolicPose:
+        """Return a pose as it would be if a frame about it had stayed where it is at a point (n,) of a program."""
+        position, rotation = self.at(self.place, nlp, x)
+        turned = at.rotation @ self.place.rotation.T @ SX(rotation.tolist())
+        return SymbolicPose(at.position - self.place.position + SX(position.tolist()), turned)
+
+    @staticmethod
+    def at(pose: SymbolicPose, nlp: Nlp, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return position (3,) and rotation (3, 3) of a pose at a point (n,) of a program."""
+        program = nlp.program
+        function = ca.Function("placed", [program.x, program.p], [ca.densify(each) for each in pose])
+        position, rotation = (each.full() for each in function(x, nlp.arguments))
+        return position.ravel(), rotation
