@@ -29,6 +29,7 @@ from ..proof.certificate.branch_and_bound import certify_program
 from ..proof.certificate.certificate import Certificate
 from ..proof.enclosure.engine import kernel
 from ..solver.multistart import ProgramSolution, solve_program
+from ..solver.status import Status
 from .boxes import GoalBox, Region
 from .goals import Goal, GoalProgram, loosest_numbers, program_of, read_goals
 
@@ -247,7 +248,8 @@ class _Builder:
         first = [_start(program, point) for point in near]
         solution = solve_program(nlp, self.search, first=first, jobs=self.jobs)
         if not solution.status.is_answer:
-            self.failed += 1
+            # An interrupted search has not failed.
+            self.failed += solution.status is not Status.INTERRUPTED
             return None
         return FrontPoint(program.measure(solution.x), replace(program, nlp=solution.nlp), bounds, solution)
 

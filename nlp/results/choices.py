@@ -118,12 +118,9 @@ def _statement(choice: "Choice", starts: int, status: Status) -> str:
     if not choice.is_complete:
         some = f"{choice.solved:,} of {count}, {how}"
         if status is Status.INTERRUPTED:
-            is_any = choice.solved > 0
-            return (
-                f"stopped after {some}; the others are not all searched"
-                if is_any
-                else f"stopped in the first of {count}"
-            )
+            if not choice.solved:
+                return f"stopped in the first of {count}"
+            return f"stopped after {some}; the others are not all searched"
         return f"the best of {some}; the others are not all searched" if is_answer else f"no answer in {some}"
     # The solves of ranges began from as many starts.
     ranges = f"{choice.solved:,} {how}, and the others left out by solves of {choice.relaxed:,} ranges of values"

@@ -133,7 +133,8 @@ def test_a_combination_of_catalogue_values_that_is_cut_is_not_solved() -> None:
         assert (found.status, result.F, result.status) == (Status.INTERRUPTED, None, Status.INTERRUPTED)
         assert (choice.is_complete, choice.solved < 2) == (False, True)
         assert result.choice is not None
-        assert result.choice.statement.startswith(f"stopped after {choice.solved} of 2 combinations")
+        words = f"stopped after {choice.solved} of 2" if choice.solved else "stopped in the first of 2"
+        assert result.choice.statement.startswith(f"{words} combinations of values")
         assert {part.ranges for part in choice.parts} == {((k, k + 1),) for k in range(2)}
     assert cuts == len(PARTS)
     # What a bound is proved for in no time is no answer either.
