@@ -20,6 +20,7 @@ from .arcs import PLANES, TOLERANCES, Arc, ArcError, Tolerances, arc_about, arc_
 from .options import SYSTEMS, Between, PathOptions, code_of_unit, program_unit
 from .orientation import order_named
 from .path import Kind, ProgrammedPath, idle_words
+from .standing import turns_between, without_rests
 from .words import AXES, Block, WordError, block_of
 
 #: A way of the position, in millimetres or inches, that is none: a motion so short turns the platform alone.
@@ -51,6 +52,7 @@ class _Machine:
 
     def __init__(self, source: str, units: Units, options: PathOptions) -> None:
         self.source, self.units, self.options = source, units, options
+        self.order, self.between = order_named(options.angles), options.between or Between.ANGLES
         self.line = 0
         # Modes, as LinuxCNC begins.
         self.motion: float = 80
@@ -99,7 +101,7 @@ class _Machine:
             line = self.lines[max(int(np.argmin((np.abs(knots) <= LARGEST).all(axis=1))) - 1, 0)]
             raise InputError(f"{self.source}: line {line}: must be finite, of a size of at most {LARGEST:g}")
         knots[:, 3:] = np.radians(knots[:, 3:])
-        return ProgrammedPath(
+        path = ProgrammedPath(
             self.source,
             knots,
             np.array(self.lines, dtype=np.int32),
@@ -107,10 +109,11 @@ class _Machine:
             np.array(self.seconds),
             np.array(self.arcs).reshape(-1, 6),
             np.array(self.planes, dtype=np.uint8),
-            order_named(self.options.angles),
-            self.options.between or Between.ANGLES,
+            self.order,
+            self.between,
             idle_words(self.idle),
         )
+        return without_rests(path, are_timed=False)
 
     def _run(self, lines: Iterable[str]) -> bool:
         """Run a program, and return whether it has an end."""
@@ -313,7 +316,8 @@ class _Machine:
             return 60 / words["F"]
         if length > _NO_WAY * self.scale[0] / self.scale[1]:
             return 60 * length / self.feed
-        return 60 * math.dist(self.now[3:], end[3:]) / self.turn_feed
+        turn = turns_between(np.radians([self.now[3:], end[3:]]), self.order, self.between)[0]
+        return 60 * math.degrees(turn) / self.turn_feed
 
     def _move_along_arc(self, motion: float, words: dict[str, float], end: list[float]) -> None:
         """Make an arc or a helix."""

@@ -18,8 +18,9 @@ from ..case.pose import LARGEST
 from ..errors import CaseError, InputError
 from ..units import Units
 from .options import Between, PathOptions
-from .orientation import ORDERS, order_named, quaternions_from_angles, roll_pitch_yaw, shortest_turns
+from .orientation import ORDERS, order_named, roll_pitch_yaw
 from .path import Kind, ProgrammedPath
+from .standing import still_way, turns_between, without_rests
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,22 +87,21 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
     if between is Between.ANGLES and not has_angles:
         raise InputError(f"{source}: linear angles need columns roll, pitch, yaw; other rotations are joined by slerp")
     knots = np.hstack([table.block("x y z"), _angles(table, units)])
-    moves = np.any(np.diff(knots, axis=0) != 0, axis=1)
-    # A point that is there twice is a dwell where its time is stated, and no segment where it is not.
-    keeps = np.ones_like(moves) if "t" in table.columns else moves
-    if not keeps.any():
+    if len(knots) < 2:
         raise InputError(f"{source}: there is no path: fewer than two points below a row that names the columns")
-    return ProgrammedPath(
+    path = ProgrammedPath(
         source,
-        knots[np.concatenate([[True], keeps])],
-        table.rows[1:][keeps],
-        np.where(moves, Kind.LINE, Kind.DWELL).astype(np.uint8)[keeps],
-        _durations(table, knots, between, units)[keeps],
+        knots,
+        table.rows[1:],
+        np.full(len(knots) - 1, Kind.LINE, dtype=np.uint8),
+        _durations(table, knots, between, units),
         np.empty((0, 6)),
         np.empty(0, dtype=np.uint8),
         ORDERS["rpy"],
         between,
     )
+    # A point that is there twice is a dwell where its time is stated, and no segment where it is not.
+    return without_rests(path, are_timed="t" in table.columns)
 
 
 def _check_columns(top: int, header: list[str], source: str) -> list[list[int]]:
@@ -181,10 +181,8 @@ def _durations(table: _Table, knots: FloatArray, between: Between, units: Units)
     elif "feed" in table.columns:
         feeds = table.columns["feed"]
         table.refuse(~(feeds > 0), "feed", "must be positive")
-        change = np.diff(knots, axis=0)
-        ways, turns = np.linalg.norm(change[:, :3], axis=1), np.linalg.norm(change[:, 3:], axis=1)
-        if between is Between.SLERP:
-            quaternions = quaternions_from_angles(knots[:, 3:], ORDERS["rpy"])
-            _, turns = shortest_turns(quaternions[:-1], quaternions[1:])
-        durations = np.where(ways > 0, ways, turns / units.to_internal(1, Dimension.ANGLE)) / feeds[1:]
+        ways = np.linalg.norm(np.diff(knots[:, :3], axis=0), axis=1)
+        turns = turns_between(knots[:, 3:], ORDERS["rpy"], between) / units.to_internal(1, Dimension.ANGLE)
+        # A turn in place takes the time of its turn.
+        durations = np.where(ways > still_way(knots[:, :3]), ways, turns) / feeds[1:]
     return durations

@@ -71,7 +71,7 @@ def first_faults(
         sampled = _Sampled(numbers, cover, cover.pieces[rows], near[rows])
         for k, (claim, worst) in list(left.items()):
             goal = goal_of(claim)
-            first = sampled.first(k, (goal.limit or 0.0) - goal.slack)
+            first = sampled.first(k, (goal.limit or 0.0) - goal.slack, worst.place)
             if first is None:
                 continue
             del left[k]
@@ -114,16 +114,35 @@ class _Sampled:
         found[known] = self._numbers.values(z[known])
         return found
 
-    def first(self, k: int, least: float) -> tuple[Place, float] | None:
-        """Return the first place known at which a number is less than a value, and the number; None without one."""
-        beyond = np.argwhere(self._values[:, :, k] < least)
-        if not len(beyond):
+    def first(self, k: int, least: float, worst: Place | None) -> tuple[Place, float] | None:
+        """Return the first place known at which a number is less than a value, and the number; None without one.
+
+        Args:
+            k: of the number.
+            least: the value.
+            worst: a place at which the number is less, which may be between two points; None where none is known.
+        """
+        beyond = [(row, self._parts[sample]) for row, sample in np.argwhere(self._values[:, :, k] < least)[:1].tolist()]
+        begin, end = (int(self._pieces[row, 0]) for row in (0, -1))
+        if worst is not None and begin <= worst.segment <= end:
+            beyond.append((int(np.flatnonzero(self._pieces[:, 0] == worst.segment)[0]), worst.parameter))
+        if not beyond:
             return None
-        row, sample = beyond[0].tolist()
-        piece, z, high = self._pieces[row : row + 1], self._points[sample][row : row + 1], self._parts[sample]
-        low, value = self._parts[max(sample - 1, 0)], float(self._values[row, sample, k])
-        for _ in range(_STEPS if sample else 0):
+        row, high = min(beyond)
+        # The last point before, at which the number is not less.
+        sample = max(int(np.searchsorted(self._parts, high)) - 1, 0)
+        low = min(self._parts[sample], high)
+        beside = [self._points[each][row : row + 1] for each in (min(sample + 1, len(self._parts) - 1), sample)]
+        piece, z = self._pieces[row : row + 1], next((at for at in beside if np.isfinite(at).all()), beside[0])
+
+        def value_at(part: float) -> float:
+            return float(self._values_at(self._closed(z, piece, part))[0, k])
+
+        value = value_at(high)
+        if not value < least:  # as where the loops are lost on the way
+            return None
+        for _ in range(_STEPS if low < high else 0):
             half = 0.5 * (low + high)
-            there = float(self._values_at(self._closed(z, piece, half))[0, k])
+            there = value_at(half)
             low, high, value = (low, half, there) if there < least else (half, high, value)
         return place_in(piece[0], high), value

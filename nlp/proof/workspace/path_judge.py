@@ -31,7 +31,7 @@ from ...path.arcs import PLANES
 from ...path.path import ProgrammedPath
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
-from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim, dependent_claims
+from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim, dependent_claims, searched_claims
 from ..statement.motors import in_motion, motor_claims
 from ..statement.tolerance import Directions
 from .numbers.bound_search import Minimum
@@ -202,7 +202,9 @@ def judge_path(
         lengths = [each.bound for each in found if each.name.startswith("leg_length limb ")]
         subject = Subject(case, closed.model, family, "", min(lengths, default=0.0))
         found = with_strokes(subject, found, partial(_finer, machines, claims))
-        found += searched_extremes(subject, (), gap=gap)
+        numbers_of_jacobian = list(searched_extremes(subject, (), gap=gap))
+        found += numbers_of_jacobian
+        faults |= _searched_faults(subject, numbers_of_jacobian, cover)
         report("actuators")
         found += _of_actuators(subject, machines, cover, gap, faults, is_timed=path.is_timed, with_all=not limits_alone)
     dependent = tuple(workspace.names[each.index] for each in workspace.dependent)
@@ -241,6 +243,14 @@ def _of_actuators(
     found = [*motor_extremes(subject, speeds=bounds, with_all=with_all), *unknown]
     faults |= _motor_faults(subject, found, cover)
     return [*speeds.extremes, *found]
+
+
+def _searched_faults(subject: Subject, found: Sequence[Extreme], cover: PathCover) -> dict[tuple[str, Sense], Fault]:
+    """Return the first known points at which singular values, condition numbers and clearances break their limits."""
+    faults: dict[tuple[str, Sense], Fault] = {}
+    for pair in refuted(list(searched_claims(subject.case)), found).values():
+        faults |= first_faults(subject.number(pair[0]), {0: pair}, cover)
+    return faults
 
 
 def _motor_faults(subject: Subject, found: Sequence[Extreme], cover: PathCover) -> dict[tuple[str, Sense], Fault]:

@@ -218,8 +218,9 @@ class SmallestValues(LoopRule):
         self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
         left = some(found, np.flatnonzero(~done))
         width = self.widths(left.boxes)
-        # Bounds over long and narrow boxes are wide, those of loops above all.
-        split = coordinates_to_split(left.shares * np.sqrt(width / width.max(axis=1, keepdims=True)), width)
+        widest = width.max(axis=1, keepdims=True, initial=0.0)
+        # Bounds over long and narrow boxes are wide, those of loops above all. A box of a dwell has no width.
+        split = coordinates_to_split(left.shares * np.sqrt(width / np.where(widest > 0, widest, 1.0)), width)
         parts = self.boxes_of(left, (-left.smallest).max(axis=1), split, left.smallest)
         return Verdicts(parts, -float(found.smallest[done].min(initial=np.inf)), len(done))
 

@@ -20,7 +20,7 @@ from casadi import SX
 from .....models import FloatArray
 from .....models.arrays import first_largest
 from ....evidence.closed_loops import inverses
-from ...boxes.search import Boxes, Order, Rule, Search, bisected, joined, some
+from ...boxes.search import SMALL, Boxes, Order, Rule, Search, bisected, joined, some
 from ...boxes.tree import TreeRecord
 from ...enclosure.forms import Encloser, Forms
 from ..robot.path_cover import PathCover
@@ -414,12 +414,14 @@ class LoopRule(Rule[Followed]):
         self.whole[self._independent] = (self._start.upper.max(axis=0) - self._start.lower.min(axis=0))[
             self._independent
         ]
+        self._fixed: FloatArray = np.zeros(len(problem.start))
         if problem.cover is not None:
             # What is fixed along the path is as wide as its rounding, however often a piece is halved.
             size = np.maximum(np.abs(self._start.lower).max(axis=0), np.abs(self._start.upper).max(axis=0))
             turns = [j for j, k in enumerate(problem.free) if k >= 3]
             size[turns] = np.maximum(size[turns], 1.0)
-            self.whole[~(self.whole > _FIXED * size)] = 0.0
+            self._fixed = np.nan_to_num(_FIXED * size)
+            self.whole[~(self.whole > self._fixed)] = 0.0
         # The boxes in which dependent coordinates became known.
         self._roots: list[LoopBoxes] = []
         self._root_pieces: list[FloatArray] = []
@@ -503,6 +505,11 @@ class LoopRule(Rule[Followed]):
         """Return examined boxes with bounds (B,), places (B,) of the coordinates to bisect, and columns of the rule."""
         lower, upper, near, is_known = found.boxes
         columns = np.array(self._independent)[split]
+        if self._problem.cover is not None:
+            # Halves of a piece along which the platform stands, but for rounding, are as wide as the piece.
+            own = list(self._problem.stated)
+            stands = ((upper - lower)[:, own] <= self._fixed[own]).all(axis=1)
+            columns = np.where(stands, SMALL, columns)
         return Boxes(lower, upper, bound, columns, Followed(near, is_known, found.relation, more, found.along))
 
     def widths(self, boxes: LoopBoxes | Boxes[Followed]) -> FloatArray:
