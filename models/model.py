@@ -62,7 +62,7 @@ class Model(Whole, Shown):
         quantities: named quantities for results and limits.
         scene: the drawing.
         unknowns: internal unknowns; empty for robots whose rows follow from parameters and pose.
-        closure: the independent equations that determine the unknowns.
+        closure: the independent equations that determine the unknowns, but for free positions of driven joints.
         loops: all equations of closed loops, which hold where the robot is assembled; empty for the closure alone.
         signs: of home's assembly of its joints, where these are known.
         distances: equations that follow from those of the loops, and help a search of a whole box.
@@ -155,6 +155,11 @@ class Model(Whole, Shown):
     def rank(self) -> int:
         """Rank of the Jacobian at almost all dimensions and poses: below six, the structure is singular at all of them."""
         return min(len(self.rows), 6) if self.generic is None else self.generic.jacobian
+
+    @property
+    def free_joints(self) -> tuple[str, ...]:
+        """Labels of the driven joints whose positions the pose does not determine."""
+        return tuple(each.joint for each in self.unknowns if each.is_free)
 
     @property
     def has_couples(self) -> bool:

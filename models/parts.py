@@ -77,6 +77,10 @@ class Parameter:
 class Unknown:
     """An internal unknown, such as a passive joint's position, that the closure equations determine.
 
+    A robot with more actuators than its platform has degrees of freedom has driven joints that the pose does not
+    determine. As many of their positions as are independent are *free*: the closure equations determine the other
+    unknowns from the parameters, the pose and these positions.
+
     Attributes:
         name: unique within the model.
         symbol: (1, 1) CasADi symbol.
@@ -85,6 +89,7 @@ class Unknown:
         lower: finite bound from which on the program searches the assembly, in parts of ``size``.
         upper: finite bound up to which it does.
         size: (1, 1) expression of the parameters of the order of the unknown: 1, or a length of the robot's.
+        joint: label, such as ``2:3``, of the driven joint whose free position it is; empty for a determined unknown.
     """
 
     name: str
@@ -94,6 +99,12 @@ class Unknown:
     lower: float
     upper: float
     size: SX = field(default_factory=lambda: SX(1))
+    joint: str = ""
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the pose and the closure equations leave it free."""
+        return bool(self.joint)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +226,7 @@ class Actuator:
         dimension: length for a slide or a parallelogram, angle for a rotation.
         relations: (r, 1) its factors in the equations that loops demand of the actuators' rates alone: all actuators of
             a robot have as many. There are none but where more actuators drive nested loops than these have freedoms.
+        joint: label of its joint, such as ``2:3``.
     """
 
     name: str
@@ -223,6 +235,7 @@ class Actuator:
     screws: SX
     dimension: Dimension
     relations: SX = field(default_factory=lambda: SX(0, 1))
+    joint: str = ""
 
     def screw_in(self, member: str) -> SX | None:
         """Return its screw (6, 1) as a member demands it, by the member's label; None where it does not move it."""

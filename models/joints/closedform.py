@@ -77,6 +77,8 @@ class ClosedForm:
 def closed_form(model: Model, *, extended: bool = False, with_angles: bool = True) -> ClosedForm:
     """Return a robot without those of its unknowns that follow from dimensions and pose in closed form.
 
+    Free positions of driven joints stay unknowns, from which others may follow too.
+
     Args:
         model: the robot.
         extended: whether the expressions have values out of reach too, for searches that pass through it: the square
@@ -84,7 +86,11 @@ def closed_form(model: Model, *, extended: bool = False, with_angles: bool = Tru
         with_angles: whether angles are replaced too. As unknowns, they have no jump where a joint turns all round.
     """
     depends = [
-        [k for k, each in enumerate(model.unknowns) if ca.depends_on(equation.expression, each.symbol)]
+        [
+            k
+            for k, each in enumerate(model.unknowns)
+            if not each.is_free and ca.depends_on(equation.expression, each.symbol)
+        ]
         for equation in model.closure
     ]
     found: dict[int, Solved] = {}

@@ -9,10 +9,10 @@ have one unknown less than the gap itself. An unknown follows from one equation,
 * an angle from ``a cos t + b sin t + c = 0`` with perpendicular vectors a and b of one length, ``cos t = -a.c / a.a``
   and ``sin t = -b.c / b.b``; a slide from ``a q + c = 0``: one solution.
 
-The expression of an unknown depends on dimensions and pose, and on no other unknown. Each form is read off an equation
-at a few values of the unknown, and tested at random dimensions and poses near home; of these expressions, which are
-analytic, one that agrees there agrees everywhere. A root is written ``sqrt(max(v, 0))``, so that it has a value beyond
-the edge of reach too; a search excludes such points by ``v >= 0``.
+The expression of an unknown depends on dimensions, pose and free positions of driven joints, and on no other unknown.
+Each form is read off an equation at a few values of the unknown, and tested at random dimensions and poses near home;
+of these expressions, which are analytic, one that agrees there agrees everywhere. A root is written ``sqrt(max(v,
+0))``, so that it has a value beyond the edge of reach too; a search excludes such points by ``v >= 0``.
 """
 
 from __future__ import annotations
@@ -104,8 +104,12 @@ class _Elimination:
         return equation._replace(expression=expression)
 
     def open_unknowns(self, expression: SX) -> list[int]:
-        """Return the indices of the unknowns that an expression depends on, and that are not determined by now."""
+        """Return the indices of the unknowns that an expression depends on, and that are not determined by now.
+
+        Free positions of driven joints are given, as dimensions and pose are.
+        """
         known = {each.place for each in self.found}
+        known |= {k for k, each in enumerate(self.model.unknowns) if each.is_free}
         every = enumerate(ca.vertsplit(self.symbols[1]))
         names = {each.element_hash(): k for k, each in every if k not in known}
         return sorted(names[h] for h in (s.element_hash() for s in ca.symvar(expression)) if h in names)

@@ -1,7 +1,8 @@
-"""Independent loop equations, which alone enter a program: those of an overconstrained robot depend on each other.
+"""Independent loop equations, which alone enter a program, and the driven joints whose positions they leave free.
 
-The equations are measured at random closed configurations: random dimensions, and a pose near home from which Newton's
-method with least-norm steps closes all loops.
+Equations of an overconstrained robot depend on each other, and a robot with more actuators than degrees of freedom can
+move some of its joints while the platform stands still. Both are measured at random closed configurations: random
+dimensions, and a pose near home from which Newton's method with least-norm steps closes all loops.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from casadi import SX
 from ..arrays import FloatArray
 from ..parts import Closure, Unknown
 from ..rotation import matrix_from_cayley
-from ..rows import DEPENDENT, independent_rows
+from ..rows import DEPENDENT, independent_rows, rank_of
 from .chain import HomeRobot
 from .forms import RobotError
 from .generic import PathFrame
@@ -28,6 +29,8 @@ _STEPS = 40
 _CLOSED = 1e-12
 #: Largest random change of the pose's coordinates and of the unknowns, in the robot's size and radians.
 _CHANGES = (0.15, 0.05)
+#: Part of a joint's rate, in a self-motion of unit size, that is independent of the joints before: rounding leaves less.
+_INDEPENDENT = 1e-6
 
 
 class ClosedPoint(NamedTuple):
@@ -47,19 +50,29 @@ class ClosedPoint(NamedTuple):
 
 
 class Loops(NamedTuple):
-    """Closed configurations of a robot, and the indices of the independent ones among its loop equations."""
+    """Closed configurations of a robot, and what its loop equations determine there.
+
+    Attributes:
+        points: the configurations.
+        independent: indices of the independent loop equations.
+        free: indices of driven unknowns that the pose leaves free, as many as are independent of each other.
+    """
 
     points: tuple[ClosedPoint, ...]
     independent: tuple[int, ...]
+    free: tuple[int, ...]
 
 
-def examine_loops(frame: PathFrame, equations: Sequence[Closure], unknowns: Sequence[Unknown]) -> Loops:
-    """Return closed configurations near home, and which of the loop equations are independent there.
+def examine_loops(
+    frame: PathFrame, equations: Sequence[Closure], unknowns: Sequence[Unknown], driven: Sequence[int]
+) -> Loops:
+    """Return closed configurations near home, which of the loop equations are independent there, and what they leave.
 
     Args:
         frame: values that all paths of the robot share.
         equations: of dimensions, pose and unknowns.
         unknowns: their symbols, and the sizes by which they become numbers of order 1.
+        driven: indices of the unknowns that are positions of driven joints.
 
     Raises:
         RobotError: no closed configuration was found near home.
@@ -94,7 +107,40 @@ def examine_loops(frame: PathFrame, equations: Sequence[Closure], unknowns: Sequ
                 jacobians.append(function(found, sample)[1].full())
     if not points:
         raise RobotError("", "its loops could not be closed at any configuration near home: is it movable?")
-    return Loops(tuple(points), independent_rows(jacobians))
+    own_slopes = [each[:, 6 : 6 + len(unknowns)] for each in jacobians]
+    return Loops(tuple(points), independent_rows(jacobians), _free(own_slopes, driven))
+
+
+def _free(slopes: Sequence[FloatArray], driven: Sequence[int]) -> tuple[int, ...]:
+    """Return the driven unknowns that the pose leaves free, the first ones that are independent of each other.
+
+    Args:
+        slopes: (c, u) derivatives of the loop equations by the unknowns at each closed configuration.
+        driven: indices of the driven unknowns.
+    """
+    motions = [_self_motions(each) for each in slopes]
+    fewest = min(each.shape[1] for each in motions)
+    usual = [each for each in motions if each.shape[1] == fewest]
+    found: list[int] = []
+    for k in driven:
+        if len(found) < fewest and all(_is_independent(each[[*found, k]]) for each in usual):
+            found.append(k)
+    return tuple(found)
+
+
+def _self_motions(slopes: FloatArray) -> FloatArray:
+    """Return an orthonormal basis (u, n) of the rates of unknowns with which the platform stands still."""
+    _, values, right = np.linalg.svd(slopes)
+    return np.asarray(right[rank_of(values) :].T)
+
+
+def _is_independent(rows: FloatArray) -> bool:
+    """Return whether the last row (n,) is independent of those before it."""
+    *others, last = rows
+    if others:
+        basis = np.linalg.svd(np.array(others), full_matrices=False)[2]
+        last = last - basis.T @ (basis @ last)
+    return bool(np.linalg.norm(last) > _INDEPENDENT)
 
 
 def _slopes(residual: SX, moving: SX, robot: HomeRobot) -> SX:

@@ -38,12 +38,16 @@ def mode_signs(
 ) -> list[AssemblySign]:
     """Return the sign of home's working mode of a limb; none where it has no unknowns, or no sign here.
 
+    Free positions of driven joints count as given.
+
     Args:
         limb: name of the limb.
         paths: its paths.
         unknowns: its unknowns.
         frame: values that all paths of the robot share.
     """
+    every = ca.vertcat(SX(0, 1), *[item.symbol for item in unknowns])
+    unknowns = [item for item in unknowns if not item.is_free]
     count, symbols = len(unknowns), ca.vertcat(SX(0, 1), *[item.symbol for item in unknowns])
     if count == 1:
         moved = [[each for each in path.equations if ca.depends_on(each.expression, symbols)] for path in paths]
@@ -62,7 +66,7 @@ def mode_signs(
         largest = ca.norm_2(columns[:, 0]) * ca.norm_2(columns[:, 1]) * ca.norm_2(columns[:, 2])
     else:
         return []
-    at_home, most = (frame.value_at_home(each, symbols) for each in (value, largest))
+    at_home, most = (frame.value_at_home(each, every) for each in (value, largest))
     if not abs(at_home) > _SINGULAR * most:
         return []
     return [AssemblySign(f"working mode {limb}", limb, value / at_home, is_mode=True)]

@@ -330,7 +330,8 @@ def add_resisting(
         name = network.graph.joints[k].name
         (axis,) = network.joint(k).axes
         twists, factors = ca.horzcat(SX(6, 0), *screws[k].values()), relations[:, column] / rate_sizes[k]
-        found.actuators.append(Actuator(name, limb, tuple(screws[k]), twists, axis.dimension, factors))
+        label = f"{limb}:{name}"
+        found.actuators.append(Actuator(name, limb, tuple(screws[k]), twists, axis.dimension, factors, label))
         found.positions.append(axis.way(network.values[k, 0]))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -119,6 +120,22 @@ def robot(
     return model_of_home(at_home, sampled_dimensions(at_home), definition)
 
 
+class _LimbModes(NamedTuple):
+    """What the sign of a limb's working mode is made from.
+
+    Attributes:
+        place: index of the sign among all signs.
+        limb: name of the limb.
+        paths: of the limb.
+        unknowns: places of its unknowns.
+    """
+
+    place: int
+    limb: str
+    paths: list[OpenedPath]
+    unknowns: slice
+
+
 @dataclass(eq=False)
 class _Builder(ResistingParts):
     """The parts of a robot's model while its limbs are added one after the other."""
@@ -136,6 +153,8 @@ class _Builder(ResistingParts):
     remarks: list[str] = field(default_factory=list)
     ranks: dict[tuple[int, int], Ranks] = field(default_factory=dict)
     networks: list[OpenNetwork] = field(default_factory=list)
+    driven: list[tuple[SX, str]] = field(default_factory=list)
+    modes: list[_LimbModes] = field(default_factory=list)
 
     @property
     def robot(self) -> HomeRobot:
@@ -152,6 +171,8 @@ class _Builder(ResistingParts):
         self.closure += closures("loop", name, network.equations)
         self.checks += closures("sign", name, zip(network.checks, strict=True))
         self.joints += nested_joints(network)
+        actuated = [k for k in joints if network.joint(k).actuated]
+        self.driven += [(network.values[k, 0], f"{name}:{network.graph.joints[k].name}") for k in actuated]
 
     def add_limb(self, limb: Limb) -> None:
         """Add a limb: its unknowns, equations, rows, members and actuators."""
@@ -189,16 +210,24 @@ class _Builder(ResistingParts):
                 "remove actuated = true or a passive joint"
             )
             raise RobotError(limb.place, fault)
-        self.signs += mode_signs(limb.name, opened, self.unknowns[count:], self.frame)
+        self.modes.append(_LimbModes(len(self.signs), limb.name, opened, slice(count, len(self.unknowns))))
         for k, places in enumerate(driven.values()):
             joint, path, j, _ = places[0]
             name = actuator_name(self.robot, limb, joint, k + 1) if len(driven) > 1 else limb.name
             members = tuple(member for *_, member in places)
             (axis,) = joint.axes
             screws = ca.repmat(path.screws[j][0], 1, len(members))
-            self.actuators.append(Actuator(name, limb.name, members, screws, axis.dimension))
+            label = labels[id(joint)]
+            self.actuators.append(Actuator(name, limb.name, members, screws, axis.dimension, joint=label))
+            self.driven += [(known[joint, 0], label)] if (joint, 0) in known else []
             way = slide_length(path, self.frame) if j == path.cut.slide else axis.way(known[joint, 0])
             self.positions.append(SX(0) if way is None else way)
+
+    def add_modes(self) -> None:
+        """Add the signs of working modes, each behind those of its limb's joints, where free positions are known."""
+        for each in reversed(self.modes):
+            own = self.unknowns[each.unknowns]
+            self.signs[each.place : each.place] = mode_signs(each.limb, each.paths, own, self.frame)
 
     @property
     def carrying(self) -> set[str]:
@@ -305,7 +334,13 @@ def model_of_home(
     x, y, z = map(float, frame.typical_value(at_home.home).ravel())
     unknowns = ca.vertcat(SX(0, 1), *[item.symbol for item in builder.unknowns])
     closure = builder.closure
-    loops = examine_loops(frame, closure, builder.unknowns)
+    labels = {symbol.element_hash(): label for symbol, label in builder.driven}
+    driven = [k for k, each in enumerate(builder.unknowns) if each.symbol.element_hash() in labels]
+    loops = examine_loops(frame, closure, builder.unknowns, driven)
+    for k in loops.free:
+        each = builder.unknowns[k]
+        builder.unknowns[k] = replace(each, joint=labels[each.symbol.element_hash()])
+    builder.add_modes()
     numbers = [at_home.symbols, unknowns, pose.rotation, pose.position]
     for network in builder.networks:
         add_resisting(builder, network, frame, numbers, loops.points)

@@ -3,7 +3,8 @@
 The same dimensions and pose often allow several values of the internal unknowns, such as an elbow on either side, and
 the same loops several modes of operation, in which the platform moves otherwise. From home, where the robot file states
 the joints, dimensions and pose move along a straight line to those of the point, and Newton's method with least-norm
-steps keeps the loops closed. Where the line leaves the poses that the robot can take, the pose is the nearest one.
+steps keeps the loops closed; free positions of driven joints move along it too. Where the line leaves the poses that
+the robot can take, the pose is the nearest one.
 Assemblies and modes meet at singularities of the loop equations, so the smallest singular values of their derivatives
 say how near the path comes to one.
 
@@ -139,10 +140,10 @@ def assembly_at(model: Model, posture: Posture) -> Assembly:
         posture: its joints.
     """
     axis, angle = axis_angle_from_matrix(posture.rotation)
-    found, nearness = _follow(model, posture.parameters, np.concatenate([angle * axis, posture.position]))
+    unknowns = posture.unknowns
+    found, nearness = _follow(model, posture.parameters, np.concatenate([angle * axis, posture.position]), unknowns)
     if found is None:
         return Assembly(is_home=False, nearness=0.0)
-    unknowns = posture.unknowns
     angles = np.array([item.dimension is Dimension.ANGLE for item in model.unknowns])
     apart = np.abs(found - unknowns) / _sizes_of_unknowns(model, posture.parameters)
     apart[angles] = np.abs(np.remainder(apart[angles] + np.pi, 2 * np.pi) - np.pi)
@@ -159,15 +160,18 @@ def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str
     return tuple(limb for limb in turned_limbs(model, posture) if limb in own)
 
 
-def unknowns_from_home(model: Model, parameters: FloatArray, pose: FloatArray) -> FloatArray | None:
+def unknowns_from_home(
+    model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray
+) -> FloatArray | None:
     """Return the internal unknowns (u,) to which the path from home leads at a pose; None where it does not reach it.
 
     Args:
         model: the robot.
         parameters: (k,) components of all parameters, radians for angles.
         pose: (6,) rotation vector, radians, and position of the platform.
+        given: (u,) values of the unknowns, of which those count that are free positions of driven joints.
     """
-    return _follow(model, parameters, pose)[0]
+    return _follow(model, parameters, pose, given)[0]
 
 
 def home_position(model: Model, parameters: FloatArray) -> FloatArray:
@@ -175,8 +179,13 @@ def home_position(model: Model, parameters: FloatArray) -> FloatArray:
     return np.array(model.home) * _path_of(model).factor(parameters)
 
 
-def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[FloatArray | None, float]:
-    """Return the unknowns (u,) at the end of the path from home, None where it ends early, and the nearness on it."""
+def _follow(
+    model: Model, parameters: FloatArray, pose: FloatArray, unknowns: FloatArray
+) -> tuple[FloatArray | None, float]:
+    """Return the unknowns (u,) at the end of the path from home, None where it ends early, and the nearness on it.
+
+    Free positions of driven joints go on the path to their values among the given unknowns (u,).
+    """
     path = _path_of(model)
     dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
     start = np.concatenate([np.zeros(3), model.home])
@@ -184,15 +193,17 @@ def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[Flo
     parameters = np.where(path.is_length, parameters / factor, parameters)
     pose = np.concatenate([pose[:3], pose[3:] / factor])
     at = np.concatenate([start, np.zeros(len(model.unknowns))])
+    sizes = _sizes_of_unknowns(model, given)
+    free = unknowns / sizes * path.is_free
     at_home = path.singular_values(at, dimensions)
     regular = at_home > _ZERO
     nearness, done, step = 1.0, 0.0, _FIRST
     while done < 1.0:
         part = min(1.0, done + step)
         here = (1 - part) * dimensions + part * parameters
-        target = np.concatenate([(1 - part) * start + part * pose, at[6:]])
+        target = np.concatenate([(1 - part) * start + part * pose, np.where(path.is_free, part * free, at[6:])])
         # The last step ends at the pose itself, where the unknowns alone close the loops.
-        closed = path.closed(target, here, first=6 if part == 1.0 else 0)
+        closed = path.closed(target, here, with_pose=part < 1.0)
         change = np.inf if closed is None else float(np.linalg.norm((closed - at) / path.scale))
         if change > _LARGE and part - done > _SHORTEST:
             step = (part - done) / 2
@@ -204,7 +215,7 @@ def _follow(model: Model, parameters: FloatArray, pose: FloatArray) -> tuple[Flo
         at, done = closed, part
         step = 2 * step if change < _LARGE / 4 else step
         nearness = min(nearness, float((path.singular_values(at, here)[regular] / at_home[regular]).min(initial=1.0)))
-    return at[6:] * _sizes_of_unknowns(model, given), nearness
+    return at[6:] * sizes, nearness
 
 
 @lru_cache(maxsize=4)
@@ -224,6 +235,7 @@ class _Path:
     Attributes:
         scale: (6 + u,) size of each number: a length of the robot's for positions, 1 for the others.
         is_length: (k,) whether each component of the parameters is a length.
+        is_free: (u,) whether each unknown is a free position of a driven joint.
     """
 
     def __init__(self, model: Model) -> None:
@@ -246,6 +258,8 @@ class _Path:
         self._typical = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])
         lengths = [[item.dimension is Dimension.LENGTH] * len(item.typical) for item in model.parameters]
         self.is_length = np.concatenate([np.zeros(0, dtype=bool), *lengths])
+        self.is_free = np.array([item.is_free for item in model.unknowns], dtype=bool)
+        self._determined = 6 + np.flatnonzero(~self.is_free)
 
     def factor(self, parameters: FloatArray) -> float:
         """Return by what the lengths of a robot with parameters (k,) are larger than its own at home.
@@ -261,30 +275,35 @@ class _Path:
         return factor if float(np.abs(self._kernel(home, typical)[0]).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
-        """Return the smallest singular values (2,) of the derivatives by unknowns alone, and with the pose."""
-        slopes = self._kernel(z, parameters)[1] * self.scale
-        both = (np.linalg.svd(part, compute_uv=False) for part in (slopes[:, 6:], slopes))
-        return np.array([each[-1] for each in both])
+        """Return the smallest singular values of the derivatives by determined unknowns alone, and with the pose.
 
-    def closed(self, z: FloatArray, parameters: FloatArray, first: int) -> FloatArray | None:
+        There are none without equations, or without such unknowns.
+        """
+        slopes = self._kernel(z, parameters)[1] * self.scale
+        with_pose = np.concatenate([np.arange(6), self._determined])
+        parts = (slopes[:, own] for own in (self._determined, with_pose))
+        return np.array([np.linalg.svd(part, compute_uv=False)[-1] for part in parts if part.size])
+
+    def closed(self, z: FloatArray, parameters: FloatArray, *, with_pose: bool) -> FloatArray | None:
         """Return the point near another at which the loops are closed, or None.
 
         Args:
             z: (6 + u,) the point.
             parameters: (k,) of the robot.
-            first: index of the first number that may move.
+            with_pose: whether the pose may move too, and not the determined unknowns alone.
         """
+        movable = np.concatenate([np.arange(6), self._determined]) if with_pose else self._determined
+        scale = self.scale[movable].copy()
+        scale[movable < 6] *= _HEAVY
         for _ in range(_STEPS):
             residual, slopes = self._kernel(z, parameters)
             if not (np.isfinite(residual).all() and np.isfinite(slopes).all()):
                 return None
-            if float(np.abs(residual).max()) <= _CLOSED:
+            if float(np.abs(residual).max(initial=0.0)) <= _CLOSED:
                 return z
-            scale = self.scale[first:].copy()
-            scale[: 6 - first] *= _HEAVY
-            step = np.linalg.lstsq(slopes[:, first:] * scale, -residual.ravel(), rcond=_ZERO)[0]
+            step = np.linalg.lstsq(slopes[:, movable] * scale, -residual.ravel(), rcond=_ZERO)[0]
             z = z.copy()
-            z[first:] += scale * step
+            z[movable] += scale * step
         return None
 
 

@@ -1,7 +1,8 @@
 """Starting points at which the robot's loops are closed, in the assembly of home.
 
 Newton's method from home may end in another assembly where the pose is far from there. At the first starting point the
-loops are therefore closed along a path from home. The other starting points take their unknowns from there.
+loops are therefore closed along a path from home. The other starting points take their unknowns from there; those of a
+robot with free positions of driven joints, which are spread over their ranges, have each a path from home.
 """
 
 from __future__ import annotations
@@ -35,6 +36,25 @@ def closed_start(nlp: Nlp, others: Iterable[FloatArray] = ()) -> FloatArray:
         except EvaluationError as error:
             fault = fault or error
     raise fault or EvaluationError("there is no starting point")
+
+
+def closed_starts(nlp: Nlp, points: FloatArray) -> FloatArray:
+    """Return starting points (k, n) of a program with the robot's loops closed.
+
+    Raises:
+        EvaluationError: the robot does not exist at any of these points.
+    """
+    home = closed_start(nlp, points)
+    close = _closed_along_path if nlp.program.model.free_joints else close_near
+    return np.array([close(nlp, home, x) for x in points])
+
+
+def _closed_along_path(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
+    """Return a point (n,) with the loops closed along a path from home; near those of another where it is no robot."""
+    try:
+        return close_equations(nlp, _with_unknowns_from_home(nlp, x))
+    except EvaluationError:
+        return close_near(nlp, first, x)
 
 
 def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
@@ -84,7 +104,7 @@ def _with_unknowns_from_home(nlp: Nlp, x: FloatArray) -> FloatArray:
         state = evaluate(nlp, x, pose)
         parameters = np.concatenate([np.zeros(0), *[state.parameters[item.name] for item in model.parameters]])
         place = np.concatenate([state.angle * state.axis, state.position])
-        unknowns = unknowns_from_home(model, parameters, place)
+        unknowns = unknowns_from_home(model, parameters, place, x[list(own)])
         if unknowns is not None:
             found[list(own)] = unknowns
     return np.clip(found, nlp.lower, nlp.upper)

@@ -297,7 +297,8 @@ def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> Float
     """Return the point, nearest to the given one to first order, at which the program's equations hold.
 
     Newton's method with least-norm steps on the equations alone: unit lengths of directions and closure of loops. Where
-    the robot has internal unknowns, these move alone if that closes the loops, else with the pose, else with all.
+    the robot has internal unknowns, those that the loops determine move alone if that closes the loops, else with free
+    positions of driven joints, else with the pose, else with all.
 
     Args:
         nlp: the program.
@@ -328,9 +329,10 @@ def close_equations(nlp: Nlp, x: FloatArray, *, in_place: bool = False) -> Float
 def _movable(nlp: Nlp) -> list[list[int]]:
     """Return the indices of the variables that close a program's equations: the unknowns, then more, then all."""
     places, every = nlp.program.places, list(range(nlp.n))
-    unknowns = sorted({index for at_pose in places.unknowns for index in at_pose})
-    if not unknowns:
+    unknowns = [sorted(places.determined), sorted({index for at_pose in places.unknowns for index in at_pose})]
+    unknowns = unknowns if len(unknowns[0]) < len(unknowns[1]) else unknowns[:1]
+    if not unknowns[-1]:
         return [every]
     count = sum(len(item.typical) for item in nlp.program.model.parameters)
     dimensions = {place.index for place in places.numbers[:count] if place.vector == "x"}
-    return [unknowns, [index for index in every if index not in dimensions], every]
+    return [*unknowns, [index for index in every if index not in dimensions], every]

@@ -9,8 +9,9 @@ work at home. Between the two is a serial singularity, where it does none. The s
 * ``det[passive, actuated, Z]`` beside that of home for a limb whose wrenches have no such expressions, where the
   columns ``Z`` complete the screws of all joints, turned to those of home.
 
-The sense is compared point by point, without a path from home, so that a limb which has turned by more than a right
-angle may have the other sign in the same working mode. A difference of the sense alone is therefore no verdict.
+Actuators whose positions the pose leaves free count as locked in both. The sense is compared point by point, without a
+path from home, so that a limb which has turned by more than a right angle may have the other sign in the same working
+mode. A difference of the sense alone is therefore no verdict.
 """
 
 from __future__ import annotations
@@ -101,14 +102,15 @@ class _Modes:
         paths = {each.limb: each for each in model.joint_screws if not each.is_nested}
         for limb in model.limbs:
             rows = [row for row in model.wrenches if row.limb == limb]
-            driving = [each for each in model.actuators if each.limb == limb]
+            driving = [each for each in model.actuators if each.limb == limb and each.joint not in model.free_joints]
             path = paths.get(limb)
             if rows and driving:
                 self._add(limb, driven(rows, driving, SX(1)), None, outputs)
             elif driving and path is not None:
-                passive = [k for k in range(path.all.shape[1]) if k not in path.driven]
-                if len(passive) == path.passive_rank and path.all.shape[1] == path.all_rank:
-                    self._add(limb, path.all[:, [*passive, *path.driven]], len(passive), outputs)
+                passive = path.passive
+                actuated = [k for k in path.driven if path.joints[k] not in model.free_joints]
+                if len(passive) == path.passive_rank and len(passive) + len(actuated) == path.all_rank:
+                    self._add(limb, path.all[:, [*passive, *actuated]], len(passive), outputs)
         function = ca.Function("modes", own.all, [ca.densify(each) for each in outputs])
         self._kernel = Kernel(function, tuple_of)
         dimensions = np.concatenate([np.zeros(0), *[item.typical for item in model.parameters]])

@@ -33,6 +33,7 @@ from ...models import (
     Parameter,
     RobotInstance,
     Substitution,
+    Unknown,
     frozen_vector,
     instantiate,
     matrix_from_axis_angle,
@@ -47,6 +48,7 @@ from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFa
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
 from ..errors import CaseError
+from .free_joints import set_ranges
 from .limits import limit_constraints
 from .loops import needed_equations
 from .nlp import Nlp
@@ -150,8 +152,15 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     reference = reference_of(case)
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
-        [table.add(f"{at}{item.name}", item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
-        for at in ([""] if case.pose_count == 1 else [f"at{k + 1}_" for k in range(case.pose_count)])
+        [
+            table.add(_name_of(item, pose), item.dimension, own)
+            for item, own in zip(model.unknowns, ranges, strict=True)
+        ]
+        for pose in ([0] if case.pose_count == 1 else range(1, case.pose_count + 1))
+    ]
+    joints = [
+        [each.places[0].index for each, item in zip(at_pose, model.unknowns, strict=True) if item.is_free]
+        for at_pose in unknowns
     ]
     length = table.add("characteristic_length", Dimension.LENGTH, case.characteristic_length).symbols
     twists = [
@@ -191,6 +200,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     varying, fixed = _divided(case, [*constraints, *loops], table)
     numbers = ca.vertsplit(ca.vertcat(values, *[pose.symbols for pose in stated]))
     limits = limit_constraints(case, robots, dict(zip(case.scalars, numbers, strict=True)), table)
+    set_ranges(table, [index for at_pose in joints for index in at_pose], limits.varying)
     places = Places(
         numbers=(
             *(place for placed in parameters for place in placed.places),
@@ -198,6 +208,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         ),
         rotations=tuple(pose.places for pose in stated),
         unknowns=tuple(tuple(each.places[0].index for each in at_pose) for at_pose in unknowns),
+        joints=tuple(map(tuple, joints)),
         twists=tuple(range(placed.places[0].index, placed.places[-1].index + 1) for placed in twists),
         directions=tuple(
             (x.index, y.index, z.index)
@@ -226,6 +237,13 @@ def reference_of(case: Case) -> tuple[float, ...]:
     """
     values = [value for item in case.model.parameters for value in case.components(item.name)]
     return tuple((each.lower + each.upper) / 2 if isinstance(each, Free) else float(each) for each in values)
+
+
+def _name_of(unknown: Unknown, pose: int) -> str:
+    """Return the name of an unknown's variable at a pose, the first of which is 1; 0 stands for the only one."""
+    if unknown.is_free:
+        return f"joint.{unknown.joint}{f' pose {pose}' if pose else ''}"
+    return f"at{pose}_{unknown.name}" if pose else unknown.name
 
 
 def _ranges_of_unknowns(model: Model, reference: tuple[float, ...]) -> list[Free]:

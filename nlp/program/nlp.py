@@ -141,7 +141,7 @@ class Nlp(Whole):
 
     @property
     def is_fixed(self) -> bool:
-        """Whether the case leaves nothing free: all variables are internal unknowns, or the level of a worst pose."""
+        """Whether the case leaves nothing free: loops determine all variables, but the level of a worst pose."""
         places = self.program.places
         own = set(places.inner)
         own |= set() if places.epigraph is None else {places.epigraph.level}

@@ -94,6 +94,7 @@ class Places:
         numbers: places of the case's own numbers, in the order of :attr:`screwsynth.nlp.case.case.Case.scalars`.
         rotations: places of the rotation of each stated pose.
         unknowns: indices in ``x`` of the robot's internal unknowns, at each pose.
+        joints: those of them that are free positions of driven joints, at each pose.
         twists: indices in ``p`` of the six numbers of each task's twist.
         directions: indices in ``x`` of the three components of each unit vector with three free components.
         epigraph: places of the epigraph of a worst case; None where the objective consists of F itself.
@@ -109,11 +110,18 @@ class Places:
     epigraph: Epigraph | None = None
     weights: tuple[int, ...] = ()
     further: tuple[int, ...] = ()
+    joints: tuple[tuple[int, ...], ...] = ()
+
+    @property
+    def determined(self) -> tuple[int, ...]:
+        """Indices in ``x`` of the unknowns that closed loops determine at the poses of the case."""
+        free = {index for at_pose in self.joints for index in at_pose}
+        return tuple(index for at_pose in self.unknowns for index in at_pose if index not in free)
 
     @property
     def inner(self) -> tuple[int, ...]:
-        """Indices in ``x`` of all unknowns: variables that closed loops determine."""
-        return (*(index for at_pose in self.unknowns for index in at_pose), *self.further)
+        """Indices in ``x`` of all variables that closed loops determine."""
+        return (*self.determined, *self.further)
 
 
 class PlacedSymbols(NamedTuple):

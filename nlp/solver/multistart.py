@@ -19,7 +19,7 @@ from ...models.values import dataclass
 from ...models.whole import Whole
 from ..case.settings import Search
 from ..errors import EvaluationError
-from ..evidence.closing import close_near, closed_start
+from ..evidence.closing import close_near, closed_start, closed_starts
 from ..evidence.kkt import FEASIBLE, close_equations, linearise
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate, loops_are_closed
@@ -199,8 +199,7 @@ def _search_within(
     points = np.vstack([*first, starting_points(nlp, search.starts, search.seed)])
     if nlp.program.model.unknowns:
         # From open loops, many searches end far from every closed one, or at one in which the robot is folded over.
-        home = closed_start(nlp, points)
-        points = np.array([close_near(nlp, home, x) for x in points])
+        points = closed_starts(nlp, points)
     points, found = searched_starts(nlp, blocks, points, search, solver, jobs)
     nlp = with_pairs_at(nlp, points)
     nlp, found = _searched(nlp, points, found, search, jobs, progress, solver, phase)
