@@ -242,6 +242,13 @@ def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberCol
     }
 
 
+def _kinds_of_joints(nlp: Nlp) -> list[int]:
+    """Return 1 for each variable that is a joint's position from closed loops, 2 for a free position, 0 for others."""
+    places = nlp.program.places
+    free = {index for at_pose in places.joints for index in at_pose}
+    return [1 if i in places.inner else 2 if i in free else 0 for i in range(nlp.n)]
+
+
 def _tables(nlp: Nlp, prefix: str, columns: NumberColumns) -> str:
     """Return names, units, bounds and defaults as constant tables; each ends with a zero, so that none is empty."""
     program, turning = nlp.program, turning_joints(nlp)
@@ -255,7 +262,7 @@ def _tables(nlp: Nlp, prefix: str, columns: NumberColumns) -> str:
         string_table(f"{prefix}_variable_names", N, variables["name"]),
         string_table(f"{prefix}_variable_units", N, variables["unit"]),
         integer_table(f"{prefix}_variable_kinds", N, kinds),
-        integer_table(f"{prefix}_variable_is_joint", N, [int(i in program.places.inner) for i in range(nlp.n)]),
+        integer_table(f"{prefix}_variable_is_joint", N, _kinds_of_joints(nlp)),
         integer_table(f"{prefix}_variable_turns", N, [int(i in turning) for i in range(nlp.n)]),
         number_table(f"{prefix}_variable_lower", N, variables["lower"]),
         number_table(f"{prefix}_variable_upper", N, variables["upper"]),

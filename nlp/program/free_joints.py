@@ -13,7 +13,6 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension
 from ..case.limits.constraint import BoundedConstraint
 from ..case.pose import Free
 from .nlp import Nlp
@@ -120,8 +119,3 @@ def _sides(
             if np.isfinite(limit) and per_unit and key:
                 found[k].append(_Side((limit - offset) / per_unit, is_upper == (per_unit > 0), item.constraint.name))
     return found
-
-
-def dimension_of(nlp: Nlp, joint: FreeJoint) -> Dimension:
-    """Return whether a joint's position is a length or an angle."""
-    return nlp.program.variables[joint.variable].dimension

@@ -11,6 +11,7 @@ from ..evidence.conventions import Dependence
 from ..evidence.mobility import Mobility, mobility_of
 from ..evidence.singularities import Singularity, SingularityKey, clause_of
 from ..evidence.state import RobotState
+from ..program.free_joints import free_joints
 from ..program.nlp import Nlp
 from .jsondata import Absent, JsonObject, Vector3, Vector6, finite_or_none, vector
 
@@ -89,6 +90,56 @@ class ActuatorData(JsonObject):
     name: str
     kind: Literal["angle", "length"]
     rate: float | None
+
+
+class FreeJointData(JsonObject):
+    """Position of a driven joint that the pose does not determine, at one pose: a variable of the program.
+
+    Attributes:
+        name: of the variable.
+        joint: limb and place of the joint.
+        kind: ``angle`` or ``length``.
+        value: position from home.
+        lower: smallest position: of the limits on it, or where there is none, of the search.
+        upper: likewise the largest.
+        limits: names of the limits on it; empty where it has none.
+        lower_is_limit: whether the smallest position is a limit of the case.
+        upper_is_limit: whether the largest position is a limit of the case.
+    """
+
+    name: str
+    joint: str
+    kind: Literal["angle", "length"]
+    value: float
+    lower: float
+    upper: float
+    limits: tuple[str, ...]
+    lower_is_limit: bool
+    upper_is_limit: bool
+
+
+def free_joints_data(nlp: Nlp, x: FloatArray) -> tuple[FreeJointData, ...] | None:
+    """Return the free positions of driven joints at a point (n,), pose after pose; None without any."""
+    units, rows = nlp.case.units, []
+    for each in free_joints(nlp):
+        variable = nlp.program.variables[each.variable]
+        value, lower, upper = (
+            units.shown(float(number), variable.dimension) for number in (x[each.variable], each.lower, each.upper)
+        )
+        rows.append(
+            FreeJointData(
+                name=variable.name,
+                joint=each.joint,
+                kind="angle" if variable.dimension is Dimension.ANGLE else "length",
+                value=value,
+                lower=lower,
+                upper=upper,
+                limits=each.limits,
+                lower_is_limit=each.is_limited[0],
+                upper_is_limit=each.is_limited[1],
+            )
+        )
+    return tuple(rows) or None
 
 
 class LimbPartData(JsonObject):

@@ -84,6 +84,7 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
         idle = [each.name for each in joints.actuators if each.rate is None]
         if idle:
             yield Line(idle_words(idle), label="note")
+    yield from _unlimited_lines(robot, units)
     if joints.constrained:
         part = number(100 * joints.constrained, 100.0, digits=3)
         words = f"the platform cannot make the task's motion exactly: constraints carry {part} % of F"
@@ -94,6 +95,23 @@ def joint_lines(robot: RobotData, joints: JointsData, units: Units) -> Iterator[
         yield from _singularity_lines(each, robot, units)
     for sentence in joints.assembly:
         yield Line(f"assembly: {sentence}", tone=Tone.CAUTION)
+
+
+def _unlimited_lines(robot: RobotData, units: Units) -> Iterator[Line]:
+    """Yield the ranges of free positions of driven joints that no limit of the case gives."""
+    groups: dict[tuple[float, float, str, str], list[str]] = {}
+    for each in robot.free_joints or ():
+        lacking = (not each.lower_is_limit, not each.upper_is_limit)
+        if any(lacking):
+            words = {(True, True): "no limits", (True, False): "no lower limit", (False, True): "no upper limit"}
+            joints = groups.setdefault((each.lower, each.upper, each.kind, words[lacking]), [])
+            joints += [] if each.joint in joints else [each.joint]
+    for (lower, upper, kind, lacking_words), names in groups.items():
+        unit = units.label(Dimension(kind))
+        who, have = ("joints", "have") if len(names) > 1 else ("joint", "has")
+        searched = f"a solve searches from {lower:.6g} to {upper:.6g} {unit}"
+        words = f"{who} {', '.join(names)} {have} {lacking_words}: {searched}; [limits.joint] states another range"
+        yield Line(words, label="note")
 
 
 def idle_words(names: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, TypeAlias
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from ..system.strictjson import Size
-from .jointdata import JointsData, MotionData
+from .jointdata import FreeJointData, JointsData, MotionData
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, Vector6
 from .loaddata import LoadingData
 
@@ -162,6 +162,7 @@ class RobotData(JsonObject):
         length_dependence: relative derivative of F by it, ``(l / F) dF/dl``, over all poses; absent for such robots,
             where F is 0, and with several tasks.
         joints: freedoms, actuator rates and singularities of a robot given joint by joint; absent for others.
+        free_joints: positions, at every pose, of driven joints that the pose does not determine; absent without any.
         loading: forces and speeds of its actuators; absent without loads and motions.
         several: the robot at every pose; absent where there is one.
     """
@@ -183,6 +184,7 @@ class RobotData(JsonObject):
     characteristic_length: Absent[float]
     length_dependence: Absent[float]
     joints: Absent[JointsData]
+    free_joints: Absent[tuple[FreeJointData, ...]]
     loading: Inline[LoadingData | None]
     several: Inline[PosesData | None]
 

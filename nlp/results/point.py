@@ -21,7 +21,7 @@ from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
 from .design import unit_of_side
-from .jointdata import joints_data, motion_data
+from .jointdata import free_joints_data, joints_data, motion_data
 from .jsondata import Vector, matrix, vector
 from .loaddata import loading_data
 from .objective import pose_objective
@@ -100,6 +100,7 @@ def robot_data(nlp: Nlp, x: FloatArray, state: RobotState, task: int | None) -> 
         characteristic_length=case.characteristic_length if case.model.has_couples else None,
         length_dependence=None if dependence is None else dependence.length,
         joints=joints_data(nlp, x, state, dependence, with_task=task is not None),
+        free_joints=free_joints_data(nlp, x),
         loading=loading_data(nlp, x, state) if case.loading != NO_LOADING else None,
         several=several,
     )

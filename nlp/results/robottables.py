@@ -34,10 +34,13 @@ from .text import FEWEST_FOLDED, Figure, TextTable
 
 if TYPE_CHECKING:
     from .data import ActiveData, CombinedData, SolveResult
+    from .jointdata import FreeJointData
     from .parts import ByOwner, PoseData, PosesData, PoseStateData, RobotData, SensitivityData, TaskData
 
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6
+#: So many free positions of driven joints are shown among the free numbers, else all of them behind the fixed ones.
+_JOINTS = 12
 #: So many values of a number are shown, else the first two and the last.
 _LISTED = 5
 
@@ -84,7 +87,15 @@ class _Reasons:
         self._fixed: Mapping[str, SensitivityData] = {row.name: row for row in sensitivity}
         self.any = bool(active or sensitivity)
 
-    def row(self, name: str, value: float, given: Value, dimension: Dimension, beside: float) -> _Row:
+    def row(
+        self,
+        name: str,
+        value: float,
+        given: Value,
+        dimension: Dimension,
+        beside: float,
+        limits: Sequence[str] = (),
+    ) -> _Row:
         """Return the row of a number.
 
         Args:
@@ -93,6 +104,7 @@ class _Reasons:
             given: the number in the case.
             dimension: of the number.
             beside: largest of the numbers that were stated with it, in the case's units.
+            limits: names of limits of the case on this number alone.
         """
         label = self._units.label(dimension)
         if isinstance(given, Free):
@@ -101,7 +113,8 @@ class _Reasons:
         else:
             lower, upper = value, value
             shown, between = number(value, beside, part=STATED), ""
-        side, fixed = self._active.get(name), self._fixed.get(name)
+        fixed = self._fixed.get(name)
+        side = next((self._active[each] for each in (name, *limits) if each in self._active), None)
         place, why, felt = _Place.FREE if between else _Place.FIXED, "", 0.0
         held = "fixed" if not isinstance(given, Free) else "chosen" if given.values else "rounded"
         if side is not None:
@@ -159,6 +172,8 @@ def design_table(
     stated = (robot.pose,) if robot.several is None else robot.several.stated_poses
     for k, found in enumerate(stated):
         rows += _pose_rows(case, k, found, reasons)
+    joints = _free_joint_rows(case, robot.free_joints or (), reasons)
+    rows += joints if len(joints) <= _JOINTS else []
     rows.sort(key=lambda row: row.place)
     fixed = [row for row in rows if row.place is _Place.FIXED]
     folded = len(fixed) - _FIXED if len(fixed) < len(rows) else 0
@@ -166,9 +181,15 @@ def design_table(
     if folded:
         fixed.sort(key=lambda row: -ordered(row.felt))
         rows[len(rows) - len(fixed) :] = fixed
+    words = "more fixed numbers"
+    if len(joints) > _JOINTS:
+        # Those of many poses would hide the rest.
+        rows += joints
+        words = "positions of driven joints" if not folded else "fixed numbers and positions of driven joints"
+        folded += len(joints)
     headers = ("", "reached" if reached else "value", "unit", "free between", *(("held by",) if reasons.any else ()))
     cells = tuple(row.cells for row in rows)
-    return TextTable(headers, cells, "design", folded=folded, folded_words="more fixed numbers")
+    return TextTable(headers, cells, "design", folded=folded, folded_words=words)
 
 
 def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_Row]:
@@ -196,6 +217,16 @@ def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_
     axis = listed(found.axis) if turned or is_held else "none"
     cells = (f"{prefix}axis", axis, "", "" if is_held else "any direction", *(("",) if reasons.any else ()))
     return [*rows, _Row(last.place, cells, last.felt), last]
+
+
+def _free_joint_rows(case: Case, joints: Sequence[FreeJointData], reasons: _Reasons) -> list[_Row]:
+    """Return the rows of driven joints whose positions the pose does not determine."""
+    rows = []
+    for each in joints:
+        dimension = Dimension(each.kind)
+        ends = (case.units.to_internal(end, dimension) for end in (each.lower, each.upper))
+        rows.append(reasons.row(each.name, each.value, Free(*ends), dimension, abs(each.value), each.limits))
+    return rows
 
 
 def solved_design_table(case: Case, result: SolveResult, robot: RobotData) -> TextTable:
