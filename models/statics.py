@@ -60,7 +60,9 @@ def statics_hindrance(model: Model) -> str:
         return "its platform cannot move"
     if count > freedoms:
         surplus = f"it has {_counted(count, 'actuator')} for {_counted(freedoms, 'freedom')}"
-        return f"{surplus}, so that they can load each other with forces that no load determines"
+        apart = "which can move while its platform stands still: forces of such robots are not computed"
+        against = "so that they can load each other with forces that no load determines"
+        return f"{surplus}, {apart if model.generic is not None and model.generic.idle else against}"
     if count < freedoms:
         held = f"{_counted(freedoms, 'freedom')} of its platform"
         return f"its {_counted(count, 'actuator')} {'do' if count > 1 else 'does'} not hold the {held}"

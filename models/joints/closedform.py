@@ -116,6 +116,16 @@ def closed_form(model: Model, *, extended: bool = False, with_angles: bool = Tru
     return ClosedForm(_rewritten(model, found, kept), tuple(reaches), with_angles)
 
 
+def with_joints_at_home(model: Model) -> Model:
+    """Return a robot whose driven joints that the pose does not determine are held at home; its drawing is left out."""
+    held = {
+        k: Solved.angle(SX(0), SX(1), SX(0)) if each.dimension is Dimension.ANGLE else Solved(SX(0), None, None, SX(0))
+        for k, each in enumerate(model.unknowns)
+        if each.is_free
+    }
+    return _rewritten(model, held, model.closure) if held else model
+
+
 def _solved(model: Model, unknown: Unknown, equation: Closure, extended: bool) -> Solved | None:
     """Return an unknown that an equation determines in closed form; None where the equation has another form."""
     q = unknown.symbol

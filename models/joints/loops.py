@@ -29,7 +29,7 @@ _STEPS = 40
 _CLOSED = 1e-12
 #: Largest random change of the pose's coordinates and of the unknowns, in the robot's size and radians.
 _CHANGES = (0.15, 0.05)
-#: Part of a joint's rate, in a self-motion of unit size, that is independent of the joints before: rounding leaves less.
+#: Part of a joint's rate, in a self-motion of unit size, that is independent of joints before: rounding leaves less.
 _INDEPENDENT = 1e-6
 
 

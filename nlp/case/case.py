@@ -21,7 +21,15 @@ from ...models.values import dataclass
 from ...models.whole import Whole
 from ..errors import CaseError, NoRobotError, listing, nearest
 from ..units import Units
-from .checks import check_direction, check_real, check_reals, check_statics, check_value, check_vector
+from .checks import (
+    check_determined_joints,
+    check_direction,
+    check_real,
+    check_reals,
+    check_statics,
+    check_value,
+    check_vector,
+)
 from .existence import fault_of_dimensions
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
@@ -127,6 +135,8 @@ class Case(Whole, Shown):
         _check_worst_everywhere(self)
         _check_loading(self)
         self.limits.check(self.as_limited)
+        if self.limits_over:
+            check_determined_joints(self.model, "limits.over", self.source)
         _check_tolerance(self)
         if self.workspace is not None:
             self.workspace.check(self.units)

@@ -190,3 +190,21 @@ def check_statics(model: Model, key: str, value: str | None = None) -> None:
     hindrance = statics_hindrance(model)
     if hindrance:
         raise CaseError(key, f"is not for {model.name!r}: {hindrance}", value)
+
+
+def check_determined_joints(model: Model, key: str, source: str | None = None) -> None:
+    """Refuse a robot with driven joints that the pose does not determine, where poses are judged.
+
+    Args:
+        model: the robot.
+        key: dotted key of what is judged, for the message.
+        source: name of the case's file.
+
+    Raises:
+        CaseError: the robot has such joints.
+    """
+    if joints := model.free_joints:
+        several = len(joints) > 1
+        who = f"driven joint{'s' * several} {', '.join(joints)} of {model.name!r}"
+        fault = f"is not possible: the pose does not determine the position{'s' * several} of {who}"
+        raise CaseError(key, f"{fault}; use a robot file without {'them' if several else 'it'}", source=source)

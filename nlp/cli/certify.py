@@ -42,8 +42,6 @@ def certify(
         files = options.Outputs(json=json_file, proof=proof)
         loaded, text, inputs = options.read_machine(case, settings, of).file
         files.check(inputs)
-        if not files.is_piped:
-            options.show(unknown_lines(loaded.model, all_assemblies=all_assemblies), whole=True)
         certified = certify_with_progress(
             loaded,
             gap=gap,
@@ -68,5 +66,7 @@ def certify(
     if not files.is_piped:
         from ..results.summary import certified_summary
 
+        in_home_mode = all(each.nlp.in_home_mode for each in certified.certificates)
+        options.show(unknown_lines(loaded.model, all_assemblies=not in_home_mode), whole=True)
         options.show(certified_summary(loaded, result), whole=whole)
     raise typer.Exit(0 if certified.is_proved else 1)

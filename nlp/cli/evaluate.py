@@ -28,8 +28,8 @@ def evaluate(
 ) -> None:
     """Show F, J, rank and rates at one point.
 
-    Nothing is optimised. Free numbers are at their starts, or in the middle of their ranges. Driven joints that the pose
-    does not determine are at home, or where --of has them.
+    Nothing is optimised. Free numbers are at their starts, or in the middle of their ranges. Driven joints that the
+    pose does not determine are at home, or where --of has them.
     """
     from dataclasses import replace
 
@@ -51,9 +51,10 @@ def evaluate(
     options.check_csv(csv_file, table, loaded, at_point=True)
     nlps = formulate_each(loaded)
     if of is not None and loaded.model.free_joints:
-        from ..results.settings import begun_at_joints, load_answer, robot_of
+        from ..program.free_joints import begun_at
+        from ..results.settings import joints_of, load_answer, robot_of
 
-        nlps[0] = begun_at_joints(nlps[0], robot_of(load_answer(of), f"--of {of}", loaded))
+        nlps[0] = begun_at(nlps[0], joints_of(robot_of(load_answer(of), f"--of {of}", loaded), loaded))
     x = with_exact_level(nlps[0], closed_start(nlps[0]))
     result = evaluation_of(nlps, x, [state.evaluate(nlp, x) for nlp in nlps])
     options.write_json(json_file, result)

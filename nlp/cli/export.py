@@ -43,18 +43,19 @@ def export(
         check_folder(out)
     fixings = options.read_settings(settings)
     loaded, _, inputs = read_case(case, fixings)
-    jacobian = None
+    jacobian, joints = None, dict[str, float]()
     if of is not None:
         import numpy as np
 
-        from ..results.settings import load_answer, robot_of, settings_of
+        from ..results.settings import joints_of, load_answer, robot_of, settings_of
 
         robot = robot_of(load_answer(of), f"--of {of}", loaded)
         jacobian = np.array(robot.jacobian)
+        joints |= joints_of(robot, loaded)
         loaded, _, inputs = read_case(case, {**fixings, **settings_of(robot, loaded)})
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     check_pose(loaded, pose)
-    fixed = fixed_point(loaded)
+    fixed = fixed_point(loaded, joints)
     if fixed is None:
         solution = solve_with_progress(loaded, jobs).solution
         nlp, x = solution.outcomes[0].own.nlp, solution.x

@@ -160,9 +160,7 @@ def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str
     return tuple(limb for limb in turned_limbs(model, posture) if limb in own)
 
 
-def unknowns_from_home(
-    model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray
-) -> FloatArray | None:
+def unknowns_from_home(model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray) -> FloatArray | None:
     """Return the internal unknowns (u,) to which the path from home leads at a pose; None where it does not reach it.
 
     Args:

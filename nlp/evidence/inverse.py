@@ -3,7 +3,7 @@
 Unknowns that limbs have in closed form are expressions of the pose. The others are followed, for many poses at once,
 along paths of the pose: from home's assembly, or from the pose before. Newton's method closes the loops at each step of
 a path, from joints that are extrapolated. Where it corrects these by more than a little, it may have found another
-assembly, and the steps are made shorter.
+assembly, and the steps are made shorter. Driven joints that the pose does not determine are held at home.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from casadi import SX
 from ...models import Dimension, FloatArray, Substitution, axis_angle_from_matrix
 from ...models.arrays import values_at
 from ...models.instance import instantiate
-from ...models.joints.closedform import closed_form
+from ...models.joints.closedform import closed_form, with_joints_at_home
 from ...models.parts import Quantity
 from ...models.rows import independent_rows
 from ...models.statics import driven_joints, inverse_rates, rows_about
@@ -59,6 +59,7 @@ class InversePoses:
 
     Attributes:
         actuators: (a,) names of the actuators.
+        held: labels of the driven joints that the pose does not determine: they are held at home, with rates of 0.
         measures: (a,) the quantity that each coordinate is: ``leg_length``, the distance between a leg's joints, of
             robots given by their rows; ``actuator_angle`` or ``actuator_length``, away from home, of others.
         joints: (u,) names of the passive joints' positions that are unknowns of the robot.
@@ -77,6 +78,7 @@ class InversePoses:
     """
 
     actuators: tuple[str, ...]
+    held: tuple[str, ...]
     measures: tuple[str, ...]
     joints: tuple[str, ...]
     coordinates: FloatArray
@@ -110,6 +112,8 @@ def inverse(
         follow: the assembly of the joints where loops are not closed by formulas: that of ``"home"``, or that to which
             the way from the closed pose ``"previous"`` to each one leads, which takes one pose after the other. Angles
             of actuators then have no jumps by a turn either.
+
+    Driven joints that the pose does not determine are held at home.
 
     Raises:
         CaseError: a dimension of the case's robot is free.
@@ -155,7 +159,8 @@ def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePo
     arrays = q, unknowns, J, rates, closed, singular, p.copy(), R.copy()
     for each in arrays:
         each.flags.writeable = False
-    return InversePoses(machine.actuators, machine.measures, machine.joints, *arrays)
+    names = machine.actuators, case.model.free_joints, machine.measures, machine.joints
+    return InversePoses(*names, *arrays)
 
 
 class _Values(NamedTuple):
@@ -198,7 +203,9 @@ class _Machine:
             all_of_them = ca.vertcat(*[each.symbol for each in model.unknowns])
             listed = Quantity("every unknown", self.joints, all_of_them, Dimension.NUMBER, "of joints")
             model = replace(model, quantities=(*model.quantities, listed))
-        self._model = closed_form(model).model
+        at_home = with_joints_at_home(model)
+        kept = tuple(each for each in at_home.actuators if each.joint not in model.free_joints)
+        self._model = closed_form(replace(at_home, actuators=kept)).model
         own, pose = self._model.unknowns, SX.sym("pose", _POSE)
         z = ca.vertcat(pose, SX.sym("z", len(own)))
         position = pose[9:]
@@ -222,11 +229,15 @@ class _Machine:
         size = np.concatenate([np.ones(_POSE), self.size])
         self._loops = Loops(z, robot.closure, every, robot.signs, size)
         is_mode = [each.is_mode for each in self._model.signs]
+        rates = SX(len(drives), 6)
+        moving = [each.name for each in driven_joints(self._model)]
+        turned = [k for k, each in enumerate(drives) if each.name in moving]
+        rates[turned, :] = inverse_rates(self._model, robot)
         outputs = [
             ca.vertcat(*[known[name][1] for name in self.actuators]),
             values.get("every unknown", SX(0, 1)),
             robot.jacobian.T,
-            inverse_rates(self._model, robot).T,
+            rates.T,
             _margin(rows_about(robot.jacobian, position)),
             every,
             robot.signs[[k for k, mode in enumerate(is_mode) if not mode], :],
@@ -269,7 +280,8 @@ class _Machine:
         chosen = poses[np.unique(np.linspace(0, len(poses) - 1, _REFERENCES).astype(int))]
         for pose in (at_home, *chosen):
             axis, angle = axis_angle_from_matrix(pose[:9].reshape(3, 3).T)
-            unknowns = unknowns_from_home(self._model, self._parameters, np.concatenate([angle * axis, pose[9:]]))
+            place, held = np.concatenate([angle * axis, pose[9:]]), np.zeros(len(self._model.unknowns))
+            unknowns = unknowns_from_home(self._model, self._parameters, place, held)
             if unknowns is not None:
                 return np.concatenate([pose, unknowns])
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..errors import InputError, nearest
 from ..evidence.closing import closed_start
 from ..evidence.state import evaluate
 from ..program.formulation import formulate
+from ..program.free_joints import begun_at
 from ..program.nlp import Nlp
 from .solved.mechanism_of import Exported, mechanism_of
 from .writing.cutlist import cut_list_csv, drawn_links
@@ -76,13 +77,18 @@ def files_at(nlp: Nlp, x: FloatArray, formats: Collection[str], pose: int) -> di
         raise InputError(f"robot {nlp.program.model.name!r} cannot be exported: {error}") from None
 
 
-def fixed_point(case: Case) -> tuple[Nlp, FloatArray] | None:
-    """Return the program of the first task and its point where nothing of a case is free; None where something is."""
+def fixed_point(case: Case, joints: Mapping[str, float]) -> tuple[Nlp, FloatArray] | None:
+    """Return the program of the first task and its point where nothing of a case is free; None where something is.
+
+    Args:
+        case: the case.
+        joints: positions of driven joints that the pose does not determine, by the names of their variables.
+    """
     values = [value for name in case.parameters for value in case.components(name)]
     values += [value for pose in case.poses for value in (*pose.position, pose.rotation.angle)]
-    if any(isinstance(value, Free) for value in values):
+    if any(isinstance(value, Free) for value in values) or (case.model.free_joints and not joints):
         return None
-    nlp = formulate(case)
+    nlp = begun_at(formulate(case), joints)
     return nlp, closed_start(nlp)
 
 

@@ -140,7 +140,9 @@ def _shortened(table: TextTable, width: int, room: int) -> list[_Styled]:
             last: list[_Styled] = [[(words, _LABEL)]] if count < every else []
             lines = [*_table_lines(replace(table, rows=tuple(table.rows[k] for k in places)), width), *last, *note]
         else:
-            lines = [*_table_lines(replace(table, folded=every - count), width), *note]
+            is_named = table.named is None or every - count <= table.named
+            words = table.folded_words if is_named else "more rows"
+            lines = [*_table_lines(replace(table, folded=every - count, folded_words=words), width), *note]
         if len(lines) <= room:
             break
     return lines

@@ -8,11 +8,13 @@ the robot gives its unknown.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from ...models import frozen_vector
 from ..case.limits.constraint import BoundedConstraint
 from ..case.pose import Free
 from .nlp import Nlp
@@ -62,7 +64,7 @@ def free_joints(nlp: Nlp) -> Iterator[FreeJoint]:
         for each, low, high in zip(program.constraints, nlp.g_lower, nlp.g_upper, strict=True)
     ]
     indices = [k for at_pose in program.places.joints for k in at_pose]
-    found = _sides(bounded, [program.x, program.p], nlp.arguments, indices)
+    found = _sides(bounded, [program.x, program.p], nlp.arguments.tolist(), indices)
     for pose, at_pose in enumerate(program.places.joints):
         for k, joint in zip(at_pose, program.model.free_joints, strict=True):
             lower = [each.value for each in found[k] if not each.is_upper]
@@ -70,6 +72,12 @@ def free_joints(nlp: Nlp) -> Iterator[FreeJoint]:
             names = tuple(dict.fromkeys(each.name for each in found[k]))
             ends = max(lower, default=float(nlp.lower[k])), min(upper, default=float(nlp.upper[k]))
             yield FreeJoint(k, joint, pose, *ends, names, (bool(lower), bool(upper)))
+
+
+def begun_at(nlp: Nlp, joints: Mapping[str, float]) -> Nlp:
+    """Return a program whose start has some positions of free joints, by the names of their variables."""
+    start = [joints.get(each.name, value) for each, value in zip(nlp.program.variables, nlp.start, strict=True)]
+    return replace(nlp, start=frozen_vector(start))
 
 
 def set_ranges(table: SymbolTable, indices: Sequence[int], limits: Iterable[BoundedConstraint]) -> None:

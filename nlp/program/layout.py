@@ -152,10 +152,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     reference = reference_of(case)
     ranges = _ranges_of_unknowns(model, reference)
     unknowns = [
-        [
-            table.add(_name_of(item, pose), item.dimension, own)
-            for item, own in zip(model.unknowns, ranges, strict=True)
-        ]
+        [table.add(_name_of(item, pose), item.dimension, own) for item, own in zip(model.unknowns, ranges, strict=True)]
         for pose in ([0] if case.pose_count == 1 else range(1, case.pose_count + 1))
     ]
     joints = [

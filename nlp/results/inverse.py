@@ -34,6 +34,11 @@ def inverse_summary(case: Case, found: InversePoses, file: str, rows: Sequence[i
         rows: number of each pose's row in it.
     """
     yield title_line(case)
+    if found.held:
+        several = len(found.held) > 1
+        who = f"driven joint{'s' * several} {', '.join(found.held)}"
+        words = f"{who} held at home: the pose does not determine {'their positions' if several else 'its position'}"
+        yield Line(words, label="note")
     total, closed = len(rows), int(found.closed.sum())
     if closed == total:
         yield Line("the pose is closed" if total == 1 else f"all {total} poses are closed", tone=Tone.HOLDS)

@@ -101,17 +101,16 @@ def _unlimited_lines(robot: RobotData, units: Units) -> Iterator[Line]:
     """Yield the ranges of free positions of driven joints that no limit of the case gives."""
     groups: dict[tuple[float, float, str, str], list[str]] = {}
     for each in robot.free_joints or ():
-        lacking = (not each.lower_is_limit, not each.upper_is_limit)
-        if any(lacking):
-            words = {(True, True): "no limits", (True, False): "no lower limit", (False, True): "no upper limit"}
-            joints = groups.setdefault((each.lower, each.upper, each.kind, words[lacking]), [])
+        none = "no limits" if not (each.lower_is_limit or each.upper_is_limit) else "no upper limit"
+        none = "no lower limit" if each.upper_is_limit else none
+        if not (each.lower_is_limit and each.upper_is_limit):
+            joints = groups.setdefault((each.lower, each.upper, each.kind, none), [])
             joints += [] if each.joint in joints else [each.joint]
-    for (lower, upper, kind, lacking_words), names in groups.items():
+    for (lower, upper, kind, none), names in groups.items():
         unit = units.label(Dimension(kind))
         who, have = ("joints", "have") if len(names) > 1 else ("joint", "has")
         searched = f"a solve searches from {lower:.6g} to {upper:.6g} {unit}"
-        words = f"{who} {', '.join(names)} {have} {lacking_words}: {searched}; [limits.joint] states another range"
-        yield Line(words, label="note")
+        yield Line(f"{who} {', '.join(names)} {have} {none}: {searched}; [limits.joint] states a range", label="note")
 
 
 def idle_words(names: Sequence[str]) -> str:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 #: So many fixed numbers are shown where others are free; those that F feels most, where that is known.
 _FIXED = 6
-#: So many free positions of driven joints are shown among the free numbers, else all of them behind the fixed ones.
+#: So many free positions of driven joints are shown among the free numbers, and those of further poses at the end.
 _JOINTS = 12
 #: So many values of a number are shown, else the first two and the last.
 _LISTED = 5
@@ -173,7 +173,7 @@ def design_table(
     for k, found in enumerate(stated):
         rows += _pose_rows(case, k, found, reasons)
     joints = _free_joint_rows(case, robot.free_joints or (), reasons)
-    rows += joints if len(joints) <= _JOINTS else []
+    rows += joints[:_JOINTS]
     rows.sort(key=lambda row: row.place)
     fixed = [row for row in rows if row.place is _Place.FIXED]
     folded = len(fixed) - _FIXED if len(fixed) < len(rows) else 0
@@ -181,15 +181,13 @@ def design_table(
     if folded:
         fixed.sort(key=lambda row: -ordered(row.felt))
         rows[len(rows) - len(fixed) :] = fixed
-    words = "more fixed numbers"
-    if len(joints) > _JOINTS:
-        # Those of many poses would hide the rest.
-        rows += joints
-        words = "positions of driven joints" if not folded else "fixed numbers and positions of driven joints"
-        folded += len(joints)
+    words, named, more = "more fixed numbers", len(fixed), joints[_JOINTS:]
+    if more:
+        rows += more
+        words, named, folded = "more numbers", len(rows), folded + len(more)
     headers = ("", "reached" if reached else "value", "unit", "free between", *(("held by",) if reasons.any else ()))
     cells = tuple(row.cells for row in rows)
-    return TextTable(headers, cells, "design", folded=folded, folded_words=words)
+    return TextTable(headers, cells, "design", folded=folded, folded_words=words, named=named)
 
 
 def _pose_rows(case: Case, k: int, found: PoseData, reasons: _Reasons) -> list[_Row]:
@@ -224,8 +222,9 @@ def _free_joint_rows(case: Case, joints: Sequence[FreeJointData], reasons: _Reas
     rows = []
     for each in joints:
         dimension = Dimension(each.kind)
-        ends = (case.units.to_internal(end, dimension) for end in (each.lower, each.upper))
-        rows.append(reasons.row(each.name, each.value, Free(*ends), dimension, abs(each.value), each.limits))
+        lower, upper = (case.units.to_internal(end, dimension) for end in (each.lower, each.upper))
+        given = Free(lower, upper)
+        rows.append(reasons.row(each.name, each.value, given, dimension, abs(each.value), each.limits))
     return rows
 
 

@@ -96,8 +96,13 @@ def _loop_words(model: Model) -> Iterator[Line | TextTable]:
     if not model.structure:
         return
     unknowns, every = len(model.unknowns), sum(each.equations for each in model.structure)
+    free = _free_joint_words(model)
+    if free:
+        yield Line(f"{free}, which the pose does not determine", label="variables")
     if every == 0:
-        yield Line("closed by the pose alone: no unknowns, no equations", label="loops")
+        how = f"the pose and these {len(model.free_joints)} variables: no equations"
+        how = how if free else "the pose alone: no unknowns, no equations"
+        yield Line(f"closed by {how}", label="loops")
         return
     loops = [
         (each.name, each.opened, str(each.unknowns), str(each.equations), str(each.equations - each.kept))
@@ -105,13 +110,19 @@ def _loop_words(model: Model) -> Iterator[Line | TextTable]:
     ]
     yield TextTable(("loop", "opened at", "unknowns", "equations", "dropped"), tuple(loops))
     kept = len(model.closure)
-    words = f"{unknowns} unknowns, {every} equations"
+    words = f"{unknowns} unknowns{', these variables among them' if free else ''}, {every} equations"
     words += (
         f", of which {every - kept} follow from the others"
         if kept < every
         else ", none of which follows from the others"
     )
     yield Line(words, label="loops")
+
+
+def _free_joint_words(model: Model) -> str:
+    """Return the words for the positions of driven joints that the pose does not determine; empty without any."""
+    joints, ending = model.free_joints, "s" * (len(model.free_joints) > 1)
+    return f"position{ending} of driven joint{ending} {', '.join(joints)}" if joints else ""
 
 
 def _domain(parameter: Parameter) -> str:
@@ -123,15 +134,20 @@ def _domain(parameter: Parameter) -> str:
 
 
 def unknown_lines(model: Model, *, all_assemblies: bool) -> Iterator[Line]:
-    """Yield the limbs whose joint positions are unknowns of the program; nothing for a robot without unknowns.
+    """Yield the joint positions that are variables of the program: free ones, then those of closed loops, by limb.
 
     Args:
         model: the robot.
         all_assemblies: whether all working modes are covered, and not home's alone.
     """
+    if free := _free_joint_words(model):
+        yield Line(f"{free}, which the pose does not determine", label="variables")
     counts: dict[str, int] = {}
     for each in model.structure:
         counts[each.limb] = counts.get(each.limb, 0) + each.unknowns
+    for actuator in model.actuators:
+        if actuator.joint in model.free_joints:
+            counts[actuator.limb] -= 1
     modes = set() if all_assemblies else {each.limb for each in model.signs if each.is_mode}
     groups: dict[tuple[int, bool], list[str]] = {}
     for limb, count in counts.items():

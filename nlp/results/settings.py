@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import TypeAlias
 
-from ...models import Dimension, frozen_vector
+from ...models import Dimension
 from ..case.case import Case
 from ..case.overrides import Settings
 from ..case.pose import Free, Pose, RotationForm
 from ..errors import InputError
-from ..program.nlp import Nlp
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .jsondata import Vector
@@ -115,13 +114,9 @@ def _setting(value: float | Vector) -> float | list[float]:
     return list(value) if isinstance(value, tuple) else value
 
 
-def begun_at_joints(nlp: Nlp, robot: RobotData) -> Nlp:
-    """Return a program whose start has the free positions of driven joints that a result of its case has."""
-    start, places = nlp.start.copy(), {each.name: k for k, each in enumerate(nlp.program.variables)}
-    for each in robot.free_joints or ():
-        if each.name in places:
-            start[places[each.name]] = nlp.case.units.to_internal(each.value, Dimension(each.kind))
-    return replace(nlp, start=frozen_vector(start))
+def joints_of(robot: RobotData, case: Case) -> Mapping[str, float]:
+    """Return the free positions of driven joints by the names of their variables, length or radians."""
+    return {each.name: case.units.to_internal(each.value, Dimension(each.kind)) for each in robot.free_joints or ()}
 
 
 def place_of(result: Answer, case: Case) -> Settings:

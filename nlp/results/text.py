@@ -79,6 +79,7 @@ class TextTable:
         title: line above the table on a terminal; empty where the table needs none.
         folded: number of the last rows that are of less interest: a terminal counts them, a page opens them.
         folded_words: name of these rows in the plural.
+        named: number of the last rows that this name is for; None for all rows.
         part: name of the part of the result that the table belongs to; empty for the answer.
         extra: number of the last columns that a short view leaves out where the table is too long for it.
         is_curve: whether the rows are points of a curve: a short view takes some in equal steps, not the first ones.
@@ -90,6 +91,7 @@ class TextTable:
     title: str = ""
     folded: int = 0
     folded_words: str = "more rows"
+    named: int | None = None
     part: str = ""
     extra: int = 0
     is_curve: bool = False

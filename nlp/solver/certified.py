@@ -95,10 +95,14 @@ class Certified(Whole, Shown, Answer):
         return self.tasks[0] if self.solution.combination is None else self.combined
 
     @property
+    def certificates(self) -> tuple[Certificate, ...]:
+        """All certificates: of the tasks, and of the combined program."""
+        return (*self.tasks, *([] if self.combined is None else [self.combined]))
+
+    @property
     def is_proved(self) -> bool:
         """Whether every certificate is proved."""
-        every = [*self.tasks, *([] if self.combined is None else [self.combined])]
-        return all(each.status is CertificateStatus.PROVED for each in every)
+        return all(each.status is CertificateStatus.PROVED for each in self.certificates)
 
 
 @one_call

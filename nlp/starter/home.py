@@ -191,7 +191,11 @@ def _places(nlp: Nlp) -> list[_Place]:
     home = _home_point(nlp)
     points = [home]
     if nlp.n:
-        near = (close_near(nlp, home, x) for x in starting_points(nlp, _POSES, _SEED)[1:])
+        around = starting_points(nlp, _POSES, _SEED)[1:]
+        # Driven joints that the pose does not determine stay at home.
+        held = [index for at_pose in nlp.program.places.joints for index in at_pose]
+        around[:, held] = home[held]
+        near = (close_near(nlp, home, x) for x in around)
         points += [x for x in near if loops_are_closed(nlp, x)]
     return [_place(nlp, x) for x in points]
 

@@ -45,6 +45,7 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
     search, units = Search(), _units_of(model)
     lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
     home = read_home(model, math.hypot(*model.home) or max(lengths, default=0.0) or _size(model) or 1 / 0.25)
+    workspace = _workspace_lines(model, home, units)
     lines = [
         f'title = "My {model.name}"',
         "",
@@ -65,8 +66,8 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         _commented("[limits]", "of a buildable design; see the documentation for all"),
         *_limit_lines(model, home),
         "",
-        *(f"# {line}" for line in _workspace_lines(model, home, units)),
-        "",
+        *(f"# {line}" for line in workspace),
+        *([""] if workspace else []),
         "[solve]",
         _commented(f"starts = {search.starts}", "starting points; more find the best of several optima more surely"),
         f"seed = {search.seed}",
@@ -158,7 +159,7 @@ def _task_lines(model: Model, home: Home) -> list[str]:
 
 def _limit_lines(model: Model, home: Home) -> list[str]:
     """Return lines of limits that the robot keeps at home."""
-    lines = [*_actuator_lines(model, home), *_joint_lines(model, home)]
+    lines = [*_actuator_lines(model, home), *_free_joint_lines(model, home), *_joint_lines(model, home)]
     is_singular = home.state.is_singular
     if "base_joint_angle" in home.state.quantities and not is_singular:
         return lines  # cones keep legs apart from a singularity, and are sooner proved
@@ -200,6 +201,17 @@ def _actuator_lines(model: Model, home: Home) -> list[str]:
     ]
 
 
+def _free_joint_lines(model: Model, home: Home) -> list[str]:
+    """Return limits on driven joints that the pose does not determine, where those on actuators are on legs."""
+    lines = []
+    for each in model.unknowns if model.legs else ():
+        if each.is_free:
+            most = _SWING if each.dimension is Dimension.ANGLE else home.reach
+            table = f"joint.{toml_key(each.joint)} = {{ min = {-most:g}, max = {most:g} }}"
+            lines.append(_commented(table, "of a driven joint that the pose does not determine, from home"))
+    return lines
+
+
 def _joint_lines(model: Model, home: Home) -> list[str]:
     """Return limits on the cones of passive joints."""
     angles = home.state.quantities.get("base_joint_angle")
@@ -218,8 +230,8 @@ def _joint_lines(model: Model, home: Home) -> list[str]:
 
 
 def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
-    """Return a box of poses about home as comments; nothing where the robot has one pose."""
-    if not (any(home.moves) or home.turning.numbers):
+    """Return a box of poses about home as comments; nothing where the robot has one pose, or free joints."""
+    if model.free_joints or not (any(home.moves) or home.turning.numbers):
         return []
     half = round_number(_BOX * home.reach)
     position = [

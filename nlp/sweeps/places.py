@@ -225,8 +225,10 @@ def _program(case: Case) -> Nlp:
         raise NotPlacedError("the case has no free number")
     if nlp.program.places.epigraph is not None:
         raise NotPlacedError("the case is a worst case over poses")
-    if nlp.program.model.unknowns or nlp.program.model.loops:
+    if nlp.program.model.closure or nlp.program.model.loops:
         raise NotPlacedError("the robot has loops to close")
+    if nlp.program.model.unknowns:
+        raise NotPlacedError("the pose does not determine all joints of the robot")
     if nlp.constant_limits:
         raise NotPlacedError("the case has limits that depend on fixed numbers alone")
     return with_all_pairs(nlp)

@@ -127,7 +127,8 @@ class Linkage:
         ]
         self._drawing = Kernel(ca.Function("drawing", own.all, [ca.densify(each) for each in outputs]), tuple_of)
         closure = ca.vertcat(SX(0, 1), *[equation.scaled for equation in model.closure])
-        slopes = ca.jacobian(closure, own.unknowns)
+        self._determined = [k for k, each in enumerate(model.unknowns) if not each.is_free]
+        slopes = ca.jacobian(closure, own.unknowns)[:, self._determined]
         self._loops = Kernel(ca.Function("loops", own.all, [ca.densify(closure), ca.densify(slopes)]), tuple_of)
 
     def posture_at(self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray) -> Posture:
@@ -169,7 +170,8 @@ class Linkage:
     def posture_after(self, start: Posture, twist: FloatArray, t: float) -> Posture | None:
         """Return the drawing after the platform has moved from a posture along a twist (6,) for a time ``t``.
 
-        Newton's method on the loops gives the internal unknowns, so a robot that has some needs small motions.
+        Newton's method on the loops gives the internal unknowns, so a robot that has some needs small motions. Driven
+        joints that the pose does not determine stay where they are.
 
         Returns:
             The posture; None where the loops do not close there, or a limb has zero length.
@@ -177,13 +179,13 @@ class Linkage:
         turn, shift = displacement(twist, t)
         rotation, position = turn @ start.rotation, turn @ start.position + shift
         unknowns = np.array(start.unknowns)
-        for _ in range(_STEPS if len(unknowns) else 0):
+        for _ in range(_STEPS if self._determined else 0):
             residual, slopes = self._loops(self._parameters, unknowns, rotation.ravel(order="F"), position)
             if not np.isfinite(residual).all() or np.max(np.abs(residual)) <= _ROUNDING:
                 break
-            unknowns = unknowns - np.linalg.lstsq(slopes, residual.ravel(), rcond=None)[0]
+            unknowns[self._determined] -= np.linalg.lstsq(slopes, residual.ravel(), rcond=None)[0]
         reached = self.posture_at(rotation, position, unknowns)
-        if len(unknowns):
+        if self._determined:
             residual, _ = self._loops(self._parameters, unknowns, rotation.ravel(order="F"), position)
             if not np.max(np.abs(residual)) <= np.sqrt(_ROUNDING):
                 return None

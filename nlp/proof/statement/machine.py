@@ -9,6 +9,7 @@ import numpy as np
 
 from ....models import FloatArray, Model, frozen_array
 from ...case.case import Case
+from ...case.checks import check_determined_joints
 from ...case.pose import Free
 from ...case.workspace import Workspace
 from ...errors import CaseError, InputError
@@ -55,12 +56,13 @@ def workspace_of_case(case: Case) -> Workspace:
 
     Raises:
         CaseError: the case has none, a dimension of its robot is free, limits need a motion that it does not state, or
-            as :func:`~...evidence.dependent.with_dependent`.
+            the pose does not determine its driven joints; or as :func:`~...evidence.dependent.with_dependent`.
     """
     if case.workspace is None:
         raise CaseError("workspace", "is missing: it states the poses to be judged", source=case.source)
     case.fixed_parameters("a workspace is judged with fixed dimensions")
     case.require_motion()
+    check_determined_joints(case.model, "workspace", case.source)
     return with_dependent(case, case.workspace)
 
 

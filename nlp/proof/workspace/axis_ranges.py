@@ -19,6 +19,7 @@ import numpy as np
 from ....models import Dimension, FloatArray
 from ....models.joints.closedform import closed_form
 from ...case.case import Case
+from ...case.checks import check_determined_joints
 from ...case.limits.legs import Actuator
 from ...case.pose import Free
 from ...errors import InputError, nearest
@@ -191,9 +192,10 @@ def axis_ranges(
         progress: called with what is done next.
 
     Raises:
-        CaseError: a dimension of the robot is free.
+        CaseError: a dimension of the robot is free, or the pose does not determine its driven joints.
         InputError: the pose is free or none, no coordinate has a name, or the largest ranges are not positive.
     """
+    check_determined_joints(case.model, "path", case.source)
     here = _of_case(case) if start is None else np.array(start, dtype=np.float64)
     _check(here, axes)
     # The workspace says nothing here, but a judged machine has one.

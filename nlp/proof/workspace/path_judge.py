@@ -19,6 +19,7 @@ from ....models import FloatArray, frozen_array
 from ....models.joints.closedform import ClosedForm
 from ....models.statics import statics_hindrance
 from ...case.case import Case
+from ...case.checks import check_determined_joints
 from ...case.motors import MotorNumber
 from ...case.pose import Free, Value, ends_of
 from ...case.task import Sense
@@ -157,6 +158,7 @@ def judge_path(
     cover, box, workspace = covered(path)
     case = replace(case, workspace=workspace)
     case.fixed_parameters("a path is judged with fixed dimensions")
+    check_determined_joints(case.model, "path", case.source)
     if not path.is_timed:
         case.require_motion(", or a path that states times")
     stated, case = case, in_motion(case) if case.without_motion else case

@@ -183,7 +183,7 @@ class Assembly:
         poses, count = len(self._robot.free), self._count
         unknowns = list(range(poses, len(start) - self._robot.errors))
         if count < len(unknowns):
-            raise ProofError("the loops leave a passive joint free")
+            raise ProofError("the pose does not determine every joint")
         J, chosen = self.points.at(start[None])[1][0], [*self._robot.dependent, *unknowns]
         values = np.linalg.svd(J[:, chosen], compute_uv=False) if len(chosen) == count else np.zeros(1)
         if not values.min(initial=1.0) > _ZERO * values.max(initial=0.0):

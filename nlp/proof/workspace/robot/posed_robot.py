@@ -363,7 +363,7 @@ def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBo
     unknowns, k = list(range(count, len(start))), loops.count
     following = [j for j, index in enumerate(free) if index in box.dependent]
     if k < len(unknowns):
-        raise NotJudgedError("the loops leave a passive joint free")
+        raise NotJudgedError("the pose does not determine every joint")
     if k != len(unknowns) + len(following):
         raise NotJudgedError("the platform cannot choose all coordinates of the pose that are stated")
     if not k:
@@ -372,7 +372,7 @@ def _dependent(loops: Loops, start: FloatArray, free: Sequence[int], box: PoseBo
     if unknowns:
         values = np.linalg.svd(slopes[:, unknowns], compute_uv=False)
         if not values[-1] > _ZERO * values[0]:
-            raise NotJudgedError("the loops leave a passive joint free in the middle of the workspace")
+            raise NotJudgedError("the pose does not determine every joint in the middle of the workspace")
     values = np.linalg.svd(slopes[:, [*following, *unknowns]], compute_uv=False)
     if not values[-1] > _ZERO * values[0]:
         raise NotJudgedError("the loops are singular in the middle of the workspace")
