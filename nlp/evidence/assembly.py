@@ -160,16 +160,19 @@ def _turned(model: Model, posture: Posture, differ: Sequence[bool]) -> tuple[str
     return tuple(limb for limb in turned_limbs(model, posture) if limb in own)
 
 
-def unknowns_from_home(model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray) -> FloatArray | None:
+def unknowns_from_home(
+    model: Model, parameters: FloatArray, pose: FloatArray, given: FloatArray | None = None
+) -> FloatArray | None:
     """Return the internal unknowns (u,) to which the path from home leads at a pose; None where it does not reach it.
 
     Args:
         model: the robot.
         parameters: (k,) components of all parameters, radians for angles.
         pose: (6,) rotation vector, radians, and position of the platform.
-        given: (u,) values of the unknowns, of which those count that are free positions of driven joints.
+        given: (u,) values of the unknowns, of which those count that are free positions of driven joints; home's if
+            left out.
     """
-    return _follow(model, parameters, pose, given)[0]
+    return _follow(model, parameters, pose, np.zeros(len(model.unknowns)) if given is None else given)[0]
 
 
 def home_position(model: Model, parameters: FloatArray) -> FloatArray:

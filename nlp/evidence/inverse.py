@@ -280,8 +280,7 @@ class _Machine:
         chosen = poses[np.unique(np.linspace(0, len(poses) - 1, _REFERENCES).astype(int))]
         for pose in (at_home, *chosen):
             axis, angle = axis_angle_from_matrix(pose[:9].reshape(3, 3).T)
-            place, held = np.concatenate([angle * axis, pose[9:]]), np.zeros(len(self._model.unknowns))
-            unknowns = unknowns_from_home(self._model, self._parameters, place, held)
+            unknowns = unknowns_from_home(self._model, self._parameters, np.concatenate([angle * axis, pose[9:]]))
             if unknowns is not None:
                 return np.concatenate([pose, unknowns])
         return None
