@@ -128,7 +128,9 @@ def inverse(
     if follow not in ("home", "previous"):
         raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
     found = _inverse(case, p, R, follow)
-    near = None if found.closed.all() else completed(case, p, R, ~found.closed & _are_poses(R, p))
+    # Joints that are held have no part in what follows from what.
+    held = replace(case, model=with_joints_at_home(case.model)) if case.model.free_joints else case
+    near = None if found.closed.all() else completed(held, p, R, ~found.closed & _are_poses(R, p))
     if near is None or not near.dependent:
         return found
     return replace(_inverse(case, near.positions, near.rotations, follow), dependent=near.dependent)
