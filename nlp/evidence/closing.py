@@ -39,11 +39,22 @@ def closed_start(nlp: Nlp, others: Iterable[FloatArray] = ()) -> FloatArray:
 
 
 def closed_starts(nlp: Nlp, points: FloatArray) -> FloatArray:
-    """Return starting points (k, n) of a program with the robot's loops closed."""
-    if nlp.program.model.free_joints:
-        return np.array([close_equations(nlp, _with_unknowns_from_home(nlp, x)) for x in points])
+    """Return starting points (k, n) of a program with the robot's loops closed.
+
+    Raises:
+        EvaluationError: the robot does not exist at any of these points.
+    """
     home = closed_start(nlp, points)
-    return np.array([close_near(nlp, home, x) for x in points])
+    close = _closed_along_path if nlp.program.model.free_joints else close_near
+    return np.array([close(nlp, home, x) for x in points])
+
+
+def _closed_along_path(nlp: Nlp, first: FloatArray, x: FloatArray) -> FloatArray:
+    """Return a point (n,) with the loops closed along a path from home; near those of another where it is no robot."""
+    try:
+        return close_equations(nlp, _with_unknowns_from_home(nlp, x))
+    except EvaluationError:
+        return close_near(nlp, first, x)
 
 
 def closed_in_place(nlp: Nlp, x: FloatArray) -> FloatArray | None:
