@@ -237,9 +237,9 @@ def ask_import(found: dict[str, Answer], folder: Path, case: Path) -> None:
     status, _, err = command("import", str(xml), "--platform", "platform", "--out", str(out), "--force")
     rows: list[list[float | str]] = []
     if out.exists():
-        for line in out.read_text(encoding="utf-8").splitlines():
-            if not line.startswith("#"):
-                rows.append([number_or_word(each) for each in re.split(r"([-+]?\d+\.?\d*(?:e[-+]?\d+)?)", line)])
+        lines = (line for line in out.read_text(encoding="utf-8").splitlines() if not line.startswith("#"))
+        numbers = r"([-+]?\d+\.?\d*(?:e[-+]?\d+)?)"
+        rows.extend([number_or_word(each) for each in re.split(numbers, line)] for line in lines)
     found["import"] = Answer(status, rows, err)
 
 

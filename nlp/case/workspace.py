@@ -136,6 +136,11 @@ class Workspace:
         return (*POSITION, *turns)
 
     @property
+    def dependent_names(self) -> tuple[str, ...]:
+        """Names of the dependent coordinates."""
+        return tuple(self.names[each.index] for each in self.dependent)
+
+    @property
     def independent(self) -> tuple[str, ...]:
         """Names of the coordinates with ranges that the robot chooses."""
         dependent = [each.index for each in self.dependent]

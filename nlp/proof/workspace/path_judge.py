@@ -207,8 +207,7 @@ def judge_path(
         faults |= _searched_faults(subject, numbers_of_jacobian, cover)
         report("actuators")
         found += _of_actuators(subject, machines, cover, gap, faults, is_timed=path.is_timed, with_all=not limits_alone)
-    dependent = tuple(workspace.names[each.index] for each in workspace.dependent)
-    return PathJudgement(stated, path, tuple(ranks), tuple(found), faults, knots, dependent)
+    return PathJudgement(stated, path, tuple(ranks), tuple(found), faults, knots, workspace.dependent_names)
 
 
 def _of_actuators(
