@@ -118,9 +118,8 @@ class Entry:
 
     @property
     def keeps_limits(self) -> bool:
-        """Whether the answer keeps every limit of the case: the robot can have them all, and none is violated."""
-        is_whole = self.placed is not None and not self.placed.left_out
-        return is_whole and self.solution is not None and self.solution.keeps_limits
+        """Whether an answer keeps every limit of the case: the robot can have them all."""
+        return self.placed is not None and not self.placed.left_out
 
     @property
     def can_move(self) -> bool | None:
