@@ -98,10 +98,11 @@ def test_limits_over_boxes_are_those_at_their_poses(limited: Path, kind: TurnKin
     case, rng = load_case(str(limited)), np.random.default_rng(0)
     count = 3 if kind is TurnKind.ROLL_PITCH_YAW else 1
     turns = Turns(kind, (Free(-0.7, 0.7),) * count, (0.6, 0.0, 0.8))
-    box = pose_box(Workspace((Free(-12.0, 12.0), 0.0, Free(11.0, 29.0)), turns))
+    workspace = Workspace((Free(-12.0, 12.0), 0.0, Free(11.0, 29.0)), turns)
+    box = pose_box(workspace)
     chosen = (0, 3) if kind is TurnKind.AXIS else (3, 4)
     closed = closed_form(case.model)
-    cells = SliceLimits(case, closed, box)
+    cells = SliceLimits(case, closed, workspace)
     free = list(cells.problem.free)
     lower = np.repeat(0.5 * (box.lower + box.upper)[None], BOXES, axis=0)
     upper = lower.copy()
