@@ -30,7 +30,7 @@ from .checks import (
     check_value,
     check_vector,
 )
-from .excursions import check_excursions, in_world, not_held, refuse_free
+from .excursions import NotHeld, check_excursions, in_world, not_held, refuse_free
 from .existence import fault_of_dimensions
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
@@ -284,10 +284,10 @@ class Case(Whole, Shown):
         return in_world(self.workspace, self.poses[0])
 
     @property
-    def workspace_notice(self) -> str:
-        """Sentence about a workspace that holds no pose of the case; else empty."""
+    def not_held(self) -> NotHeld | None:
+        """How a workspace holds no pose of the case; None where it holds one, or there is none."""
         if self.workspace is None:
-            return ""
+            return None
         follows = self.model.generic is not None and self.model.generic.constraints > 0
         return not_held(self.workspace, self.poses, self.units, by_ranges=follows)
 

@@ -11,7 +11,7 @@ about y to pitch where roll is 0, and about z to yaw where both are 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -115,8 +115,20 @@ def refuse_free(workspace: Workspace, pose: Pose, source: str | None) -> None:
         raise CaseError("pose.rotation.axis", fault, source=source)
 
 
-def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ranges: bool = False) -> str:
-    """Return a sentence where a workspace in world coordinates holds none of a case's poses; else an empty one.
+class NotHeld(NamedTuple):
+    """A workspace in world coordinates that holds none of a case's poses.
+
+    Attributes:
+        sentence: what is outside, with the offer where the numbers may be excursions.
+        may_be_excursions: whether the workspace holds 0 where the pose is outside of it, as excursions do.
+    """
+
+    sentence: str
+    may_be_excursions: bool
+
+
+def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ranges: bool = False) -> NotHeld | None:
+    """Return how a workspace in world coordinates holds none of a case's poses; None where it holds one.
 
     Of a pose with free numbers, any value counts. Rotations are compared where both are fixed or about one axis.
 
@@ -127,16 +139,20 @@ def not_held(workspace: Workspace, poses: Sequence[Pose], units: Units, *, by_ra
         by_ranges: whether ranges of the workspace alone count: those of its fixed numbers that the robot cannot choose
             follow from others.
     """
-    faults = ["" if workspace.about_pose else _fault(workspace, pose, units, by_ranges=by_ranges) for pose in poses]
-    if not all(faults):
-        return ""
-    first = f"the workspace does not hold the pose{'' if len(poses) == 1 else 's'}: {faults[0]}"
-    offer = 'write about = "pose" in [workspace] if its numbers are excursions about the pose'
-    return f"{first}; {offer}" if len(poses) == 1 else first
+    if workspace.about_pose:
+        return None
+    every = [list(_faults(workspace, pose, units, by_ranges=by_ranges)) for pose in poses]
+    if not all(every):
+        return None
+    is_one, (fault, holds_zero) = len(poses) == 1, max(every[0], key=lambda each: each.may_be_excursions)
+    sentence = f"the workspace does not hold the pose{'' if is_one else 's'}: {fault}"
+    if is_one and holds_zero:
+        sentence += '; write about = "pose" in [workspace] if its numbers are excursions about the pose'
+    return NotHeld(sentence, is_one and holds_zero)
 
 
-def _fault(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -> str:
-    """Return how a pose is outside of a workspace; empty where it is not, or where that is not known."""
+def _faults(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -> Iterator[NotHeld]:
+    """Yield each coordinate in which a pose is outside of a workspace, as far as that is known."""
     pairs = [
         (name, stated, own, Dimension.LENGTH)
         for name, stated, own in zip("xyz", workspace.position, pose.position, strict=True)
@@ -148,8 +164,7 @@ def _fault(workspace: Workspace, pose: Pose, units: Units, *, by_ranges: bool) -
         is_meant = isinstance(stated, Free) or not by_ranges
         if is_meant and (least > high + slack or most < low - slack):
             ranges = [_span(each, units, dimension) for each in (stated, own)]
-            return f"{name} is {ranges[0]}, and the pose has {ranges[1]}"
-    return ""
+            yield NotHeld(f"{name} is {ranges[0]}, and the pose has {ranges[1]}", low <= 0 <= high)
 
 
 def _angles(turns: Turns, rotation: Rotation) -> list[tuple[str, Value, Value]]:

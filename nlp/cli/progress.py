@@ -86,11 +86,15 @@ class SolveOutcome(NamedTuple):
 
 
 def tell_workspace(case: Case) -> None:
-    """Say on standard error that the workspace of a case holds no pose of it, where that is so."""
+    """Say on standard error that the workspace of a case holds no pose of it, where that may be a mistake.
+
+    Where limits do not hold over the workspace, it may well be elsewhere, but not if it looks like excursions.
+    """
     from ..errors import one_line
 
-    if case.workspace_notice:
-        sys.stderr.write(f"{one_line(case.workspace_notice)}\n")
+    found = case.not_held
+    if found is not None and (case.limits_over == "workspace" or found.may_be_excursions):
+        sys.stderr.write(f"{one_line(found.sentence)}\n")
 
 
 def solve_with_progress(

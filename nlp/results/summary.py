@@ -68,8 +68,8 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
     yield from fault_lines(result, case)
     if result.F is None:
         yield from starts_lines(result.starts, robot)
-        if case.limits_over == "workspace" and case.workspace_notice:
-            yield Line(case.workspace_notice, label="note")
+        if case.limits_over == "workspace" and case.not_held is not None:
+            yield Line(case.not_held.sentence, label="note")
     elif (caution := better_line(result.starts)) is not None:
         yield caution
     yield from _proof_lines(case, result)

@@ -380,29 +380,42 @@ HELD = {
 }
 
 
+def notice_of(given: dict[str, Any]) -> str:
+    """The sentence about a workspace that holds no pose; empty for another."""
+    found = case_from(given).not_held
+    assert found is None or len(found.sentence) < 200
+    return "" if found is None else found.sentence
+
+
 @pytest.mark.parametrize("words", HELD)
 def test_a_workspace_that_does_not_hold_the_pose_is_said_before_the_search(words: str) -> None:
     given = tables(**HELD[words])
     del given["workspace"]["about"]
-    notice = case_from(given).workspace_notice
+    notice = notice_of(given)
     offer = '; write about = "pose" in [workspace] if its numbers are excursions about the pose'
     assert notice.startswith("the workspace does not hold the pose: " + words if words else "")
     assert notice.endswith(offer if words else "")
-    assert len(notice) < 200
     if "rotation" not in HELD[words].get("pose", {}):
         given["workspace"]["about"] = "pose"
-        assert not case_from(given).workspace_notice
+        assert not notice_of(given)
 
 
 def test_of_several_poses_one_in_the_workspace_is_enough() -> None:
     given = tables(pose=[{"position": [0, 0, 0]}, {"position": [0, 0, 2]}])
     del given["workspace"]["about"]
-    assert not case_from(given).workspace_notice
+    assert not notice_of(given)
     given["pose"][0]["position"][2] = 1
-    assert (
-        case_from(given).workspace_notice
-        == "the workspace does not hold the poses: z is -0.1 to 0.1 m, and the pose has 1 m"
-    )
+    notice = "the workspace does not hold the poses: z is -0.1 to 0.1 m, and the pose has 1 m"
+    assert notice_of(given) == notice
+
+
+def test_a_workspace_elsewhere_is_no_mistake_of_excursions(tmp_path: Path, cli: Run) -> None:
+    text = BASE.replace('about = "pose"\n', "").replace("{ min = -0.1, max = 0.1 }]", "{ min = 0.7, max = 0.8 }]")
+    text = text.replace("{ min = 0.5, max = 1.4 }", "1.2").replace("x1 = { min = 0.4, max = 0.9 }", "x1 = 0.8")
+    notice = "the workspace does not hold the pose: z is 0.7 to 0.8 m, and the pose has 1.2 m"
+    assert notice_of(tomllib.loads(text)) == notice
+    file = saved(tmp_path / "elsewhere.toml", text.replace('over = "workspace"\n', ""))
+    assert cli("workspace", str(file), "--time", "1")[2] == ""
 
 
 def test_the_commands_say_it_and_nothing_else_on_standard_error(tmp_path: Path, cli: Run) -> None:

@@ -245,7 +245,7 @@ class _Checker:
         z, count = loops.robot.z, loops.robot.errors
         split = z.numel() - count
         number = NumberClaim(loops, symbols.of(claim.expression, z[split:, :], z[:split, :]), claim.sense, bound)
-        self._show(number, given.tree)
+        self._show(number, given.unpacked())
         number.finish()
         return bound
 
