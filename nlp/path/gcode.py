@@ -20,7 +20,7 @@ from .arcs import PLANES, TOLERANCES, Arc, ArcError, Tolerances, arc_about, arc_
 from .options import SYSTEMS, Between, PathOptions, code_of_unit, program_unit
 from .orientation import order_named
 from .path import Kind, ProgrammedPath, idle_words
-from .standing import turns_between, without_rests
+from .standing import duration_at, turns_between, without_rests
 from .words import AXES, Block, WordError, block_of
 
 #: A way of the position, in millimetres or inches, that is none: a motion so short turns the platform alone.
@@ -314,10 +314,12 @@ class _Machine:
         """Return the time of a motion at the feed, whose position has a way of a length."""
         if self.is_inverse_time:
             return 60 / words["F"]
-        if length > _NO_WAY * self.scale[0] / self.scale[1]:
+        still = _NO_WAY * self.scale[0] / self.scale[1]
+        if length > still:
             return 60 * length / self.feed
-        turn = turns_between(np.radians([self.now[3:], end[3:]]), self.order, self.between)[0]
-        return 60 * math.degrees(turn) / self.turn_feed
+        turn = turns_between(np.radians([self.now[3:], end[3:]]), self.order, self.between)
+        feeds = np.array([self.feed / 60]), np.array([math.radians(self.turn_feed) / 60])
+        return float(duration_at(np.array([length]), turn, feeds, still)[0])
 
     def _move_along_arc(self, motion: float, words: dict[str, float], end: list[float]) -> None:
         """Make an arc or a helix."""

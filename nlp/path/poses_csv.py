@@ -20,7 +20,7 @@ from ..units import Units
 from .options import Between, PathOptions
 from .orientation import ORDERS, order_named, roll_pitch_yaw
 from .path import Kind, ProgrammedPath
-from .standing import still_way, turns_between, without_rests
+from .standing import duration_at, still_way, turns_between, without_rests
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -182,7 +182,7 @@ def _durations(table: _Table, knots: FloatArray, between: Between, units: Units)
         feeds = table.columns["feed"]
         table.refuse(~(feeds > 0), "feed", "must be positive")
         ways = np.linalg.norm(np.diff(knots[:, :3], axis=0), axis=1)
-        turns = turns_between(knots[:, 3:], ORDERS["rpy"], between) / units.to_internal(1, Dimension.ANGLE)
-        # A turn in place takes the time of its turn.
-        durations = np.where(ways > still_way(knots[:, :3]), ways, turns) / feeds[1:]
+        turns = turns_between(knots[:, 3:], ORDERS["rpy"], between)
+        both = feeds[1:], feeds[1:] * units.to_internal(1, Dimension.ANGLE)
+        durations = duration_at(ways, turns, both, still_way(knots[:, :3]))
     return durations

@@ -65,6 +65,36 @@ def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.in
     return at
 
 
+def duration_at(way: FloatArray, turn: FloatArray, feeds: tuple[FloatArray, FloatArray], still: float) -> FloatArray:
+    """Return the times of motions at a feed, seconds: of the way, or, for a turn in place, of the turn.
+
+    Args:
+        way: lengths.
+        turn: radians.
+        feeds: lengths, and radians, per second.
+        still: way up to which the platform turns in place.
+    """
+    of_way, of_turn = way / feeds[0], turn / feeds[1]
+    # Neither of both is a motion: a part of one.
+    of_rest = np.where(turn > STILL, of_turn, np.maximum(of_way, of_turn))
+    return np.asarray(np.where(way > still, of_way, of_rest))
+
+
+def _times_of_steps(path: ProgrammedPath, at: NDArray[np.intp]) -> FloatArray:
+    """Return the times of segments, where short steps one after the other are one motion in the time of them all."""
+    found = path.durations.copy()
+    ways, turns = path.lengths, turns_between(path.knots[:, 3:], path.order, path.between)
+    most = still_way(path.knots[:, :3])
+    for k in np.flatnonzero((ways <= most) & (turns <= STILL) & (at[1:] == np.arange(1, len(path.knots)))).tolist():
+        ends = path.knots[[at[k], k + 1]]
+        way = float(np.linalg.norm(ends[1, :3] - ends[0, :3]))
+        whole, step = (
+            (way, ways[k]) if way > most else (turns_between(ends[:, 3:], path.order, path.between)[0], turns[k])
+        )
+        found[k] *= whole / step
+    return found
+
+
 def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
     """Return a path without the lines along which the platform stands.
 
@@ -83,7 +113,7 @@ def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
         return path if np.array_equal(knots, path.knots) else replace(path, knots=knots)
     if are_timed:
         return replace(path, knots=knots, kinds=np.where(still, Kind.DWELL, path.kinds).astype(np.uint8))
-    kept = ~still
+    kept, durations = ~still, _times_of_steps(path, at)
     if not kept.any():
         raise InputError(f"{path.source}: there is no path: all of its points are one pose")
     return replace(
@@ -91,5 +121,5 @@ def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
         knots=knots[np.concatenate([[True], kept])],
         lines=path.lines[kept],
         kinds=path.kinds[kept],
-        durations=path.durations[kept],
+        durations=durations[kept],
     )
