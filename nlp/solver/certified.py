@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
+from ...models import FloatArray
 from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
@@ -223,9 +224,7 @@ def _certify(
 
     def certify_one(own: ProgramSolution, name: str, recorder: TreeRecord | None, programs: int = 1) -> Certificate:
         """Certify a program with an equal part of the time left, which so many programs share."""
-        x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
-        if own.status is Status.INTERRUPTED and own.optima:
-            x = own.optima[0].x
+        x, claimed = _incumbent(own)
         in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
         certificate = certify_program(
             replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp,
@@ -267,6 +266,13 @@ def _certify(
     certificate = certify_one(combined, case.method.value, writer)
     statement = replace(_combined_statement(case, combined), in_home_mode=certificate.nlp.in_home_mode)
     return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
+
+
+def _incumbent(own: ProgramSolution) -> tuple[FloatArray | None, float | None]:
+    """Return the best point (n,) of a solve, and the objective that it claims there; of one cut short an optimum."""
+    if own.status.is_answer:
+        return own.x, own.F
+    return (own.optima[0].x if own.status is Status.INTERRUPTED and own.optima else None), None
 
 
 def _after_solve(certificate: Certificate, own: ProgramSolution, starts: int) -> Certificate:
