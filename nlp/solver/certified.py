@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
+from ...models import FloatArray
 from ...models.shown import Shown
 from ...models.whole import Whole
 from ..case.case import Case
@@ -34,6 +36,9 @@ from .status import Status
 
 #: Words of a bound for a design that was rounded: only its pose, and what was not rounded, is free.
 _ROUNDED = "with the rounded dimensions"
+#: Part of the time of a certificate that its solve takes at most.
+_SHARE = 0.5
+_Solved = TypeVar("_Solved")
 
 
 class OptionError(InputError):
@@ -125,8 +130,8 @@ def certify(
         found: a case, which is solved first, or its solution.
         gap: allowed distance of the bound from the incumbent, as a part of the incumbent.
         above: prove, instead, that F of a case's only task is above this value on the whole box.
-        time_limit: seconds for the whole call, the solve included; searches then stop with the bounds reached. Of the
-            time left, each of several programs takes an equal part at most.
+        time_limit: seconds for the whole call, the solve included, which takes half of them at most; searches then stop
+            with the bounds reached. Of the time left, each of several programs takes an equal part at most.
         jobs: number of threads; the result does not depend on it.
         starts: number of starting points instead of the case's.
         seed: seed instead of the case's.
@@ -179,6 +184,13 @@ def _check_writable(case: Case, *, is_rounded: bool) -> None:
         )
 
 
+def _in_half(solve: Callable[[], _Solved]) -> _Solved:
+    """Return what a solve returns in half of the time left at most: the other half is that of the proof."""
+    left = seconds_left()
+    with within(None if math.isinf(left) else _SHARE * left):
+        return solve()
+
+
 def _certify(
     found: Case | Solution,
     options: CertifyOptions,
@@ -194,7 +206,8 @@ def _certify(
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
     if case.is_optimised_everywhere:
-        return _certify_from_poses(given or solve(case, starts=starts, seed=seed, jobs=jobs), options, progress)
+        own = given or _in_half(lambda: solve(case, starts=starts, seed=seed, jobs=jobs))
+        return _certify_from_poses(own, options, progress)
     several = len(case.tasks) > 1
     if above is not None:
         try:
@@ -214,9 +227,9 @@ def _certify(
 
     def certify_one(own: ProgramSolution, name: str, recorder: TreeRecord | None, programs: int = 1) -> Certificate:
         """Certify a program with an equal part of the time left, which so many programs share."""
-        x, claimed = (own.x, own.F) if own.status.is_answer else (None, None)
+        x, claimed = _incumbent(own)
         in_home_mode = with_mode and (x is None or is_in_home_mode(own.nlp, x) is True)
-        return certify_program(
+        certificate = certify_program(
             replace(own.nlp, in_home_mode=True) if in_home_mode else own.nlp,
             x,
             claimed=claimed,
@@ -227,11 +240,16 @@ def _certify(
             progress=None if progress is None else progress(name),
             recorder=recorder,
         )
+        return _after_solve(certificate, own, search.starts)
 
     if not several:
         statement = Statement(is_minimum=above is not None and case.tasks[0].sense is Sense.MAX)
         nlp = replace(nlps[0], sense=Sense.MIN) if statement.is_minimum else nlps[0]
-        own = given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
+        own = _in_half(
+            lambda: (
+                given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
+            )
+        )
         writer = TreeRecord() if with_proof and nlp.n else None
         certificate = certify_one(own, case.tasks[0].name, writer)
         if certificate.was_beaten and certificate.x is not None:
@@ -243,7 +261,7 @@ def _certify(
         solution = solution_of_one_task(case, own)
         statement = replace(statement, in_home_mode=certificate.nlp.in_home_mode)
         return Certified(solution, (certificate,), None, statement, _complete_tree(writer, certificate))
-    solution = given or solve_programs(case, nlps, search, jobs=jobs)
+    solution = given or _in_half(lambda: solve_programs(case, nlps, search, jobs=jobs))
     count = len(solution.outcomes) + 1  # and the combined program
     alone = tuple(
         certify_one(outcome.own, outcome.task.name, None, count - k) for k, outcome in enumerate(solution.outcomes)
@@ -255,6 +273,21 @@ def _certify(
     certificate = certify_one(combined, case.method.value, writer)
     statement = replace(_combined_statement(case, combined), in_home_mode=certificate.nlp.in_home_mode)
     return Certified(solution, alone, certificate, statement, _complete_tree(writer, certificate))
+
+
+def _incumbent(own: ProgramSolution) -> tuple[FloatArray | None, float | None]:
+    """Return the best point (n,) of a solve, and the objective that it claims there; of one cut short an optimum."""
+    if own.status.is_answer:
+        return own.x, own.F
+    return (own.optima[0].x if own.status is Status.INTERRUPTED and own.optima else None), None
+
+
+def _after_solve(certificate: Certificate, own: ProgramSolution, starts: int) -> Certificate:
+    """Return a certificate that says, where it is not proved, that the solve before it was cut short."""
+    if own.status is not Status.INTERRUPTED or certificate.status is CertificateStatus.PROVED:
+        return certificate
+    done = f"the solve before had half of the time, for {len(own.starts)} of {starts} starts"
+    return replace(certificate, reason=f"{certificate.reason}; {done}" if certificate.reason else done)
 
 
 def _certify_choices(
@@ -274,7 +307,7 @@ def _certify_choices(
         return solve_programs(one, formulate_each(one), search, jobs=options.jobs)
 
     choice = found.choice if isinstance(found, Solution) else None
-    choice = choice or solve_choices(case, solve_fixed).choice
+    choice = choice or _in_half(lambda: solve_choices(case, solve_fixed).choice)
     if choice is None:
         raise OptionError("values: the case has none to choose from")
     best, values, together = prove_choices(
