@@ -206,8 +206,8 @@ def _certify(
     given = found if isinstance(found, Solution) else None
     case = found.case if isinstance(found, Solution) else found
     if case.is_optimised_everywhere:
-        own = given or _in_half(lambda: solve(case, starts=starts, seed=seed, jobs=jobs))
-        return _certify_from_poses(own, options, progress)
+        design = given or _in_half(lambda: solve(case, starts=starts, seed=seed, jobs=jobs))
+        return _certify_from_poses(design, options, progress)
     several = len(case.tasks) > 1
     if above is not None:
         try:
