@@ -1,0 +1,101 @@
+"""Robots of literal numbers: the same robot in other units of length has the same verdicts, and numbers in proportion."""
+
+import math
+from pathlib import Path
+
+import pytest
+from builders import saved
+
+from screwsynth.nlp import Case, Outcome, judge_workspace, load_case
+from screwsynth.nlp.proof.workspace.judge import Judgement
+
+#: A linear Delta, millimetres: radius of the rails, half width of a parallelogram, radius of the platform, rods' height.
+RAIL, HALF, RADIUS, HEIGHT = 234.8, 30.0, 0.0, 408.301310309
+#: Lengths of one unit, in millimetres.
+UNITS = {"um": 1e-3, "mm": 1.0, "in": 25.4, "m": 1e3, "km": 1e6}
+
+
+def point(azimuth: float, out: float, across: float, height: float, unit: float) -> list[float]:
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return [(c * out - s * across) / unit, (s * out + c * across) / unit, height / unit]
+
+
+def linear_delta(folder: Path, unit: float) -> Case:
+    """The case of the robot in a unit, with a workspace and limits of the same sizes."""
+    limbs = []
+    for k in range(3):
+        azimuth = 2 * math.pi * k / 3
+        rods = [
+            f"{{ joints = [{{ type = 'S', at = {point(azimuth, RAIL, side, HEIGHT, unit)} }}, "
+            f"{{ type = 'S', at = {point(azimuth, RADIUS, side, 0, unit)} }}] }}"
+            for side in (HALF, -HALF)
+        ]
+        slide = f"{{ type = 'P', at = {point(azimuth, RAIL, 0, HEIGHT, unit)}, axis = 'z', actuated = true }}"
+        limbs.append(f"[[limb]]\njoints = [{slide}]\nbranch = [{', '.join(rods)}]\n")
+    saved(folder / "robot.toml", f"name = 'd'\nhome = [0, 0, 0]\n{''.join(limbs)}")
+    across, high = 50 / unit, 20 / unit
+    text = f"""
+[units]
+length = "any"
+[robot]
+file = "robot.toml"
+parameters = {{}}
+[pose]
+position = [0, 0, 0]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[limits]
+actuator_length = {{ min = {-90 / unit!r}, max = {90 / unit!r} }}
+[workspace]
+position = [{{ min = {-across!r}, max = {across!r} }}, {{ min = {-across!r}, max = {across!r} }},
+            {{ min = {-high!r}, max = {high!r} }}]
+"""
+    return load_case(str(saved(folder / "case.toml", text)))
+
+
+def numbers(judged: Judgement, unit: float) -> dict[tuple[str, str], float]:
+    return {
+        (each.name, each.sense.value): each.reached * (unit if each.name.startswith("actuator") else 1.0)
+        for each in judged.extremes
+    }
+
+
+def test_a_robot_of_literal_numbers_has_the_same_verdicts_in_every_unit(tmp_path: Path) -> None:
+    found = {name: judge_workspace(linear_delta(tmp_path, unit), jobs=1) for name, unit in UNITS.items()}
+    expected = numbers(found["mm"], 1.0)
+    assert len(expected) > 4
+    for name, judged in found.items():
+        assert judged.is_proved, name
+        assert numbers(judged, UNITS[name]) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_structure_with_fewer_than_six_rows_is_singular_at_every_pose(tmp_path: Path) -> None:
+    feet = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1)]
+    for count in (5, 3):
+        limbs = "".join(
+            f"[[limb]]\njoints = [{{ type = 'S', at = [{x}, {y}, 0] }}, "
+            f"{{ type = 'P', at = [{x}, {y}, 0], axis = {[0.4 * y - 0.5 * x, -0.5 * y + 0.1, 1]}, actuated = true }}, "
+            f"{{ type = 'S', at = {[x + 0.4 * y - 0.5 * x, y - 0.5 * y + 0.1, 1]} }}]\n"
+            for x, y in feet[:count]
+        )
+        saved(tmp_path / "robot.toml", f"name = 'struts'\nhome = [0, 0, 1]\n{limbs}")
+        text = """
+[units]
+length = "m"
+[robot]
+file = "robot.toml"
+parameters = {}
+[pose]
+position = [0, 0, 1]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[workspace]
+position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 0.9, max = 1.1 }]
+"""
+        judged = judge_workspace(load_case(str(saved(tmp_path / "case.toml", text))), time_limit=5)
+        assert judged.regularity.outcome is Outcome.REFUTED
+        assert "below six at all dimensions and poses" in judged.regularity.reason
