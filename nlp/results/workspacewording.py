@@ -11,6 +11,7 @@ from ..case.case import Case
 from ..case.motors import MotorNumber
 from ..case.pose import ends_of
 from ..case.task import Sense
+from ..case.workspace import POSITION
 from ..interruption import STOPPED
 from ..proof.workspace.verdict import EVERYWHERE, Outcome
 from .posewording import pose_words
@@ -63,10 +64,17 @@ def following_lines(names: Sequence[str], claims: Sequence[ExtremeData | PathCla
     for name in names:
         ends = {each.sense: each for each in claims if each.name == name}
         bounds = [ends[sense].bound if sense in ends else None for sense in (Sense.MIN, Sense.MAX)]
-        low, high = ("unknown" if each is None else number(each) for each in bounds)
+        size = _size_of(name, claims)
+        low, high = ("unknown" if each is None else number(each, size) for each in bounds)
         unit = next((each.unit or "" for each in ends.values()), "")
         words = f"{name} {low} to {high} {unit}".rstrip() if None not in bounds else f"{name}, no range is proved"
         yield Line(words, label="follows")
+
+
+def _size_of(name: str, claims: Sequence[ExtremeData | PathClaimData]) -> float:
+    """Return a size beside which a coordinate is rounding: that of the positions of poses; 0 for a rotation."""
+    poses = [each.pose for each in claims if each.pose is not None] if name in POSITION else []
+    return max((abs(part) for pose in poses for part in pose.position), default=0.0)
 
 
 def verdict_words(result: WorkspaceResult) -> str:

@@ -16,6 +16,7 @@ from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.case.motors import Motor, MotorNumber
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.cli.paper import _premises
+from screwsynth.nlp.proof.checker.workspace.check import VerifiedWorkspace
 from screwsynth.nlp.proof.checker.workspace.forms import AffineMatrix, solved
 from screwsynth.nlp.proof.checker.workspace.loop_claims import PosedLoops, posed_loops
 from screwsynth.nlp.proof.checker.workspace.motor_claims import MotorClaims
@@ -247,7 +248,10 @@ def test_speeds_of_three_freedoms_are_those_of_results(angular: float) -> None:
 def test_proofs_name_the_assembly_that_numbers_of_actuators_are_about() -> None:
     """They follow the loops, and are not about every assembly as other numbers may be."""
     case = robot_of("3-rps")
-    said = [list(_premises(each, "every assembly"))[-1] for each in (case, replace(case, loading=Loading()))]
+    said = []
+    for each in (case, replace(case, loading=Loading())):
+        checked = VerifiedWorkspace((), "every assembly", workspace_of_case(each), 0, 0)
+        said.append(list(_premises(each, checked))[-1])
     assert said == [
         f"assemblies: {ranks} in the one of home in the middle of the workspace, {numbers} in every assembly"
         for ranks, numbers in (("ranks, forces, speeds and powers", "other numbers"), ("ranks", "numbers"))

@@ -516,7 +516,8 @@ def test_slices_show_limits_on_actuators_where_loops_are_followed() -> None:
     (found,) = slices_of(replace(case, limits=Limits(ActuatorForce(max=limit))))
     assert found.left_out == ()
     size = np.prod(found.boxes[:, 2:] - found.boxes[:, :2], axis=1)
-    for state in (KEPT, 0):
+    of_force = [each.key for each in found.limits].index("actuator_force.max")
+    for state in (KEPT, of_force):
         own = np.flatnonzero(found.binding == state)
         assert size[own].sum() > 0.1 * size.sum()
         for low, high in found.boxes[own[np.argsort(size[own])[-16:]]].reshape(-1, 2, 2):

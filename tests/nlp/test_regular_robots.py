@@ -19,6 +19,8 @@ from screwsynth.models import Substitution
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Outcome, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
 from screwsynth.nlp.cli.app import app
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.evidence.dependent import with_dependent
 from screwsynth.nlp.proof.enclosure.forms import ULP, Encloser, Forms
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.machine import legs_of
@@ -46,9 +48,9 @@ def problem_of(name: str, part: float, degrees: float) -> Problem:
     size = max(abs(each) for each in (*model.home, *values.values()))
     angle = math.radians(degrees)
     place = [Free(each - part * size, each + part * size) for each in model.home]
-    box = pose_box(Workspace(place, Turns(TurnKind.ROLL_PITCH_YAW, (Free(-angle, angle),) * 3)))
+    workspace = Workspace(place, Turns(TurnKind.ROLL_PITCH_YAW, (Free(-angle, angle),) * 3))
     case = Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])])
-    return build_problem(case, closed_form(model).model, box)
+    return build_problem(case, closed_form(model).model, pose_box(with_dependent(case, workspace)))
 
 
 def random_cells(problem: Problem, count: int, width: float, rng: np.random.Generator) -> LoopBoxes:
@@ -130,7 +132,7 @@ def test_a_rule_without_linear_parts_is_caught(monkeypatch: pytest.MonkeyPatch) 
         rest = np.where(np.isfinite(forms.r), 0.0, forms.r)
         return examine(self, Forms(forms.c, np.zeros_like(forms.a), rest), f, errors)
 
-    monkeypatch.setattr(loop_boxes, "MOST_VARIABLES", 0)  # forms of first order, as robots with loops have them
+    monkeypatch.setattr(loop_boxes, "_MOST_SECOND", 0)  # forms of first order, as robots with loops have them
     problem = problem_of("6-ups", 0.5, 80)
     assert not wrong_boxes(problem, problem.locked, 1.0, 1)[1]
     monkeypatch.setattr(rank.RankTest, "examine", without)
@@ -267,9 +269,8 @@ def test_a_wrist_does_not_translate() -> None:
     tables = starter_tables("spherical-3-rrr")
     tables["robot"]["parameters"]["radius"] = 0.1
     tables["workspace"] = {"position": [{"min": -0.02, "max": 0.02}] * 3}
-    found = judge_workspace(case_from(tables | {"limits": {}}), time_limit=20)
-    assert found.regularity.outcome is Outcome.OPEN
-    assert "cannot move in the numbers of the pose" in found.regularity.reason
+    with pytest.raises(CaseError, match="this robot cannot choose x and y and z"):
+        judge_workspace(case_from(tables | {"limits": {}}), time_limit=20)
 
 
 def test_a_determinant_that_touches_zero_is_refuted_with_the_pose() -> None:
