@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
@@ -207,6 +208,9 @@ def test_a_workspace_is_the_same_in_every_unit(name: str) -> None:
         held = case_from(tables, name)
         found = workspace_of(judge_workspace(held))
         assert found.regular.outcome.name == "PROVED"
+        # What follows is reached at symmetric poses alike, or is 0 but for rounding.
+        kept = tuple(each for each in found.extremes if each.name not in (found.dependent or ()))
+        found = replace(found, extremes=kept, dependent=None, poses=None)
         return json_data(found), workspace_summary(held, found)
 
     check(model, judged, units_of(name))

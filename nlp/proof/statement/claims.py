@@ -71,6 +71,7 @@ class Claim:
         length: by which moments are divided in a spectrum, length.
         motor: the actuator and its number, of claims about motors.
         uncovered: reason for a claim about the exact machine where others are meant; else empty.
+        is_coordinate: whether the number is a dependent coordinate of the pose, which is often 0.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Claim:
     length: float = 1.0
     motor: Motor | None = None
     uncovered: str = ""
+    is_coordinate: bool = False
 
     @property
     def label(self) -> tuple[str, str]:
@@ -119,7 +121,8 @@ def dependent_claims(robot: RobotInstance, workspace: Workspace) -> Iterator[Cla
         value, name = stated[k] if is_stated else None, workspace.names[k]
         for sense in Sense:
             limit = getattr(value, _ENDS[sense]) if isinstance(value, Free) else None
-            yield Claim(name, sense, expression, reading, "" if limit is None else f"{WORKSPACE}.{name}", limit)
+            key = "" if limit is None else f"{WORKSPACE}.{name}"
+            yield Claim(name, sense, expression, reading, key, limit, is_coordinate=True)
 
 
 def _turn(R: SX, turns: Turns, k: int) -> tuple[SX, Reading]:

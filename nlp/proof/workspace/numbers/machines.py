@@ -113,7 +113,9 @@ class Machines:
         try:
             if not self.family.problem.dependent and is_smooth(number):
                 found = self._by_first_order(claim, number, gap, jobs, paper)
-            return found or next(self._by_search([claim], gap, paper=paper))
+            return found or next(
+                self._by_search([claim], gap, small=_SMALL if claim.is_coordinate else 0.0, paper=paper)
+            )
         except UncoveredError as error:
             return extreme_of(claim, Minimum(reason=str(error)))
 
