@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 from decimal import Decimal
 from typing import Any
 
@@ -33,7 +32,7 @@ from screwsynth.nlp.results.evaluation import evaluation_of
 from screwsynth.nlp.results.rounding import ordered, residual
 from screwsynth.nlp.results.summary import case_summary, evaluation_summary
 from screwsynth.nlp.results.text import Line, TextTable
-from screwsynth.nlp.results.workspace import workspace_of
+from screwsynth.nlp.results.workspace import WorkspaceResult, workspace_of
 from screwsynth.nlp.results.workspacewording import workspace_summary
 from screwsynth.nlp.sweeps.columns import columns_of
 from screwsynth.nlp.sweeps.journal import Row
@@ -210,7 +209,7 @@ def test_a_workspace_is_the_same_in_every_unit(name: str) -> None:
         assert found.regular.outcome.name == "PROVED"
         # What follows is reached at symmetric poses alike, or is 0 but for rounding.
         kept = tuple(each for each in found.extremes if each.name not in (found.dependent or ()))
-        found = replace(found, extremes=kept, dependent=None, poses=None)
+        found = WorkspaceResult.of(found, extremes=kept, dependent=None, poses=None)
         return json_data(found), workspace_summary(held, found)
 
     check(model, judged, units_of(name))
