@@ -178,8 +178,7 @@ def held_at(case: Case, position: list[float], rotation: Rotation) -> tuple[Load
 def test_numbers_of_robots_with_passive_joints_are_those_that_a_pose_shows(name: str) -> None:
     """With six freedoms or fewer, with loops in closed form and others: forces and torques from J at single poses."""
     load = Load("push", (1.0, 2.0, -10.0), point=(0.0, 0.1, 0.1), any_force=2.0)
-    turned = {} if name == "delta" else {"degrees": 3}  # a Delta does not turn
-    case = replace(at_home(name, part=0.01, **turned), loading=Loading((load,), Motion(1.0, 0.5)))
+    case = replace(at_home(name, part=0.01, degrees=3), loading=Loading((load,), Motion(1.0, 0.5)))
     found = motors_of(case)
     assert all(each.outcome is Outcome.PROVED for each in found.values())
 
