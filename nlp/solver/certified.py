@@ -344,6 +344,15 @@ def _certify_from_poses(
         jobs=options.jobs,
         progress=None if progress is None else progress(solution.case.tasks[0].name),
     )
+    if x is None and options.above is None and certificate.status is CertificateStatus.PROVED:
+        # Its point keeps the limits at these poses alone: the bound holds, and has no design beside it.
+        certificate = replace(
+            certificate,
+            status=CertificateStatus.INCOMPLETE,
+            x=None,
+            incumbent=math.nan,
+            reason=f"the solve before found no design that keeps the limits over the {solution.case.limits_over}",
+        )
     return Certified(solution, (certificate,), None, Statement(), None)
 
 
