@@ -9,18 +9,19 @@ active limits have independent normals and positive multipliers, which :mod:`scr
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
+from casadi import SX
 
 from ...models import Dimension, FloatArray
 from ...models.values import dataclass
 from ..case.limits.constraint import BoundedConstraint, Constraint
 from ..program.nlp import Nlp
 from ..program.pairs import pair_constraints, tightest_pairs, with_pairs_at
-from .kkt import FEASIBLE, linearise, multipliers
-from .state import RobotState, evaluate
+from .kkt import FEASIBLE, Linearisation, linearise, multipliers
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,40 @@ class Margin:
         return self.limit - self.value if self.bound == "max" else self.value - self.limit
 
 
+def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation) -> FloatArray:
+    """Return the distances (k,) of a point from all sides, negative outside, of the measured numbers themselves.
+
+    A program keeps singular values and condition numbers by estimates on the safe side, which may be beyond a limit
+    where the number is not.
+
+    Args:
+        nlp: the program.
+        x: (n,) the point.
+        at: the program there.
+    """
+    slack = at.slack.copy()
+    estimated = [(j, side.constraint) for j, side in enumerate(at.sides) if side.constraint is not None]
+    chosen = [(j, k) for j, k in estimated if nlp.program.constraints[k].measure is not None]
+    if chosen:
+        constraints = [nlp.program.constraints[k] for _, k in chosen]
+        numbers = _measured(nlp, x, constraints, np.full(len(chosen), np.nan))
+        for (j, _), constraint, number in zip(chosen, constraints, numbers, strict=True):
+            value = float(constraint.reading.to_value(SX(number)))
+            slack[j] = -float(nlp.sides.sign[j] * (value - nlp.sides.limit[j]) * at.per_unit[j])
+    return slack
+
+
+def measured_violation(nlp: Nlp, x: FloatArray) -> float:
+    """Return how far a point (n,) lies outside of a side by the measured numbers; ``inf`` where it is not defined."""
+    at = linearise(nlp, x)
+    return replace(at, slack=measured_slack(nlp, x, at)).violation
+
+
+def measured_numbers(nlp: Nlp, x: FloatArray) -> list[float]:
+    """Return the number that each constraint of a program limits at a point (n,), radians for angles; NaN for none."""
+    return _measured(nlp, x, nlp.program.constraints, nlp.evaluate(x)[1])
+
+
 def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     """Return the margins of a point in every limit of the case, in the order of the program's constraints.
 
@@ -72,7 +107,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     active = set(at.active())
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
     gained = -mu * nlp.sides.sign * at.per_unit * nlp.objective_scale * nlp.sign
-    measured = _measured(nlp, x, nlp.program.constraints, nlp.evaluate(x)[1])
+    measured, slack = measured_numbers(nlp, x), measured_slack(nlp, x, at)
     rows = []
     for j, side in enumerate(nlp.sides.sides):
         if side.constraint is None:
@@ -91,7 +126,7 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
                 limit=constraint.reading.from_value(limit),
                 dimension=constraint.reading.dimension,
                 active=j in active,
-                violated=bool(at.slack[j] < -FEASIBLE),
+                violated=bool(slack[j] < -FEASIBLE),
                 cost=float(gained[j] * constraint.reading.slope(limit)) if optimal else None,
             )
         )
@@ -164,10 +199,8 @@ def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values
         function = ca.Function("exact", [nlp.program.x, nlp.program.p], [ca.densify(ca.vertcat(*exact.values()))])
         for k, value in zip(exact, function(x, nlp.arguments).full().ravel(), strict=True):
             measured[k] = float(value)
-    states: dict[int, RobotState] = {}
     for k, each in enumerate(constraints):
-        if each.measure is not None:
-            if each.pose not in states:
-                states[each.pose] = evaluate(nlp, x, each.pose)
-            measured[k] = each.measure(states[each.pose].jacobian, states[each.pose].position)
+        if each.measure is not None and each.spectral is not None:
+            function = ca.Function("matrix", [nlp.program.x, nlp.program.p], [ca.densify(each.spectral.matrix)])
+            measured[k] = each.measure(function(x, nlp.arguments).full(), np.zeros(3))
     return measured

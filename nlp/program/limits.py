@@ -15,7 +15,7 @@ from casadi import SX
 
 from ...models import RobotInstance
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, PairFamily
+from ..case.limits.constraint import BoundedConstraint, Constraint, PairFamily
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..errors import CaseError
 from .places import SymbolTable
@@ -72,13 +72,24 @@ def limit_constraints(
     varying: list[BoundedConstraint] = []
     constant: list[BoundedConstraint] = []
     for item, varies, value in zip(limits, free, values, strict=True):
-        holds = item.lower - _ROUNDING <= value <= item.upper + _ROUNDING
+        estimated = item.constraint.spectral is not None and not varies
+        number = _measured(item.constraint, x, p, table) if estimated else value
+        holds = item.lower - _ROUNDING <= number <= item.upper + _ROUNDING
         if holds and not varies and not math.isfinite(value):
             # An infinite value is above every bound, and keeps none.
             key = next(filter(None, item.constraint.keys))
             raise CaseError(f"limits.{key}", f"has no finite value: {item.constraint.name}", source=case.source)
         (constant if holds and not varies else varying).append(item)
     return LimitConstraints(tuple(varying), tuple(constant), deferred, fixed)
+
+
+def _measured(constraint: Constraint, x: SX, p: SX, table: SymbolTable) -> float:
+    """Return the value of a constraint on eigenvalues that no variable changes, from the number itself."""
+    spectral, measure = constraint.spectral, constraint.measure
+    if spectral is None or measure is None:
+        return math.nan
+    matrix = ca.Function("matrix", [x, p], [ca.densify(spectral.matrix)])(0, table.values).full()
+    return float(constraint.reading.to_value(SX(measure(matrix, np.zeros(3)))))
 
 
 def _sorted_families(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -17,6 +18,7 @@ from ..case.loads import NO_LOADING
 from ..evidence.conventions import dependence_of
 from ..evidence.kkt import FEASIBLE, linearise
 from ..evidence.loads import loads_at
+from ..evidence.margins import measured_numbers, measured_slack
 from ..evidence.state import RobotState, StatedPose, evaluate, stated_poses
 from ..program.nlp import Nlp
 from ..program.pairs import with_pairs_at
@@ -218,18 +220,21 @@ def violations(nlp: Nlp, x: FloatArray) -> tuple[ViolationData, ...]:
     """
     nlp = with_pairs_at(nlp, [x])
     at, g = linearise(nlp, x), nlp.evaluate(x)[1]
-    units = nlp.case.units
+    slack, units = measured_slack(nlp, x, at), nlp.case.units
+    worst = -float(np.min(slack, initial=0.0)) if np.isfinite(slack).all() else math.inf
+    least = -max(FEASIBLE, _SMALL * worst)
+    outside = [j for j in range(len(slack)) if not slack[j] >= least]
+    measured = measured_numbers(nlp, x) if outside else []
     rows: list[ViolationData] = []
-    for j, side in enumerate(nlp.sides.sides):
-        if at.slack[j] >= -max(FEASIBLE, _SMALL * at.violation):
-            continue
-        value = float(x[side.variable]) if side.variable is not None else float(g[side.constraint or 0])
-        limit = float(nlp.sides.limit[j])
+    for j in outside:
+        side, limit = nlp.sides.sides[j], float(nlp.sides.limit[j])
         if side.constraint is None:
-            dimension = nlp.program.variables[side.variable or 0].dimension
+            value, dimension = float(x[side.variable or 0]), nlp.program.variables[side.variable or 0].dimension
         else:
             reading = nlp.program.constraints[side.constraint].reading
-            dimension, value, limit = reading.dimension, reading.from_value(value), reading.from_value(limit)
+            dimension, limit, value = reading.dimension, reading.from_value(limit), measured[side.constraint]
+            # Equations are no limits, and are not measured otherwise.
+            value = reading.from_value(float(g[side.constraint])) if math.isnan(value) else value
         shown, allowed = units.shown(value, dimension), units.shown(limit, dimension)
         unit = unit_of_side(nlp.case, side.name, dimension) or None
         rows.append(ViolationData(name=side.name, bound=side.bound, value=shown, limit=allowed, unit=unit))

@@ -28,6 +28,7 @@ from ...models import FloatArray, frozen_array
 from ..case.case import Case
 from ..case.task import Method, Sense, Task
 from ..evidence.kkt import FEASIBLE, close_equations, correct_point, linearise
+from ..evidence.margins import measured_slack
 from ..evidence.optimality import PointKind, examine
 from ..program.epigraph import formulate_worst, level_of_tasks
 from ..program.formulation import formulate_weighted, proximity_program, scaled_weights, with_proximity_term
@@ -98,8 +99,10 @@ def combine(
     else:
         combined = _solve_combined(case, nlps, own, points, weights, solve_one)
         x, status, value = combined.x[: nlps[0].n], combined.status, combined.nlp.evaluate(combined.x)[0]
-    at = linearise(with_pairs_at(nlps[0], [x]), x)
-    violated = tuple(dict.fromkeys(at.sides[j].name for j in np.flatnonzero(at.slack < -FEASIBLE)))
+    paired = with_pairs_at(nlps[0], [x])
+    at = linearise(paired, x)
+    outside = np.flatnonzero(measured_slack(paired, x, at) < -FEASIBLE)
+    violated = tuple(dict.fromkeys(at.sides[j].name for j in outside))
     if violated and status.is_answer:
         status = Status.INFEASIBLE
     return Solution(

@@ -21,6 +21,7 @@ from ..case.settings import Search
 from ..errors import EvaluationError
 from ..evidence.closing import close_near, closed_start, closed_starts
 from ..evidence.kkt import FEASIBLE, close_equations, linearise
+from ..evidence.margins import measured_violation
 from ..evidence.optimality import Evidence, PointKind, examine
 from ..evidence.state import RobotState, evaluate, loops_are_closed
 from ..interruption import Milestone, is_requested, reached
@@ -218,7 +219,7 @@ def _search_within(
     else:
         x = (better or min(starts, key=lambda start: (start.violation, start.stationarity))).x
         evidence = examine(nlp, x)
-    status = Status.INTERRUPTED if interrupted else _status(evidence, bool(optima), better)
+    status = Status.INTERRUPTED if interrupted else _status(nlp, x, evidence, bool(optima), better)
     return replace(
         _outcome(status, nlp, x, evidence, search, began),
         starts=tuple(starts),
@@ -277,7 +278,7 @@ def _best_value(nlp: Nlp, starts: Iterable[Start]) -> float | None:
 def _evaluate_fixed(nlp: Nlp, search: Search, began: float) -> ProgramSolution:
     """Evaluate a program of a case that leaves nothing free, once: only the robot's loops are closed."""
     x = closed_point(nlp, search)
-    status = Status.EVALUATED if linearise(nlp, x).violation <= FEASIBLE else Status.INFEASIBLE
+    status = Status.EVALUATED if measured_violation(nlp, x) <= FEASIBLE else Status.INFEASIBLE
     evidence = None if status is Status.EVALUATED else examine(nlp, x)
     return _outcome(status, nlp, x, evidence, search, began)
 
@@ -296,12 +297,13 @@ def _find_better_start(nlp: Nlp, starts: Sequence[Start], optima: Sequence[Optim
     return best if gain > _BETTER * nlp.objective_scale else None
 
 
-def _status(evidence: Evidence, converged: bool, better: Start | None) -> Status:
-    """Return the status of a search from the evidence at its best point, and a better start that did not converge."""
+def _status(nlp: Nlp, x: FloatArray, evidence: Evidence, converged: bool, better: Start | None) -> Status:
+    """Return the status of a search from the evidence at its best point (n,), and a better start, not converged."""
     if converged and evidence.kind.is_optimum:
         return Status.OPTIMAL if better is None else Status.LOCAL
     if evidence.kind is PointKind.INFEASIBLE:
-        return Status.INFEASIBLE
+        # A point that only an estimate on the safe side refuses shows that there is one.
+        return Status.INFEASIBLE if measured_violation(nlp, x) > FEASIBLE else Status.NOT_CONVERGED
     if evidence.kind is PointKind.LIMB_SINGULAR:
         return Status.LIMB_SINGULAR
     return Status.SADDLE if evidence.kind is PointKind.SADDLE else Status.NOT_CONVERGED

@@ -491,9 +491,8 @@ def _closed_at(problem: Problem, y: FloatArray) -> FloatArray | None:
 
 
 def _tightened(item: BoundedConstraint, name: str) -> BoundedConstraint:
-    """Return a constraint with tighter bounds and a name; its number is that of its expression."""
+    """Return a constraint with tighter bounds and a name."""
     lower = item.lower + TIGHTER * abs(item.lower) if math.isfinite(item.lower) else item.lower
     upper = item.upper - TIGHTER * abs(item.upper) if math.isfinite(item.upper) else item.upper
-    # A measure is evaluated at the stated pose, and this is another.
     stated = (item.lower, item.upper)
-    return BoundedConstraint(replace(item.constraint, name=name, measure=None, stated=stated), lower, upper)
+    return BoundedConstraint(replace(item.constraint, name=name, stated=stated), lower, upper)
