@@ -26,6 +26,7 @@ from ..errors import InputError
 from ..program.formulation import formulate
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
+from ..system.markdown import markdown_text
 from .ctext import (
     comment_text,
     for_controllers,
@@ -113,6 +114,8 @@ def generate_c(case: Case, source: str = _NO_CASE_FILE) -> dict[str, str]:
     files = {f"{prefix}{ending}": _fill_template(f"{part}.in", names) for ending, part in parts.items()}
     files |= {f"{prefix}{ending}": _core_text(ending, prefix, names) for ending in _CORE}
     files |= {name: _fill_template(f"{name}.in", names) for name in _OTHERS}
+    title = markdown_text(" ".join((case.title or case.name).split()))
+    files["README.md"] = _fill_template("README.md.in", names | {"title": title})
     casadi = _casadi_files((*staged.all, *limits.functions), f"{prefix}_CASADI")
     files |= {f"{prefix}-casadi{end}": text for end, text in casadi.items()} | {"case.toml": source}
     return files | {MANIFEST: manifest_text(nlp, columns, names, files)}

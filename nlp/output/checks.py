@@ -9,6 +9,7 @@ from ..errors import one_line
 from ..results.checks import published_words, reproduction_table
 from ..results.regression import CaseCheck
 from ..results.text import Line, TextTable
+from ..system.markdown import markdown_text
 
 
 def checks_as_junit(checks: Sequence[CaseCheck]) -> str:
@@ -59,4 +60,4 @@ def _words(cell: str | Line) -> str:
 
 def _row(cells: Sequence[str]) -> str:
     """Return a row of a Markdown table."""
-    return "| " + " | ".join(one_line(text).replace("|", "\\|") for text in cells) + " |"
+    return "| " + " | ".join(markdown_text(text) for text in cells) + " |"

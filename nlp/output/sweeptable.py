@@ -24,6 +24,7 @@ from ..sweeps.engines import EngineKind
 from ..sweeps.journal import Row
 from ..sweeps.points import CaseSource, Points, grid_of
 from ..sweeps.sweep import Sweep, SweepProgress, run_sweep
+from ..system.csvtext import csv_row, text_of_cell
 from .files import check_target, write_whole
 
 #: Endings of a table's file.
@@ -96,8 +97,8 @@ def write_table(target: str, sweep: Sweep, rows: Iterable[Row]) -> None:
         if PurePath(target).suffix.lower() == _CSV:
             with path.open("w", encoding="utf-8", newline="") as file:
                 writer = csv.writer(file, lineterminator="\n")
-                writer.writerow([*columns, _KEY])
-                writer.writerows([*row, sweep.fingerprint] for row in cells)
+                writer.writerow(csv_row([*columns, _KEY]))
+                writer.writerows(csv_row([*row, sweep.fingerprint]) for row in cells)
         else:
             _write_parquet(path, sweep, columns, cells)
 
@@ -109,7 +110,10 @@ def table_points(target: str) -> list[TablePoint]:
     """
     if PurePath(target).suffix.lower() == _CSV:
         with Path(target).open(encoding="utf-8", newline="") as file:
-            return [TablePoint(float(row["F"] or "nan"), intern(row["active"])) for row in csv.DictReader(file)]
+            return [
+                TablePoint(float(row["F"] or "nan"), intern(text_of_cell(row["active"])))
+                for row in csv.DictReader(file)
+            ]
     import pyarrow.parquet as pq  # noqa: PLC0415 - only tables in this format need it
 
     found: list[TablePoint] = []

@@ -1,16 +1,42 @@
-"""Comma-separated values as text."""
+"""Comma-separated values as text.
+
+A spreadsheet computes a cell that begins with ``=``, ``+``, ``-`` or ``@`` as a formula, which may call programs. Names
+of robots, joints and tasks are anybody's. Such a cell begins with an apostrophe here, unless it is numbers and a unit.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Sequence
+
+#: First characters of formulas; some spreadsheets skip the last two.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:inf|nan)"
+#: Numbers, as in a vector or a range, and a unit behind them: letters and signs of which no formula consists.
+_NUMBERS = re.compile(rf"(?:{_NUMBER})(?:(?:[,;]? +|, ?| \.\. | to )(?:{_NUMBER}))*(?: [A-Za-z0-9%°²³/·^()\[\] ]+)?")
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table as comma-separated values; None is an empty cell."""
+    """Return a table as comma-separated values; None is an empty cell, and no text is a formula."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
+    writer.writerow(csv_row(head))
+    writer.writerows(map(csv_row, rows))
     return text.getvalue()
+
+
+def csv_row(cells: Sequence[object]) -> list[object]:
+    """Return the cells of a row, with texts that a spreadsheet would compute quoted as texts."""
+    return [f"'{cell}" if isinstance(cell, str) and _is_formula(cell) else cell for cell in cells]
+
+
+def text_of_cell(cell: str) -> str:
+    """Return the text of a cell that :func:`csv_row` wrote."""
+    return cell[1:] if cell.startswith("'") and _is_formula(cell[1:]) else cell
+
+
+def _is_formula(cell: str) -> bool:
+    """Return whether a spreadsheet may take a text for a formula: a sign alone is none, nor are numbers with a unit."""
+    return len(cell) > 1 and cell.startswith(_FORMULA) and not _NUMBERS.fullmatch(cell)

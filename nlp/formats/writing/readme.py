@@ -11,7 +11,7 @@ import numpy as np
 from ....models import Dimension
 from ....models.mechanism import MechanismJoint
 from ... import __version__
-from ...errors import one_line
+from ...system.markdown import markdown_text
 from ..solved.mechanism_of import Exported
 from ..solved.words import ExportedJoint
 from .plates import Plate
@@ -58,9 +58,9 @@ def readme_text(exported: Exported, files: Iterable[str], plates: Sequence[Plate
     case, units = exported.case, exported.case.units
     pose = f", pose {exported.pose} of {case.pose_count}" if case.pose_count > 1 else ""
     versions = f"screwsynth {__version__} with CasADi {ca.CasadiMeta.version()} and NumPy {np.__version__}"
-    length, angle = one_line(units.label(Dimension.LENGTH)), units.label(Dimension.ANGLE)
+    length, angle = markdown_text(units.label(Dimension.LENGTH)), units.label(Dimension.ANGLE)
     parts = [
-        f"# {one_line(case.model.name)} from the case {one_line(case.name)}{pose}",
+        f"# {markdown_text(case.model.name)} from the case {markdown_text(case.name)}{pose}",
         _paragraph(f"Written by {versions}."),
         "## Files",
         "\n".join(_paragraph(f"- `{name}`: {_FILES.get(name, _LINK)}", "  ") for name in files),
@@ -93,9 +93,9 @@ def _paragraph(text: str, indent: str = "") -> str:
 
 def _row(joint: MechanismJoint, words: ExportedJoint) -> str:
     """Return the row of a joint."""
-    label = one_line(f"{words.label} {words.part}".rstrip()).replace("|", "/")
-    actuator = one_line(words.actuator).replace("|", "/")
-    return f"| {joint.name} | {joint.kind} | {joint.inner}, {joint.outer} | {label} | {actuator} |"
+    label, actuator = markdown_text(f"{words.label} {words.part}".rstrip()), markdown_text(words.actuator)
+    name, inner, outer = map(markdown_text, (joint.name, joint.inner, joint.outer))
+    return f"| {name} | {joint.kind} | {inner}, {outer} | {label} | {actuator} |"
 
 
 def _offsets(plate: Plate, unit: str) -> str:
