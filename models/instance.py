@@ -22,7 +22,7 @@ from .arrays import FloatArray
 from .limbjoints import LimbJoint, LimbLink
 from .member import Member, resistance
 from .model import Model
-from .parts import Actuator, Closure, Unknown, rate_relations
+from .parts import Actuator, Closure, Dimension, Unknown, rate_relations
 from .values import dataclass
 from .whole import expressions_of, with_expressions
 from .wrench import Wrench, WrenchKind
@@ -207,6 +207,21 @@ def sizes_at(
     values = function(np.array(reference)).full().ravel()
     each = (SX(float(value)) if 0 < value < np.inf else otherwise[k] for k, value in enumerate(values))
     return ca.vertcat(*each)
+
+
+def length_of(model: Model, values: Sequence[float]) -> float:
+    """Return a length of the order of a robot's, by which its lengths become plain numbers.
+
+    Tolerances on lengths, areas and products of lengths are parts of it, so that no answer depends on a unit.
+
+    Args:
+        model: the robot.
+        values: (n,) of its parameters.
+    """
+    lengths = [ca.vec(item.symbol) for item in model.parameters if item.dimension is Dimension.LENGTH]
+    size = ca.norm_2(ca.vertcat(SX(0, 1), *lengths)) if model.size is None else model.size
+    found = float(ca.Function("size", [Substitution.identity(model).parameters], [ca.densify(size)])(list(values)))
+    return found if 0 < found < np.inf else float(np.linalg.norm(model.home)) or 1.0
 
 
 def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ()) -> SX:

@@ -74,6 +74,7 @@ class Model(Whole, Shown):
         generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
         structure: the structure of each path of joints; empty for a robot given by its rows.
         length_unit: unit of the parameters' typical lengths, such as ``m``; empty for proportions in any unit.
+        size: (1, 1) a length of the order of the robot's own, of its parameters; that of the parameters if left out.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
@@ -106,6 +107,7 @@ class Model(Whole, Shown):
     generic: GenericRanks | None = None
     structure: tuple[PathStructure, ...] = ()
     length_unit: str = ""
+    size: SX | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))

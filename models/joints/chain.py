@@ -177,21 +177,23 @@ def home_of(words: RobotWords, values: Mapping[str, float] = MappingProxyType({}
     stacked = ca.vertcat(SX(0, 1), *symbols.values())
     lengths = [symbols[name] for name, item in dimensions if item.kind is Dimension.LENGTH]
     robot = HomeRobot(words, stacked, np.array(typical), home, SX(1), tuple(limbs), graph)
-    return replace(robot, size=_size(lengths, robot.joints, stacked))
+    return replace(robot, size=_size(lengths, robot))
 
 
-def _size(lengths: Sequence[SX], joints: Sequence[Joint], symbols: SX) -> SX:
+def _size(lengths: Sequence[SX], robot: HomeRobot) -> SX:
     """Return a length of the order of the robot's, smooth and positive for all dimensions but zero.
 
-    It is the root of the sum of the squares of the dimensions that are lengths; without any, the largest coordinate of
-    a joint, or 1 where all joints are at the origin.
+    It is the root of the sum of the squares of the dimensions that are lengths, and of the largest coordinate of a
+    joint that is left without these; 1 where all are at the origin.
     """
-    if lengths:
-        return ca.norm_2(ca.vertcat(*lengths))
-    points = ca.veccat(SX(0), *[joint.point for joint in joints])
-    middle = ca.Function("points", [symbols], [ca.densify(points)])(1.0).full()
-    largest = float(np.nan_to_num(np.abs(middle)).max())
-    return SX(largest or 1.0)
+    points = ca.veccat(SX(0), *[joint.point for joint in robot.joints])
+    is_length = np.array([item.kind is Dimension.LENGTH for item in robot.words.dimensions.values()], dtype=bool)
+    left = ca.Function("points", [robot.symbols], [ca.densify(points)])(np.where(is_length, 0.0, robot.typical)).full()
+    written = float(np.abs(left[np.isfinite(left)]).max(initial=0.0))
+    parts = [*lengths, *([SX(written)] if written else [])]
+    if not parts:
+        return SX(1)
+    return ca.norm_2(ca.vertcat(*parts)) if lengths else SX(written)
 
 
 def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:

@@ -353,6 +353,7 @@ def model_of_home(
         name=words.name,
         description=words.description,
         length_unit=words.length_unit,
+        size=at_home.size,
         options={"definition": definition},
         parameters=(*parameters(at_home), *more),
         pose=pose,
