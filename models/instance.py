@@ -110,6 +110,7 @@ class RobotInstance:
         distances: (d, 1) left sides of the equations that follow from those of the loops.
         joints: the joints of the model's limbs.
         links: their links.
+        size: (1, 1) a length of the order of the robot's.
         reference: values of the parameters at which the sizes of the loop equations are taken; None for expressions.
     """
 
@@ -133,6 +134,7 @@ class RobotInstance:
     distances: SX
     joints: tuple[LimbJoint, ...]
     links: tuple[LimbLink, ...]
+    size: SX
     reference: tuple[float, ...] | None = None
 
 
@@ -149,9 +151,11 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         (model.wrenches, model.members, model.actuators, model.closure, model.loops, model.distances),
         (model.signs, model.quantities, model.joints, model.links),
         tuple((leg.base, leg.platform) for leg in model.legs),
+        _size_of(model),
     )
     function = ca.Function("model", Substitution.identity(model).all, expressions_of(given))
-    found, (signs, quantities, joints, links), ends = with_expressions(given, iter(function.call(substitution.all)))
+    replaced = with_expressions(given, iter(function.call(substitution.all)))
+    found, (signs, quantities, joints, links), ends, size = replaced
     rows, members, actuators, *equations = found
 
     def left_sides(own: Sequence[Closure], replaced: Sequence[Closure]) -> SX:
@@ -185,6 +189,7 @@ def instantiate(model: Model, substitution: Substitution, length: SX, twists: Se
         signs=ca.vertcat(SX(0, 1), *[each.value for each in signs]),
         joints=joints,
         links=links,
+        size=size,
         reference=substitution.reference,
     )
 
@@ -218,10 +223,17 @@ def length_of(model: Model, values: Sequence[float]) -> float:
         model: the robot.
         values: (n,) of its parameters.
     """
-    lengths = [ca.vec(item.symbol) for item in model.parameters if item.dimension is Dimension.LENGTH]
-    size = ca.norm_2(ca.vertcat(SX(0, 1), *lengths)) if model.size is None else model.size
-    found = float(ca.Function("size", [Substitution.identity(model).parameters], [ca.densify(size)])(list(values)))
+    function = ca.Function("size", [Substitution.identity(model).parameters], [ca.densify(_size_of(model))])
+    found = float(function(list(values)))
     return found if 0 < found < np.inf else float(np.linalg.norm(model.home)) or 1.0
+
+
+def _size_of(model: Model) -> SX:
+    """Return a length of the order of a robot's in the symbols of its parameters."""
+    if model.size is not None:
+        return model.size
+    lengths = [ca.vec(item.symbol) for item in model.parameters if item.dimension is Dimension.LENGTH]
+    return ca.norm_2(ca.vertcat(*lengths)) if lengths else SX(float(np.linalg.norm(model.home)) or 1.0)
 
 
 def jacobian(rows: Sequence[Wrench], length: SX, members: Sequence[Member] = ()) -> SX:

@@ -267,9 +267,9 @@ def ask_import(found: dict[str, Answer], folder: Path, case: Path) -> None:
 
 def csv_of(tables: Tables, file: Path, *, timed: bool) -> Path:
     """Write poses of the workspace as a table, and return the file."""
+    rows = enumerate(path_poses(tables))
     lines = ["x,y,z,roll,pitch,yaw" + ",t" * timed]
-    for k, at in enumerate(path_poses(tables)):
-        lines.append(",".join(repr(each) for each in [*at, *[float(k)] * timed]))
+    lines += [",".join(repr(each) for each in [*at, *[float(k)] * timed]) for k, at in rows]
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return file
 

@@ -26,6 +26,7 @@ from casadi import SX
 
 from .. import Closure, Dimension, Model, Substitution, Unknown
 from ..drawing import Scene
+from ..instance import length_of
 from ..whole import expressions_of, with_expressions
 from .elimination import limb_of
 from .replacing import Solved, at_turn, with_replaced
@@ -195,12 +196,14 @@ def _is_same(model: Model, one: SX, other: SX) -> bool:
     symbols = Substitution.identity(model).all
     function = ca.Function("two", symbols, [ca.densify(one), ca.densify(other)])
     rng = np.random.default_rng(_SEED)
-    typical = model.typical
+    typical, size = model.typical, length_of(model, model.typical.tolist())
+    lengths = np.array([size if item.dimension is Dimension.LENGTH else 1.0 for item in model.unknowns])
     for _ in range(_TESTS):
         values = typical * rng.uniform(0.8, 1.2, typical.shape)
         turn = rng.normal(size=(3, 3))
-        place = np.array(model.home) + rng.uniform(-0.5, 0.5, 3)
-        a, b = (float(each) for each in function(values, rng.uniform(-1.5, 1.5, symbols[1].numel()), turn, place))
+        place = np.array(model.home) + size * rng.uniform(-0.5, 0.5, 3)
+        unknowns = lengths * rng.uniform(-1.5, 1.5, symbols[1].numel())
+        a, b = (float(each) for each in function(values, unknowns, turn, place))
         if not abs(a - b) <= _SAME * (1 + abs(a) + abs(b)):
             return False
     return True

@@ -28,6 +28,7 @@ import numpy as np
 from casadi import SX
 
 from .. import Dimension, FloatArray, Model, Substitution, Unknown
+from ..instance import length_of
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest difference of two sides of an identity at random values, in parts of the sizes of its terms: rounding.
@@ -304,7 +305,7 @@ def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]
     rng = np.random.default_rng(_SEED)
     typical = model.typical
     home = np.array(model.home)
-    size = float(np.linalg.norm(home)) or 1.0
+    size = float(np.linalg.norm(home)) or length_of(model, typical.tolist())
     points = [[typical, np.zeros(len(model.unknowns)), np.eye(3) if rotation is None else rotation, home]]
     lengths = np.array([item.dimension is not Dimension.ANGLE for item in model.unknowns])
     for _ in range(_TESTS):

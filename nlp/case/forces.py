@@ -98,7 +98,7 @@ class PosedForces(NamedTuple):
         return found
 
 
-def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading) -> PosedForces:
+def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading, size: SX) -> PosedForces:
     """Return the forces and speeds of a robot's actuators at a pose.
 
     Args:
@@ -106,9 +106,10 @@ def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading) ->
         statics: motions of its platform at the pose.
         rotation: (3, 3) platform to world coordinates.
         loading: loads on its platform, and its motions.
+        size: (1, 1) a length of the order of the robot's.
     """
     cases = tuple(_case_forces(case, statics, rotation) for case in loading.cases)
-    speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion)
+    speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion, size)
     joints = driven_joints(model)
     known = [] if loading.stiffness is None else loading.stiffness_of([joint.name for joint in joints])
     return PosedForces(joints, statics, cases, speeds, SX(known) if known else SX(0, 1))
@@ -132,12 +133,10 @@ def _case_forces(case: LoadCase, statics: Statics, rotation: SX) -> CaseForces:
     return CaseForces(case, wrench, centre, spread, statics.divisor)
 
 
-def _speeds(model: Model, statics: Statics, motion: Motion) -> SX:
+def _speeds(model: Model, statics: Statics, motion: Motion, size: SX) -> SX:
     """Return the largest speeds (a, 1) of the actuators."""
-    if freedoms_of(model) == 6 and not model.actuators:
-        rates = statics.rows  # of straight legs
-    else:
-        rates = statics.rates(SX(motion.linear / motion.angular if motion.linear and motion.angular else 1.0))
+    is_legs = freedoms_of(model) == 6 and not model.actuators
+    rates = statics.rows if is_legs else statics.rates(SX(motion.length(size)))
     return ca.vertcat(
         *[motion.linear * _size(row[3:].T) + motion.angular * _size(row[:3].T) for row in ca.vertsplit(rates)]
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -29,6 +29,8 @@ _KNOWN = ("m", "N")
 #: Largest number of loads with both signs that are always there: each doubles the loads that act together.
 _MOST_SIGNS = 6
 _NONE = (0.0, 0.0, 0.0)
+#: A number or an expression.
+Length = TypeVar("Length", float, SX)
 #: Work below this part of what force and moment could do is none.
 _NO_WORK = 1e-9
 
@@ -108,6 +110,14 @@ class Motion:
 
     linear: float = 0.0
     angular: float = 0.0
+
+    def length(self, size: Length) -> float | Length:
+        """Return the length by which angular velocities count beside velocities: the ratio of both speeds.
+
+        Args:
+            size: of the robot, length, which is taken where one speed alone is stated.
+        """
+        return self.linear / self.angular if self.linear and self.angular else size
 
     def check(self) -> None:
         """Refuse a speed that is negative or not finite, and no motion at all.

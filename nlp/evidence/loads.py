@@ -17,6 +17,7 @@ from casadi import SX
 
 from ...models import FloatArray, rank_of_rows
 from ...models.basis import is_apart
+from ...models.instance import length_of
 from ...models.statics import Statics, statics_of
 from ..case.forces import CaseForces, PosedForces, forces_at
 from ..program.nlp import Nlp
@@ -83,7 +84,8 @@ def loads_at(nlp: Nlp, x: FloatArray, state: RobotState, pose: int = 0) -> PoseL
     at = velocities_at(nlp, x, nlp.program.kernels.robot_states[pose](x, nlp.arguments), pose)
     J, D, p, R = (SX(ca.DM(each)) for each in (at.jacobian, at.driven, state.position, state.rotation))
     statics = statics_of(model, J, D, p)
-    found = forces_at(model, statics, R, loading)
+    values = [float(each) for item in model.parameters for each in np.ravel(state.parameters[item.name])]
+    found = forces_at(model, statics, R, loading, SX(length_of(model, values)))
     held = {} if state.is_singular else _constraints(nlp, statics)
     loads = tuple(_load(case, state, found, held) for case in found.cases)
     is_elastic = bool(found.stiffness.numel())

@@ -68,7 +68,7 @@ def _values(layout: Layout) -> Iterator[Measured]:
     for k, robot in enumerate(robots):
         where = f" pose {k + 1}" if len(robots) > 1 else ""
         statics = posed_statics(case.model, robot)
-        for each in squares_of(case, forces_at(case.model, statics, robot.rotation, case.loading)):
+        for each in squares_of(case, forces_at(case.model, statics, robot.rotation, case.loading, robot.size)):
             yield Measured(f"{each.name}{where}", each.value)
 
 

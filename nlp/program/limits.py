@@ -13,7 +13,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ...models import RobotInstance
+from ...models import Dimension, RobotInstance
+from ...models.instance import length_of
 from ..case.case import Case
 from ..case.limits.constraint import BoundedConstraint, Constraint, PairFamily
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
@@ -24,7 +25,8 @@ from .repeated import without_repeated
 #: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
 #: choice among them takes half of the time already.
 _ALL_PAIRS = 3
-#: How well a limit that depends on fixed numbers alone must hold: they are written with a dozen digits.
+#: How well a limit that depends on fixed numbers alone must hold, in parts of its size: they are written with a dozen
+#: digits.
 _ROUNDING = 1e-9
 
 
@@ -69,12 +71,14 @@ def limit_constraints(
     expressions = ca.vertcat(*[item.constraint.expression for item in limits])
     free = ca.which_depends(expressions, x, 1, True) if table.bounds else [False] * len(limits)
     values = ca.Function("limits", [x, p], [ca.densify(expressions)])(0, table.values).full().ravel()
+    size = length_of(case.model, robots[0].reference or ())
     varying: list[BoundedConstraint] = []
     constant: list[BoundedConstraint] = []
     for item, varies, value in zip(limits, free, values, strict=True):
         estimated = item.constraint.spectral is not None and not varies
         number = _measured(item.constraint, x, p, table) if estimated else value
-        holds = item.lower - _ROUNDING <= number <= item.upper + _ROUNDING
+        low, high = (_ROUNDING * max(abs(end), _size_of(item, size)) for end in (item.lower, item.upper))
+        holds = item.lower - low <= number <= item.upper + high
         if holds and not varies and not math.isfinite(value):
             # An infinite value is above every bound, and keeps none.
             key = next(filter(None, item.constraint.keys))
@@ -90,6 +94,19 @@ def _measured(constraint: Constraint, x: SX, p: SX, table: SymbolTable) -> float
         return math.nan
     matrix = ca.Function("matrix", [x, p], [ca.densify(spectral.matrix)])(0, table.values).full()
     return float(constraint.reading.to_value(SX(measure(matrix, np.zeros(3)))))
+
+
+def _size_of(item: BoundedConstraint, length: float) -> float:
+    """Return the size of numbers such as a limit's that are written with a dozen digits; 0 where it is not known.
+
+    Args:
+        item: the limit.
+        length: of the order of the robot's.
+    """
+    reading = item.constraint.reading
+    if reading.dimension is Dimension.LENGTH:
+        return float(length**reading.power)
+    return 1.0 if reading.dimension in (Dimension.ANGLE, Dimension.NUMBER) or not reading.power else 0.0
 
 
 def _sorted_families(

@@ -149,7 +149,7 @@ def read_home(model: Model, size: float) -> Home:
     if 0 < len(possible) < 6:
         motion, is_flat = _motion(possible, places, size)
     free = _free_parameter(model, moves, turning, reach, size, motion)
-    state, arm = evaluate(free_pose, _home_point(free_pose)), _arm(places[0])
+    state, arm = evaluate(free_pose, _home_point(free_pose)), _arm(places[0], size)
     near = _places(_program(model, moves, turning, reach, length=arm))
     condition = min(_condition(each, arm) for each in (near if state.is_singular else near[:1]))
     return Home(state, arm, condition, freedoms, moves, turning, reach, free, motion, is_flat)
@@ -216,14 +216,14 @@ def _scaled(rows: FloatArray, centre: FloatArray, size: float) -> FloatArray:
     return np.hstack([rows[:, :3], (rows[:, 3:] - np.cross(centre, rows[:, :3])) / size])
 
 
-def _arm(place: _Place) -> float:
-    """Return the root mean square arm of the forces of a place about the platform's origin, 1 for none."""
+def _arm(place: _Place, size: float) -> float:
+    """Return the root mean square arm of a place's forces about the platform's origin; the robot's size for none."""
     rows = _scaled(place.rows, place.position, 1.0)
     sizes = np.linalg.norm(rows[:, :3], axis=1)
     forces = sizes > _FORCE
     arms = np.linalg.norm(rows[forces, 3:], axis=1) / sizes[forces]
     arm = math.sqrt(float(np.mean(arms**2))) if len(arms) else 0.0
-    return float(f"{arm:.2g}") if arm > _ZERO else 1.0
+    return float(f"{arm if arm > _ZERO * size else size:.2g}")
 
 
 def _condition(place: _Place, arm: float) -> float:
@@ -328,7 +328,7 @@ def _free_parameter(
     for index, item in enumerate(model.parameters):
         nlp = _program(model, moves, turning, reach, index)
         work = max(float(np.abs(each.constraints @ twist).max(initial=0.0)) for each in _places(nlp))
-        if work > _ZERO * (1 + size):
+        if work > _ZERO * (np.linalg.norm(twist[:3]) + size * np.linalg.norm(twist[3:])):
             continue
         home = _home_point(nlp)
         other = home.copy()

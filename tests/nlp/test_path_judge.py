@@ -107,7 +107,7 @@ def test_boxes_of_pieces_hold_their_points(
     text = f"G21 G94 F60\nG{code} G3 {' '.join(words)} P{turns}\nG1 X{ends[3]:.9f} A{ends[6]:.9f}\nM2"
     start = (*ends[:3], *ends[6:9])
     path = program(text, Units("mm"), start)
-    cover = covered(path)[0]
+    cover = covered(path, 1.0)[0]
     low, high = 0.0, 1.0
     for is_upper in halves:
         middle = 0.5 * (low + high)

@@ -183,7 +183,7 @@ class PosedRobot:
         from ..forces import forces_at  # noqa: PLC0415 - likewise
 
         statics = posed_statics(self.model, self.robot)
-        return forces_at(self.model, statics, self.robot.rotation, self.loading)
+        return forces_at(self.model, statics, self.robot.rotation, self.loading, self.robot.size)
 
 
 class Measures(NamedTuple):

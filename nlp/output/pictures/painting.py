@@ -40,7 +40,8 @@ _ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72, 0.1, 0.84)
 _ALONG_ARROW = (0.5, 0.35, 0.7)
 #: Radius of an angle's arc, in parts of its first ray.
 _ARC = 0.72
-#: A rate below this part of the largest, and a pitch or velocity below this part of the robot's size, show as 0.
+#: A rate below this part of the largest, a pitch below this part of the robot's size, and a velocity below this part of
+#: the largest that the motion could cause, show as 0.
 _NOISE = 1e-9
 
 
@@ -278,11 +279,19 @@ class Panel:
                 handle = Line2D([], [], color=MUTED, linewidth=2.6, marker=">")
                 self.legend.append((handle, "couple that a limb applies (two heads)"))
 
+    @property
+    def _most(self) -> float:
+        """The fastest velocity that a part of the robot could have in the motion; 0 without one."""
+        motion = self.drawing.motion
+        if motion is None:
+            return 0.0
+        return float(np.linalg.norm(motion.twist[:3])) * self.drawing.size + float(np.linalg.norm(motion.twist[3:]))
+
     def _paint_velocities(self) -> None:
         """Paint the velocities of the platform's corners, the fastest with a fixed length."""
         velocities = self.drawing.velocities_at(self.drawing.posture)
         fastest = float(np.max(np.linalg.norm(velocities, axis=1), initial=0.0))
-        if fastest <= _NOISE * self.drawing.size:
+        if fastest <= _NOISE * self._most:
             return
         factor = _ARROW * self.drawing.size / fastest
         for index, velocity in zip(self.drawing.corners, velocities, strict=True):
@@ -382,7 +391,7 @@ class Panel:
 
     def _rate_text(self, rate: float) -> str:
         """Return a rate with its sign and unit; rounding error beside the largest rate is 0."""
-        text = "0" if abs(rate) <= _NOISE * max(self.largest, 1e-6) else rate_text(rate)
+        text = "0" if abs(rate) <= _NOISE * max(self.largest, _NOISE * self._most) else rate_text(rate)
         return f"{text} {self._rate_unit()}".strip()
 
     def _rate_unit(self) -> str:

@@ -14,7 +14,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray
+from ....models import Dimension, FloatArray
+from ....models.instance import length_of
 from ...case.case import Case
 from ...case.task import Sense
 from ...errors import EvaluationError
@@ -22,7 +23,7 @@ from ...evidence.closing import closed_in_place
 from ...evidence.mobility import mobility_of
 from ...evidence.singularities import is_passive_singular
 from ...evidence.state import evaluate
-from ...program.layout import Layout
+from ...program.layout import Layout, reference_of
 from ...program.nlp import Nlp
 from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import JointErrors
@@ -36,8 +37,9 @@ from .verdict import Outcome, slack_of
 #: Reasons for a claim that poses of other assemblies leave open.
 _ELSEWHERE = "poses beyond the limit are known only in other assemblies of the joints than home's"
 _WIDER = "the bound holds in every assembly of the joints, and the value reached is one of home's"
-#: Part of its size by which a value in home's assembly differs from that of the same assembly in a search.
-_SAME = 1e-6
+#: Part of itself by which a value in home's assembly differs from that of the same assembly in a search, and part of
+#: the size of such numbers below which values are 0.
+_SAME, _SMALL = 1e-6, 1e-6
 
 
 class Homes:
@@ -122,8 +124,14 @@ class Homes:
             if sign * (value - claim.limit) > slack_of(claim.limit):
                 return replace(each, reached=reached, outcome=Outcome.REFUTED, reason="")
             return replace(opened, reached=reached)
-        is_other = abs(reached - each.reached) > _SAME * max(abs(each.reached), 1e-6)
+        is_other = abs(reached - each.reached) > _SAME * max(abs(each.reached), _SMALL * self._size_of(claim))
         return replace(opened if is_other else each, reached=reached)
+
+    def _size_of(self, claim: Claim) -> float:
+        """Return the size of a claim's numbers: for lengths the robot's, for F the size without cancellation."""
+        if claim.reading.dimension is Dimension.LENGTH:
+            return length_of(self.case.model, reference_of(self.case)) ** claim.reading.power
+        return self._nlp.objective_size if claim.name.partition(" ")[0] == "F" else 1.0
 
     def _closed(self, y: FloatArray, errors: JointErrors | None) -> FloatArray | None:
         """Return the point of the program with closed loops at a pose (6,) of a machine; None without one."""

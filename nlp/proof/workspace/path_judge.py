@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, frozen_array
+from ....models.instance import length_of
 from ....models.joints.closedform import ClosedForm
 from ....models.statics import statics_hindrance
 from ...case.case import Case
@@ -29,6 +30,7 @@ from ...evidence.dependent import dependent_of, robot_size
 from ...interruption import is_requested, one_call, one_search, within
 from ...path.arcs import PLANES
 from ...path.path import ProgrammedPath
+from ...program.layout import reference_of
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim, dependent_claims, searched_claims
@@ -59,7 +61,8 @@ from .verdict import EVERYWHERE, Outcome
 TIME_LIMIT = 600.0
 #: Part of the time that is left that a search takes at most, and gap of a number without a limit, as a part of it.
 _PART, GAP = 0.5, 1e-3
-#: Part of the sizes of positions by which the box of all poses is wider than a path that stays at one.
+#: Part of the robot's size, or of the sizes of positions, by which the box of all poses is wider than a path that stays
+#: at one.
 _ROOM = 1e-9
 #: Parts of a robot's size, or angle, by which a coordinate moves that stands still but for rounding.
 _STILL = 1e-9
@@ -155,7 +158,7 @@ def judge_path(
         InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
             robot of which the positions of actuators are not known.
     """
-    cover, box, workspace = covered(path)
+    cover, box, workspace = covered(path, length_of(case.model, reference_of(case)))
     case = replace(case, workspace=workspace)
     case.fixed_parameters("a path is judged with fixed dimensions")
     check_determined_joints(case.model, "path", case.source)
@@ -290,8 +293,12 @@ def _finer(
     return machines.searched([claim], gap, is_enough=False)[0]
 
 
-def covered(path: ProgrammedPath) -> tuple[PathCover, PoseBox, Workspace]:
+def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Workspace]:
     """Return the boxes of a path, the box of all its poses, and a workspace about it.
+
+    Args:
+        path: the path.
+        size: of the robot, length.
 
     Raises:
         InputError: it has no motion, or its rotations are not covered.
@@ -308,7 +315,7 @@ def covered(path: ProgrammedPath) -> tuple[PathCover, PoseBox, Workspace]:
     lower, upper = cover.boxes(cover.pieces)
     low, high = lower.min(axis=0), upper.max(axis=0)
     if not (high > low).any():  # a path that stays at one pose
-        room = _ROOM * (np.abs(path.knots[:, :3]).max() or 1.0)
+        room = _ROOM * max(float(np.abs(path.knots[:, :3]).max()), size)
         low[0], high[0] = low[0] - room, high[0] + room
     box = PoseBox(
         turns.kind,

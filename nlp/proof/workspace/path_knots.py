@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from casadi import SX
 
-from ....models import FloatArray
+from ....models import Dimension, FloatArray
 from ....models.joints.closedform import closed_form
+from ....models.statics import driven_joints
 from ...case.case import Case
 from ...case.pose import Free, ends_of
 from ...case.workspace import DependentCoordinate, TurnKind, Workspace
@@ -169,7 +170,7 @@ def knots_within(case: Case, path: ProgrammedPath, cover: PathCover, workspace: 
     every, pieces, reason = cover.pieces, None, ""
     try:
         with one_search():
-            division = _Division(*_machine(case, cover, workspace), cover, within, path.lines)
+            division = _Division(*_machine(case, cover, workspace), cover, within, path.lines, _are_turning(case))
             pieces, reason = division.run()
     except (NotJudgedError, UncoveredError) as error:
         reason = str(error)
@@ -212,6 +213,11 @@ def _machine(case: Case, cover: PathCover, workspace: Workspace) -> tuple[Proble
     return problem, coordinates
 
 
+def _are_turning(case: Case) -> NDArray[np.bool_]:
+    """Return whether the coordinate of each actuator (a,) is an angle."""
+    return np.array([each.dimension is Dimension.ANGLE for each in driven_joints(case.model)], dtype=bool)
+
+
 class _Pieces(NamedTuple):
     """B pieces of a path.
 
@@ -245,14 +251,21 @@ class _Division:
         cover: of the path.
         within: the largest distance.
         lines: (N,) of the program, of the segments.
+        turning: (a,) whether the coordinate of each actuator is an angle.
     """
 
     def __init__(
-        self, problem: Problem, coordinates: SX, cover: PathCover, within: float, lines: NDArray[np.int32]
+        self,
+        problem: Problem,
+        coordinates: SX,
+        cover: PathCover,
+        within: float,
+        lines: NDArray[np.int32],
+        turning: NDArray[np.bool_],
     ) -> None:
         self._tubes, self._within, self._lines = Tubes(problem, coordinates, cover), within, lines
         self._own, self._D = list(problem.independent), list(problem.dependent)
-        self._noise = _NOISE * max(problem.length, 1.0)
+        self._noise = _NOISE * np.where(turning, 1.0, problem.length)
         self._start = self._unproved(cover.pieces, whole_workspace(problem).near)
 
     def _unproved(self, along: FloatArray, near: FloatArray) -> _Pieces:

@@ -31,6 +31,7 @@ import numpy as np
 from casadi import SX
 
 from .....models import Actuator, FloatArray, Model, Substitution, Wrench, WrenchKind, rate_relations
+from .....models.instance import length_of
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
@@ -60,7 +61,7 @@ class PosedRobot:
         dependent: places among these of the coordinates that follow from the others.
         centre: (n,) the middle of the workspace, with unknowns and errors of 0.
         size: (n,) by which coordinates are comparable: half ranges, sizes of the unknowns, and the tolerance.
-        length: by which rotations are multiplied, length: any positive number.
+        length: of the order of the robot's, by which rotations are multiplied.
         position: (3, 1) the platform's origin, length.
         rotation: (3, 3) platform to world coordinates.
         scale: (1, 1) by which rows are multiplied that are linear in the rotation; at least 1.
@@ -82,7 +83,8 @@ class PosedRobot:
         values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
         errors = SX.sym("errors", symbols[0].numel() - len(values))
         turned, self.scale = turned_rotation(root, y[3:])
-        self.model, self.length, self.position = model, case.characteristic_length, ca.vertcat(*y[:3])
+        self.model, self.position = model, ca.vertcat(*y[:3])
+        self.length = length_of(model, [*values, *[0.0] * errors.numel()])
         self.rotation = turned / self.scale
         self.z, self.errors = ca.vertcat(SX(0, 1), *[y[k] for k in self.free], unknowns, errors), errors.numel()
 

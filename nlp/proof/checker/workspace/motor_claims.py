@@ -78,7 +78,6 @@ class MotorClaims(LoopClaim):
         robot, motor, motion = loops.robot, claims[0][0], case.loading.motion or Motion()
         self._numbers = [_number_of(*each) for each in claims]
         self._place, self._fastest = motor.place, (motion.linear, motion.angular * robot.length)
-        self._length = robot.length
         load = next((each for each in case.loading.cases if each.name == motor.load), None)
         parts = [] if load is None else [each.load for each in load.parts]
         self._any = [(each.any_force, each.any_moment / robot.length) for each in parts]
@@ -149,7 +148,7 @@ class MotorClaims(LoopClaim):
             rates, known, _ = solved(x, right)
         else:
             # Rows g of rates of least size, as numbers at a pose have them: (X' S X)^-1 X' S.
-            length = linear / angular if linear and angular else 1 / self._length
+            length = linear / angular if linear and angular else 1.0  # the robot's length
             weights = np.repeat([1.0, length**2], 3)
             right = _transposed(AffineMatrix(*(each * weights[:, None] for each in x)))
             rates, known, _ = solved(right.matmul(x), right)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 #: Number of boxes examined at once, and number of those with the smallest bounds at which values are computed.
 _BLOCK, _TRIED = 256, 8
-#: Value below which gaps are parts of this one.
+#: Part of the largest value known below which gaps are parts of this one.
 _NEAR_ZERO = 1e-6
 #: Random points from which the search of a small value begins, steps from the best of them, and points in each step.
 _POINTS, _STEPS, _AROUND = 256, 24, 32
@@ -161,9 +161,14 @@ class Goal(NamedTuple):
     slack: float = 0.0
     is_enough: bool = True
 
-    def levels(self, value: float) -> tuple[float, float]:
-        """Return the bounds at which a box is closed, and at which the search ends, for the smallest value known."""
-        met = value - self.gap - self.part * max(abs(value), _NEAR_ZERO) if math.isfinite(value) else math.inf
+    def levels(self, value: float, size: float) -> tuple[float, float]:
+        """Return the bounds at which a box is closed, and at which the search ends.
+
+        Args:
+            value: the smallest one known.
+            size: that the number has elsewhere.
+        """
+        met = value - self.gap - self.part * max(abs(value), _NEAR_ZERO * size) if math.isfinite(value) else math.inf
         if self.limit is None or value < self.limit - self.slack:
             return met, met
         decided = self.limit if value >= self.limit else self.limit - self.slack
@@ -197,7 +202,7 @@ class SmallestValues(LoopRule):
         self.block = _BLOCK if number.problem.dependent else 2 * _BLOCK
         K, start = len(goals), number.problem.start
         self._best = _Best(np.full(K, np.inf), np.tile(start, (K, 1)), np.zeros((K, 2)))
-        self._closed = np.full(len(goals), np.inf)
+        self._closed, self._sizes = np.full(K, np.inf), np.zeros(K)
         cover = self._problem.cover
         if cover is not None:
             self._start_from_path(cover)
@@ -206,13 +211,17 @@ class SmallestValues(LoopRule):
 
     def _levels(self) -> FloatArray:
         """Return the bounds (K,) at which boxes are closed: of several numbers those that are enough."""
-        pairs = [goal.levels(value) for goal, value in zip(self._goals, self._best.value.tolist(), strict=True)]
+        known = self._best.value.tolist(), self._sizes.tolist()
+        pairs = [goal.levels(*each) for goal, *each in zip(self._goals, *known, strict=True)]
         return np.array(pairs)[:, 1 if len(pairs) > 1 else 0]
 
     def examine(self, boxes: Boxes[Followed]) -> Verdicts[Followed]:
         """Return bounds of boxes, and take note of small values in them."""
         self._number.levels = self._levels()
         found = self.examined(boxes)
+        if not self._sizes.all():  # of numbers that are 0 wherever they are known, that of their bounds
+            bounds = np.where(np.isfinite(found.smallest), np.abs(found.smallest), 0.0)
+            self._sizes = np.maximum(self._sizes, bounds.max(axis=0, initial=0.0))
         self._try(found)
         done = found.boxes.is_known & (found.smallest >= self._levels()).all(axis=1)
         self._closed = np.minimum(self._closed, found.smallest[done].min(axis=0, initial=np.inf))
@@ -285,6 +294,7 @@ class SmallestValues(LoopRule):
             values = self._number.values(z)
             values = np.where(np.isfinite(values), values, np.inf)
             least = values.min(axis=0)
+            self._sizes = np.maximum(self._sizes, np.where(np.isfinite(values), np.abs(values), 0.0).max(axis=0))
             better = np.isfinite(least) & ~(least >= known - _TIE * np.abs(known))
             first = np.argmax(values <= least + _TIE * np.abs(least), axis=0)
         if better.any():
@@ -307,7 +317,7 @@ class SmallestValues(LoopRule):
         search = self.search(Order.LARGEST if is_one else Order.NEWEST)
 
         def ending() -> str | None:
-            if is_one and -search.bound >= self._goals[0].levels(float(self._best.value[0]))[1]:
+            if is_one and -search.bound >= self._goals[0].levels(float(self._best.value[0]), float(self._sizes[0]))[1]:
                 return ""
             small = max((float(each.bound.max()) for each in search.state.small), default=-math.inf)
             return TOO_SMALL if search.state.small and (small >= search.bound or not is_one) else None

@@ -23,12 +23,14 @@ from casadi import SX
 
 from .....models import FloatArray, rate_relations
 from .....models.arrays import values_at
+from .....models.instance import length_of
 from .....models.statics import freedoms_of
 from ....case.case import Case
 from ....case.loads import Motion
 from ....case.motors import Motor, MotorNumber
 from ....case.task import Sense
 from ....case.workspace import TurnKind
+from ....program.layout import reference_of
 from ...enclosure.forms import Forms
 from ...statement.claims import Claim
 from ..ranks.krawczyk import ROUNDING
@@ -65,6 +67,7 @@ class Motors(Number):
             raise NotJudgedError("loops demand relations of its actuators' rates, for which there is no rule")
         motor, R = claims[0].motor or Motor(), posed.turned[0]
         self._actuator, self._length, self._is_six = motor.place, problem.length, freedoms_of(case.model) == 6
+        self._size = length_of(case.model, reference_of(case))
         self._numbers = [_parts_of(case, claim) for claim in claims]
         self._parts = list(dict.fromkeys(itertools.chain(*self._numbers)))
         A, D = posed.driven_rows
@@ -213,7 +216,7 @@ class Motors(Number):
             eye = np.broadcast_to(np.eye(6)[:, :, None], x.c.shape)
             rates = solved(x, Quadratics(eye, 0 * x.a, 0 * x.q, 0 * x.r, x.errors)).transposed
         else:
-            length = motion.linear / angular if linear and angular else 1 / self._length
+            length = motion.length(self._size) / self._length
             weighted = x.times(np.repeat([1.0, length**2], 3)[:, None, None])
             rates = solved(x.transposed.matmul(weighted), weighted.transposed).transposed
         own = rates[:, self._actuator : self._actuator + 1]

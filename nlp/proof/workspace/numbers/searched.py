@@ -33,8 +33,8 @@ from .motors import Motors
 if TYPE_CHECKING:
     from ..paper_record import PaperRecord
 
-#: Values in parts of which gaps count where the smallest value is near 0, as parts of the limit.
-_NEAR_ZERO = 0.1
+#: Singular values, and clearances in parts of the robot's length, of which gaps are parts where a limit is smaller.
+_NEAR_ZERO = {ClaimKind.SPECTRUM: 0.1, ClaimKind.CLEARANCE: 0.01}
 #: Reason for a measure of which nothing is known of every machine.
 _TOO_LARGE = "the errors of joint centres are too large for a bound of the change of J"
 #: Gap of numbers of actuators as a part of the largest size of the same number.
@@ -130,7 +130,8 @@ def _answer(subject: Subject, claim: Claim, gap: float, paper: PaperRecord | Non
         return extreme_of(claim, Minimum(reason=EVERYWHERE))
     try:
         number, problem = subject.number(claim), subject.problem
-        allowed = _asked_gap(subject, number, gap) if claim.limit is None else gap * max(abs(claim.limit), _NEAR_ZERO)
+        least = _NEAR_ZERO[claim.kind] * (problem.length if claim.kind is ClaimKind.CLEARANCE else 1.0)
+        allowed = _asked_gap(subject, number, gap) if claim.limit is None else gap * max(abs(claim.limit), least)
         recorder = None if paper is None or problem.dependent else paper.own(claim.name)
         (found,) = smallest_values(number, [goal_of(claim, allowed)], recorder)
     except (UncoveredError, NotJudgedError) as error:

@@ -19,11 +19,13 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray, Model, frozen_array
+from .....models.instance import length_of
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
 from ....case.workspace import TurnKind
 from ....evidence.closed_loops import DEPENDENT, Loops, closed_from_home
+from ....program.layout import reference_of
 from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .path_cover import PathCover
@@ -238,8 +240,9 @@ def build_problem(
     middle[list(dependent)] = start[list(dependent)]
     moved = loops.all_closed(middle[:, None], dependent)[:, 0]
     start = moved if loops.is_closed(moved) else start
-    _check_left_out(loops, start, dependent, box, case.characteristic_length)
-    chosen = _chosen(posed, model, start, needed, case.characteristic_length)
+    size = length_of(case.model, reference_of(case))
+    _check_left_out(loops, start, dependent, box, size)
+    chosen = _chosen(posed, model, start, needed, size)
     posed = posed.reduced(chosen)
     return Problem(
         box=box,
@@ -387,7 +390,7 @@ def _chosen(posed: PosedModel, model: Model, start: FloatArray, needed: tuple[in
     Raises:
         NotJudgedError: the screws or the nested loops of a limb are singular at the start.
     """
-    length = _length(posed, start) or float(np.linalg.norm(model.home)) or otherwise
+    length = _length(posed, start, otherwise) or float(np.linalg.norm(model.home)) or otherwise
     columns, rows = [], []
     for each in posed.limbs.members:
         kept = tuple(range(each.rank))
@@ -413,8 +416,8 @@ def _independent(values: FloatArray, rank: int, what: str) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def _length(posed: PosedModel, start: FloatArray) -> float:
-    """Return the median arm of rows and screws about the platform's origin; 0 where they have none."""
+def _length(posed: PosedModel, start: FloatArray, size: float) -> float:
+    """Return the median arm of rows and screws about the platform's origin; 0 where they have none beside a size."""
     lines = [(row.force, row.moment) for row in posed.limbs.wrenches]
     lines += [(screw[:3], screw[3:]) for each in posed.limbs.members for screw in ca.horzsplit(each.screws)]
     pairs = [
@@ -422,7 +425,8 @@ def _length(posed: PosedModel, start: FloatArray) -> float:
         for along, moment in lines
     ]
     values = posed.values(ca.horzcat(SX(2, 0), *pairs), start)
-    arms = [a / b for a, b in values.T if a > _ZERO and b > _ZERO]
+    directions = _ZERO * float(values[1].max(initial=0.0))
+    arms = [a / b for a, b in values.T if b > directions and a > _ZERO * size * b]
     return float(np.median(arms)) if arms else 0.0
 
 
