@@ -188,7 +188,9 @@ def _size(lengths: Sequence[SX], robot: HomeRobot) -> SX:
     """
     points = ca.veccat(SX(0), *[joint.point for joint in robot.joints])
     is_length = np.array([item.kind is Dimension.LENGTH for item in robot.words.dimensions.values()], dtype=bool)
-    left = ca.Function("points", [robot.symbols], [ca.densify(points)])(np.where(is_length, 0.0, robot.typical)).full()
+    own = [k for k, symbol in enumerate(ca.vertsplit(robot.symbols)) if symbol.is_symbolic()]
+    function = ca.Function("points", [robot.symbols[own]], [ca.densify(points)])
+    left = function(np.where(is_length, 0.0, robot.typical)[own]).full()
     written = float(np.abs(left[np.isfinite(left)]).max(initial=0.0))
     parts = [*lengths, *([SX(written)] if written else [])]
     if not parts:

@@ -38,7 +38,7 @@ class Package:
     def __init__(self, model: Model, loading: Loading) -> None:
         own = Substitution.identity(model)
         posed = instantiate(model, own, SX(LENGTH), [SX.zeros(6)])
-        found = forces_at(model, posed_statics(model, posed), posed.rotation, loading)
+        found = forces_at(model, posed_statics(model, posed), posed.rotation, loading, posed.size)
         self.model, self.unknowns = model, len(model.unknowns)
         self.names = [joint.name for joint in found.joints]
         self.typical = np.concatenate([np.ravel(item.typical) for item in model.parameters] or [np.zeros(0)])
