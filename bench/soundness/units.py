@@ -36,9 +36,13 @@ NAMES = sorted(each.stem for each in FOLDER.glob("*.toml"))
 SAME, NEAR, BOXES, NOISE = 1e-9, 1e-6, 0.02, 1e-9
 #: Powers of a length that numbers have: F of a rotation is a squared length, and a row of J in it one.
 POWERS = (0, 1, -1, 2, -2)
-#: Keys of JSON that depend on the computer, and those of numbers of boxes.
-SKIPPED = {"seconds", "version", "source", "units", "case", "model", "parameters", "history", "file"}
+#: Keys of JSON that depend on the computer, those of one of several equal places, and those of numbers of boxes.
+SKIPPED = {"seconds", "version", "source", "units", "case", "model", "parameters", "history", "file"} | {"pose", "machine"}
 COUNTED = {"boxes", "open"}
+#: Number of boxes that makes no difference: a choice among equal boxes.
+FEW = 8
+#: Numbers that a search ends at within its gap, and this gap.
+SEARCHED, GAP = {"bound", "reached"}, 0.1
 #: Keys of numbers that depend on the scale of variables and loops, which is the robot's size.
 SCALED = frozenset({"multiplier", "eigenvalues", "stationarity", "feasibility", "boxes", "open", "iterations"})
 #: Limits that are lengths, in starter cases.
@@ -209,17 +213,17 @@ def answers(name: str, unit: str, *, parameters: bool) -> dict[str, Answer]:
 
         ask("evaluate", "evaluate", str(cases["pose"]))
         ask("solve", "solve", str(cases["free"]))
-        ask("certify", "certify", str(cases["free"]), "--gap", "0.1", "--time", "15")
+        ask("certify", "certify", str(cases["free"]), "--gap", str(GAP), "--time", "2")
         proof = folder / "proof.zip"
-        ask("workspace", "workspace", str(cases["pose"]), "--gap", "0.1", "--time", "20", "--proof", str(proof))
+        ask("workspace", "workspace", str(cases["pose"]), "--gap", str(GAP), "--time", "2", "--proof", str(proof))
         if proof.exists():
             status, text, err = command("verify-proof", str(proof))
             found["verify-proof"] = Answer(status, text, err)
-        ask("tolerance", "workspace", str(cases["tolerance"]), "--gap", "0.1", "--time", "15")
-        ask("path", "path", str(cases["pose"]), "--along", str(path), "--time", "30")
+        ask("tolerance", "workspace", str(cases["tolerance"]), "--gap", str(GAP), "--time", "2")
+        ask("path", "path", str(cases["pose"]), "--along", str(path), "--time", "5")
         if unit != "km":
             program = gcode_of(tables["pose"], folder / "program.ngc", scale)
-            ask("gcode", "path", str(cases["pose"]), "--along", str(program), "--unit", "mm", "--time", "30")
+            ask("gcode", "path", str(cases["pose"]), "--along", str(program), "--unit", "mm", "--time", "5")
         ask_text(found, "inverse", "inverse", str(cases["pose"]), "--poses", str(poses), "--csv", "-", "--derivatives")
         ask_import(found, folder, cases["pose"])
         out = folder / "c"
@@ -318,10 +322,11 @@ def differences(one: Any, other: Any, scale: float, same: float, skipped: Set[st
             if (key in one) != (key in other):
                 yield f"{path}.{key}: in one alone"
             elif key in COUNTED:
-                if abs(one[key] - other[key]) > max(BOXES * max(one[key], other[key]), 2):
+                if abs(one[key] - other[key]) > max(BOXES * max(one[key], other[key]), FEW):
                     yield f"{path}.{key}: {one[key]} and {other[key]}"
             else:
-                yield from differences(one[key], other[key], scale, same, skipped, f"{path}.{key}")
+                near = GAP if key in SEARCHED else same
+                yield from differences(one[key], other[key], scale, near, skipped, f"{path}.{key}")
     elif isinstance(one, list) and isinstance(other, list):
         if len(one) != len(other):
             yield f"{path}: {len(one)} and {len(other)} items"
@@ -368,7 +373,7 @@ def are_same(one: Any, other: Any, scale: float, same: float) -> bool:  # noqa: 
 
 def plain(text: str) -> str:
     """Return words without numbers and units of length."""
-    text = re.sub(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?", "#", text)
+    text = re.sub(r"[-+]?\d+(?:,\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?", "#", text)
     return " ".join(re.sub(r"\b(um|mm|in|km|m|unit)\b", "m", text).lower().split())
 
 

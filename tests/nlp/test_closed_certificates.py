@@ -5,12 +5,12 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from builders import EACH_KIND
+from builders import EACH_KIND, Array, turn_about
 from numpy_engine.bounding import NumpyEngine
 
 from screwsynth.models import Dimension, Model, hexapod, robot_function
 from screwsynth.nlp import Case, Free, Limits, Rotation, Task, certify, formulate, solve
-from screwsynth.nlp.case.limits.singular_values import SmallestSingularValue
+from screwsynth.nlp.case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations, linearise
 from screwsynth.nlp.evidence.state import loops_are_closed
@@ -122,7 +122,7 @@ def test_a_proof_without_unknowns_is_checked() -> None:
     assert check_proof(proof, found.certificate.nlp).leaves > 1
 
 
-def hexapod_with(limit: SmallestSingularValue) -> Case:
+def hexapod_with(limit: SmallestSingularValue | ConditionNumber) -> Case:
     """A hexapod with its pose free by far, and a limit on singular values."""
     angles = np.radians([-10, 10, 110, 130, 230, 250])
     parameters = {}
@@ -162,3 +162,31 @@ def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
     estimate = tuple(each for each in form.conditions if each.kind is not Kind.FOLLOWS)
     by_estimate = Engine(replace(form, conditions=estimate), 1).examine(bad - half, bad + half, -np.inf).verdict
     assert not (by_estimate == Verdict.INFEASIBLE).any()
+
+
+def condition_number(case: Case, position: Array, turn: Array, length: float) -> float:
+    """The condition number of unit forces along six legs, moments about the platform's origin in parts of a length.
+
+    The turn is the vector part of its quaternion.
+    """
+    angle = 2 * np.arcsin(np.linalg.norm(turn))
+    arms = np.array([case.parameters[f"platform_{k}"] for k in range(1, 7)]) @ turn_about(turn, angle).T
+    legs = position + arms - np.array([case.parameters[f"base_{k}"] for k in range(1, 7)])
+    forces = legs / np.linalg.norm(legs, axis=1)[:, None]
+    return float(np.linalg.cond(np.hstack([forces, np.cross(arms, forces) / length])))
+
+
+def test_minors_of_condition_numbers_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
+    most, length = 4.0, 10.0
+    case = hexapod_with(ConditionNumber(most, length))
+    form = standard_form(formulate(case))
+    follows = np.array([each.kind is Kind.FOLLOWS for each in form.conditions])
+    rng = np.random.default_rng(0)
+    points = rng.uniform(form.lower, form.upper, (2000, 6))
+    values = ca.Function("h", [form.x], [form.expressions])
+    h = np.array([values(each).full().ravel()[len(form.functions) :] for each in points])[:, follows]
+    numbers = np.array([condition_number(case, each[:3], each[3:], length) for each in points])
+    kept = numbers <= most
+    assert 100 < kept.sum() < 1900
+    assert np.all(h[kept] <= 0)
+    assert np.mean((h[numbers > 2 * most] > 0).any(axis=1)) > 0.5

@@ -14,8 +14,9 @@ is at least ``s^2``
 
 So no principal minor of M is negative. Minors are polynomials in J, whose terms cancel in forms of second order. By
 interlacing a box with two eigenvalues of M below 0, where the determinant is positive, has smaller minors that are
-negative. For condition numbers the like, with ``tr A^4 / (c^2 tr A^3)`` in the place of ``s^2``, excludes wide boxes
-too, but saved no boxes of a search.
+negative. A limit c on the condition number has the like, with ``A_ii / c^2`` in the place of ``s^2``: the largest
+eigenvalue is at most ``c^2`` times the smallest one, and no entry ``A_ii`` is larger. The largest entry of one point is
+taken, which is the eigenvalue itself where the motion i is a principal one, as of many robots at symmetric poses.
 
 In home's working mode an unknown that follows from dimensions and pose in closed form is an expression of the others
 (:mod:`screwsynth.models.joints.elimination`). The form keeps, in its place, the condition that the limb reaches the
@@ -51,6 +52,9 @@ __all__ = ["Condition", "Kind", "StandardForm", "is_in_home_mode", "standard_for
 #: Orders of the principal minors. Those of 4 and 5 exclude boxes twice as wide as the determinant alone; smaller ones
 #: gain nothing more, as few poses have so many small singular values.
 _ORDERS = (4, 5, 6)
+#: Those for condition numbers, whose bound of the largest eigenvalue is no number, and part by which two of its entries
+#: are one but for rounding.
+_ORDERS_OF_RATIO, _SAME = (1, 2, 3, 4), 1e-9
 #: Part of itself by which s^2 is smaller than stated: rounding of its numbers.
 _ROUNDING = 1e-9
 _SIZE = 6
@@ -157,18 +161,33 @@ def _of_joints(nlp: Nlp) -> Iterator[Condition]:
 
 
 def _of_singular_values(nlp: Nlp) -> Iterator[Condition]:
-    """Yield conditions on the minors that follow from limits on the smallest singular value of J, in its symbols."""
-    for constraint, lower in zip(nlp.program.constraints, nlp.g_lower.tolist(), strict=True):
+    """Yield conditions on the minors that follow from limits on singular values of J, in its symbols."""
+    limits = zip(nlp.program.constraints, nlp.g_lower.tolist(), nlp.g_upper.tolist(), strict=True)
+    for constraint, lower, upper in limits:
         spectral = constraint.spectral
-        if spectral is None or spectral.end is not End.SMALLEST or not (np.isfinite(lower) and lower > 0):
+        if spectral is None:
             continue
         J = spectral.matrix @ ca.diag(SX([1, 1, 1, *[1 / spectral.length] * 3]))
-        for chosen, minor in _principal_minors(J.T @ J - (1 - _ROUNDING) * lower * SX.eye(_SIZE)):
+        A, least, orders = J.T @ J, SX(lower), _ORDERS
+        if spectral.end is End.MINUS_RATIO and upper < 0:
+            largest = _largest_at_start(nlp, ca.diag(A))
+            least, orders = -upper * A[largest, largest], _ORDERS_OF_RATIO
+        elif spectral.end is not End.SMALLEST or not (np.isfinite(lower) and lower > 0):
+            continue
+        for chosen, minor in _principal_minors(A - (1 - _ROUNDING) * least * SX.eye(_SIZE), orders):
             name = f"{constraint.name} minor {''.join(str(k + 1) for k in chosen)}"
             yield Condition(name, -minor, is_equation=False, kind=Kind.FOLLOWS)
 
 
-def _principal_minors(A: SX) -> Iterator[tuple[tuple[int, ...], SX]]:
+def _largest_at_start(nlp: Nlp, values: SX) -> int:
+    """Return the index of the largest of some expressions (k, 1) of a program at its start; of the first of several."""
+    program = nlp.program
+    found = ca.Function("values", [program.x, program.p], [ca.densify(values)])(nlp.start, nlp.arguments)
+    sizes = np.nan_to_num(np.array(found).ravel())
+    return int(np.argmax(sizes > sizes.max() * (1 - _SAME)))
+
+
+def _principal_minors(A: SX, orders: Sequence[int]) -> Iterator[tuple[tuple[int, ...], SX]]:
     """Yield the places and values of principal minors, by expansion along rows, each minor computed once."""
 
     @cache
@@ -182,7 +201,7 @@ def _principal_minors(A: SX) -> Iterator[tuple[tuple[int, ...], SX]]:
         ]
         return sum(terms, SX(0))
 
-    for order in _ORDERS:
+    for order in orders:
         for chosen in combinations(range(_SIZE), order):
             yield chosen, minor(chosen, chosen)
 
