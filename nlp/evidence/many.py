@@ -118,7 +118,8 @@ def judge_many(nlp: Nlp, x: FloatArray, numbers: Numbers) -> Verdicts:
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         scales = _scales(nlp, numbers)
         at = _linearise(nlp, x, numbers, scales)
-        active = at.slack <= ACTIVE
+        # No side is active where the equations have no finite value.
+        active = (at.slack <= ACTIVE) & np.isfinite(at.violation)[:, None]
         mu = np.zeros((count, len(sides.sides)))
         stationarity, curvature = np.full(count, np.inf), np.full(count, np.nan)
         is_decided = np.zeros(count, dtype=bool)

@@ -16,7 +16,6 @@ from screwsynth.nlp import InputError, examine, formulate, load_case, load_resul
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
-from screwsynth.nlp.evidence.optimality import PointKind
 from screwsynth.nlp.output.sweeptable import table_points, write_table
 from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
@@ -73,8 +72,7 @@ def test_many_verdicts_are_those_of_single_points() -> None:
     assert found.feasibility == pytest.approx([each.feasibility for each in single], abs=1e-14)
     for k, (nlp, evidence) in enumerate(zip(several, single, strict=True)):
         sides = np.flatnonzero(found.active[k])
-        if evidence.kind is not PointKind.UNDEFINED:  # no side is active where the equations have no value
-            assert [nlp.sides.sides[j].name for j in sides] == [side.name for side in evidence.active]
+        assert [nlp.sides.sides[j].name for j in sides] == [side.name for side in evidence.active]
         if k < 4:
             assert found.F[k] == pytest.approx(nlp.evaluate(x[k]).F, rel=1e-14)
             assert found.stationarity[k] == pytest.approx(evidence.stationarity, abs=1e-12)
