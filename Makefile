@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick check lint types more-types docs site figures bench dist clean
+.PHONY: help demo test quick soak check lint types more-types docs site figures bench dist clean
 
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -27,7 +27,11 @@ test: $(VENV)/ready ## set everything up and run every test
 	$(BIN)/python -P -m pytest --numprocesses auto --dist worksteal
 
 quick: $(VENV)/ready ## run the fast tests only
-	$(BIN)/python -P -m pytest --numprocesses auto --dist worksteal -m 'not slow'
+	$(BIN)/python -P -m pytest --numprocesses auto --dist worksteal -m 'not slow and not soak'
+
+soak: $(VENV)/ready ## run what make test leaves out: whole loops over robots, cases and units
+	$(BIN)/python -P -m pytest --numprocesses auto --dist worksteal -m soak
+	$(BIN)/python bench/soundness/units.py 120 0
 
 # Type checkers cannot follow the editable install's hook, so they get the folders under the package's name.
 build/typing/screwsynth:
