@@ -21,9 +21,9 @@ The largest eigenvalue is ``c - lambda_min(c I - A)`` for any larger c, and is e
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import ClassVar, TypeAlias
 
 import casadi as ca
@@ -176,6 +176,22 @@ Rows: TypeAlias = list[list[SX]]
 
 def smallest_eigenvalue(A: SX) -> SX:
     """Return an estimate (1, 1) from below of the smallest eigenvalue of a symmetric positive semidefinite (n, n)."""
+    return _estimate(_smallest, A.shape[0])(A)
+
+
+def largest_eigenvalue(A: SX) -> SX:
+    """Return an estimate (1, 1) from above of the largest eigenvalue of a symmetric positive semidefinite (n, n)."""
+    return _estimate(_largest, A.shape[0])(A)
+
+
+@cache
+def _estimate(formula: Callable[[SX], SX], n: int) -> ca.Function:
+    """Return an estimate of a matrix (n, n) as a function: a call copies its thousands of operations at once."""
+    A = SX.sym("A", n, n)
+    return ca.Function("estimate", [A], [formula(A)])
+
+
+def _smallest(A: SX) -> SX:
     n = A.shape[0]
     scale = ca.trace(A) / n
     rows = _upper(A / scale)
@@ -186,8 +202,7 @@ def smallest_eigenvalue(A: SX) -> SX:
     return found * scale
 
 
-def largest_eigenvalue(A: SX) -> SX:
-    """Return an estimate (1, 1) from above of the largest eigenvalue of a symmetric positive semidefinite (n, n)."""
+def _largest(A: SX) -> SX:
     scale = ca.trace(A)
     rows = _upper(A / scale)
     # (tr A^m)^(1/m) is above, by no more than n^(1/m).
