@@ -20,7 +20,7 @@ _LIMITS = "limits."
 #: Stands before the name of a number of a path's place.
 _PLACE = "path.place."
 #: What a free number has.
-_ENDS = ("min", "max", "start")
+ENDS = ("min", "max", "start")
 #: Beginning of the name of a number of a task, such as ``task.pitch`` or ``task[1].point_x``.
 _TASK = re.compile(r"task(\[\d+\])?\..+")
 #: Names of the six numbers of a task's twist.
@@ -56,7 +56,7 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         return
     places, rotations = _places(tables, name)
     whole, _, end = name.rpartition(".")
-    if end in _ENDS and whole in places:
+    if end in ENDS and whole in places:
         table, place = places[whole]
         if not isinstance(table[place], dict):
             raise CaseError(name, f"cannot be set: {whole} is not free")
@@ -74,7 +74,7 @@ def _allowed(name: str, tables: Mapping[str, Any], places: Mapping[str, _Place],
     """Return the names that can be set, those of ends, limits and tasks by an example each, as a hint."""
     written = {each: table[place] for each, (table, place) in places.items()}
     free = [each for each, value in written.items() if isinstance(value, dict) and "values" not in value]
-    ends = [f"{each}.{end}" for each in free for end in _ENDS]
+    ends = [f"{each}.{end}" for each in free for end in ENDS]
     tasks = sorted(task_numbers(tables), key=len)
     others = [
         *(f"ends of free numbers such as {each}" for each in ends[1:2]),
@@ -165,7 +165,7 @@ def _rotation_places(pose: dict[str, Any], prefix: str, name: str) -> dict[str, 
             pose["rotation"] = {part: None}
             return {name: (pose["rotation"], part)}
     for part in ("angle", "axis"):
-        if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in _ENDS)):
+        if name in (f"{prefix}{part}", *(f"{prefix}{part}.{end}" for end in ENDS)):
             rotation = pose.setdefault("rotation", {"axis": [0, 0, 1], "angle": 0})
             if part == "axis":
                 # An axis takes the place of a rotation in another form; it then needs an angle of its own.

@@ -106,7 +106,7 @@ def path(
         programmed = path_of_case(loaded, choices) if along is None else read_path(along, loaded.units, choices)
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(loaded, programmed, gap=gap, time_limit=limit, sampling=sampling, progress=show)
-    result = path_result(judged)
+    result = path_result(judged, chosen)
 
     def command(pose: WorkspacePose) -> str:
         """Return the command that shows a pose."""

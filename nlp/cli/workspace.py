@@ -62,7 +62,7 @@ def workspace(
         from ..proof.workspace.scale import largest_scale
 
         largest = scale_data(largest_scale(loaded, time_limit=time, jobs=jobs, judged=judged), loaded.units)
-    result = workspace_of(judged, largest)
+    result = workspace_of(judged, largest, chosen)
 
     def command(pose: WorkspacePose) -> str:
         """Return the command that shows a pose."""

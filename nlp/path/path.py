@@ -2,8 +2,8 @@
 
 A path of a million segments is a few arrays; a :class:`Segment` is a view of one of them that is made when it is asked
 for. Along each segment a parameter goes from 0 to 1: the position is a linear or circular function of it, and so is the
-orientation. Poses are those of the platform frame in the world frame; machine coordinates of a program are the world's.
-Angles are radians.
+orientation. Poses are those of the platform frame in the world frame; machine coordinates of a program are the world's,
+unless the path has a frame of its own. Angles are radians.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from casadi import SX
 from ...models import FloatArray
 from ...models.rotation import matrix_from_axis_angle
 from .arcs import PLANES, Arc, arc_length
+from .frame import PathFrame
 from .options import Between
 from .orientation import (
     Order,
@@ -92,7 +93,7 @@ class Shape(NamedTuple):
         return (6 if self.plane is None else 8) + (13 if self.order is None else 6)
 
     def pose(self, numbers: SX, s: SX) -> SymbolicPose:
-        """Return the pose at a parameter of a segment.
+        """Return the pose at a parameter of a segment, in the path's frame where it has one.
 
         Args:
             numbers: (size, 1) of the segment, as numbers or symbols; see :attr:`Segment.numbers`.
@@ -124,7 +125,8 @@ class ProgrammedPath:
 
     Attributes:
         source: name of the file.
-        knots: (n + 1, 6) position and angles of the ends: segment k goes from knot k to knot k + 1.
+        knots: (n + 1, 6) position and angles of the ends: segment k goes from knot k to knot k + 1. These numbers, and
+            those of arcs, are coordinates of the frame, if there is one, else of the world.
         lines: (n,) lines of the file, or rows of a table, that make the segments.
         kinds: (n,) kinds of the segments.
         durations: (n,) seconds; NaN where the file states neither time nor feed, as for rapid motions.
@@ -133,6 +135,7 @@ class ProgrammedPath:
         order: convention of the angles.
         between: motion between two points.
         idle: what moves nothing.
+        frame: place of the path in the world; None where its numbers are those of the world.
     """
 
     source: str
@@ -145,6 +148,7 @@ class ProgrammedPath:
     order: Order
     between: Between
     idle: tuple[Idle, ...] = ()
+    frame: PathFrame | None = None
 
     def __post_init__(self) -> None:
         for array in (self.knots, self.lines, self.kinds, self.durations, self.arcs, self.planes):
@@ -211,7 +215,10 @@ class ProgrammedPath:
             first_one = quaternions_from_angles(start[:, 3:], self.order)
             about, angles = shortest_turns(first_one, quaternions_from_angles(end[:, 3:], self.order))
             quaternions = turned(first_one, about, parameter[:, 0] * angles)
-        return Poses(points[:, :3], matrices_from_quaternions(quaternions))
+        positions, frame = points[:, :3], self.frame
+        if frame is not None:
+            positions, quaternions = frame.positions(positions), frame.orientations(quaternions)
+        return Poses(positions, matrices_from_quaternions(quaternions))
 
     def arc_of(self, segment: int) -> tuple[Arc, int]:
         """Return the arc of a segment that is one, and the code of its plane."""
@@ -250,12 +257,12 @@ class Segment:
 
     @property
     def start(self) -> FloatArray:
-        """Position and angles (6,) at the start."""
+        """Position and angles (6,) at the start, in the path's frame."""
         return np.asarray(self.path.knots[self.index])
 
     @property
     def end(self) -> FloatArray:
-        """Position and angles (6,) at the end."""
+        """Position and angles (6,) at the end, in the path's frame."""
         return np.asarray(self.path.knots[self.index + 1])
 
     @property
@@ -301,7 +308,11 @@ class Segment:
 
     def expressions(self, s: SX) -> SymbolicPose:
         """Return the pose as expressions of the parameter (1, 1)."""
-        return self.shape.pose(SX(self.numbers), s)
+        pose, frame = self.shape.pose(SX(self.numbers), s), self.path.frame
+        if frame is None:
+            return pose
+        R = SX(frame.rotation.tolist())
+        return SymbolicPose(R @ pose.position + SX(frame.origin.tolist()), R @ pose.rotation)
 
 
 def idle_words(counts: dict[str, list[int]]) -> tuple[Idle, ...]:

@@ -66,7 +66,7 @@ def path_of_case(case: Case, options: PathOptions | None = None) -> ProgrammedPa
 
     Raises:
         CaseError: it states none, or a number of its place is free.
-        InputError: its file cannot be read, or holds anything that is not read, or that is not covered in its place.
+        InputError: its file cannot be read, or holds anything that is not read.
     """
     path, stated = stated_path(case, options), case.path
     numbers = () if stated is None else stated.place

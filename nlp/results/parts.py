@@ -3,9 +3,11 @@
 Numbers are in the case's units. Nothing is ever NaN or infinite, but an infinite pitch, which is the string ``"inf"``.
 """
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal, TypeAlias
 
+from ..case.overrides import Settings
 from ..case.pose import OverPoses
 from ..case.task import Sense
 from ..system.strictjson import Size
@@ -21,8 +23,28 @@ SCHEMA: Final = 1
 Bound: TypeAlias = Literal["min", "max", "equal"]
 #: Values of a quantity by the limb or joint that has it.
 ByOwner: TypeAlias = Mapping[str, float]
+#: Numbers that replace those of a case file, by the names of ``--set``; an infinite one is a text.
+SettingsData: TypeAlias = Mapping[str, float | Vector | Literal["inf", "-inf"]]
 RotationMatrix: TypeAlias = Annotated[tuple[Vector3, ...], Size(3)]
 Jacobian: TypeAlias = tuple[Vector6, ...]
+
+
+def settings_data(settings: Settings) -> SettingsData | None:
+    """Return numbers that replace those of a case file as JSON has them; None without any."""
+    return {name: _setting_data(value) for name, value in settings.items()} or None
+
+
+def _setting_data(value: float | list[float]) -> float | Vector | Literal["inf", "-inf"]:
+    if isinstance(value, list):
+        return tuple(value)
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return float(value)
+
+
+def settings_from_data(data: SettingsData) -> Settings:
+    """Return the numbers that replace those of a case file from their JSON."""
+    return {name: list(value) if isinstance(value, tuple) else float(value) for name, value in data.items()}
 
 
 class UnitsData(JsonObject):

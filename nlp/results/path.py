@@ -15,12 +15,13 @@ from ..proof.workspace.numbers.extremes import Extreme
 from ..proof.workspace.verdict import Outcome
 from .jsondata import Absent, Inline, JsonObject
 from .objective import unit_of_claim
-from .parts import HeadData, VersionsData
+from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .pathtable import knot_motion
 from .point import head_data, versions
 from .workspace import BindingData, DesignData, WorkspacePose, pose_data
 
 if TYPE_CHECKING:
+    from ..case.overrides import Settings
     from ..proof.workspace.path_judge import PathJudgement, RankOnPath
     from ..proof.workspace.path_knots import Knots
     from ..solver.over_path import PathProof
@@ -166,12 +167,15 @@ class PathResult(JsonObject):
 
     Attributes:
         head: the case.
+        settings: numbers that replaced those of the case file, such as a limit, by the names of ``--set``; absent
+            without any, and in results of earlier versions.
         proved: whether all ranks and limits are proved at every point.
         path: the path.
         versions: of the programs.
     """
 
     head: Inline[HeadData]
+    settings: Absent[SettingsData]
     proved: bool
     path: PathData
     versions: VersionsData
@@ -224,10 +228,16 @@ class PathProofData(JsonObject):
     claims: tuple[PathClaimData, ...]
 
 
-def path_result(judged: "PathJudgement") -> PathResult:
-    """Return the verdicts as a result."""
+def path_result(judged: "PathJudgement", settings: "Settings | None" = None) -> PathResult:
+    """Return the verdicts on a path as a result.
+
+    Args:
+        judged: the verdicts.
+        settings: numbers that replaced those of the case file; None without any.
+    """
     return PathResult(
         head=head_data(judged.case),
+        settings=settings_data(settings or {}),
         proved=judged.is_proved,
         path=PathData(
             file=judged.path.source,

@@ -59,7 +59,7 @@ def knot_motion(path: ProgrammedPath, knots: Knots) -> KnotMotion:
 
 def _angles(path: ProgrammedPath, k: NDArray[np.intp], s: FloatArray, rotations: FloatArray) -> FloatArray:
     """Return roll, pitch and yaw (K, 3) at places: those of the path where it is stated by them."""
-    if path.between is Between.ANGLES and path.order == ORDERS["rpy"]:
+    if path.between is Between.ANGLES and path.order == ORDERS["rpy"] and path.frame is None:
         start = path.knots[k, 3:]
         return np.asarray(start + s[:, None] * (path.knots[k + 1, 3:] - start))
     R = rotations

@@ -7,13 +7,13 @@ from typing import TypeAlias
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.overrides import Settings
+from ..case.overrides import ENDS, Settings
 from ..case.pose import Free, Pose, RotationForm
 from ..errors import InputError
 from .data import CombinedResult, SolveResult
 from .evaluation import EvaluationResult
 from .jsondata import Vector
-from .parts import PoseData, RobotData
+from .parts import PoseData, RobotData, settings_from_data
 from .path import PathResult
 from .posewording import rotation_form, rotation_numbers
 from .schema import load_result
@@ -21,6 +21,8 @@ from .workspace import WorkspaceResult
 from .workspaceposes import refuted_claims
 
 Answer: TypeAlias = SolveResult | CombinedResult | EvaluationResult
+#: Names of the numbers of a pose, behind its prefix.
+_OF_POSE = ("p_x", "p_y", "p_z", "axis", "angle", RotationForm.RPY.value, RotationForm.QUATERNION.value)
 
 
 def load_answer(file: str) -> Answer:
@@ -62,7 +64,7 @@ def robot_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fal
 
 
 def claim_settings(given: str, case: Case) -> Settings:
-    """Return the dimensions and the pose of a refuted claim by the names that they have in its case.
+    """Return the numbers with which a refuted claim was judged, limits too, and its pose, by their names in its case.
 
     Args:
         given: a file that ``workspace --json`` or ``path --json`` wrote, ``#``, and the number of the claim from 1, in
@@ -77,6 +79,11 @@ def claim_settings(given: str, case: Case) -> Settings:
         raise InputError(f"--set-from {given}: must be RESULT#N: a file, and the number of a refuted claim in it")
     result = load_result(file)
     form, numbers = rotation_form(case), dict[str, float | list[float]]()
+    if isinstance(result, WorkspaceResult | PathResult):
+        # The pose of the claim takes the place of the case's first one.
+        replaced = {f"{case.pose_prefixes[0]}{name}" for name in _OF_POSE}
+        of_command = settings_from_data(result.settings or {})
+        numbers |= {name: each for name, each in of_command.items() if _without_end(name) not in replaced}
     if isinstance(result, WorkspaceResult):
         poses = [claim.pose for claim in refuted_claims(result)]
         numbers |= {case.parameter_name(name): _setting(value) for name, value in result.parameters.items()}
@@ -108,6 +115,12 @@ def settings_of(robot: RobotData, case: Case) -> Settings:
 def dimensions_of(robot: RobotData, case: Case) -> Settings:
     """Return the dimensions of a robot by the names that they have in its case, in the case's units."""
     return {case.parameter_name(name): _setting(value) for name, value in robot.parameters.items()}
+
+
+def _without_end(name: str) -> str:
+    """Return the name of a number without that of an end of its range."""
+    whole, _, end = name.rpartition(".")
+    return whole if end in ENDS else name
 
 
 def _setting(value: float | Vector) -> float | list[float]:

@@ -15,11 +15,12 @@ from ..proof.workspace.verdict import Outcome
 from ..units import Units
 from .jsondata import Absent, Inline, JsonObject, Vector, Vector3, finite_or_none, vector
 from .objective import unit_of_claim
-from .parts import HeadData, VersionsData
+from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .point import head_data, versions
 
 if TYPE_CHECKING:
     from ..case.case import Case
+    from ..case.overrides import Settings
     from ..proof.statement.machine import JointErrors
     from ..proof.workspace.judge import Judgement
     from ..proof.workspace.numbers.extremes import Extreme
@@ -199,6 +200,8 @@ class WorkspaceResult(JsonObject):
     Attributes:
         head: the case.
         parameters: dimensions by name; three numbers for a point or direction.
+        settings: numbers that replaced those of the case file, such as a limit, by the names of ``--set``; absent
+            without any, and in results of earlier versions.
         joint_centre: every claim is about all machines whose joint centres are off by at most this; absent where it is
             about the exact machine alone.
         proved: whether J is regular at every pose, and every limit holds; numbers without a limit are information.
@@ -214,6 +217,7 @@ class WorkspaceResult(JsonObject):
 
     head: Inline[HeadData]
     parameters: Mapping[str, float | Vector]
+    settings: Absent[SettingsData]
     joint_centre: Absent[float]
     proved: bool
     poses: Absent[str]
@@ -291,8 +295,16 @@ def proof_data(proof: "WorkspaceProof | None") -> WorkspaceProofData | None:
     )
 
 
-def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> WorkspaceResult:
-    """Return the verdicts on a machine as a result."""
+def workspace_of(
+    judged: "Judgement", scale: ScaleData | None = None, settings: "Settings | None" = None
+) -> WorkspaceResult:
+    """Return the verdicts on a robot over its workspace as a result.
+
+    Args:
+        judged: the verdicts.
+        scale: the largest proved box; None where no search for it was made.
+        settings: numbers that replaced those of the case file; None without any.
+    """
     case = judged.case
     parameters: dict[str, float | Vector] = {}
     for item in case.model.parameters:
@@ -301,6 +313,7 @@ def workspace_of(judged: "Judgement", scale: ScaleData | None = None) -> Workspa
     return WorkspaceResult(
         head=head_data(case),
         parameters=parameters,
+        settings=settings_data(settings or {}),
         joint_centre=case.joint_centre_tolerance,
         proved=judged.is_proved,
         poses=poses_of(judged),

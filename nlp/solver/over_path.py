@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from ..case.case import Case
-from ..case.pose import Free
 from ..path.placing import in_frame, in_world, placed
 from ..path.reader import path_of_case, stated_path
 from ..program.nlp import Nlp
@@ -53,14 +52,10 @@ def over_path(case: Case, nlp: Nlp) -> SemiInfinite[PathJudgement, PathProof]:
         nlp: its program with limits at the stated poses.
 
     Raises:
-        InputError: the file of the path cannot be read or holds what is not read, or the path has angles that are not
-            covered.
+        InputError: the file of the path cannot be read, or holds what is not read.
     """
     nlp, numbers, frame = with_place(nlp, case)
     path = path_of_case(case) if frame is None else stated_path(case)
-    if frame is not None and case.path is not None:
-        # What is not covered after such a turn is refused before any solve.
-        placed(path, [0.0] * 3 + [float(isinstance(value, Free) or value != 0) for value in case.path.place[3:]])
     start = path.poses_at([0], 0.0)
     first = pose_of(start.positions[0], start.rotations[0])
 

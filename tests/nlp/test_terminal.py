@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, commands_in, output_of, refusal_of, turn_about, unbroken
+from builders import Run, commands_in, output_of, refusal_of, saved, turn_about, unbroken
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -250,8 +250,7 @@ def test_a_refuted_claim_of_a_result_is_evaluated(cli: Run, tmp_path: Path) -> N
     claims = [each for each in json.loads(Path(target).read_text())["extremes"] if each["outcome"] == "refuted"]
     assert len(claims) > 2
     for k, claim in enumerate(claims, start=1):
-        limit = ("--set", "limits.leg_length.max=40")
-        status, out, _ = cli("evaluate", "hexapod-linuxcnc", "--set-from", f"{target}#{k}", *limit, "--json", "-")
+        status, out, _ = cli("evaluate", "hexapod-linuxcnc", "--set-from", f"{target}#{k}", "--json", "-")
         point = json.loads(out)
         assert status == 1
         assert point["parameters"]["x1"] == 25
@@ -260,3 +259,49 @@ def test_a_refuted_claim_of_a_result_is_evaluated(cli: Run, tmp_path: Path) -> N
     for wrong, words in ((f"{target}#0", "refuted claims"), (target, "RESULT#N"), (f"{target}#99", "refuted claims")):
         refusal_of(cli("evaluate", "hexapod-linuxcnc", "--set-from", wrong), "--set-from", words)
     refusal_of(cli("evaluate", "hexapod-pocket", "--set-from", f"{target}#1"), "hexapod-linuxcnc", "hexapod-pocket")
+
+
+def test_limits_of_set_are_evaluated_at_a_claim_of_a_workspace(cli: Run, tmp_path: Path) -> None:
+    """The limits that the claim was judged with are in the result; those of the command take their place."""
+    target = tmp_path / "result.json"
+    settings = ("--set", "x1=25", "--set", "limits.leg_length.max=40", "--set", "p_x=1", "--set", "task.pitch=inf")
+    cli("workspace", "hexapod-linuxcnc", *settings, "--json", str(target))
+    tables = json.loads(target.read_text())
+    claims = [each for each in tables["extremes"] if each["outcome"] == "refuted"]
+    k, claim = next((k, each) for k, each in enumerate(claims, start=1) if each["limit"] == 40)
+    owner = claim["name"].split()[-1]
+    for limits, most in ((), 40.0), (("limits.leg_length.max=41",), 41.0), (("limits.leg_length=60",), 60.0):
+        given = [part for each in limits for part in ("--set", each)]
+        status, out, _ = cli("evaluate", "hexapod-linuxcnc", "--set-from", f"{target}#{k}", *given, "--json", "-")
+        point = json.loads(out)
+        lengths = point["quantities"]["leg_length"]
+        assert lengths[owner] == pytest.approx(claim["reached"], rel=1e-9)
+        assert status == int(max(lengths.values()) > most or min(lengths.values()) < 17)
+        assert point["pose"]["position"] == claim["pose"]["position"]
+    # A result of an earlier version has no settings.
+    assert tables.pop("settings") == {"x1": 25, "limits.leg_length.max": 40, "p_x": 1, "task.pitch": "inf"}
+    target.write_text(json.dumps(tables))
+    shown = json.loads(cli("evaluate", "hexapod-linuxcnc", "--set-from", f"{target}#{k}", "--json", "-")[1])
+    assert shown["parameters"]["x1"] == 25
+
+
+def test_dimensions_and_limits_of_set_are_evaluated_at_a_claim_of_a_path(cli: Run, tmp_path: Path) -> None:
+    way = saved(tmp_path / "way.csv", "x,y,z,roll,pitch,yaw\n0,0,19,0,0,0\n5,0,19,0,0,9\n")
+    target = tmp_path / "path.json"
+    limits = {"leg_length.max": 30.0, "base_joint_angle.max": 50.0}
+    settings = [
+        "--set",
+        "x1=25",
+        *(part for key, value in limits.items() for part in ("--set", f"limits.{key}={value}")),
+    ]
+    cli("path", "hexapod-linuxcnc", "--along", str(way), *settings, "--json", str(target))
+    faults = [each for each in json.loads(target.read_text())["path"]["claims"] if each["outcome"] == "refuted"]
+    assert {each["limit"] for each in faults} == {30, 50}
+    for k, claim in enumerate(faults, start=1):
+        point = json.loads(cli("evaluate", "hexapod-linuxcnc", "--set-from", f"{target}#{k}", "--json", "-")[1])
+        assert point["parameters"]["x1"] == 25
+        assert limits.items() <= {each["key"]: each["limit"] for each in point["limits"]}.items()
+        kind, owner = claim["name"].split(" limb ")
+        assert point["quantities"][kind][owner] == pytest.approx(claim["fault"]["value"], rel=1e-9)
+        wide = [part for key in limits for part in ("--set", f"limits.{key}=89")]
+        assert cli("evaluate", "hexapod-linuxcnc", "--set-from", f"{target}#{k}", *wide)[0] == 0

@@ -311,7 +311,7 @@ def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Work
     arcs[k] = path.arcs
     axes[k] = [PLANES[plane] for plane in path.planes.tolist()] if len(k) else np.zeros((0, 3), dtype=np.intp)
     seconds = np.where(np.isfinite(path.durations), path.durations, np.inf)
-    cover = PathCover(path.knots[:, :3], arcs, axes, turns, seconds)
+    cover = PathCover(path.knots[:, :3], arcs, axes, turns, seconds, path.frame)
     lower, upper = cover.boxes(cover.pieces)
     low, high = lower.min(axis=0), upper.max(axis=0)
     if not (high > low).any():  # a path that stays at one pose

@@ -20,7 +20,14 @@ from .....models import FloatArray
 from ....case.workspace import TurnKind
 from ....errors import InputError
 from ....path.options import Between
-from ....path.orientation import ORDERS, quaternion_products, quaternions_from_angles, shortest_turns
+from ....path.orientation import (
+    ORDERS,
+    Order,
+    quaternion_products,
+    quaternions_from_angles,
+    roll_pitch_yaw,
+    shortest_turns,
+)
 from .path_turns import (
     CHORD,
     PER_RADIAN,
@@ -30,7 +37,9 @@ from .path_turns import (
     ShortestTurns,
     Tangents,
     divided,
+    in_world,
     relative,
+    turning_in_world,
     varying,
 )
 from .pose_box import UNTURNED, Reference
@@ -38,6 +47,7 @@ from .pose_box import UNTURNED, Reference
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ....path.frame import PathFrame
     from ....path.path import ProgrammedPath
 
 #: Angles from which on the tangent of the half is too large a coordinate, and its cosine: the least scalar.
@@ -52,6 +62,9 @@ _MOST = 5_000_000
 _NEAR = math.sqrt(0.5)
 #: Steps in the search of the middle of rotations, most rotations that are looked at, and largest part of the reference.
 _STEPS, _SAMPLES, _ROUND = 100, 8192, 8
+#: Largest pitch at which roll and yaw are computed from a rotation, and by how much these are off at most. A matrix is
+#: off by 110 roundings (2^-53), a yaw by 160 over the pitch's cosine, 0.17, and a roll by both over this cosine: 7000.
+_STEEP, _OFF_HELD = math.radians(80), 2.0**-39
 #: References of the four divisors.
 _UNITS: tuple[Reference, ...] = (UNTURNED, (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
 
@@ -125,25 +138,25 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
     Raises:
         InputError: they turn too often.
     """
-    angles, is_slerp = path.knots[:, 3:], path.between is Between.SLERP
-    if not is_slerp and path.order == ORDERS["rpy"] and np.abs(angles).max() < _LARGEST:
+    angles, is_slerp, frame = path.knots[:, 3:], path.between is Between.SLERP, path.frame
+    held = None if frame is None else _held(angles, path.order, frame)
+    if held is not None:
+        return held
+    if frame is None and not is_slerp and path.order == ORDERS["rpy"] and np.abs(angles).max() < _LARGEST:
         return Tangents(angles)
     order, change = path.order, np.diff(angles, axis=0)
     if is_slerp:
-        quaternions = quaternions_from_angles(angles, order)
+        quaternions = in_world(quaternions_from_angles(angles, order), frame)
         axes, width = shortest_turns(quaternions[:-1], quaternions[1:])
         # Of both quaternions of a rotation the one nearer to that before.
         flips = (quaternions[:-1] * quaternions[1:]).sum(axis=1) < 0
         quaternions[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
-        off = ROUNDED + PER_RADIAN * np.abs(angles).sum(axis=1)
-        every = quaternions
+        off = (1 if frame is None else 2) * ROUNDED + PER_RADIAN * np.abs(angles).sum(axis=1)
+        every, turning = quaternions, turning_in_world(varying(angles, order, UNTURNED), frame)
 
         def turns(reference: Reference) -> PathTurns:
-            own, (vary, turning) = (
-                relative(quaternions, reference),
-                (varying(angles, order, r) for r in (reference, UNTURNED)),
-            )
-            return ShortestTurns(own, off, 0.5 * width, width[:, None] * axes, vary, turning, reference)
+            own, vary = relative(quaternions, reference), varying(angles, order, reference, frame)
+            return ShortestTurns(own, off, 0.5 * width, width[:, None] * axes * turning, vary, turning, reference)
     else:
         width = np.abs(change).sum(axis=1)
         if np.ceil(width / CHORD).sum() > _MOST + len(path):
@@ -151,10 +164,11 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
             fault = f"angles change by {math.degrees(float(width.sum())):.4g} degrees in all, most of them here"
             raise InputError(f"{path.source}: line {line}: {fault}; at most {math.degrees(_MOST * CHORD):.4g} are read")
         rows, parts = divided(np.tile([0.0, 1.0], (len(path), 1)), np.ceil(width / CHORD))
-        every = quaternions_from_angles(np.append(angles[rows] + parts[:, :1] * change[rows], angles[-1:], 0), order)
+        points = np.append(angles[rows] + parts[:, :1] * change[rows], angles[-1:], 0)
+        every = in_world(quaternions_from_angles(points, order), frame)
 
         def turns(reference: Reference) -> PathTurns:
-            return LinearAngles(angles, order, reference)
+            return LinearAngles(angles, order, reference, frame)
 
     reference = _reference(every)
     scalars = relative(every, reference)[:, 0]
@@ -168,8 +182,30 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
         middles += np.sin(s * 0.5 * width[rows, None]) * every[rows + 1]
         middles = np.where(width[rows, None] > 0, middles, every[rows])
     else:
-        middles = quaternions_from_angles(angles[rows] + s * change[rows], order)
+        middles = in_world(quaternions_from_angles(angles[rows] + s * change[rows], order), frame)
     return LongTurns([turns(each) for each in _UNITS], counts, np.argmax(np.abs(middles), axis=1))
+
+
+def _held(angles: FloatArray, order: Order, frame: PathFrame) -> Tangents | None:
+    """Return the rotation of a path that does not turn in its frame, as roll, pitch and yaw in the world.
+
+    Args:
+        angles: (N + 1, 3) at the knots.
+        order: of their convention.
+        frame: of the path.
+
+    Returns:
+        None where it turns, or where roll, pitch and yaw are large or not well determined.
+    """
+    if np.ptp(angles, axis=0).any():
+        return None
+    found, off = frame.angles, 0.0
+    if angles.any():
+        found = roll_pitch_yaw(frame.orientations(quaternions_from_angles(angles[:1], order)))[0]
+        if abs(found[1]) > _STEEP:
+            return None
+        off = _OFF_HELD * (1 + float(np.abs(angles[0]).sum()))
+    return Tangents(np.tile(found, (len(angles), 1)), off) if np.abs(found).max() < _LARGEST else None
 
 
 def _reference(quaternions: FloatArray) -> Reference:

@@ -1,7 +1,9 @@
 """Boxes of poses that cover pieces of a path: hulls in the coordinates of a :class:`~.pose_box.PoseBox`.
 
 Positions on a line are monotone between its ends. Those on an arc are products of a radius between its ends and of
-cosines over a range. Ends move outwards by several roundings. Ranges of rotations are those of :mod:`.path_turns`.
+cosines over a range. In a frame that is turned, a coordinate ``u cos a + v sin a`` of a circle is again a cosine,
+``hypot(u, v) cos(a - atan2(v, u))``, and a helix adds its height. Ends move outwards by several roundings. Ranges of
+rotations are those of :mod:`.path_turns`.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from .path_turns import TINY, PathTurns, divided
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ....path.frame import PathFrame
 
 #: Part of the sizes of the numbers of a piece by which its ends move outwards: more than the rounding of its formulas.
 _OUTWARDS = 2.0**-48
@@ -38,16 +42,45 @@ def place_in(piece: FloatArray, part: float) -> Place:
     return Place(int(segment), low + part * (high - low) if part < 1 else high)
 
 
+class _CircleRows(NamedTuple):
+    """A coordinate in the world of A arcs, ``centre + size r cos(a - phase) + rise (height + s change)``.
+
+    Attributes:
+        axis: of the coordinate.
+        which: (A,) indices of the arcs.
+        centre: (A,) coordinate of the centre, at the height 0.
+        size: (A,) at most 1.
+        phase: (A,) radians.
+        rise: (A,) of the coordinate by the height.
+        height: (A,) at the start, along the axis of the plane.
+        change: (A,) of the height.
+        off: (A,) sizes of the numbers from which centre and height are computed.
+        off_change: (A,) those of the change of the height.
+    """
+
+    axis: int
+    which: NDArray[np.intp]
+    centre: FloatArray
+    size: FloatArray
+    phase: FloatArray
+    rise: FloatArray
+    height: FloatArray
+    change: FloatArray
+    off: FloatArray
+    off_change: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class PathCover:
     """A path as boxes of poses.
 
     Attributes:
-        knots: (N + 1, 3) positions.
+        knots: (N + 1, 3) positions, as arcs in the path's frame.
         arcs: (N, 6) centre, radius, growth of the radius, angle and sweep of arcs; NaN of lines.
         axes: (N, 3) axes of the plane of arcs, and the axis along it.
         turns: the rotations.
         seconds: (N,) times of the segments; infinite, as if the platform stood there, where none is known.
+        frame: place of the path in the world; None where its numbers are those of the world.
     """
 
     knots: FloatArray
@@ -55,6 +88,7 @@ class PathCover:
     axes: NDArray[np.intp]
     turns: PathTurns
     seconds: FloatArray
+    frame: PathFrame | None = None
 
     @cached_property
     def pieces(self) -> FloatArray:
@@ -78,31 +112,73 @@ class PathCover:
             within: (B, 3) pieces whose references of rotations are used; the pieces themselves if left out.
         """
         k = pieces[:, 0].astype(int)
-        start, change = self.knots[k], self.knots[k + 1] - self.knots[k]
+        (start, off), (end, off_end) = self._in_world(k), self._in_world(k + 1)
+        change, off = end - start, np.maximum(off, off_end)
         ends = [start + s[:, None] * change for s in (pieces[:, 1], pieces[:, 2])]
-        slack = _OUTWARDS * (np.abs(start) + np.abs(change)) + TINY
+        slack = _OUTWARDS * (np.abs(start) + np.abs(change)) + TINY + off
         low, high = np.minimum(*ends) - slack, np.maximum(*ends) + slack
         # Fixed coordinates stay so.
-        low, high = (np.where(change == 0, start, each) for each in (low, high))
+        low, high = (np.where((change == 0) & (off == 0), start, each) for each in (low, high))
         arcs = np.flatnonzero(np.isfinite(self.arcs[k, 0]))
         if arcs.size:
-            first, second, radius, growth, angle, sweep = self.arcs[k[arcs]].T
+            _, _, radius, growth, angle, sweep = self.arcs[k[arcs]].T
             s = pieces[arcs, 1:]
             radii = radius[:, None] + s * growth[:, None]
             angles = angle[:, None] + s * sweep[:, None]
-            for axis, centre, turn in ((0, first, 0.0), (1, second, -0.5 * np.pi)):
-                cosines = _cosines(angles + turn)
-                products = radii[:, :, None] * cosines[:, None, :]
-                size = np.abs(centre) + np.abs(radii).max(axis=1) * (4 + np.abs(angles).max(axis=1))
-                at = arcs, self.axes[k[arcs], axis]
-                low[at] = centre + products.min(axis=(1, 2)) - _OUTWARDS * size
-                high[at] = centre + products.max(axis=(1, 2)) + _OUTWARDS * size
+            for row in self._circles(k[arcs]):
+                products = radii[row.which, :, None] * _cosines(angles[row.which] - row.phase[:, None])[:, None, :]
+                products *= row.size[:, None, None]
+                heights = row.rise[:, None] * (row.height[:, None] + s[row.which] * row.change[:, None])
+                size = np.abs(radii[row.which]).max(axis=1) * (4 + np.abs(angles[row.which]).max(axis=1))
+                slack = _OUTWARDS * (row.off + size)
+                at = arcs[row.which], row.axis
+                low[at] = row.centre + products.min(axis=(1, 2)) + heights.min(axis=1) - slack
+                high[at] = row.centre + products.max(axis=(1, 2)) + heights.max(axis=1) + slack
             # The ends of an arc meet its knots up to rounding, or up to what a program may be off.
-            for end, knots in enumerate((start, self.knots[k + 1])):
-                at = arcs[s[:, end] == end]
-                low[at], high[at] = np.minimum(low[at], knots[at]), np.maximum(high[at], knots[at])
+            for index, knots in enumerate((start, end)):
+                at = arcs[s[:, index] == index]
+                low[at], high[at] = np.minimum(low[at], (knots - off)[at]), np.maximum(high[at], (knots + off)[at])
         turns = self.turns.boxes(k, pieces[:, 1:], None if within is None else within[:, 1:])
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
+
+    def _in_world(self, knots: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+        """Return positions (B, 3) of knots in the world, and how far they may be off by the frame's rounding."""
+        points = self.knots[knots]
+        if self.frame is None:
+            return points, np.zeros_like(points)
+        return self.frame.positions(points), self.frame.off_positions(points)
+
+    def _circles(self, k: NDArray[np.intp]) -> Iterator[_CircleRows]:
+        """Yield each coordinate in the world of arcs that turns: the other ones are linear.
+
+        Args:
+            k: (A,) segments of the arcs.
+        """
+        frame, axes = self.frame, self.axes[k]
+        every, (first, second, along) = np.arange(len(k)), axes.T
+        centres = np.zeros((len(k), 3))
+        centres[every, first], centres[every, second] = self.arcs[k, 0], self.arcs[k, 1]
+        heights = self.knots[k, along], self.knots[k + 1, along] - self.knots[k, along]
+        sizes, (R, pattern) = np.abs(centres), (np.eye(3), np.eye(3, dtype=bool))
+        if frame is not None:
+            sizes, centres, R, pattern = frame.sizes(centres), frame.positions(centres), frame.rotation, frame.pattern
+        for axis in range(3):
+            which = np.flatnonzero(pattern[axis, first] | pattern[axis, second])
+            u, v, rise = R[axis, axes[which]].T
+            height, change = (each[which] for each in heights)
+            rises = pattern[axis, along[which]]
+            yield _CircleRows(
+                axis=axis,
+                which=which,
+                centre=centres[which, axis],
+                size=np.hypot(u, v),
+                phase=np.arctan2(v, u),
+                rise=rise,
+                height=height,
+                change=change,
+                off=sizes[which, axis] + rises * (np.abs(height) + np.abs(change)),
+                off_change=rises * np.abs(change),
+            )
 
     def derivatives(self, pieces: FloatArray, order: int = 1) -> tuple[FloatArray, FloatArray]:
         """Return the ends (B, 6) of derivatives of the pose by the parameter, over pieces (B, 3).
@@ -116,7 +192,10 @@ class PathCover:
         k = pieces[:, 0].astype(int)
         turns = self.turns.derivatives(k, pieces[:, 1:]) if order == 1 else np.zeros((2, len(k), 3))
         change = self.knots[k + 1] - self.knots[k] if order == 1 else np.zeros((len(k), 3))
-        slack = _OUTWARDS * np.abs(change)
+        off = np.zeros_like(change)
+        if self.frame is not None:
+            change, off = self.frame.vectors(change), self.frame.off_vectors(change)
+        slack = _OUTWARDS * np.abs(change) + off
         low, high = change - slack, change + slack
         arcs = np.flatnonzero(np.isfinite(self.arcs[k, 0]))
         if arcs.size:
@@ -129,13 +208,16 @@ class PathCover:
             by_radius = radii * (sweep**order)[:, None]
             size = np.abs(by_growth) + np.abs(by_radius).max(axis=1)
             size *= 8 + np.abs(angles).max(axis=1)
-            for axis, turn in ((0, 0.0), (1, -0.5 * np.pi)):
-                before, after = (_cosines(angles + turn + 0.5 * np.pi * n) for n in (order - 1, order))
-                one = by_growth[:, None] * before
-                other = by_radius[:, :, None] * after[:, None, :]
-                at = arcs, self.axes[k[arcs], axis]
-                low[at] = one.min(axis=1) + other.min(axis=(1, 2)) - _OUTWARDS * size
-                high[at] = one.max(axis=1) + other.max(axis=(1, 2)) + _OUTWARDS * size
+            for row in self._circles(k[arcs]):
+                turned = angles[row.which] - row.phase[:, None]
+                before, after = (_cosines(turned + 0.5 * np.pi * n) for n in (order - 1, order))
+                one = (row.size * by_growth[row.which])[:, None] * before
+                other = (row.size[:, None] * by_radius[row.which])[:, :, None] * after[:, None, :]
+                rise = row.rise * row.change if order == 1 else np.zeros(len(row.which))
+                slack = _OUTWARDS * (size[row.which] + row.off_change * (order == 1))
+                at = arcs[row.which], row.axis
+                low[at] = one.min(axis=1) + other.min(axis=(1, 2)) + rise - slack
+                high[at] = one.max(axis=1) + other.max(axis=(1, 2)) + rise + slack
         return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
 
     def rates(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:

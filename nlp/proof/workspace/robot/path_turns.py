@@ -4,7 +4,8 @@ Roll, pitch and yaw that change linearly have monotone tangents of their halves.
 ``r = v / w`` of quaternions ``(w, v)``, relative to a reference to which the whole path is nearer than half a turn. A
 turn about a fixed axis moves the quaternion along a great circle, and so r along a straight line. With angles in any
 convention the quaternion is a product of three; r is off the chord between two points by a bound of its second
-derivative. Where no reference is near the whole path, pieces of it have one each; see :mod:`.long_turns`.
+derivative. The rotation of a frame of the path, which is one more factor on the left, changes no size. Where no
+reference is near the whole path, pieces of it have one each; see :mod:`.long_turns`.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from .pose_box import UNTURNED, Reference
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from ....path.frame import PathFrame
 
 #: Part of a tangent's, and its angle's, sizes by which its ends move outwards: more than the rounding of its formulas.
 _OUTWARDS = 2.0**-48
@@ -80,9 +83,11 @@ class Tangents:
 
     Attributes:
         angles: (N + 1, 3) at the knots.
+        off: by which each angle may be off.
     """
 
     angles: FloatArray
+    off: float = 0.0
     kind = TurnKind.ROLL_PITCH_YAW
     reference = UNTURNED
     counts = None
@@ -97,9 +102,9 @@ class Tangents:
         start, change = self.angles[segments], self.angles[segments + 1] - self.angles[segments]
         low, high = np.sort([start + s[:, None] * change for s in ends.T], axis=0)
         # Fixed coordinates stay so.
-        slack = np.where(change == 0, 0.0, _OUTWARDS * (np.abs(start) + np.abs(change)))
+        slack = np.where(change == 0, 0.0, _OUTWARDS * (np.abs(start) + np.abs(change))) + self.off
         low, high = np.tan(0.5 * (low - slack)), np.tan(0.5 * (high + slack))
-        tiny = np.where((start == 0) & (change == 0), 0.0, TINY)
+        tiny = np.where((start == 0) & (change == 0) & (self.off == 0), 0.0, TINY)
         return low - _OUTWARDS * np.abs(low) - tiny, high + _OUTWARDS * np.abs(high) + tiny
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002
@@ -172,18 +177,25 @@ class LinearAngles:
         angles: (N + 1, 3) at the knots.
         order: of the convention.
         reference: of the vectors.
+        frame: in which the angles are; None for the world.
     """
 
     angles: FloatArray
     order: Order
     reference: Reference
+    frame: PathFrame | None = None
     kind = TurnKind.ANY_AXIS
     counts = None
 
     @cached_property
     def _vary(self) -> FloatArray:
         """1 for the coordinates (3,) that are not zero at all points, else 0."""
-        return varying(self.angles, self.order, self.reference)
+        return varying(self.angles, self.order, self.reference, self.frame)
+
+    @cached_property
+    def _rounded(self) -> float:
+        """By how much a quaternion may be off beside the rounding of its angles: a frame is one more factor."""
+        return ROUNDED if self.frame is None else 2 * ROUNDED
 
     def boxes(
         self,
@@ -197,8 +209,9 @@ class LinearAngles:
         rows, parts = divided(ends, np.ceil(width / CHORD))
         start, change = self.angles[segments[rows]], change[rows]
         each = [start + s[:, None] * change for s in parts.T]
-        quaternions = np.stack([relative(quaternions_from_angles(at, self.order), self.reference) for at in each])
-        off = ROUNDED + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)
+        own = [in_world(quaternions_from_angles(at, self.order), self.frame) for at in each]
+        quaternions = np.stack([relative(at, self.reference) for at in own])
+        off = self._rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)
         # A quaternion's derivative is at most half the sum of those of the angles, its second one that squared.
         bend = (0.5 * np.abs(change).sum(axis=1) * (parts[:, 1] - parts[:, 0])) ** 2 / 8 * _UP
         least = np.abs(quaternions[:, :, 0]).min(axis=0) - bend - off
@@ -215,8 +228,12 @@ class LinearAngles:
         middle = _angular_velocities(start + ends.mean(axis=1)[:, None] * change, change, self.order)
         # A rate turns with the angles before it.
         turned = (first * second + (first + second) * third) * (ends[:, 1] - ends[:, 0]) / 2
-        off = (ROUNDED + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)) * 4 * (first + second + third)
-        slack = (turned + off)[:, None] * varying(self.angles, self.order, UNTURNED)
+        off = (self._rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)) * 4 * (first + second + third)
+        # The slack bounds the size of a vector, so that it holds in any frame.
+        vary = varying(self.angles, self.order, UNTURNED)
+        if self.frame is not None:
+            middle, vary = self.frame.vectors(middle), turning_in_world(vary, self.frame)
+        slack = (turned + off)[:, None] * vary
         return middle - slack, middle + slack
 
 
@@ -228,14 +245,38 @@ def relative(quaternions: FloatArray, reference: Reference) -> FloatArray:
     return quaternion_products(quaternions, inverse[None])
 
 
-def varying(angles: FloatArray, order: Order, reference: Reference) -> FloatArray:
+def in_world(quaternions: FloatArray, frame: PathFrame | None) -> FloatArray:
+    """Return quaternions (n, 4) in the world of those in a frame; None for the world."""
+    return quaternions if frame is None else frame.orientations(quaternions)
+
+
+def turning_in_world(turning: FloatArray, frame: PathFrame | None) -> FloatArray:
+    """Return 1 for components (3,) in the world of vectors that are not exactly zero at all points, else 0.
+
+    Args:
+        turning: (3,) the same of their components in a frame.
+        frame: the frame; None for the world.
+    """
+    return turning if frame is None else np.asarray((frame.pattern @ turning > 0).astype(float))
+
+
+def varying(angles: FloatArray, order: Order, reference: Reference, frame: PathFrame | None = None) -> FloatArray:
     """Return 1 for components (3,) of vectors that are not exactly zero at all points, else 0.
 
     The product of the units i and j is the unit of the bits of both, exclusive, but for its sign.
+
+    Args:
+        angles: (n, 3) at points.
+        order: of their convention.
+        reference: of the vectors.
+        frame: in which the angles are; None for the world.
     """
+    factors = [(axis, angles[:, axis].any()) for axis in order]
+    if frame is not None:
+        factors += [(axis, frame.angles[axis] != 0) for axis in range(3)]
     found = {0}
-    for axis in order:
-        found |= {unit ^ (1 + axis) for unit in found if angles[:, axis].any()}
+    for axis, turns in factors:
+        found |= {unit ^ (1 + axis) for unit in found if turns}
     found = {unit ^ other for unit in found for other in range(4) if reference[other]}
     return np.array([float(unit in found) for unit in (1, 2, 3)])
 
