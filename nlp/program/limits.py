@@ -25,9 +25,11 @@ from .repeated import without_repeated
 #: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
 #: choice among them takes half of the time already.
 _ALL_PAIRS = 3
-#: How well a limit that depends on fixed numbers alone must hold, in parts of its size: they are written with a dozen
-#: digits.
-_ROUNDING = 1e-9
+#: How well a limit that depends on fixed numbers alone must hold, in parts of itself: better than what a proof counts as
+#: on it, so that a pose that refutes a claim is beyond the limit where it is evaluated.
+_ROUNDING = 1e-10
+#: And in parts of the sizes of its numbers, near 0: they are written with a dozen digits.
+_WRITTEN = 1e-11
 
 
 class LimitConstraints(NamedTuple):
@@ -77,7 +79,8 @@ def limit_constraints(
     for item, varies, value in zip(limits, free, values, strict=True):
         estimated = item.constraint.spectral is not None and not varies
         number = _measured(item.constraint, x, p, table) if estimated else value
-        low, high = (_ROUNDING * max(abs(end), _size_of(item, size)) for end in (item.lower, item.upper))
+        least = _WRITTEN * _size_of(item, size)
+        low, high = (max(_ROUNDING * abs(end), least) for end in (item.lower, item.upper))
         holds = item.lower - low <= number <= item.upper + high
         if holds and not varies and not math.isfinite(value):
             # An infinite value is above every bound, and keeps none.
