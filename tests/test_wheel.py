@@ -67,6 +67,7 @@ def test_a_wheel_has_its_kernels_and_is_for_every_later_python(wheel: Path) -> N
     assert set(zipfile.ZipFile(wheel).namelist()) >= KERNELS
 
 
+@pytest.mark.soak  # each version installs the packages that the program needs
 @pytest.mark.parametrize("version", ["3.11", "3.12", "3.13", "3.14"])
 def test_a_wheel_proves_a_task_under_another_python(version: str, wheel: Path, tmp_path: Path) -> None:
     python = other_pythons().get(version)

@@ -23,7 +23,7 @@ from screwsynth.nlp.output.report.report import report_of
 QUICK = (
     "3-rps", "3-upu", "6-rus", "delta", "delta-parallelogram", "exechon", "spherical-3-rrr", "tricept", "tripteron",
 )  # fmt: skip
-ROBOTS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in GALLERY]
+ROBOTS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.soak) for name in GALLERY]
 
 
 @cache

@@ -53,7 +53,7 @@ def test_many_random_mechanisms_have_the_numbers_of_the_engine() -> None:
     [
         (("delta", "hinge", "hinge", "hinge"), 6),  # a Delta with a wrist of three axes
         # A leg: hip and ankle of two struts or cranks each, and a knee.
-        pytest.param(("ankle", "four_bar", "ankle"), 5, marks=pytest.mark.slow),
+        pytest.param(("ankle", "four_bar", "ankle"), 5, marks=pytest.mark.soak),
         (("five_bar", "hinge"), 3),
         (("overdriven",), 1),  # a four-bar with two motors
     ],

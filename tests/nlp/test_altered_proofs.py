@@ -343,7 +343,7 @@ PLATFORMS = ("task", "above", "weighted sum", "worst case", "worst loss")
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(each, marks=pytest.mark.slow) if each in SLOW else each for each in KINDS]
+    "name", [pytest.param(each, marks=pytest.mark.soak) if each in SLOW else each for each in KINDS]
 )
 def test_an_altered_field_is_rejected_or_changes_nothing_but_a_true_bound(cli: Run, folder: Path, name: str) -> None:
     faults, tries, _ = faults_of(cli, folder, name, 1)

@@ -44,7 +44,7 @@ FEW = ("planar-3-rpr", "6-rus", "five-bar")
 
 @pytest.mark.parametrize(
     "names",
-    [FEW, pytest.param([each for each in EACH_KIND if each not in FEW], marks=pytest.mark.slow)],
+    [FEW, pytest.param([each for each in EACH_KIND if each not in FEW], marks=pytest.mark.soak)],
     ids=["few", "others"],
 )
 def test_what_replaces_unknowns_closes_the_loops_in_homes_mode(names: tuple[str, ...]) -> None:

@@ -119,7 +119,7 @@ def curvatures(c: Embedded, nlp: Nlp, close: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if "sum over" in name else name for name in CASES]
+    "name", [pytest.param(name, marks=pytest.mark.soak) if "sum over" in name else name for name in CASES]
 )
 def test_the_c_has_the_programs_values_and_its_optimum(name: str, embed: Callable[..., Embedded]) -> None:
     case = table(*CASES[name])

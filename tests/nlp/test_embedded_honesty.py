@@ -100,7 +100,7 @@ def test_the_judgement_of_a_soak_sees_what_is_wrong(compiled: Compiled, ticks: M
     assert ticks.judged(robot, tick, found)["false infeasible"].sum() > 20
 
 
-@pytest.mark.parametrize("name", ["camera-mount", pytest.param("flight-simulator", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["camera-mount", pytest.param("flight-simulator", marks=pytest.mark.soak)])
 def test_the_worst_case_of_other_tasks_is_theirs(name: str, compiled: Compiled, ticks: ModuleType) -> None:
     own = compiled(name)
     robot, p = ticks.Robot(own, 1.0), tasks(own, 60, 3) * 10 ** np.linspace(-3, 3, 60)[:, None]

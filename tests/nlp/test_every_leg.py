@@ -138,7 +138,7 @@ def limited(rng: np.random.Generator) -> Case:
     return case_from(tables, "random")
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, pytest.param(12, marks=pytest.mark.soak)])
 def test_no_solve_with_random_limits_answers_a_wrong_design(count: int) -> None:
     rng, answers = np.random.default_rng(count), 0
     for _ in range(count):

@@ -70,7 +70,7 @@ def test_evaluate_writes_json_and_csv_with_the_values_of_the_program(tmp_path: P
         assert len(rows) > 5
 
 
-@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.slow)], ids=["one", "others"])
+@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.soak)], ids=["one", "others"])
 def test_tasks_poses_and_limits_together(names: tuple[str, ...]) -> None:
     for name in names:
         case = narrow(starter(name))
@@ -95,7 +95,7 @@ def test_tasks_poses_and_limits_together(names: tuple[str, ...]) -> None:
             assert pytest.approx(F, rel=1e-12) == found.F
 
 
-@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.slow)], ids=["one", "others"])
+@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.soak)], ids=["one", "others"])
 def test_sensitivities_are_those_of_solved_neighbours(names: tuple[str, ...]) -> None:
     for name in names:
         case = replace(narrow(starter(name)), search=Search(starts=1))

@@ -125,7 +125,7 @@ def check_interrupted(ended: Ended, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("command", "after"),
     [
-        pytest.param(each, t, marks=[pytest.mark.slow] if t > 0.1 or each != "solve" else [])
+        pytest.param(each, t, marks=[pytest.mark.soak] if t > 0.1 or each != "solve" else [])
         for k, each in enumerate(OPTIONS)
         for t in (MOMENTS if each == "solve" else MOMENTS[k % 2 :: 2])
     ],

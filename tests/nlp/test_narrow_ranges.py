@@ -190,7 +190,7 @@ def test_narrow_ranges_are_answered_as_by_another_search() -> None:
     assert not faults
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize("part", range(2))  # for several processes
 def test_160_narrow_cases(part: int) -> None:
     # Those of the test above are the rest of the 160; all 1,000 are in bench/narrow_ranges.py.

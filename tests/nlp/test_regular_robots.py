@@ -104,7 +104,7 @@ def matrices(problem: Problem) -> Iterator[RankMatrix]:
 
 
 @pytest.mark.parametrize(
-    "name", [each if each in ROBOTS[:4] else pytest.param(each, marks=pytest.mark.slow) for each in ROBOTS]
+    "name", [each if each in ROBOTS[:4] else pytest.param(each, marks=pytest.mark.soak) for each in ROBOTS]
 )
 def test_no_box_is_regular_in_which_a_closed_point_is_not(name: str) -> None:
     problem = problem_of(name, 0.1, 20)
@@ -186,7 +186,7 @@ def test_forms_hold_against_balls_of_200_bits() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["6-rss", "6-pus", "delta", *(pytest.param(each, marks=pytest.mark.slow) for each in ("6-rus", "spherical-3-rrr"))],
+    ["6-rss", "6-pus", "delta", *(pytest.param(each, marks=pytest.mark.soak) for each in ("6-rus", "spherical-3-rrr"))],
 )
 def test_unknowns_in_closed_form_close_their_loops_where_the_limb_reaches(name: str) -> None:
     model = build_model(name)

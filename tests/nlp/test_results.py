@@ -321,7 +321,7 @@ def test_a_page_solves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_one_table_for_terminal_markdown_and_page() -> None:
     table = TextTable(("name", "length\ncm"), ((Line("a|b<", tone=Tone.NO_ANSWER), "1.5"), ("c", "no")))
-    assert markdown(table) == "| name | length, cm |\n|---|---|\n| a\\|b< | 1.5 |\n| c | no |\n"
+    assert markdown(table) == "| name | length, cm |\n|---|---|\n| a\\|b&lt; | 1.5 |\n| c | no |\n"
     html = html_table(table, "Lengths", id="lengths")
     assert '<th scope="col">length, cm</th>' in html
     assert '<th scope="row">a|b&lt;</th><td class="number">1.5</td>' in html

@@ -162,7 +162,7 @@ def solved(case: Case) -> tuple[object, Iterable[Line | TextTable]]:
 def some(*names: str, robots: Iterable[str] = ROBOTS) -> object:
     """Names of robots of which only these are fast."""
     return pytest.mark.parametrize(
-        "name", [*names, *(pytest.param(each, marks=pytest.mark.slow) for each in robots if each not in names)]
+        "name", [*names, *(pytest.param(each, marks=pytest.mark.soak) for each in robots if each not in names)]
     )
 
 

@@ -84,7 +84,7 @@ FEW = ("3-rrs", "6-pus", "planar-3-rrr", "spherical-3-rrr")
 
 @pytest.mark.parametrize(
     "names",
-    [FEW, pytest.param([each for each in (*EACH_KIND, "6-rss") if each not in FEW], marks=pytest.mark.slow)],
+    [FEW, pytest.param([each for each in (*EACH_KIND, "6-rss") if each not in FEW], marks=pytest.mark.soak)],
     ids=["few", "others"],
 )
 def test_signs_are_positive_from_home_on_and_negative_in_other_modes(names: tuple[str, ...]) -> None:

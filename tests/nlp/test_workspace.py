@@ -521,7 +521,7 @@ def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme:
     return np.linalg.norm(position - points[:, :3], axis=1), np.arcsin(np.linalg.norm(vector, axis=0) / 2)
 
 
-@pytest.mark.parametrize("joint", [0.0005, pytest.param(0.05, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("joint", [0.0005, pytest.param(0.05, marks=pytest.mark.soak)])
 def test_errors_of_the_pose_are_bounded_for_every_machine_within_its_tolerances(case: Case, joint: float) -> None:
     angle = Free(-math.radians(10), math.radians(10))
     workspace = Workspace((Free(-2.0, 2.0), Free(-2.0, 2.0), Free(18.0, 22.0)), Turns(TurnKind.ANY_AXIS, (angle,)))

@@ -145,7 +145,7 @@ def boxes_about(y: FloatArray, half: FloatArray, rng: np.random.Generator) -> tu
 
 @pytest.mark.parametrize(
     ("name", "part", "degrees", "seed"),
-    [("6-rus", 0.1, 40, 2), pytest.param("6-ups", 0.4, 70, 1, marks=pytest.mark.slow)],
+    [("6-rus", 0.1, 40, 2), pytest.param("6-ups", 0.4, 70, 1, marks=pytest.mark.soak)],
 )
 def test_no_box_with_a_singular_pose_is_shown_to_be_regular(name: str, part: float, degrees: float, seed: int) -> None:
     """The pose is one that Newton's method finds to 1e-10, in a robot with random dimensions."""
@@ -165,7 +165,7 @@ def test_no_box_with_a_singular_pose_is_shown_to_be_regular(name: str, part: flo
 
 @pytest.mark.parametrize(
     ("name", "part", "degrees", "seed"),
-    [("3-rps", 0.3, 60, 1), pytest.param("planar-3-rrr", 0.3, 60, 2, marks=pytest.mark.slow)],
+    [("3-rps", 0.3, 60, 1), pytest.param("planar-3-rrr", 0.3, 60, 2, marks=pytest.mark.soak)],
 )
 def test_no_box_with_a_singular_closed_pose_is_shown(name: str, part: float, degrees: float, seed: int) -> None:
     case = gallery_case(name, part, degrees, seed)

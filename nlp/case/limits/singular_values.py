@@ -176,12 +176,12 @@ Rows: TypeAlias = list[list[SX]]
 
 def smallest_eigenvalue(A: SX) -> SX:
     """Return an estimate (1, 1) from below of the smallest eigenvalue of a symmetric positive semidefinite (n, n)."""
-    return _estimate(_smallest, A.shape[0])(A)
+    return _estimate(_estimate_smallest, A.shape[0])(A)
 
 
 def largest_eigenvalue(A: SX) -> SX:
     """Return an estimate (1, 1) from above of the largest eigenvalue of a symmetric positive semidefinite (n, n)."""
-    return _estimate(_largest, A.shape[0])(A)
+    return _estimate(_estimate_largest, A.shape[0])(A)
 
 
 @cache
@@ -191,7 +191,7 @@ def _estimate(formula: Callable[[SX], SX], n: int) -> ca.Function:
     return ca.Function("estimate", [A], [formula(A)])
 
 
-def _smallest(A: SX) -> SX:
+def _estimate_smallest(A: SX) -> SX:
     n = A.shape[0]
     scale = ca.trace(A) / n
     rows = _upper(A / scale)
@@ -202,7 +202,7 @@ def _smallest(A: SX) -> SX:
     return found * scale
 
 
-def _largest(A: SX) -> SX:
+def _estimate_largest(A: SX) -> SX:
     scale = ca.trace(A)
     rows = _upper(A / scale)
     # (tr A^m)^(1/m) is above, by no more than n^(1/m).
