@@ -37,7 +37,10 @@ SAME, NEAR, BOXES, NOISE = 1e-9, 1e-6, 0.02, 1e-9
 #: Powers of a length that numbers have: F of a rotation is a squared length, and a row of J in it one.
 POWERS = (0, 1, -1, 2, -2)
 #: Keys of JSON that depend on the computer, those of one of several equal places, and those of numbers of boxes.
-SKIPPED = {"seconds", "version", "source", "units", "case", "model", "parameters", "history", "file"} | {"pose", "machine"}
+SKIPPED = {"seconds", "version", "source", "units", "case", "model", "parameters", "history", "file"} | {
+    "pose",
+    "machine",
+}
 COUNTED = {"boxes", "open"}
 #: Number of boxes that makes no difference: a choice among equal boxes.
 FEW = 8
