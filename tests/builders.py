@@ -11,13 +11,14 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from screwsynth.models import Dimension, Model, robot_function
@@ -41,6 +42,10 @@ EACH_KIND = (
     "3-puu", "3-rps", "3-upu", "6-pus", "6-rus", "delta", "delta-parallelogram", "exechon", "five-bar", "planar-3-rrr",
     "spherical-3-rrr", "tricept",
 )  # fmt: skip
+#: Four of these that differ most: members, cranks, parallelograms, and a robot in a plane.
+FEW_KINDS = ("3-rps", "6-rus", "delta-parallelogram", "five-bar")
+#: Shipped cases that differ most: one leg layout each, limits of every kind, several tasks, several poses, loops.
+FEW_CASES = ("camera-mount", "flight-simulator", "haptic-device", "paper-4.1-helical", "paper-4.4-max", "reachy-mini")
 #: The command line in this process: exit status, standard output, standard error.
 Run = Callable[..., tuple[int, str, str]]
 # Six legs with one free height. Of unit forces along z, x and y the sums of squares are F of the translations along
@@ -63,6 +68,11 @@ leg_length = { min = 2, max = 60 }
 [solve]
 starts = 2
 """
+
+
+def soaked(values: Iterable[Any], kept: Collection[Any]) -> list[Any]:
+    """Values of a test's parameter: those that are kept here, and the others of their kind for ``make soak``."""
+    return [each if each in kept else pytest.param(each, marks=pytest.mark.soak) for each in values]
 
 
 def case_from(given: str | Mapping[str, Any], name: str = "case") -> Case:

@@ -25,8 +25,8 @@ from .repeated import without_repeated
 #: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
 #: choice among them takes half of the time already.
 _ALL_PAIRS = 3
-#: How well a limit that depends on fixed numbers alone must hold, in parts of itself: better than what a proof counts as
-#: on it, so that a pose that refutes a claim is beyond the limit where it is evaluated.
+#: How well a limit that depends on fixed numbers alone must hold, in parts of itself. A proof allows more: a pose
+#: that refutes a claim is beyond the limit where it is evaluated.
 _ROUNDING = 1e-10
 #: And in parts of the sizes of its numbers, near 0: they are written with a dozen digits.
 _WRITTEN = 1e-11

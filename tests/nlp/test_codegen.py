@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import FEW_CASES, soaked
 from generated import (
     COMPILERS,
     OPTIMISED,
@@ -40,7 +41,7 @@ CASES = [name for name in shipped_cases() if name not in LIKE_OTHERS]
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", soaked(CASES, FEW_CASES))
 def test_shipped_cases_compile_without_a_warning_and_pass_their_tests(
     name: str, tmp_path: Path, embedded: Callable[[str], Embedded]
 ) -> None:

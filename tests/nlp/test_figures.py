@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import EACH_CASE, Run, case_from, output_of, refusal_of, saved
+from builders import EACH_CASE, EACH_KIND, FEW_CASES, Run, case_from, output_of, refusal_of, saved, soaked
 from casadi import SX
 from matplotlib.figure import Figure
 from measures import exponential
@@ -190,7 +190,7 @@ def assert_labels_are_clear(robots: list[Drawing]) -> Figure:
     return figure
 
 
-@pytest.mark.parametrize("name", PICTURED)
+@pytest.mark.parametrize("name", soaked(PICTURED, FEW_CASES))
 def test_limbs_are_drawn_between_their_joints_in_the_view_with_clear_labels(name: str) -> None:
     robot = drawing(name)
     view, figure = clearest_view(robot), assert_labels_are_clear([robot])
@@ -208,7 +208,7 @@ def test_limbs_are_drawn_between_their_joints_in_the_view_with_clear_labels(name
         assert np.max(np.abs(dict(lines)["axis"][[0, -1]] - view.project(robot.motion.line))) <= 1e-9 * robot.size
 
 
-@pytest.mark.parametrize("name", model_names())
+@pytest.mark.parametrize("name", soaked(model_names(), EACH_KIND))
 def test_labels_of_robots_stand_on_no_other_limb(name: str) -> None:
     options = [each for each in model_options(name) if each.choices]
     variants = [{option.name: choice} for option in options for choice in option.choices or ()] or [{}]
@@ -223,7 +223,7 @@ def test_labels_of_robots_stand_on_no_other_limb(name: str) -> None:
                 assert not [k for loop in edges for k in range(len(loop) - 1) if crosses_box(loop[k], loop[k + 1], box)]
 
 
-@pytest.mark.parametrize("name", PICTURED)
+@pytest.mark.parametrize("name", soaked(PICTURED, FEW_CASES))
 def test_no_motion_is_seen_from_its_end_and_no_path_from_its_edge(name: str) -> None:
     robot = drawing(name)
     axes = figure_of([robot]).axes[0]

@@ -309,7 +309,7 @@ def test_an_interrupted_search_claims_no_more_than_a_complete_one(search: Search
     assert interrupted(search, MemoryError, LOOPS, 1, 1) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @each_search
 @pytest.mark.parametrize("watched", [LOOPS, WATCHED], ids=["loops", "all"])
 def test_searches_are_interrupted_at_many_instructions(search: Search, watched: tuple[str, ...]) -> None:

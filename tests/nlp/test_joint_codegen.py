@@ -104,7 +104,14 @@ def test_links_at_several_poses_are_loops_and_no_value_needs_itself() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "poses"), [("3-rps", 1), ("3-rps", 2), ("planar-3-rrr", 1)])
+@pytest.mark.parametrize(
+    ("name", "poses"),
+    [
+        ("3-rps", 2),
+        pytest.param("3-rps", 1, marks=pytest.mark.soak),
+        pytest.param("planar-3-rrr", 1, marks=pytest.mark.soak),
+    ],
+)
 def test_c_has_the_values_of_the_program_with_limits(name: str, poses: int, embed: Callable[..., Any]) -> None:
     hinges = (RateShare(0.9), JointMotion("1:1", min=-1.4), ActuatorRate(50.0))
     case = starter(name, *(LIMITS if name == "3-rps" else hinges), poses=poses)

@@ -8,7 +8,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from builders import EACH_KIND, Array, Run, case_from, edited, saved, starter_tables, unbroken
+from builders import EACH_KIND, FEW_KINDS, Array, Run, case_from, edited, saved, soaked, starter_tables, unbroken
 from measures import circle_joints
 
 from screwsynth.nlp import Case, evaluate, formulate, solve
@@ -94,7 +94,7 @@ def test_a_feasible_design_that_only_the_estimate_refuses_is_not_called_infeasib
 
 
 @pytest.mark.parametrize("key", [CONDITION, "smallest_singular_value"])
-@pytest.mark.parametrize("name", EACH_KIND)
+@pytest.mark.parametrize("name", soaked(EACH_KIND, FEW_KINDS))
 def test_margins_and_violations_are_those_of_the_jacobian(name: str, key: str) -> None:
     tables = starter_tables(name)
     tables["limits"] = {key: {"max": 1.001, "length": 0.37} if key == CONDITION else {"min": 10, "length": 0.37}}

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import turn_about
+from builders import soaked, turn_about
 from hexapods import case_of_legs
 from test_workspace_claims import at_home
 
@@ -63,7 +63,7 @@ def proof_of(case: Case) -> tuple[dict[tuple[str, str], Extreme], Proof]:
     return {(each.name, each.sense.value): each for each in found}, proof
 
 
-@pytest.mark.parametrize("name", ["legs", "legs with a tolerance", "delta", "3-rps"])
+@pytest.mark.parametrize("name", soaked(["legs", "legs with a tolerance", "delta", "3-rps"], ["legs", "3-rps"]))
 def test_a_proof_is_accepted_and_one_with_a_bound_that_a_pose_exceeds_is_not(name: str) -> None:
     """Six freedoms and three; rows of legs and passive joints; closed forms and loops that are followed."""
     case = robot_of(name)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import EACH_CASE, Run, edited, output_of
+from builders import EACH_CASE, FEW_CASES, Run, edited, output_of, soaked
 from jsonschema import Draft202012Validator
 
 import screwsynth.cases
@@ -111,7 +111,7 @@ def test_the_schema_is_one(cli: Run, schema: Json) -> None:
             assert all(part.get("description") for part in each["properties"].values()), name
 
 
-@pytest.mark.parametrize("name", [*EACH_CASE, *WRITTEN])
+@pytest.mark.parametrize("name", soaked([*EACH_CASE, *WRITTEN], (*FEW_CASES, *WRITTEN)))
 def test_solves_and_evaluations_keep_to_the_schema(
     name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
 ) -> None:

@@ -78,7 +78,7 @@ def test_screening_loses_no_optimum(name: str) -> None:
     compare(replace(case, search=replace(case.search, starts=min(case.search.starts, 8))))
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.parametrize("name", [name for name in SHIPPED if name not in {"hexapod-workspace", "paper-4.4-snu"}])
 def test_screening_loses_no_optimum_of_a_shipped_case(name: str) -> None:
     compare(load_case(name))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import EACH_KIND, case_from, soaked
 
 from screwsynth.models import Model, WrenchKind, model_names, robot_function, three_upu
 from screwsynth.models.joints.robot import robot
@@ -56,7 +56,11 @@ def name_of(robot: str | Model) -> str:
 
 
 @pytest.mark.parametrize(
-    "given", [*model_names(), *(three_upu(axes=axes) for axes in ("limb", "snu", "tsai"))], ids=name_of
+    "given",
+    soaked(
+        [*model_names(), *(three_upu(axes=axes) for axes in ("limb", "snu", "tsai"))], (*EACH_KIND, "stewart-gough")
+    ),
+    ids=name_of,
 )
 def test_every_starter_is_solved_to_a_machine_that_makes_its_task(given: str | Model) -> None:
     model = robot_function(given)() if isinstance(given, str) else given

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import EACH_CASE, Run, case_from, output_of, refusal_of
+from builders import EACH_CASE, FEW_CASES, Run, case_from, output_of, refusal_of, soaked
 from rich.console import Console
 
 from screwsynth.models import model_names
@@ -126,7 +126,7 @@ def check_widths(items: tuple[Line | TextTable, ...]) -> None:
         assert not words - Counter(text.split()), width
 
 
-@pytest.mark.parametrize("name", ["eight", *EACH_CASE])
+@pytest.mark.parametrize("name", soaked(["eight", *EACH_CASE], ("eight", *FEW_CASES)))
 def test_no_number_of_a_solve_or_an_evaluation_is_split_at_any_width(name: str) -> None:
     case = case_of(name)
     check_widths(solved(name))

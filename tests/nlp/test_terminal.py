@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, commands_in, output_of, refusal_of, saved, turn_about, unbroken
+from builders import FEW_CASES, Run, commands_in, output_of, refusal_of, saved, soaked, turn_about, unbroken
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -76,7 +76,7 @@ def test_a_command_prints_its_answer_in_few_short_lines(
         assert len(every.splitlines()) >= len(out.splitlines()) - 1
 
 
-@pytest.mark.parametrize("name", shipped_cases())
+@pytest.mark.parametrize("name", soaked(shipped_cases(), FEW_CASES))
 def test_an_evaluation_is_short_for_every_shipped_case(name: str, cli: Run) -> None:
     _, out, _ = cli("evaluate", name)
     assert 0 < len(out.splitlines()) <= ROOM

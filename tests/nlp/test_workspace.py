@@ -290,7 +290,7 @@ def test_roll_pitch_and_yaw_have_the_same_poses_in_both_searches(case: Case) -> 
         assert most <= each.bound <= 1.02 * most
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_largest_box_is_found_to_a_hundredth(case: Case) -> None:
     found = largest_scale(case, time_limit=100)
     assert found.refuted

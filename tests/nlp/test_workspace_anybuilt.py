@@ -295,7 +295,7 @@ def test_no_sampled_machine_is_outside_of_the_bounds_which_are_near_to_the_worst
         assert max(found.values()) <= 1.5, found
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_no_sampled_machine_with_cranks_is_outside_of_the_bounds() -> None:
     found = ratios("6-rus", 5e-4, ("actuator_angle limb 5", "F"))
     assert len(found) == 4

@@ -10,7 +10,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, soaked
 from hexapods import bounds_of, clearance, hexapod_text, smallest, subject_of, values_of
 from typer.testing import CliRunner
 
@@ -352,7 +352,7 @@ def test_closed_forms_of_the_worst_machine(case: Case) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tolerance", [TOLERANCE, 0.2])
+@pytest.mark.parametrize("tolerance", soaked([TOLERANCE, 0.2], [0.2]))
 def test_every_claim_holds_for_a_hundred_thousand_machines(case: Case, tolerance: float) -> None:
     # Shares of rates take longest, and are judged for the smaller tolerance.
     kept = [each for each in case.limits if tolerance == TOLERANCE or not isinstance(each, RateShare)]
