@@ -13,6 +13,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -81,6 +82,12 @@ def case_from(given: str | Mapping[str, Any], name: str = "case") -> Case:
     return case_from_tables(tables, name=name, source=f"{name}.toml")
 
 
+@cache
+def starter_text(name: str) -> str:
+    """The starter of a robot by its name, which is computed once in a process."""
+    return starter_case(robot_function(name)())
+
+
 def starter_tables(robot: str | Model) -> dict[str, Any]:
     """The tables that tests begin with: a starter with its whole pose free, a motion of any kind, and no limits.
 
@@ -88,7 +95,7 @@ def starter_tables(robot: str | Model) -> dict[str, Any]:
     test_starters.py.
     """
     model = robot_function(robot)() if isinstance(robot, str) else robot
-    tables = tomllib.loads(starter_case(model))
+    tables = tomllib.loads(starter_text(robot) if isinstance(robot, str) else starter_case(model))
     del tables["limits"]
     if "characteristic_length" in tables["robot"]:
         tables["robot"]["characteristic_length"] = 1.0

@@ -44,8 +44,8 @@ SKIPPED = {"seconds", "version", "source", "units", "case", "model", "parameters
 COUNTED = {"boxes", "open"}
 #: Number of boxes that makes no difference: a choice among equal boxes.
 FEW = 8
-#: Numbers that a search ends at within its gap, and this gap.
-SEARCHED, GAP = {"bound", "reached"}, 0.1
+#: Numbers at which a search ends, within its gap beyond the best value known, this gap, and by how much two ends differ.
+SEARCHED, GAP, APART = {"bound", "reached"}, 0.1, 0.2
 #: Keys of numbers that depend on the scale of variables and loops, which is the robot's size.
 SCALED = frozenset({"multiplier", "eigenvalues", "stationarity", "feasibility", "boxes", "open", "iterations"})
 #: Limits that are lengths, in starter cases.
@@ -328,7 +328,7 @@ def differences(one: Any, other: Any, scale: float, same: float, skipped: Set[st
                 if abs(one[key] - other[key]) > max(BOXES * max(one[key], other[key]), FEW):
                     yield f"{path}.{key}: {one[key]} and {other[key]}"
             else:
-                near = GAP if key in SEARCHED else same
+                near = APART if key in SEARCHED else same
                 yield from differences(one[key], other[key], scale, near, skipped, f"{path}.{key}")
     elif isinstance(one, list) and isinstance(other, list):
         if len(one) != len(other):

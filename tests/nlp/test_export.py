@@ -10,11 +10,11 @@ import ezdxf
 import mujoco
 import numpy as np
 import pytest
-from builders import EACH_KIND, Array, case_from, rows_of, starter, turn_about
+from builders import EACH_KIND, Array, case_from, rows_of, starter, starter_text, turn_about
 from link_robots import CASE, COUPLING, ROBOT
 from mujoco_trees import Tree
 
-from screwsynth.models import WrenchKind, robot, robot_function
+from screwsynth.models import WrenchKind, robot
 from screwsynth.models.catalog import SHIPPED
 from screwsynth.models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink, links_of, wrenches_of
 from screwsynth.nlp import (
@@ -41,7 +41,6 @@ from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
 from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.formats.writing.urdf import urdf_of
-from screwsynth.nlp.starter.text import starter_case
 
 ROBOTS = (*EACH_KIND, *SHIPPED)
 #: One of each kind of limb and of closing, for tests that build the robot again.
@@ -238,7 +237,7 @@ def test_screws_couplings_and_welds_of_any_mechanism_are_written() -> None:
 
 
 def test_ranges_count_from_the_pose_and_reach_the_actuators() -> None:
-    text = starter_case(robot_function("3-rps")()).replace("actuator_length", "# actuator_length")
+    text = starter_text("3-rps").replace("actuator_length", "# actuator_length")
     tables = tomllib.loads(text)
     tables["limits"] = {"actuator_length": {"min": -0.4, "max": 0.5}, "joint": {"1:1": {"max": 30}}}
     nlp = formulate(case_from(tables, "rps"))

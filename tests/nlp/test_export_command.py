@@ -9,12 +9,11 @@ from pathlib import Path
 import mujoco
 import pytest
 import yaml
-from builders import Run, case_from, output_of, refusal_of, saved
+from builders import Run, case_from, output_of, refusal_of, saved, starter_text
 from mujoco_trees import Tree
 
-from screwsynth.models import robot, robot_function
+from screwsynth.models import robot
 from screwsynth.nlp import Case, InputError, Task, export_robot, formulate, load_case, solve
-from screwsynth.nlp.starter.text import starter_case
 
 
 def test_command_writes_what_is_asked_for_and_the_same_bytes_again(tmp_path: Path, cli: Run) -> None:
@@ -73,7 +72,7 @@ def test_refusals_are_one_sentence_and_write_nothing(tmp_path: Path, cli: Run, m
 
 
 def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_path: Path, cli: Run) -> None:
-    text = starter_case(robot_function("hexapod")())
+    text = starter_text("hexapod")
     path, out = saved(tmp_path / "case.toml", text), tmp_path / "robot"
     words = ("export", str(path), "--format", "mjcf", "--out", str(out))
     status, _, wrong = cli(*words, "--starts", "2", "--set=limits.leg_length.min=0.5", "--set=limits.leg_length.max=1")
@@ -91,7 +90,7 @@ def test_a_case_that_cannot_be_solved_is_not_exported_and_a_fixed_one_is(tmp_pat
 
 def test_a_result_is_exported_without_a_solve(tmp_path: Path, cli: Run) -> None:
     # A robot given joint by joint away from home, two tasks combined, and several poses.
-    (tmp_path / "3-rps.toml").write_text(starter_case(robot_function("3-rps")()), encoding="utf-8")
+    (tmp_path / "3-rps.toml").write_text(starter_text("3-rps"), encoding="utf-8")
     cases = (str(tmp_path / "3-rps.toml"), ()), ("paper-4.2", ()), ("flight-simulator", ("--pose", "7"))
     for case, words in cases:
         result = tmp_path / "result.json"

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, case_from, starter, starter_tables
+from builders import Run, case_from, starter, starter_tables, starter_text
 
-from screwsynth.models import robot_function
 from screwsynth.nlp import (
     Case,
     Free,
@@ -33,7 +32,6 @@ from screwsynth.nlp import (
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.sensitivity import Hindrance
 from screwsynth.nlp.evidence.state import loops_are_closed
-from screwsynth.nlp.starter.text import starter_case
 
 SIX = ("3-rps", "6-rus", "delta", "delta-parallelogram", "3-upu", "planar-3-rrr")
 
@@ -55,7 +53,7 @@ def narrow(case: Case) -> Case:
 def test_evaluate_writes_json_and_csv_with_the_values_of_the_program(tmp_path: Path, cli: Run) -> None:
     for name in SIX:
         path, data_file, csv_file = (tmp_path / f"{name}.{end}" for end in ("toml", "json", "csv"))
-        path.write_text(starter_case(robot_function(name)()), encoding="utf-8")
+        path.write_text(starter_text(name), encoding="utf-8")
         status, out, err = cli("evaluate", str(path), "--json", str(data_file), "--csv", str(csv_file))
         assert (status, err) == (0, ""), name
         data = json.loads(data_file.read_text(encoding="utf-8"))
@@ -134,7 +132,7 @@ def test_a_number_that_the_robot_has_no_choice_of_has_no_sensitivity() -> None:
 def test_report_and_check_and_codegen_write_what_they_say(tmp_path: Path, cli: Run) -> None:
     name = "delta"
     path, page, folder = tmp_path / "delta.toml", tmp_path / "page.html", tmp_path / "c"
-    path.write_text(starter_case(robot_function(name)()), encoding="utf-8")
+    path.write_text(starter_text(name), encoding="utf-8")
     assert cli("report", str(path), "--out", str(page), "--starts", "2")[0] == 0
     text = page.read_text(encoding="utf-8")
     assert "another way" not in text

@@ -4,11 +4,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from builders import Run, edited, refusal_of, saved, saved_with_robot
+from builders import Run, edited, refusal_of, saved, saved_with_robot, starter_text
 
-from screwsynth.models import robot_function
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.starter.text import starter_case
 from screwsynth.nlp.system.slips import hint_of, toml_slips
 
 CASE = find_case("paper-4.1-helical").read_text(encoding="utf-8")
@@ -43,9 +41,7 @@ def test_the_nearest_right_thing_is_named(arguments: tuple[str, ...], words: str
 
 
 def test_files_of_another_kind_are_named(tmp_path: Path, cli: Run) -> None:
-    named = saved_with_robot(
-        tmp_path, ROBOT, edited(starter_case(robot_function("6-rus")()), ('"6-rus"', '"robot.toml"'))
-    )
+    named = saved_with_robot(tmp_path, ROBOT, edited(starter_text("6-rus"), ('"6-rus"', '"robot.toml"')))
     words = (
         'robot.model = "robot.toml": no such robot; a robot file is named by file = "robot.toml", in the place of model'
     )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import EACH_KIND, case_from, soaked
+from builders import EACH_KIND, case_from, soaked, starter_text
 
 from screwsynth.models import Model, WrenchKind, model_names, robot_function, three_upu
 from screwsynth.models.joints.robot import robot
@@ -97,7 +97,7 @@ def test_every_starter_is_solved_to_a_machine_that_makes_its_task(given: str | M
 
 @pytest.mark.parametrize("name", ["stewart-gough", "delta", "exechon"])
 def test_the_machine_of_a_starter_is_good_over_its_workspace(name: str) -> None:
-    case = fixed(case_from(with_workspace(starter_case(robot_function(name)()))))
+    case = fixed(case_from(with_workspace(starter_text(name))))
     assert judge_workspace(case).is_proved
 
 

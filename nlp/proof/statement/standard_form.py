@@ -51,7 +51,7 @@ __all__ = ["Condition", "Kind", "StandardForm", "is_in_home_mode", "standard_for
 
 #: Orders of the principal minors. Those of 4 and 5 exclude boxes twice as wide as the determinant alone; smaller ones
 #: gain nothing more, as few poses have so many small singular values.
-_ORDERS = (4, 5, 6)
+_ORDERS: tuple[int, ...] = (4, 5, 6)
 #: Those for condition numbers, whose bound of the largest eigenvalue is no number, and part by which two of its entries
 #: are one but for rounding.
 _ORDERS_OF_RATIO, _SAME = (1, 2, 3, 4), 1e-9
