@@ -44,7 +44,7 @@ SKIPPED = {"seconds", "version", "source", "units", "case", "model", "parameters
 COUNTED = {"boxes", "open"}
 #: Number of boxes that makes no difference: a choice among equal boxes.
 FEW = 8
-#: Numbers at which a search ends, within its gap beyond the best value known, this gap, and by how much two ends differ.
+#: Numbers at which a search ends, within its gap beyond the best value known; the gap; by how much two ends may differ.
 SEARCHED, GAP, APART = {"bound", "reached"}, 0.1, 0.2
 #: Keys of numbers that depend on the scale of variables and loops, which is the robot's size.
 SCALED = frozenset({"multiplier", "eigenvalues", "stationarity", "feasibility", "boxes", "open", "iterations"})
