@@ -264,12 +264,8 @@ def ask_import(found: dict[str, Answer], folder: Path, case: Path) -> None:
     xml = model / "robot.xml"
     out = folder / "imported.toml"
     status, _, err = command("import", str(xml), "--platform", "platform", "--out", str(out), "--force")
-    rows: list[list[float | str]] = []
-    if out.exists():
-        lines = (line for line in out.read_text(encoding="utf-8").splitlines() if not line.startswith("#"))
-        numbers = r"([-+]?\d+\.?\d*(?:e[-+]?\d+)?)"
-        rows.extend([number_or_word(each) for each in re.split(numbers, line)] for line in lines)
-    found["import"] = Answer(status, rows, err)
+    read = tomllib.loads(out.read_text(encoding="utf-8")) if out.exists() else {}
+    found["import"] = Answer(status, read, err)
 
 
 def csv_of(tables: Tables, file: Path, *, timed: bool) -> Path:
