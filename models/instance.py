@@ -110,7 +110,7 @@ class RobotInstance:
         distances: (d, 1) left sides of the equations that follow from those of the loops.
         joints: the joints of the model's limbs.
         links: their links.
-        size: (1, 1) a length of the order of the robot's.
+        size: (1, 1) characteristic size of the robot, length.
         reference: values of the parameters at which the sizes of the loop equations are taken; None for expressions.
     """
 
@@ -215,13 +215,13 @@ def sizes_at(
 
 
 def length_of(model: Model, values: Sequence[float]) -> float:
-    """Return a length of the order of a robot's, by which its lengths become plain numbers.
+    """Return the characteristic size of a robot, length.
 
-    Tolerances on lengths, areas and products of lengths are parts of it, so that no answer depends on a unit.
+    Tolerances on lengths, areas and products of lengths are relative to this size. So no result depends on the unit.
 
     Args:
-        model: the robot.
-        values: (n,) of its parameters.
+        model: robot.
+        values: (n,) values of its parameters.
     """
     function = ca.Function("size", [Substitution.identity(model).parameters], [ca.densify(_size_of(model))])
     found = float(function(list(values)))
@@ -229,7 +229,7 @@ def length_of(model: Model, values: Sequence[float]) -> float:
 
 
 def _size_of(model: Model) -> SX:
-    """Return a length of the order of a robot's in the symbols of its parameters."""
+    """Return the characteristic size (1, 1) of a robot, length, in the symbols of its parameters."""
     if model.size is not None:
         return model.size
     lengths = [ca.vec(item.symbol) for item in model.parameters if item.dimension is Dimension.LENGTH]

@@ -74,7 +74,7 @@ class Model(Whole, Shown):
         generic: its ranks at almost all dimensions and poses; None for a robot given by its rows.
         structure: the structure of each path of joints; empty for a robot given by its rows.
         length_unit: unit of the parameters' typical lengths, such as ``m``; empty for proportions in any unit.
-        size: (1, 1) a length of the order of the robot's own, of its parameters; that of the parameters if left out.
+        size: (1, 1) characteristic size of the robot, length; None for the norm of the parameters that are lengths.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,

@@ -43,9 +43,9 @@ EACH_KIND = (
     "3-puu", "3-rps", "3-upu", "6-pus", "6-rus", "delta", "delta-parallelogram", "exechon", "five-bar", "planar-3-rrr",
     "spherical-3-rrr", "tricept",
 )  # fmt: skip
-#: Four of these that differ most: members, cranks, parallelograms, and a robot in a plane.
+#: Four robots of EACH_KIND: limbs with constraint wrenches, cranks, parallelograms, planar.
 FEW_KINDS = ("3-rps", "6-rus", "delta-parallelogram", "five-bar")
-#: Shipped cases that differ most: one leg layout each, limits of every kind, several tasks, several poses, loops.
+#: Six shipped cases of different kinds: leg layouts, limits, several tasks, several poses, closed loops.
 FEW_CASES = ("camera-mount", "flight-simulator", "haptic-device", "paper-4.1-helical", "paper-4.4-max", "reachy-mini")
 #: The command line in this process: exit status, standard output, standard error.
 Run = Callable[..., tuple[int, str, str]]
@@ -72,7 +72,7 @@ starts = 2
 
 
 def soaked(values: Iterable[Any], kept: Collection[Any]) -> list[Any]:
-    """Values of a test's parameter: those that are kept here, and the others of their kind for ``make soak``."""
+    """Parameter values of a test. Values that are not in ``kept`` run in ``make soak`` only."""
     return [each if each in kept else pytest.param(each, marks=pytest.mark.soak) for each in values]
 
 

@@ -181,10 +181,10 @@ def home_of(words: RobotWords, values: Mapping[str, float] = MappingProxyType({}
 
 
 def _size(lengths: Sequence[SX], robot: HomeRobot) -> SX:
-    """Return a length of the order of the robot's, smooth and positive for all dimensions but zero.
+    """Return the characteristic size of a robot (1, 1), length: smooth, and positive for nonzero dimensions.
 
-    It is the root of the sum of the squares of the dimensions that are lengths, and of the largest coordinate of a
-    joint that is left without these; 1 where all are at the origin.
+    The size is the norm of all dimensions that are lengths and of the largest literal coordinate in the robot's file.
+    A robot without any of these has size 1.
     """
     points = ca.veccat(SX(0), *[joint.point for joint in robot.joints])
     is_length = np.array([item.kind is Dimension.LENGTH for item in robot.words.dimensions.values()], dtype=bool)
@@ -193,9 +193,7 @@ def _size(lengths: Sequence[SX], robot: HomeRobot) -> SX:
     left = function(np.where(is_length, 0.0, robot.typical)[own]).full()
     written = float(np.abs(left[np.isfinite(left)]).max(initial=0.0))
     parts = [*lengths, *([SX(written)] if written else [])]
-    if not parts:
-        return SX(1)
-    return ca.norm_2(ca.vertcat(*parts)) if lengths else SX(written)
+    return ca.norm_2(ca.vertcat(*parts)) if parts else SX(1)
 
 
 def _limbs(group: int, words: LimbWords, names: Mapping[str, SX]) -> list[Limb]:

@@ -106,7 +106,7 @@ def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading, si
         statics: motions of its platform at the pose.
         rotation: (3, 3) platform to world coordinates.
         loading: loads on its platform, and its motions.
-        size: (1, 1) a length of the order of the robot's.
+        size: (1, 1) characteristic size of the robot, length.
     """
     cases = tuple(_case_forces(case, statics, rotation) for case in loading.cases)
     speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion, size)

@@ -112,10 +112,10 @@ class Motion:
     angular: float = 0.0
 
     def length(self, size: Length) -> float | Length:
-        """Return the length by which angular velocities count beside velocities: the ratio of both speeds.
+        """Return the length that makes angular velocities comparable with linear ones: the ratio of both speeds.
 
         Args:
-            size: of the robot, length, which is taken where one speed alone is stated.
+            size: characteristic size of the robot, length; the result where only one of both speeds is stated.
         """
         return self.linear / self.angular if self.linear and self.angular else size
 

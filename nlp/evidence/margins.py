@@ -58,25 +58,24 @@ class Margin:
         return self.limit - self.value if self.bound == "max" else self.value - self.limit
 
 
-def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation) -> FloatArray:
-    """Return the distances (k,) of a point from all sides, negative outside, of the measured numbers themselves.
+def measured_slack(nlp: Nlp, x: FloatArray, at: Linearisation, numbers: Sequence[float] | None = None) -> FloatArray:
+    """Return the distances (k,) of a point from all sides, negative outside, from measured singular values.
 
-    A program keeps singular values and condition numbers by estimates on the safe side, which may be beyond a limit
-    where the number is not.
+    The constraints of a program estimate singular values and condition numbers on the safe side. So an estimate may be
+    beyond a limit that the measured value keeps.
 
     Args:
         nlp: the program.
         x: (n,) the point.
         at: the program there.
+        numbers: measured numbers of the constraints, from :func:`measured_numbers`; computed if left out.
     """
-    slack = at.slack.copy()
-    estimated = [(j, side.constraint) for j, side in enumerate(at.sides) if side.constraint is not None]
-    chosen = [(j, k) for j, k in estimated if nlp.program.constraints[k].measure is not None]
-    if chosen:
-        constraints = [nlp.program.constraints[k] for _, k in chosen]
-        numbers = _measured(nlp, x, constraints, np.full(len(chosen), np.nan))
-        for (j, _), constraint, number in zip(chosen, constraints, numbers, strict=True):
-            value = float(constraint.reading.to_value(SX(number)))
+    slack, constraints = at.slack.copy(), nlp.program.constraints
+    sides = [(j, side.constraint) for j, side in enumerate(at.sides) if side.constraint is not None]
+    for j, k in sides:
+        if constraints[k].measure is not None:
+            numbers = measured_numbers(nlp, x) if numbers is None else numbers
+            value = float(constraints[k].reading.to_value(SX(numbers[k])))
             slack[j] = -float(nlp.sides.sign[j] * (value - nlp.sides.limit[j]) * at.per_unit[j])
     return slack
 
@@ -107,7 +106,8 @@ def margins_of(nlp: Nlp, x: FloatArray, *, optimal: bool) -> list[Margin]:
     active = set(at.active())
     mu, _ = multipliers(at, sorted(active)) if optimal else (np.zeros(len(at.sides)), 0.0)
     gained = -mu * nlp.sides.sign * at.per_unit * nlp.objective_scale * nlp.sign
-    measured, slack = measured_numbers(nlp, x), measured_slack(nlp, x, at)
+    measured = measured_numbers(nlp, x)
+    slack = measured_slack(nlp, x, at, measured)
     rows = []
     for j, side in enumerate(nlp.sides.sides):
         if side.constraint is None:
@@ -201,6 +201,5 @@ def _measured(nlp: Nlp, x: FloatArray, constraints: Sequence[Constraint], values
             measured[k] = float(value)
     for k, each in enumerate(constraints):
         if each.measure is not None and each.spectral is not None:
-            function = ca.Function("matrix", [nlp.program.x, nlp.program.p], [ca.densify(each.spectral.matrix)])
-            measured[k] = each.measure(function(x, nlp.arguments).full(), np.zeros(3))
+            measured[k] = each.measured_at((nlp.program.x, nlp.program.p), (x, nlp.arguments))
     return measured

@@ -40,7 +40,7 @@ from ...models import (
     matrix_from_quaternion_vector,
     reason_for_zero_row,
 )
-from ...models.instance import sizes_at
+from ...models.instance import length_of, sizes_at
 from ...models.values import dataclass
 from ..case.case import Case
 from ..case.choices import check_no_choice
@@ -234,6 +234,11 @@ def reference_of(case: Case) -> tuple[float, ...]:
     """
     values = [value for item in case.model.parameters for value in case.components(item.name)]
     return tuple((each.lower + each.upper) / 2 if isinstance(each, Free) else float(each) for each in values)
+
+
+def robot_length(case: Case) -> float:
+    """Return the characteristic size of a case's robot, length, at the middle of each range of its parameters."""
+    return length_of(case.model, reference_of(case))
 
 
 def _name_of(unknown: Unknown, pose: int) -> str:

@@ -16,7 +16,7 @@ from casadi import SX
 from ...models import Dimension, RobotInstance
 from ...models.instance import length_of
 from ..case.case import Case
-from ..case.limits.constraint import BoundedConstraint, Constraint, PairFamily
+from ..case.limits.constraint import BoundedConstraint, PairFamily
 from ..case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ..errors import CaseError
 from .places import SymbolTable
@@ -25,10 +25,10 @@ from .repeated import without_repeated
 #: Largest number of values at which every pair is a constraint from the start: of 3 poses there are 6 pairs. With 4, a
 #: choice among them takes half of the time already.
 _ALL_PAIRS = 3
-#: How well a limit that depends on fixed numbers alone must hold, in parts of itself. A proof allows more: a pose
-#: that refutes a claim is beyond the limit where it is evaluated.
+#: Relative tolerance on a limit that involves only fixed parameters. A proof allows more, so that an evaluation at a
+#: pose that refutes a claim shows the violated limit too.
 _ROUNDING = 1e-10
-#: And in parts of the sizes of its numbers, near 0: they are written with a dozen digits.
+#: The same for a limit near 0, relative to the robot's size: parameters are written with a dozen digits.
 _WRITTEN = 1e-11
 
 
@@ -78,7 +78,10 @@ def limit_constraints(
     constant: list[BoundedConstraint] = []
     for item, varies, value in zip(limits, free, values, strict=True):
         estimated = item.constraint.spectral is not None and not varies
-        number = _measured(item.constraint, x, p, table) if estimated else value
+        number = value
+        if estimated:
+            measured = item.constraint.measured_at((x, p), (0.0, table.values))
+            number = float(item.constraint.reading.to_value(SX(measured)))
         least = _WRITTEN * _size_of(item, size)
         low, high = (max(_ROUNDING * abs(end), least) for end in (item.lower, item.upper))
         holds = item.lower - low <= number <= item.upper + high
@@ -90,21 +93,12 @@ def limit_constraints(
     return LimitConstraints(tuple(varying), tuple(constant), deferred, fixed)
 
 
-def _measured(constraint: Constraint, x: SX, p: SX, table: SymbolTable) -> float:
-    """Return the value of a constraint on eigenvalues that no variable changes, from the number itself."""
-    spectral, measure = constraint.spectral, constraint.measure
-    if spectral is None or measure is None:
-        return math.nan
-    matrix = ca.Function("matrix", [x, p], [ca.densify(spectral.matrix)])(0, table.values).full()
-    return float(constraint.reading.to_value(SX(measure(matrix, np.zeros(3)))))
-
-
 def _size_of(item: BoundedConstraint, length: float) -> float:
-    """Return the size of numbers such as a limit's that are written with a dozen digits; 0 where it is not known.
+    """Return the typical size of a limited quantity; 0 where it is not known.
 
     Args:
         item: the limit.
-        length: of the order of the robot's.
+        length: characteristic size of the robot.
     """
     reading = item.constraint.reading
     if reading.dimension is Dimension.LENGTH:

@@ -245,11 +245,8 @@ def _certify(
     if not several:
         statement = Statement(is_minimum=above is not None and case.tasks[0].sense is Sense.MAX)
         nlp = replace(nlps[0], sense=Sense.MIN) if statement.is_minimum else nlps[0]
-        own = _in_half(
-            lambda: (
-                given.outcomes[0].own if given is not None and nlp is nlps[0] else solve_program(nlp, search, jobs=jobs)
-            )
-        )
+        is_solved = given is not None and nlp is nlps[0]
+        own = given.outcomes[0].own if given and is_solved else _in_half(lambda: solve_program(nlp, search, jobs=jobs))
         writer = TreeRecord() if with_proof and nlp.n else None
         certificate = certify_one(own, case.tasks[0].name, writer)
         if certificate.was_beaten and certificate.x is not None:
@@ -345,13 +342,13 @@ def _certify_from_poses(
         progress=None if progress is None else progress(solution.case.tasks[0].name),
     )
     if x is None and options.above is None and certificate.status is CertificateStatus.PROVED:
-        # Its point keeps the limits at these poses alone: the bound holds, and has no design beside it.
+        # The incumbent keeps the limits at these poses only, so the bound has no design to be compared with.
         certificate = replace(
             certificate,
             status=CertificateStatus.INCOMPLETE,
             x=None,
             incumbent=math.nan,
-            reason=f"the solve before found no design that keeps the limits over the {solution.case.limits_over}",
+            reason=f"the solve found no design that keeps the limits over the {solution.case.limits_over}",
         )
     return Certified(solution, (certificate,), None, Statement(), None)
 

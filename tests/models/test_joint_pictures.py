@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from builders import Array
+from builders import Array, soaked
 from mujoco_robots import Oracle
 from robot_files import every_joint
 from robot_gallery import GALLERY, RANKS, table
@@ -23,7 +23,7 @@ from screwsynth.nlp.output.report.report import report_of
 QUICK = (
     "3-rps", "3-upu", "6-rus", "delta", "delta-parallelogram", "exechon", "spherical-3-rrr", "tricept", "tripteron",
 )  # fmt: skip
-ROBOTS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.soak) for name in GALLERY]
+ROBOTS = soaked(GALLERY, QUICK)
 
 
 @cache

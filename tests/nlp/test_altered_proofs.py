@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from builders import case_from, output_of, refusal_of
+from builders import case_from, output_of, refusal_of, soaked
 from hexapods import hexapod_text
 
 from screwsynth.nlp import InputError
@@ -342,9 +342,7 @@ SLOW = ("machines", "loops", "cranks", "singular", "weighted sum", "worst case")
 PLATFORMS = ("task", "above", "weighted sum", "worst case", "worst loss")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(each, marks=pytest.mark.soak) if each in SLOW else each for each in KINDS]
-)
+@pytest.mark.parametrize("name", soaked(KINDS, [each for each in KINDS if each not in SLOW]))
 def test_an_altered_field_is_rejected_or_changes_nothing_but_a_true_bound(cli: Run, folder: Path, name: str) -> None:
     faults, tries, _ = faults_of(cli, folder, name, 1)
     assert not faults

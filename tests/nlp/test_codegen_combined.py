@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, case_from, refusal_of
+from builders import Run, case_from, refusal_of, soaked
 
 from screwsynth.nlp import Case, Limits, Nlp, RateShare, formulate, load_case, solve
 from screwsynth.nlp.embedding.loops import find_loops
@@ -118,9 +118,7 @@ def curvatures(c: Embedded, nlp: Nlp, close: float) -> None:
         assert np.max(np.abs(c.curvature(x, k, multipliers, work) - wanted)) <= close * np.max(np.abs(wanted))
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.soak) if "sum over" in name else name for name in CASES]
-)
+@pytest.mark.parametrize("name", soaked(CASES, [name for name in CASES if "sum over" not in name]))
 def test_the_c_has_the_programs_values_and_its_optimum(name: str, embed: Callable[..., Embedded]) -> None:
     case = table(*CASES[name])
     subject, c = find_subject(case), embed(case, "-O0")

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from builders import case_from, starter_tables
+from builders import case_from, soaked, starter_tables
 from generated import BAD_INPUT, COMPILERS, INFEASIBLE, OK, OTHER_ASSEMBLY, RANGE_END, written
 
 from screwsynth.nlp import Case, CompiledCase, load_case, load_compiled, shipped_cases
@@ -100,7 +100,7 @@ def test_the_judgement_of_a_soak_sees_what_is_wrong(compiled: Compiled, ticks: M
     assert ticks.judged(robot, tick, found)["false infeasible"].sum() > 20
 
 
-@pytest.mark.parametrize("name", ["camera-mount", pytest.param("flight-simulator", marks=pytest.mark.soak)])
+@pytest.mark.parametrize("name", soaked(["camera-mount", "flight-simulator"], ["camera-mount"]))
 def test_the_worst_case_of_other_tasks_is_theirs(name: str, compiled: Compiled, ticks: ModuleType) -> None:
     own = compiled(name)
     robot, p = ticks.Robot(own, 1.0), tasks(own, 60, 3) * 10 ** np.linspace(-3, 3, 60)[:, None]

@@ -11,7 +11,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Array, case_from, turn_about
+from builders import Array, case_from, soaked, turn_about
 from casadi import SX
 from generated import COMPILERS, written
 from measures import circle_joints, leg_measures
@@ -138,7 +138,7 @@ def limited(rng: np.random.Generator) -> Case:
     return case_from(tables, "random")
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(12, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("count", soaked([2, 12], [2]))
 def test_no_solve_with_random_limits_answers_a_wrong_design(count: int) -> None:
     rng, answers = np.random.default_rng(count), 0
     for _ in range(count):

@@ -10,7 +10,7 @@ import ezdxf
 import mujoco
 import numpy as np
 import pytest
-from builders import EACH_KIND, Array, case_from, rows_of, starter, starter_text, turn_about
+from builders import EACH_KIND, Array, case_from, rows_of, soaked, starter, starter_text, turn_about
 from link_robots import CASE, COUPLING, ROBOT
 from mujoco_trees import Tree
 
@@ -74,7 +74,7 @@ def work_rates(J: Array) -> Array:
     return squares / np.abs(squares).max()
 
 
-@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.soak), 1])
+@pytest.mark.parametrize("seed", soaked([0, 1], [1]))
 def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None:
     for name in ROBOTS:
         nlp, x = placed(name, seed)
@@ -168,7 +168,7 @@ def rebuilt(tables: dict[str, object], nlp: Nlp) -> Nlp:
     return formulate(case)
 
 
-@pytest.mark.parametrize("name", [*SOME, *[pytest.param(each, marks=pytest.mark.soak) for each in OTHERS]])
+@pytest.mark.parametrize("name", soaked([*SOME, *OTHERS], SOME))
 def test_a_case_of_an_imported_robot_has_the_same_rows_and_is_exported_again(name: str, tmp_path: Path) -> None:
     for seed in (0, 1):
         nlp, x = placed(name, seed)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, case_from, starter, starter_tables, starter_text
+from builders import Run, case_from, soaked, starter, starter_tables, starter_text
 
 from screwsynth.nlp import (
     Case,
@@ -68,7 +68,7 @@ def test_evaluate_writes_json_and_csv_with_the_values_of_the_program(tmp_path: P
         assert len(rows) > 5
 
 
-@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.soak)], ids=["one", "others"])
+@pytest.mark.parametrize("names", soaked([SIX[:1], SIX[1:]], [SIX[:1]]), ids=["one", "others"])
 def test_tasks_poses_and_limits_together(names: tuple[str, ...]) -> None:
     for name in names:
         case = narrow(starter(name))
@@ -93,7 +93,7 @@ def test_tasks_poses_and_limits_together(names: tuple[str, ...]) -> None:
             assert pytest.approx(F, rel=1e-12) == found.F
 
 
-@pytest.mark.parametrize("names", [SIX[:1], pytest.param(SIX[1:], marks=pytest.mark.soak)], ids=["one", "others"])
+@pytest.mark.parametrize("names", soaked([SIX[:1], SIX[1:]], [SIX[:1]]), ids=["one", "others"])
 def test_sensitivities_are_those_of_solved_neighbours(names: tuple[str, ...]) -> None:
     for name in names:
         case = replace(narrow(starter(name)), search=Search(starts=1))

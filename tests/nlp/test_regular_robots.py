@@ -9,7 +9,7 @@ import casadi as ca
 import flint
 import numpy as np
 import pytest
-from builders import case_from, starter_tables
+from builders import case_from, soaked, starter_tables
 from hexapods import bounds_of, smallest, values_of
 from kernel_enclosures import enclose
 from numpy_engine import first_order
@@ -103,9 +103,7 @@ def matrices(problem: Problem) -> Iterator[RankMatrix]:
         yield problem.unactuated
 
 
-@pytest.mark.parametrize(
-    "name", [each if each in ROBOTS[:4] else pytest.param(each, marks=pytest.mark.soak) for each in ROBOTS]
-)
+@pytest.mark.parametrize("name", soaked(ROBOTS, ROBOTS[:4]))
 def test_no_box_is_regular_in_which_a_closed_point_is_not(name: str) -> None:
     problem = problem_of(name, 0.1, 20)
     for matrix in matrices(problem):
@@ -186,7 +184,7 @@ def test_forms_hold_against_balls_of_200_bits() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["6-rss", "6-pus", "delta", *(pytest.param(each, marks=pytest.mark.soak) for each in ("6-rus", "spherical-3-rrr"))],
+    soaked(["6-rss", "6-pus", "delta", "6-rus", "spherical-3-rrr"], ["6-rss", "6-pus", "delta"]),
 )
 def test_unknowns_in_closed_form_close_their_loops_where_the_limb_reaches(name: str) -> None:
     model = build_model(name)

@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import EACH_KIND, case_from, starter_tables
+from builders import EACH_KIND, case_from, soaked, starter_tables
 from measures import scaled
 from numpy_engine.first_order import enclose
 from numpy_engine.quadratic_models import multipliers
@@ -161,9 +161,7 @@ def solved(case: Case) -> tuple[object, Iterable[Line | TextTable]]:
 
 def some(*names: str, robots: Iterable[str] = ROBOTS) -> object:
     """Names of robots of which only these are fast."""
-    return pytest.mark.parametrize(
-        "name", [*names, *(pytest.param(each, marks=pytest.mark.soak) for each in robots if each not in names)]
-    )
+    return pytest.mark.parametrize("name", soaked([*names, *(each for each in robots if each not in names)], names))
 
 
 @pytest.mark.parametrize("name", ROBOTS)

@@ -13,7 +13,7 @@ import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, soaked
 from hexapods import HEXAPOD, bounds_of, case_of_legs, clearance, hexapod_text, smallest, subject_of, values_of
 from typer.testing import CliRunner
 
@@ -521,7 +521,7 @@ def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme:
     return np.linalg.norm(position - points[:, :3], axis=1), np.arcsin(np.linalg.norm(vector, axis=0) / 2)
 
 
-@pytest.mark.parametrize("joint", [0.0005, pytest.param(0.05, marks=pytest.mark.soak)])
+@pytest.mark.parametrize("joint", soaked([0.0005, 0.05], [0.0005]))
 def test_errors_of_the_pose_are_bounded_for_every_machine_within_its_tolerances(case: Case, joint: float) -> None:
     angle = Free(-math.radians(10), math.radians(10))
     workspace = Workspace((Free(-2.0, 2.0), Free(-2.0, 2.0), Free(18.0, 22.0)), Turns(TurnKind.ANY_AXIS, (angle,)))

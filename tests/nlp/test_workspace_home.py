@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import EACH_KIND, case_from
+from builders import EACH_KIND, case_from, soaked
 
 from screwsynth.models import Dimension
 from screwsynth.models.joints.closedform import closed_form
@@ -146,7 +146,7 @@ def check_agreement(name: str, part: float, degrees: float, limit: float) -> int
     return count
 
 
-@pytest.mark.parametrize("name", ["3-prs", *(pytest.param(each, marks=pytest.mark.soak) for each in EACH_KIND)])
+@pytest.mark.parametrize("name", soaked(["3-prs", *EACH_KIND], ["3-prs"]))
 def test_limits_are_judged_alike_with_a_proof_and_without(name: str) -> None:
     count, sides = check_agreement(name, 0.02, 5, 0.01), 2 * len(build_model(name).quantities[0].owners)
     assert count == sides if name in ("3-prs", "five-bar") else count >= sides

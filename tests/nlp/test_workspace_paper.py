@@ -18,10 +18,9 @@ from builders import case_from, output_of, refusal_of, unbroken, unpacked
 from hexapods import clearance, hexapod_text, subject_of, values_of
 
 from screwsynth.models import FloatArray, hexapod, three_upu
-from screwsynth.models.instance import length_of
 from screwsynth.nlp import Case, Free, Task
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.program.layout import reference_of
+from screwsynth.nlp.program.layout import robot_length
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.checker.fractions import tangent_ends
 from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, read_proof
@@ -362,7 +361,7 @@ def test_forms_hold_exact_rows(robot: Legs, kind: TurnKind) -> None:
     claim = rank(root, robot)
     M, A, E = claim._matrices(claim.closed(lower, upper))
     case, free = six_legs(robot), list(np.flatnonzero(root.upper > root.lower))
-    length = length_of(case.model, reference_of(case))
+    length = robot_length(case)
     rounded, bent = 0, 0
     for k in range(12):
         e = rng.uniform(-1, 1, 6) if k % 2 else np.sign(rng.normal(size=6))

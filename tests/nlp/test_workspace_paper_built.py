@@ -16,13 +16,12 @@ from hexapods import hexapod_text
 
 import screwsynth.cases
 from screwsynth.models import FloatArray, hexapod
-from screwsynth.models.instance import length_of
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Limits, Task
 from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import UncoveredError
-from screwsynth.nlp.program.layout import reference_of
+from screwsynth.nlp.program.layout import robot_length
 from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, read_proof
 from screwsynth.nlp.proof.checker.workspace import check
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
@@ -409,7 +408,7 @@ def test_changes_of_rows_hold_those_of_machines() -> None:
         scale = {TurnKind.AXIS: squares[:, 0], TurnKind.ROLL_PITCH_YAW: squares.prod(axis=1)}
         s = scale.get(kind, squares.sum(axis=1) - 2)[:, None, None]
         case = case_with(some.exact)
-        length = length_of(case.model, reference_of(case))
+        length = robot_length(case)
 
         def rows(base: FloatArray, arm: FloatArray) -> FloatArray:
             """The rows of machines at the poses, times the scale."""

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from functools import cached_property, partial
 from operator import mul
 from typing import TypeAlias, TypeVar
 
+import casadi as ca
+import numpy as np
 from casadi import SX
 
 from ....models import Dimension, FloatArray
@@ -189,6 +191,18 @@ class Constraint:
     spectral: Spectral | None = None
     call: Call | None = None
     stated: tuple[float, float] | None = None
+
+    def measured_at(self, symbols: Sequence[SX], point: Sequence[FloatArray | Sequence[float] | float]) -> float:
+        """Return the measured number of a constraint with ``measure`` and ``spectral``; NaN for another constraint.
+
+        Args:
+            symbols: variables and arguments of the program.
+            point: their values.
+        """
+        if self.measure is None or self.spectral is None:
+            return math.nan
+        matrix = ca.Function("matrix", list(symbols), [ca.densify(self.spectral.matrix)])
+        return self.measure(matrix(*point).full(), np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)

@@ -186,7 +186,7 @@ def largest_eigenvalue(A: SX) -> SX:
 
 @cache
 def _estimate(formula: Callable[[SX], SX], n: int) -> ca.Function:
-    """Return an estimate of a matrix (n, n) as a function: a call copies its thousands of operations at once."""
+    """Return an estimate as a function of a matrix (n, n): a call copies thousands of operations at once."""
     A = SX.sym("A", n, n)
     return ca.Function("estimate", [A], [formula(A)])
 

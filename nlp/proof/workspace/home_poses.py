@@ -15,7 +15,6 @@ import numpy as np
 from casadi import SX
 
 from ....models import Dimension, FloatArray
-from ....models.instance import length_of
 from ...case.case import Case
 from ...case.task import Sense
 from ...errors import EvaluationError
@@ -23,7 +22,7 @@ from ...evidence.closing import closed_in_place
 from ...evidence.mobility import mobility_of
 from ...evidence.singularities import is_passive_singular
 from ...evidence.state import evaluate
-from ...program.layout import Layout, reference_of
+from ...program.layout import Layout, robot_length
 from ...program.nlp import Nlp
 from ..statement.claims import REACH, Claim, claims_of
 from ..statement.machine import JointErrors
@@ -37,8 +36,7 @@ from .verdict import Outcome, slack_of
 #: Reasons for a claim that poses of other assemblies leave open.
 _ELSEWHERE = "poses beyond the limit are known only in other assemblies of the joints than home's"
 _WIDER = "the bound holds in every assembly of the joints, and the value reached is one of home's"
-#: Part of itself by which a value in home's assembly differs from that of the same assembly in a search, and part of
-#: the size of such numbers below which values are 0.
+#: Relative difference of two values in one assembly mode, and part of the quantity's size below which values are 0.
 _SAME, _SMALL = 1e-6, 1e-6
 
 
@@ -128,9 +126,9 @@ class Homes:
         return replace(opened if is_other else each, reached=reached)
 
     def _size_of(self, claim: Claim) -> float:
-        """Return the size of a claim's numbers: for lengths the robot's, for F the size without cancellation."""
+        """Return the typical size of a claim's quantity: the robot's for lengths; for F, F without cancellation."""
         if claim.reading.dimension is Dimension.LENGTH:
-            return length_of(self.case.model, reference_of(self.case)) ** claim.reading.power
+            return robot_length(self.case) ** claim.reading.power
         return self._nlp.objective_size if claim.name.partition(" ")[0] == "F" else 1.0
 
     def _closed(self, y: FloatArray, errors: JointErrors | None) -> FloatArray | None:

@@ -16,7 +16,6 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, frozen_array
-from ....models.instance import length_of
 from ....models.joints.closedform import ClosedForm
 from ....models.statics import statics_hindrance
 from ...case.case import Case
@@ -30,7 +29,7 @@ from ...evidence.dependent import dependent_of, robot_size
 from ...interruption import is_requested, one_call, one_search, within
 from ...path.arcs import PLANES
 from ...path.path import ProgrammedPath
-from ...program.layout import reference_of
+from ...program.layout import robot_length
 from ..boxes.search import TOO_SMALL, Effort, Order, joined, some
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim, dependent_claims, searched_claims
@@ -158,7 +157,7 @@ def judge_path(
         InputError: the path has rotations that are not covered, there is no C kernel, or knots are too many, or of a
             robot of which the positions of actuators are not known.
     """
-    cover, box, workspace = covered(path, length_of(case.model, reference_of(case)))
+    cover, box, workspace = covered(path, robot_length(case))
     case = replace(case, workspace=workspace)
     case.fixed_parameters("a path is judged with fixed dimensions")
     check_determined_joints(case.model, "path", case.source)

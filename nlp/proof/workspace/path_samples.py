@@ -16,7 +16,6 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, axis_angle_from_matrix
-from ....models.instance import length_of
 from ....models.joints.closedform import ClosedForm
 from ...case.case import Case
 from ...case.motors import Motor, MotorNumber
@@ -26,7 +25,7 @@ from ...errors import InputError, UncoveredError
 from ...evidence.inverse import InversePoses, inverse
 from ...path.path import Poses
 from ...path.sampling import Points, spread_points, twists_at
-from ...program.layout import reference_of
+from ...program.layout import robot_length
 from ..statement.claims import Claim, searched_claims
 from ..statement.motors import in_motion, motor_claims, speed_claims
 from .numbers.expressions import Expressions
@@ -165,7 +164,7 @@ def _numbers(
     if joints is None and closed.model.unknowns:
         return (), tuple(dict.fromkeys(keys))
     is_rpy = case.workspace is not None and case.workspace.turns.kind is TurnKind.ROLL_PITCH_YAW
-    size = length_of(case.model, reference_of(case))
+    size = robot_length(case)
     box = pose_box(case.workspace) if case.workspace is not None and is_rpy else covered(judged.path, size)[1]
     turns = [axis_angle_from_matrix(each) for each in poses.rotations]
     pairs = zip(poses.positions, poses.rotations, turns, strict=True)

@@ -165,8 +165,8 @@ class Goal(NamedTuple):
         """Return the bounds at which a box is closed, and at which the search ends.
 
         Args:
-            value: the smallest one known.
-            size: that the number has elsewhere.
+            value: smallest known value.
+            size: largest known size of the quantity.
         """
         met = value - self.gap - self.part * max(abs(value), _NEAR_ZERO * size) if math.isfinite(value) else math.inf
         if self.limit is None or value < self.limit - self.slack:
@@ -219,7 +219,7 @@ class SmallestValues(LoopRule):
         """Return bounds of boxes, and take note of small values in them."""
         self._number.levels = self._levels()
         found = self.examined(boxes)
-        if not self._sizes.all():  # of numbers that are 0 wherever they are known, that of their bounds
+        if not self._sizes.all():  # The bounds give a size to a quantity whose known values are all 0.
             bounds = np.where(np.isfinite(found.smallest), np.abs(found.smallest), 0.0)
             self._sizes = np.maximum(self._sizes, bounds.max(axis=0, initial=0.0))
         self._try(found)

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 _OUTWARDS = 1 + 1e-12
 #: Length, in parts of the robot's, or angle, that counts as small.
 _SMALL = 0.01
-#: The same of a turn of the platform that follows: often 0 at all poses, so that a narrow gap takes many boxes.
+#: The same for a dependent rotation of the platform. It is often 0 at all poses, where a narrow gap takes many boxes.
 _SMALL_TURN = 0.03
 #: Poses from whose first-order changes the size is taken beside which terms of second order are small.
 _POSES, _SEED = 32, 0
@@ -226,10 +226,9 @@ class Machines:
         """
         problem = self.family.problem
         sizes = {LENGTH: small * problem.length, Reading(Dimension.ANGLE): small}
-        # Of the pose's coordinates that follow, those that are no lengths are angles, or half of these.
-        coordinates = {LENGTH: small * problem.length}
         least = [
-            coordinates.get(claim.reading, _SMALL_TURN) if claim.is_coordinate else sizes.get(claim.reading, 0.0)
+            # Rotations about the pose's axes are angles, or halves of angles in Cayley vectors.
+            _SMALL_TURN if claim.is_coordinate and claim.reading != LENGTH else sizes.get(claim.reading, 0.0)
             for claim in claims
         ]
         goals = [goal_of(claim, gap * own, gap, is_enough=is_enough) for claim, own in zip(claims, least, strict=True)]

@@ -23,14 +23,13 @@ from casadi import SX
 
 from .....models import FloatArray, rate_relations
 from .....models.arrays import values_at
-from .....models.instance import length_of
 from .....models.statics import freedoms_of
 from ....case.case import Case
 from ....case.loads import Motion
 from ....case.motors import Motor, MotorNumber
 from ....case.task import Sense
 from ....case.workspace import TurnKind
-from ....program.layout import reference_of
+from ....program.layout import robot_length
 from ...enclosure.forms import Forms
 from ...statement.claims import Claim
 from ..ranks.krawczyk import ROUNDING
@@ -67,7 +66,7 @@ class Motors(Number):
             raise NotJudgedError("loops demand relations of its actuators' rates, for which there is no rule")
         motor, R = claims[0].motor or Motor(), posed.turned[0]
         self._actuator, self._length, self._is_six = motor.place, problem.length, freedoms_of(case.model) == 6
-        self._size = length_of(case.model, reference_of(case))
+        self._size = robot_length(case)
         self._numbers = [_parts_of(case, claim) for claim in claims]
         self._parts = list(dict.fromkeys(itertools.chain(*self._numbers)))
         A, D = posed.driven_rows

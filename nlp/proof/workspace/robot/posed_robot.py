@@ -19,13 +19,12 @@ import numpy as np
 from casadi import SX
 
 from .....models import FloatArray, Model, frozen_array
-from .....models.instance import length_of
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
 from ....case.workspace import TurnKind
 from ....evidence.closed_loops import DEPENDENT, Loops, closed_from_home
-from ....program.layout import reference_of
+from ....program.layout import robot_length
 from ...statement.machine import INSIDE, JointErrors
 from ...statement.tolerance import BuiltModel
 from .path_cover import PathCover
@@ -240,7 +239,7 @@ def build_problem(
     middle[list(dependent)] = start[list(dependent)]
     moved = loops.all_closed(middle[:, None], dependent)[:, 0]
     start = moved if loops.is_closed(moved) else start
-    size = length_of(case.model, reference_of(case))
+    size = robot_length(case)
     _check_left_out(loops, start, dependent, box, size)
     chosen = _chosen(posed, model, start, needed, size)
     posed = posed.reduced(chosen)
