@@ -29,7 +29,7 @@ def turns_between(angles: FloatArray, order: Order, between: Between) -> FloatAr
     """Return the sizes (n,) of the turns from each of n + 1 orientations to the next, radians.
 
     Args:
-        angles: (n + 1, 3) of the orientations.
+        angles: (n + 1, 3) angles of the orientations, radians.
         order: convention of the angles.
         between: motion between two of them: a shortest turn, or three angles that change.
     """

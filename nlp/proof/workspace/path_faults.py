@@ -118,7 +118,7 @@ class _Sampled:
         """Return the first place known at which a number is less than a value, and the number; None without one.
 
         Args:
-            k: of the number.
+            k: index of the number.
             least: the value.
             worst: a place at which the number is less, which may be between two points; None where none is known.
         """

@@ -297,7 +297,7 @@ def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Work
 
     Args:
         path: the path.
-        size: of the robot, length.
+        size: characteristic size of the robot, length.
 
     Raises:
         InputError: it has no motion, or its rotations are not covered.

@@ -61,7 +61,7 @@ class PosedRobot:
         dependent: places among these of the coordinates that follow from the others.
         centre: (n,) the middle of the workspace, with unknowns and errors of 0.
         size: (n,) by which coordinates are comparable: half ranges, sizes of the unknowns, and the tolerance.
-        length: of the order of the robot's, by which rotations are multiplied.
+        length: characteristic size of the robot, factor of the angular velocities.
         position: (3, 1) the platform's origin, length.
         rotation: (3, 3) platform to world coordinates.
         scale: (1, 1) by which rows are multiplied that are linear in the rotation; at least 1.

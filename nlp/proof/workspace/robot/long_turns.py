@@ -190,9 +190,9 @@ def _held(angles: FloatArray, order: Order, frame: PathFrame) -> Tangents | None
     """Return the rotation of a path that does not turn in its frame, as roll, pitch and yaw in the world.
 
     Args:
-        angles: (N + 1, 3) at the knots.
-        order: of their convention.
-        frame: of the path.
+        angles: (N + 1, 3) angles at the knots, radians.
+        order: convention of the angles.
+        frame: frame of the path.
 
     Returns:
         None where it turns, or where roll, pitch and yaw are large or not well determined.

@@ -43,19 +43,19 @@ def place_in(piece: FloatArray, part: float) -> Place:
 
 
 class _CircleRows(NamedTuple):
-    """A coordinate in the world of A arcs, ``centre + size r cos(a - phase) + rise (height + s change)``.
+    """A world coordinate of A arcs: ``centre + size r cos(a - phase) + rise (height + s change)``.
 
     Attributes:
-        axis: of the coordinate.
+        axis: index of the coordinate.
         which: (A,) indices of the arcs.
         centre: (A,) coordinate of the centre, at the height 0.
-        size: (A,) at most 1.
-        phase: (A,) radians.
-        rise: (A,) of the coordinate by the height.
-        height: (A,) at the start, along the axis of the plane.
-        change: (A,) of the height.
-        off: (A,) sizes of the numbers from which centre and height are computed.
-        off_change: (A,) those of the change of the height.
+        size: (A,) amplitude per radius, at most 1.
+        phase: (A,) phase, radians.
+        rise: (A,) derivative of the coordinate with respect to the height.
+        height: (A,) height at the start, along the normal of the arc's plane.
+        change: (A,) change of the height along the arc.
+        off: (A,) sum of the magnitudes from which centre and height are computed, for bounds of rounding.
+        off_change: (A,) the same sum for the change of the height.
     """
 
     axis: int

@@ -83,7 +83,7 @@ class Tangents:
 
     Attributes:
         angles: (N + 1, 3) at the knots.
-        off: by which each angle may be off.
+        off: error bound of each angle, radians.
     """
 
     angles: FloatArray
@@ -177,7 +177,7 @@ class LinearAngles:
         angles: (N + 1, 3) at the knots.
         order: of the convention.
         reference: of the vectors.
-        frame: in which the angles are; None for the world.
+        frame: frame of the angles; None for the world.
     """
 
     angles: FloatArray
@@ -266,10 +266,10 @@ def varying(angles: FloatArray, order: Order, reference: Reference, frame: PathF
     The product of the units i and j is the unit of the bits of both, exclusive, but for its sign.
 
     Args:
-        angles: (n, 3) at points.
-        order: of their convention.
-        reference: of the vectors.
-        frame: in which the angles are; None for the world.
+        angles: (n, 3) angles at points, radians.
+        order: convention of the angles.
+        reference: reference of the vectors.
+        frame: frame of the angles; None for the world.
     """
     factors = [(axis, angles[:, axis].any()) for axis in order]
     if frame is not None:
