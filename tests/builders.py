@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.nlp import Case, case_from_tables, shipped_cases
 from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.case.toml import toml_document
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofClaim
 from screwsynth.nlp.starter.text import starter_case
 
@@ -127,6 +128,28 @@ def shipped_tables(name: str) -> dict[str, Any]:
     """The tables of a shipped case, without what its results are expected to be."""
     tables = tomllib.loads(find_case(name).read_text(encoding="utf-8"))
     return {key: value for key, value in tables.items() if key not in ("expect", "published")}
+
+
+def case_tables(robot: str | Mapping[str, Any], /, **tables: Any) -> dict[str, Any]:  # noqa: ANN401 - tables of a case
+    """The tables of a shipped case, of a robot's starter, or of a ``[robot]`` table, with some of them replaced.
+
+    A table that is None is left out.
+    """
+    if isinstance(robot, str):
+        found = shipped_tables(robot) if robot in shipped_cases() else starter_tables(robot)
+    else:
+        found = {"robot": dict(robot)}
+    return {key: value for key, value in (found | tables).items() if value is not None}
+
+
+def case_of(robot: str | Mapping[str, Any], /, **tables: Any) -> Case:  # noqa: ANN401 - tables of a case
+    """The case of :func:`case_tables`."""
+    return case_from(case_tables(robot, **tables), robot if isinstance(robot, str) else "case")
+
+
+def case_file(folder: Path, tables: Mapping[str, Any], name: str = "case.toml") -> Path:
+    """Write the tables of a case into a folder, and return the file's path."""
+    return saved(folder / name, toml_document(tables))
 
 
 def saved(path: Path, text: str) -> Path:
