@@ -30,6 +30,7 @@ from ...models import (
     axis_angle_from_matrix,
     matrix_from_axis_angle,
 )
+from ...models.instance import length_of
 from ...models.values import dataclass
 from ..program.nlp import Nlp
 from ..program.program import Kernel, tuple_of
@@ -318,4 +319,4 @@ def _sizes_of_unknowns(model: Model, parameters: FloatArray) -> FloatArray:
 def _size(model: Model) -> float:
     """Return a length of the order of the robot's own: of its lengths and of the place of its home."""
     lengths = [value for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
-    return float(np.linalg.norm([*lengths, *model.home])) or 1.0
+    return float(np.linalg.norm([*lengths, *model.home])) or length_of(model, model.typical.tolist())

@@ -4,9 +4,13 @@ import math
 from pathlib import Path
 
 import numpy as np
-from builders import saved
+from builders import case_of, saved
 
 from screwsynth.nlp import Case, Outcome, judge_workspace, load_case
+from screwsynth.nlp.evidence.assembly import assembly_at, unknowns_from_home
+from screwsynth.nlp.evidence.workingmode import Posture
+from screwsynth.nlp.path.reader import read_path
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
 
 #: A linear Delta, mm: radius of the rails, half width of a parallelogram, radius of the platform, height of the rods.
 RAIL, HALF, RADIUS, HEIGHT = 234.8, 30.0, 0.0, 408.301310309
@@ -94,3 +98,76 @@ position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 0.9, m
         judged = judge_workspace(load_case(str(saved(tmp_path / "case.toml", text))), time_limit=5)
         assert judged.regularity.outcome is Outcome.REFUTED
         assert "below six at all dimensions and poses" in judged.regularity.reason
+
+
+def test_the_condition_number_of_a_planar_robot_on_a_path_is_proved_in_each_unit(tmp_path: Path) -> None:
+    """Where an inverse of J is zero, rounding decides nothing: in metres all was proved, in micrometres not."""
+    found = []
+    for unit in (UNITS["um"], UNITS["in"], UNITS["m"]):
+        rail, at = [1000 / unit, -300 / unit, 0], [175 / unit, 303.1088913245535 / unit, 0]
+        slide = f"{{ type = 'P', at = {rail}, axis = 'y', actuated = true }}"
+        turns = ", ".join(f"{{ type = 'R', at = {each}, axis = 'z' }}" for each in (rail, at))
+        robot = f"name = 'planar'\nhome = [0, 0, 0]\n[[limb]]\nrepeat = 3\njoints = [{slide}, {turns}]\n"
+        saved(tmp_path / "robot.toml", robot.replace("repeat = 3", "repeat = { count = 3 }"))
+        case = case_of(
+            {"file": str(tmp_path / "robot.toml"), "characteristic_length": 350 / unit},
+            units={"length": "any"},
+            pose={"position": [0, 0, 0]},
+            task=[{"sense": "max", "axis": [1, 0, 0], "pitch": math.inf}],
+            limits={"condition_number": {"max": 2.6, "length": 350 / unit}},
+        )
+        points = [[0, 0], [24, 12], [-18, 30], [6, -24]]
+        rows = "".join(f"{x / unit!r},{y / unit!r},0,{t}\n" for t, (x, y) in enumerate(points))
+        judged = judge_path(case, read_path(saved(tmp_path / "path.csv", "x,y,z,t\n" + rows), case.units))
+        (number,) = [each for each in judged.extremes if each.name == "condition_number"]
+        assert number.outcome is Outcome.PROVED, (unit, number)
+        found.append(number.bound)
+    np.testing.assert_allclose(found, found[0], rtol=1e-9)
+
+
+def orthogonal_slides(folder: Path, unit: float) -> Case:
+    """Three slides along the axes whose home is the origin, each with a rod of parallel struts to the platform."""
+    limbs = []
+    for k in range(3):
+        axis, other = np.roll([1.0, 0, 0], k), np.roll([0, 1.0, 0], k)
+        rail = 240 * axis / unit
+        rods = [
+            "{ joints = ["
+            + ", ".join(
+                f"{{ type = 'S', at = {(each + side * 30 * other / unit).tolist()} }}" for each in (rail, 0 * rail)
+            )
+            + "] }"
+            for side in (1, -1)
+        ]
+        slide = f"{{ type = 'P', at = {rail.tolist()}, axis = {axis.tolist()}, actuated = true }}"
+        limbs.append(f"[[limb]]\njoints = [{slide}]\nbranch = [{', '.join(rods)}]\n")
+    saved(folder / "robot.toml", f"name = 'slides'\nhome = [0, 0, 0]\n{''.join(limbs)}")
+    reach = 60 / unit
+    text = f"""
+[units]
+length = "any"
+[robot]
+file = "robot.toml"
+parameters = {{}}
+[pose]
+position = [{-reach!r}, {reach!r}, {reach!r}]
+[[task]]
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+"""
+    return load_case(str(saved(folder / "case.toml", text)))
+
+
+def test_the_assembly_of_a_robot_whose_home_is_the_origin_is_the_same_in_every_unit(tmp_path: Path) -> None:
+    found = []
+    for unit in UNITS.values():
+        case = orthogonal_slides(tmp_path, unit)
+        at = np.array([-60.0, 60.0, 60.0]) / unit
+        unknowns = unknowns_from_home(case.model, np.zeros(0), np.concatenate([np.zeros(3), at]))
+        assembly = assembly_at(case.model, Posture(np.zeros(0), unknowns, np.eye(3), at))
+        found.append((assembly.is_home, assembly.nearness))
+    assert all(is_home for is_home, _ in found)
+    nearness = [near for _, near in found]
+    assert 0.1 < nearness[0] <= 1
+    np.testing.assert_allclose(nearness, nearness[0], rtol=1e-6)

@@ -216,7 +216,12 @@ def solved(A: AffineMatrix, D: AffineMatrix) -> tuple[AffineMatrix, NDArray[np.b
     known = holds & np.isfinite(Q).all(axis=(1, 2))
     bound, Q = (np.where(known[:, None, None], each, 0.0) for each in (bound, Q))
     right = bound @ Q * UP
-    X = np.linalg.solve(np.eye(bound.shape[1]) - bound, right) * (1 + ENLARGED) + ENLARGED * right
+    wider = bound * (1 + ENLARGED)
+    X = np.linalg.solve(np.eye(bound.shape[1]) - wider, right)
+    # Small entries have the rounding of the largest one before these steps.
+    for _ in range(2):
+        X = right + wider @ np.maximum(X, 0.0)
+    X *= 1 + ENLARGED
     # (I - B) X >= B Q with a spectral radius below 1: X is a bound.
     known = known & (X >= 0).all(axis=(1, 2)) & ((bound @ X) * UP + right <= X).all(axis=(1, 2))
     return AffineMatrix(Y, T, (rest + X) * UP), np.asarray(known), shares

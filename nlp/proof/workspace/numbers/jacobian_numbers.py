@@ -48,6 +48,8 @@ _OUTWARDS = 1 + 1e-12
 _ZERO = 1e-14
 #: Part by which a computed bound of an inverse is made larger, so that it surely is one.
 _ROOM = 1e-6
+#: Steps after which each entry of such a bound has few roundings of its own size, and not of that of the largest entry.
+_REFINED = 2
 #: Squarings in the norm of an inverse: its n is 2 to this power. Two equal singular values make it 2 % too large.
 _SQUARINGS = 4
 #: Signs (6, 32) of the errors of legs: a pair of opposite signs has one size.
@@ -280,7 +282,11 @@ def _left_inverses(rows: _Rows) -> tuple[FloatArray, FloatArray, FloatArray, Flo
         known &= np.isfinite(E).all(axis=(1, 2))
         E = np.where(known[:, None, None], E, 0.0)
         # |(I + E)^-1 C| <= X with (I - B) X >= |C|: an M-matrix with a nonnegative solution.
-        X = inverses(eye - E) @ size * (1 + _ROOM)
+        wider = E * (1 + _ROOM)
+        X = inverses(eye - wider) @ size
+        for _ in range(_REFINED):
+            X = size + wider @ np.maximum(X, 0.0)
+        X *= 1 + _ROOM
         known &= (X >= 0).all(axis=(1, 2)) & (size <= X - E @ X).all(axis=(1, 2))
         # Rows are divided by 1 + d with |d| <= spread of the sizes.
         change = C[:, None] * rows.bend[:, :, None] - slopes @ C[:, None]

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 _ZERO = 1e-14
 #: Part by which a computed bound of an inverse is made larger, so that it surely is one.
 _ROOM = 1e-6
+#: Steps after which each entry of such a bound has few roundings of its own size, and not of that of the largest entry.
+_REFINED = 2
 #: More than underflow can cost a sum or a product.
 _TINY = 1e-290
 
@@ -224,8 +226,11 @@ def solved(A: Quadratics, D: Quadratics) -> Quadratics:
         left += 4 * ROUNDING * (Z.size + _product(E.size, Y.size)) + _TINY
         right = np.concatenate([left, np.ones((n, 1, len(known)))], axis=1) * (1 + ROUNDING)
         size = np.where(np.isfinite(E.size), E.size, 0.0)
-        V = inverses((eye[:, :, None] - size).transpose(2, 0, 1)).transpose(1, 2, 0)
-        V = _product(V, right) * (1 + _ROOM)
+        wider = size * (1 + _ROOM)
+        V = _product(inverses((eye[:, :, None] - wider).transpose(2, 0, 1)).transpose(1, 2, 0), right)
+        for _ in range(_REFINED):
+            V = right + _product(wider, np.maximum(V, 0.0))
+        V *= 1 + _ROOM
         known &= (V >= 0).all(axis=(0, 1)) & (right <= (V - _product(size, V)) * (1 - ROUNDING)).all(axis=(0, 1))
         rest = V[:, :-1]
     rest = np.where(known & np.isfinite(rest) & np.isfinite(E.size).all(axis=(0, 1)), rest, np.inf)
