@@ -220,7 +220,7 @@ def answers(name: str, unit: str, *, parameters: bool) -> dict[str, Answer]:
         proof = folder / "proof.zip"
         ask("workspace", "workspace", str(cases["pose"]), "--gap", str(GAP), "--time", "2", "--proof", str(proof))
         if proof.exists():
-            status, text, err = command("verify-proof", str(proof))
+            status, text, err = command("verify-proof", str(proof), "--all")
             found["verify-proof"] = Answer(status, text, err)
         ask("tolerance", "workspace", str(cases["tolerance"]), "--gap", str(GAP), "--time", "2")
         ask("path", "path", str(cases["pose"]), "--along", str(path), "--time", "5")

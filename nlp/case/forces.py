@@ -9,6 +9,7 @@ with translations alone; else a motion with both at their largest may be none th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -19,7 +20,7 @@ from ...models.parts import Dimension
 from ...models.statics import DrivenJoint, Statics, driven_joints, freedoms_of
 from .loads import LoadCase, Loading, Motion
 
-#: Keeps sizes of vectors smooth where they are 0: they are too large by at most this, in the unit of the vector.
+#: Keeps sizes of vectors smooth where they are 0: they are too large by at most this part of the usual size.
 _SMOOTH = 1e-12
 
 
@@ -108,14 +109,14 @@ def forces_at(model: Model, statics: Statics, rotation: SX, loading: Loading, si
         loading: loads on its platform, and its motions.
         size: (1, 1) characteristic size of the robot, length.
     """
-    cases = tuple(_case_forces(case, statics, rotation) for case in loading.cases)
-    speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion, size)
     joints = driven_joints(model)
+    cases = tuple(_case_forces(case, statics, rotation, joints, size) for case in loading.cases)
+    speeds = SX(0, 1) if loading.motion is None else _speeds(model, statics, loading.motion, joints, size)
     known = [] if loading.stiffness is None else loading.stiffness_of([joint.name for joint in joints])
     return PosedForces(joints, statics, cases, speeds, SX(known) if known else SX(0, 1))
 
 
-def _case_forces(case: LoadCase, statics: Statics, rotation: SX) -> CaseForces:
+def _case_forces(case: LoadCase, statics: Statics, rotation: SX, joints: Sequence[DrivenJoint], size: SX) -> CaseForces:
     """Return the forces under one load case."""
     motions = ca.horzsplit(statics.numerators)
     wrench = case.wrench(rotation)
@@ -126,25 +127,34 @@ def _case_forces(case: LoadCase, statics: Statics, rotation: SX) -> CaseForces:
             arm = rotation @ SX([float(value) for value in load.point])
             spread += ca.vertcat(
                 *[
-                    load.any_force * _size(each[3:] + ca.cross(each[:3], arm)) + load.any_moment * _size(each[:3])
-                    for each in motions
+                    load.any_force * _size(each[3:] + ca.cross(each[:3], arm), reach * statics.divisor)
+                    + load.any_moment * _size(each[:3], reach / size * statics.divisor)
+                    for each, reach in zip(motions, _reaches(joints, size), strict=True)
                 ]
             )
     return CaseForces(case, wrench, centre, spread, statics.divisor)
 
 
-def _speeds(model: Model, statics: Statics, motion: Motion, size: SX) -> SX:
+def _reaches(joints: Sequence[DrivenJoint], size: SX) -> list[SX]:
+    """Return the way of a platform of the robot's size for a unit way of each actuator: 1 for slides, else the size."""
+    return [size if joint.dimension is Dimension.ANGLE else SX(1) for joint in joints]
+
+
+def _speeds(model: Model, statics: Statics, motion: Motion, joints: Sequence[DrivenJoint], size: SX) -> SX:
     """Return the largest speeds (a, 1) of the actuators."""
     is_legs = freedoms_of(model) == 6 and not model.actuators
     rates = statics.rows if is_legs else statics.rates(SX(motion.length(size)))
     return ca.vertcat(
-        *[motion.linear * _size(row[3:].T) + motion.angular * _size(row[:3].T) for row in ca.vertsplit(rates)]
+        *[
+            motion.linear * _size(row[3:].T, 1 / reach) + motion.angular * _size(row[:3].T, size / reach)
+            for row, reach in zip(ca.vertsplit(rates), _reaches(joints, size), strict=True)
+        ]
     )
 
 
-def _size(vector: SX) -> SX:
-    """Return the size of a vector (3, 1), smooth where it is 0."""
-    return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + _SMOOTH**2)
+def _size(vector: SX, usual: SX) -> SX:
+    """Return the size of a vector (3, 1), smooth where it is 0, with a size (1, 1) that it usually has."""
+    return SX(0) if vector.is_zero() else ca.sqrt(ca.sumsqr(vector) + (_SMOOTH * usual) ** 2)
 
 
 def dimension_of_measure(measure: str, joint: DrivenJoint) -> Dimension:

@@ -1,10 +1,12 @@
 """Robots of literal numbers: the same robot in other units of length has the same verdicts."""
 
+import json
 import math
 from pathlib import Path
 
 import numpy as np
-from builders import case_of, saved
+import pytest
+from builders import Run, case_file, case_of, case_tables, output_of, saved
 
 from screwsynth.nlp import Case, Outcome, judge_workspace, load_case
 from screwsynth.nlp.evidence.assembly import assembly_at, unknowns_from_home
@@ -171,3 +173,26 @@ def test_the_assembly_of_a_robot_whose_home_is_the_origin_is_the_same_in_every_u
     nearness = [near for _, near in found]
     assert 0.1 < nearness[0] <= 1
     np.testing.assert_allclose(nearness, nearness[0], rtol=1e-6)
+
+
+def test_the_force_that_a_limit_bounds_is_that_of_the_load_in_every_unit(cli: Run, tmp_path: Path) -> None:
+    """Minors of six rows are ninth powers of a length: beside them nothing is small by itself."""
+    found, out = [], tmp_path / "out.json"
+    for unit in UNITS.values():
+        tables = case_tables(
+            {"model": "stewart-gough", "layout": "octahedral"}
+            | {"parameters": {"x1": 300 / unit, "x2": 120 / unit, "x3": 0, "x4": 5}},
+            units={"length": "any", "force": "N"},
+            pose={"position": [10 / unit, 20 / unit, 220 / unit]},
+            task=[{"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}],
+            load=[{"any": {"force": 20, "moment": 300 / unit}, "point": [0, 0, 50 / unit]}],
+            motion={"linear": 50 / unit, "angular": 20},
+            limits={"actuator_force": {"max": 400}, "actuator_speed": {"max": 1e3 / unit}},
+        )
+        output_of(cli("evaluate", str(case_file(tmp_path, tables)), "--json", str(out)))
+        data = json.loads(out.read_text(encoding="utf-8"))
+        force, speed = (row["value"] for row in data["limits"])
+        assert force == pytest.approx(max(each["largest"] for each in data["loads"][0]["actuators"]), rel=1e-9)
+        assert speed == pytest.approx(max(each["value"] for each in data["speeds"]), rel=1e-9)
+        found.append([force, speed * unit])
+    np.testing.assert_allclose(found, [found[0]] * len(UNITS), rtol=1e-9)
