@@ -7,13 +7,14 @@ inside. Compared are exit statuses, every number and text of their JSON, and the
 ``pieces`` or ``leaves`` to the given part, other numbers to 1e-12, all but times and versions. Of searches that a time
 limit ends nothing is compared but that they are. The last line has the CPU time of new over old: median, 90 %, largest.
 
-The cases are the shipped ones, all robots of the gallery at home and over small envelopes, and the tables of
-docs/certificate.md and docs/workspace.md.
+The cases are the shipped ones, all robots of the gallery at home and over small envelopes, the tables of
+docs/certificate.md and docs/workspace.md, tool paths, ranges of coordinates, and tables of designs.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import math
 import resource
@@ -30,7 +31,7 @@ from screwsynth.models.catalog import gallery_names
 from screwsynth.nlp import build_model, shipped_cases
 
 #: Words of names of values that may differ: times, and what names the program itself.
-_MASKED = ("seconds", "version", "versions", "history")
+_MASKED = ("seconds", "times", "version", "versions", "history")
 #: Words of names of counts.
 _COUNTS = ("boxes", "pieces", "leaves")
 _NEAR = 1e-12
@@ -62,12 +63,14 @@ class Item:
     Attributes:
         name: what it is called.
         case: name of a shipped case, or text of a case file.
-        commands: arguments without the program; CASE, JSON, PROOF and FOLDER stand for paths.
+        commands: arguments without the program; CASE, JSON, TABLE, PROOF, FOLDER and PATH stand for paths.
+        path: name and text of the file PATH of a tool path.
     """
 
     name: str
     case: str
     commands: list[list[str]]
+    path: tuple[str, str] = ("", "")
 
 
 @dataclass
@@ -84,6 +87,9 @@ def items() -> Iterator[Item]:
     yield from solved_items()
     yield from gallery_items()
     yield from workspace_items()
+    yield from path_items()
+    yield from range_items()
+    yield from design_items()
 
 
 def solved_items() -> Iterator[Item]:
@@ -138,6 +144,80 @@ def workspace_items() -> Iterator[Item]:
         yield Item(f"workspace {name}", name, [proof, ["verify-proof", "PROOF", "CASE"]])
 
 
+def path_items() -> Iterator[Item]:
+    """Yield tool paths: programs and tables, with arcs, turns, times, motors and loops; proved, refuted and open."""
+    limits = "[limits]\nleg_length = { min = 15, max = 40 }\ncondition_number = { max = CONDITION, length = 10 }\n"
+    turned = "{ angle = { min = -20, max = 20 } }"
+    plain, tight = (_hexapod(turned, limits.replace("CONDITION", each)) for each in ("30", "1.75"))
+    motors = "[[load]]\nany = { force = 20 }\npoint = [0, 0, 5]\n[motion]\nlinear = 5\n"
+    moved = _hexapod(turned, motors + "[limits]\nactuator_force = { max = 40 }\nactuator_speed = { max = 10 }\n")
+    straight = "G20 F60\nG1 X-2 Y-1 Z19\nG1 X2 Y1 Z21\nG1 X0 Y2 Z20\nM2\n"
+    arcs = "G20 F60\nG1 X2 Y0 Z20\nG2 X-2 Y0 I-2 J0\nG3 X2 Y0 Z21 I2 J0\nG18 G2 X0 Z19 R3\nM2\n"
+    angles = "G20 F60\nG1 X0 Y0 Z20 A0 B0 C0\nG1 X1 Y1 Z20 A8 B-5 C10\nG1 X-1 A-8 C-10\nM2\n"
+    rows = ((0, 0, 20, 0, 0, 0), (1, -1, 20.5, 5, -3, 8), (-1, 1, 19.5, -5, 4, -8), (0, 0, 20, 0, 0, 10))
+    table = "x,y,z,roll,pitch,yaw\n" + "".join(f"{','.join(map(str, row))}\n" for row in rows)
+    timed = "x,y,z,roll,pitch,yaw,t\n" + "".join(f"{','.join(map(str, row))},{2 * k}\n" for k, row in enumerate(rows))
+    for name, text, path, more in (
+        ("lines", plain, ("p.ngc", straight), ["--csv", "TABLE"]),
+        ("arcs", plain, ("p.ngc", arcs), ["--csv", "TABLE", "--within", "0.01"]),
+        ("angles", plain, ("p.ngc", angles), ["--csv", "TABLE", "--step", "0.5"]),
+        ("rotations", plain, ("p.csv", table), []),
+        ("one axis a turn", plain, ("p.csv", table), ["--between", "slerp"]),
+        ("times", plain, ("p.csv", timed), ["--csv", "TABLE"]),
+        ("refuted", tight, ("p.ngc", arcs), []),
+        ("motors", moved, ("p.ngc", arcs), []),
+        ("motors and times", moved, ("p.csv", timed), []),
+        ("rough gap", moved, ("p.csv", table), ["--gap", "0.2"]),
+    ):
+        yield Item(f"path {name}", text, [["path", "CASE", "--along", "PATH", "--json", "JSON", *more]], path)
+    yield Item("path of a case", "hexapod-pocket", [["path", "CASE", "--json", "JSON"]])
+    # Coordinates that a robot of fewer freedoms chooses, and their steps in parts of its size or in degrees.
+    for name, steps in (
+        ("delta", {"x": 1, "y": -1, "z": 1}), ("6-rus", {"x": 1, "y": -1, "z": 1, "roll": 2}),
+        ("3-rps", {"z": 1, "roll": 2, "pitch": -2}), ("five-bar", {"x": 1, "y": -1}),
+        ("planar-3-rrr", {"x": 1, "y": -1, "yaw": 3}), ("spherical-3-rrr", {"roll": 2, "pitch": -3, "yaw": 1}),
+    ):  # fmt: skip
+        model = build_model(name)
+        size = 0.01 * max(abs(each) for each in (*model.home, *(item.typical[0] for item in model.parameters)))
+        home = dict(zip("xyz", map(float, model.home), strict=True)) | dict.fromkeys(("roll", "pitch", "yaw"), 0.0)
+        units = {key: size if key in "xyz" else math.radians(1) for key in home}
+        rows = ([at + part * units[key] * steps.get(key, 0) for key, at in home.items()] for part in (0, 1, -0.5))
+        lines = [",".join(map(repr, [*row, float(k)])) for k, row in enumerate(rows)]
+        path = ("p.csv", "\n".join([",".join([*home, "t"]), *lines]) + "\n")
+        text, command = _robot(name, 0.02, 5), ["path", "CASE", "--along", "PATH", "--json", "JSON"]
+        yield Item(f"path {name}", text, [command], path)
+        if name == "3-rps":  # powers of a robot whose coordinates follow from others are left open
+            yield Item(
+                f"path {name} motors", f"{text}{motors}[limits]\nactuator_power = {{ max = 900 }}\n", [command], path
+            )
+
+
+def range_items() -> Iterator[Item]:
+    """Yield ranges of coordinates from a pose: straight legs with and without limits, cranks, loops, fewer freedoms."""
+    limits = "[limits]\nleg_length = { min = 15, max = 30 }\n"
+    for name, text in (
+        ("hexapod", _hexapod("{ angle = { min = -20, max = 20 } }", limits)),
+        ("hexapod-linuxcnc", "hexapod-linuxcnc"),
+        *((name, _robot(name, 0.02, 5)) for name in ("6-rus", "delta", "3-rps", "planar-3-rpr")),
+    ):
+        yield Item(f"range {name}", text, [["path", "CASE", "--range", "--json", "JSON", "--time", "600"]])
+
+
+def design_items() -> Iterator[Item]:
+    """Yield tables of designs: sweeps, a trade-off, fronts and a comparison."""
+    few = ["--starts", "4", "--json", "JSON"]
+    over = ["--over", "x1=10:14:5"]
+    yield Item("sweep", "paper-4.1-helical", [["sweep", "CASE", *over, *few, "--engine", "ipopt", "--out", "TABLE"]])
+    proved = ["sweep", "CASE", *over, *few, "--certify", "--engine", "ipopt", "--out", "TABLE"]
+    yield Item("sweep with proofs", "paper-4.1-helical", [proved])
+    along = ["tradeoff", "CASE", "--over", "limits.leg_length.max=32:40:3", *few, "--csv", "TABLE"]
+    yield Item("trade-off", "hexapod-machining", [along])
+    front = ["pareto", "CASE", "--goal", "max F", "--goal", "min limits.leg_length.max", "--points", "4", *few]
+    yield Item("front", "hexapod-machining", [[*front, "--csv", "TABLE"]])
+    robots = ["compare", "CASE", "case", "6-ups", "delta", "3-rps", *few, "--csv", "TABLE"]
+    yield Item("comparison", "drilling-spindle", [robots])
+
+
 def _hexapod(rotation: str, more: str = "") -> str:
     """Return LinuxCNC's hexapod with a workspace."""
     return _HEXAPOD.format(rotation=rotation, more=more)
@@ -167,6 +247,10 @@ def _robot(name: str, part: float = 0.0, degrees: float = 0.0) -> str:
 def run(program: Path, item: Item, folder: Path) -> Run:
     """Run an item's commands with one program."""
     paths = {"JSON": folder / "result.json", "PROOF": folder / "proof.json", "FOLDER": folder / "c", "CASE": item.case}
+    # Results have the name of a path's file: in the folder it is the same for both.
+    paths |= {"TABLE": folder / "table.csv", "PATH": item.path[0]}
+    if item.path[0]:
+        (folder / item.path[0]).write_text(item.path[1], encoding="utf-8")
     if "\n" in item.case:
         paths["CASE"] = folder / "case.toml"
         (folder / "case.toml").write_text(item.case, encoding="utf-8")
@@ -182,8 +266,19 @@ def run(program: Path, item: Item, folder: Path) -> Run:
             print(f"{item.name}: {program} {command[0]}: {done.stderr.strip()[-200:]}")
     if (folder / "result.json").exists():
         found.data.append(json.loads((folder / "result.json").read_text(encoding="utf-8")))
+    if (folder / "table.csv").exists():
+        with (folder / "table.csv").open(encoding="utf-8", newline="") as file:
+            found.data.append([{key: _number(cell) for key, cell in row.items()} for row in csv.DictReader(file)])
     found.data += [path.read_text(encoding="utf-8") for path in sorted((folder / "c").glob("*.[ch]"))]
     return found
+
+
+def _number(cell: str) -> float | str:
+    """Return the number of a cell, or its text."""
+    try:
+        return float(cell)
+    except ValueError:
+        return cell
 
 
 def differences(old: object, new: object, boxes: float, where: str = "") -> Iterator[str]:
