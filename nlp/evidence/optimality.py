@@ -279,10 +279,10 @@ def _step_on_optimal_set(nlp: Nlp, at: Linearisation, direction: FloatArray) -> 
 
 
 def _independent_directions(directions: FloatArray) -> list[FloatArray]:
-    """Return a basis (n,) each of the span of directions (k, n), with few components that are not zero."""
+    """Return a basis (n,) each of the span of directions (k, n), sparse, in the order of their first components."""
     _, sizes, rows = np.linalg.svd(directions, full_matrices=False)
     basis = echelon_basis(rows[sizes > _INDEPENDENT * sizes[0]])
-    return list(np.where(np.abs(basis) > _NEGLIGIBLE, basis, 0.0))
+    return sorted(np.where(np.abs(basis) > _NEGLIGIBLE, basis, 0.0), key=lambda row: int(np.argmax(row != 0)))
 
 
 def _changes_by_name(nlp: Nlp, direction: FloatArray) -> Mapping[str, float]:
