@@ -6,12 +6,13 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from builders import EACH_KIND, case_from, soaked, starter_tables
+from builders import EACH_KIND, case_file, case_from, case_tables, saved, soaked, starter_tables
 from measures import scaled
 from numpy_engine.first_order import enclose
 from numpy_engine.quadratic_models import multipliers
@@ -19,8 +20,20 @@ from numpy_engine.second_order import enclose_second
 
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED
-from screwsynth.nlp import Case, CertificateStatus, certify, json_data, judge_workspace, pareto, result_of, solve
+from screwsynth.nlp import (
+    Case,
+    CertificateStatus,
+    Outcome,
+    certify,
+    json_data,
+    judge_workspace,
+    load_case,
+    pareto,
+    result_of,
+    solve,
+)
 from screwsynth.nlp.case.reader import read_case
+from screwsynth.nlp.case.toml import toml_document
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.front.goals import program_of, read_goals
@@ -324,3 +337,71 @@ def test_a_front_is_the_same_in_every_unit(name: str) -> None:
         found = pareto(with_other_task(robot_function(name)(), unit), ["max F:task", "min F:other"], points=4, starts=4)
         fronts.append([point.values / f**2 for point in found.points])
     assert all(np.allclose(fronts[0], front, rtol=1e-6) for front in fronts)
+
+
+#: A linear Delta, mm: radius of the rails, half width of a parallelogram, radius of the platform, height of the rods.
+RAIL, HALF, RADIUS, HEIGHT = 234.8, 30.0, 0.0, 408.301310309
+#: Lengths of one unit, in millimetres.
+LENGTHS = {"um": 1e-3, "mm": 1.0, "in": 25.4, "m": 1e3, "km": 1e6}
+
+
+def point_at(azimuth: float, out: float, across: float, height: float, unit: float) -> list[float]:
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return [(c * out - s * across) / unit, (s * out + c * across) / unit, height / unit]
+
+
+def case_of_robot(
+    folder: Path, limbs: list[dict[str, Any]], home: list[float], box: list[tuple[float, float]], **tables: object
+) -> Case:
+    """The case of a robot file over a box of positions."""
+    saved(folder / "robot.toml", toml_document({"name": "literal", "home": home, "limb": limbs}))
+    tables |= {"pose": {"position": home}, "task": [{"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}]}
+    tables |= {"workspace": {"position": [{"min": low, "max": high} for low, high in box]}}
+    return load_case(str(case_file(folder, case_tables({"file": "robot.toml", "parameters": {}}, **tables))))
+
+
+def linear_delta(folder: Path, unit: float) -> Case:
+    """The case of the robot in a unit, with a workspace and limits of the same sizes."""
+    limbs = []
+    for k in range(3):
+        azimuth = 2 * math.pi * k / 3
+        ends = [
+            [point_at(azimuth, out, side, height, unit) for out, height in ((RAIL, HEIGHT), (RADIUS, 0))]
+            for side in (HALF, -HALF)
+        ]
+        rods = [{"joints": [{"type": "S", "at": end} for end in rod]} for rod in ends]
+        slide = {"type": "P", "at": point_at(azimuth, RAIL, 0, HEIGHT, unit), "axis": "z", "actuated": True}
+        limbs.append({"joints": [slide], "branch": rods})
+    limits = {"actuator_length": {"min": -90 / unit, "max": 90 / unit}}
+    box = [(-half / unit, half / unit) for half in (50, 50, 20)]
+    return case_of_robot(folder, limbs, [0, 0, 0], box, units={"length": "any"}, limits=limits)
+
+
+def test_a_robot_of_literal_numbers_has_the_same_verdicts_in_every_unit(tmp_path: Path) -> None:
+    found = [judge_workspace(linear_delta(tmp_path, unit), jobs=1) for unit in LENGTHS.values()]
+    ends = []
+    for judged in found:
+        assert judged.is_proved
+        assert {each.outcome for each in judged.extremes} == {Outcome.PROVED}
+        ends.append([each.bound for each in judged.extremes if each.name == "F"])
+    # F of a translation does not depend on the unit; its bounds are found to 1e-3.
+    assert len(ends[0]) == 2
+    np.testing.assert_allclose(ends, [ends[1]] * len(LENGTHS), rtol=2e-3)
+
+
+def test_a_structure_with_fewer_than_six_rows_is_singular_at_every_pose(tmp_path: Path) -> None:
+    feet = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1)]
+    ends = [(x, y, 0.4 * y - 0.5 * x, -0.5 * y + 0.1) for x, y in feet]
+    limbs = [
+        {"joints": [
+            {"type": "S", "at": [x, y, 0]},
+            {"type": "P", "at": [x, y, 0], "axis": [a, b, 1], "actuated": True},
+            {"type": "S", "at": [x + a, y + b, 1]},
+        ]}
+        for x, y, a, b in ends
+    ]  # fmt: skip
+    for count in (5, 3):
+        case = case_of_robot(tmp_path, limbs[:count], [0, 0, 1], [(-0.1, 0.1), (-0.1, 0.1), (0.9, 1.1)])
+        judged = judge_workspace(case, time_limit=5)
+        assert judged.regularity.outcome is Outcome.REFUTED
+        assert "below six at all dimensions and poses" in judged.regularity.reason

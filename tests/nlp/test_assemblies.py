@@ -1,17 +1,32 @@
-"""Working modes: the signs that tell them apart, and certificates that keep to home's or cover them all."""
+"""Assemblies, modes of operation and working modes: which one a point is in, and certificates that keep to them."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
-from builders import EACH_KIND, Run, case_from, output_of, unbroken
+from builders import EACH_KIND, Run, case_from, output_of, saved, unbroken
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import Case, CertificateStatus, Free, Nlp, Rotation, Task, certify, formulate, solve
-from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp import (
+    Case,
+    CertificateStatus,
+    Free,
+    Nlp,
+    Rotation,
+    Search,
+    Task,
+    certify,
+    evaluate,
+    formulate,
+    result_of,
+    solve,
+)
+from screwsynth.nlp.evidence.assembly import NEAR_SINGULAR, assembly_of
+from screwsynth.nlp.evidence.closing import closed_in_place, closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.evidence.workingmode import _about
@@ -20,12 +35,125 @@ from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.statement.standard_form import Kind, is_in_home_mode, standard_form
 from screwsynth.nlp.solver.certified import proof_of
 
+
+def free_pose(name: str, reach: float, turn: float = 2.0) -> Case:
+    """The gallery's robot with the pose free about home."""
+    model = robot_function(name)()
+    position = [Free(value - reach, value + reach) for value in model.home]
+    parameters = {item.name: item.typical[0] for item in model.parameters}
+    task = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
+    return Case(model, parameters, position, [task], Rotation(None, Free(-turn, turn)))
+
+
+def test_an_elbow_on_the_other_side_is_another_assembly() -> None:
+    nlp = formulate(free_pose("6-rus", 0.3))
+    x = closed_start(nlp)
+    here = assembly_of(nlp, x, evaluate(nlp, x))
+    assert here.is_home
+    assert here.nearness == pytest.approx(1)
+    assert here.sentences == ()
+    state = evaluate(nlp, x)
+    away = assembly_of(nlp, x, replace(state, position=state.position + 100))
+    assert not away.is_home
+    (own,) = nlp.program.places.unknowns
+    other = x.copy()
+    other[own[2]] += math.radians(110)  # beyond the crank's other position
+    other = close_equations(nlp, other)
+    assert np.abs(other - x).max() > 0.5
+    assert loops_are_closed(nlp, other)
+    found = assembly_of(nlp, other, evaluate(nlp, other))
+    assert not found.is_home
+    assert found.turned == ("3",)
+    assert found.nearness > NEAR_SINGULAR
+    assert [each.partition(":")[0] for each in found.sentences] == ["another working mode than at home"]
+
+
+def test_another_mode_of_a_three_upu_is_reached_past_a_singularity() -> None:
+    nlp = formulate(free_pose("3-upu", 0.4))
+    (rotation,) = nlp.program.places.rotations
+    q = list(rotation.q)  # type: ignore[union-attr]
+    found = []
+    for turn in ((0.5, 0.3, 0.0), (0.0, 0.4, 0.3), (0.3, 0.0, 0.6)):
+        x = nlp.start.copy()
+        x[q] = turn
+        x = close_equations(nlp, x)
+        if loops_are_closed(nlp, x) and np.linalg.norm(x[q]) > 0.1:
+            found.append(assembly_of(nlp, x, evaluate(nlp, x)))
+    assert found  # the platform is turned: its own mode only translates
+    for each in found:
+        assert each.nearness < NEAR_SINGULAR
+        assert each.brief
+        assert each.sentences[0].startswith("not reached from home without passing near a singularity")
+
+
+def test_poses_near_home_are_reached_from_there() -> None:
+    nlp = formulate(free_pose("3-rps", 0.3))
+    rng = np.random.default_rng(2)
+    (rotation,) = nlp.program.places.rotations
+    for _ in range(5):
+        x = nlp.start.copy()
+        x[2] += rng.uniform(-0.2, 0.2)
+        x[list(rotation.q)[:2]] = rng.uniform(-0.1, 0.1, 2)  # type: ignore[union-attr]
+        x = close_equations(nlp, x)
+        found = assembly_of(nlp, x, evaluate(nlp, x))
+        assert found.is_home
+        assert found.nearness > 0.5
+        assert not found.brief
+
+
+def test_joints_are_put_in_place_as_on_the_path_from_home() -> None:
+    nlp, rng, count = formulate(free_pose("6-rus", 0.6)), np.random.default_rng(0), 0
+    (rotation,), own = nlp.program.places.rotations, list(range(3))
+    for _ in range(12):
+        x = nlp.start.copy()
+        x[own] = nlp.lower[own] + (nlp.upper - nlp.lower)[own] * rng.random(3)
+        x[list(rotation.q)] = rng.uniform(-0.15, 0.15, 3)  # type: ignore[union-attr]
+        found = closed_in_place(nlp, x)
+        if found is not None:
+            assembly = assembly_of(nlp, found, evaluate(nlp, found))
+            assert assembly.is_home
+            count += 1
+    assert count > 1
+
+
+def test_results_say_that_an_answer_is_in_another_assembly() -> None:
+    case = replace(free_pose("6-rus", 0.1, 0.2), search=Search(starts=1))
+    solution = solve(case)
+    own = solution.outcomes[0].own
+    assert result_of(solution).robot.joints.assembly == ()
+    nlp, (places,) = own.nlp, own.nlp.program.places.unknowns
+    other = own.x.copy()
+    other[places[1]] += math.radians(100)
+    other = close_equations(nlp, other)
+    moved = replace(own, x=other, state=evaluate(nlp, other))
+    changed = replace(solution, outcomes=(replace(solution.outcomes[0], own=moved),))
+    (sentence,) = result_of(changed).robot.joints.assembly
+    assert sentence.startswith("another working mode than at home: limb 2 ")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sense", ["max", "min"])
+def test_every_start_of_six_robots_is_solved(sense: str) -> None:
+    robots = {"3-rps": ("rb", "rp"), "6-rus": ("rb", "rp", "crank"), "6-pus": ("rb", "rp"), "delta": ("rb", "arm")}
+    for name, free in (robots | {"tricept": ("rb", "rp"), "spherical-3-rrr": ()}).items():
+        case = free_pose(name, 0.15, 0.35)
+        parameters = {
+            item.name: Free(0.85 * item.typical[0], 1.15 * item.typical[0]) if item.name in free else item.typical[0]
+            for item in case.model.parameters
+        }
+        task = replace(case.tasks[0], sense=sense)
+        own = solve(replace(case, parameters=parameters, tasks=[task]), starts=24).outcomes[0].own
+        assert [start.status.name for start in own.starts] == ["CONVERGED"] * 24, name
+        assert loops_are_closed(own.nlp, own.x)
+
+
 DELTA = """
 title = "Delta"
-[units]
-length = "m"
-[robot]
-model = "delta"
+units.length = "m"
+robot.model = "delta"
+pose.position = [0, 0, -1.1]
+task = [{ name = "vertical", sense = "max", axis = [0, 1, 2], pitch = inf }]
+solve.starts = 2
 [robot.parameters]
 rb = { min = 0.12, max = 0.2 }
 rp = 0.044
@@ -33,31 +161,12 @@ arm = { min = 0.4, max = 0.6 }
 rod = 1.244
 w = 0.131
 tilt = 20
-[pose]
-position = [0, 0, -1.1]
-[[task]]
-name = "vertical"
-sense = "max"
-axis = [0, 1, 2]
-pitch = inf
-[solve]
-starts = 2
 """
 
 
-def delta() -> Case:
-    """A Delta at a fixed pose; its arms can bend either way."""
-    return case_from(DELTA, "delta")
-
-
-def free_pose(name: str, part: float) -> Case:
+def near_home(name: str, part: float) -> Case:
     """A robot of the gallery with the pose free about home, by a part of its size."""
-    model = robot_function(name)()
-    size = float(np.linalg.norm(model.home)) or 1.0
-    position = [Free(value - part * size, value + part * size) for value in model.home]
-    parameters = {item.name: item.typical[0] for item in model.parameters}
-    task = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
-    return Case(model, parameters, position, [task], Rotation(None, Free(-part, part)))
+    return free_pose(name, part * (float(np.linalg.norm(robot_function(name)().home)) or 1.0), part)
 
 
 def moved(nlp: Nlp) -> list[int]:
@@ -89,7 +198,7 @@ FEW = ("3-rrs", "6-pus", "planar-3-rrr", "spherical-3-rrr")
 )
 def test_signs_are_positive_from_home_on_and_negative_in_other_modes(names: tuple[str, ...]) -> None:
     for name in names:
-        nlp = replace(formulate(free_pose(name, 0.05)), in_home_mode=True)
+        nlp = replace(formulate(near_home(name, 0.05)), in_home_mode=True)
         model = nlp.program.model
         assert len({each.name for each in model.signs}) == len(model.signs)
         if not model.unknowns:
@@ -115,7 +224,7 @@ def test_screws_are_compared_in_any_unit_of_length() -> None:
 
 
 def test_a_hinge_whose_axes_point_against_each_other_is_no_assembly() -> None:
-    nlp = formulate(free_pose("planar-3-rrr", 0.05))
+    nlp = formulate(near_home("planar-3-rrr", 0.05))
     form = standard_form(nlp)  # for all modes
     assert sum(each.kind is Kind.ASSEMBLY for each in form.conditions) == 3
     x = closed_start(nlp)
@@ -126,7 +235,7 @@ def test_a_hinge_whose_axes_point_against_each_other_is_no_assembly() -> None:
 
 
 def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
-    case = delta()
+    case = case_from(DELTA, "delta")
     solution = solve(case)
     own = certify(solution, with_proof=True)
     assert own.certificate.status is CertificateStatus.PROVED
@@ -153,17 +262,14 @@ def test_a_certificate_speaks_of_the_modes_that_it_names() -> None:
 
 
 def test_certify_names_the_limbs_with_unknowns_first(tmp_path: Path, cli: Run) -> None:
-    path, proof = tmp_path / "delta.toml", tmp_path / "proof.json"
-    path.write_text(DELTA, encoding="utf-8")
+    path, proof = saved(tmp_path / "delta.toml", DELTA), tmp_path / "proof.json"
     out = output_of(cli("certify", str(path), "--proof", str(proof)))
     words = "limbs 1, 2, 3 need 1 joint position each and the loop equations, in"
     assert " ".join(out.split()).startswith(f"unknowns {words} home's working mode Delta certificate proved")
     out = output_of(cli("verify-proof", str(proof)))
     assert "within the limits of delta in home's working mode" in unbroken(out)
-    assert (
-        json.loads(output_of(cli("certify", str(path), "--all-assemblies", "--json", "-")))["certificate"]["status"]
-        == "proved"
-    )
+    every = json.loads(output_of(cli("certify", str(path), "--all-assemblies", "--json", "-")))
+    assert every["certificate"]["status"] == "proved"
     status, out, _ = cli("certify", str(path), "--all-assemblies", "--time", "1e-9")
     assert status == 1
     assert " ".join(out.split()).startswith(f"unknowns {words} every assembly Delta")
