@@ -21,9 +21,9 @@ import numpy as np
 from builders import Array
 from casadi import SX
 from mujoco_robots import Oracle, null_space
-from robot_gallery import LENGTH, table
+from robot_gallery import LENGTH, model_of
 
-from screwsynth.models import Model, Substitution, robot
+from screwsynth.models import Model, Substitution
 from screwsynth.models.instance import instantiate
 from screwsynth.models.statics import posed_statics
 from screwsynth.nlp.case.forces import forces_at
@@ -77,7 +77,7 @@ def random_loads(rng: np.random.Generator, count: int = LOADS) -> list[Load]:
 @cache
 def scene(name: str) -> tuple[Package, list[Load]]:
     loads = random_loads(np.random.default_rng([11, *name.encode()]))
-    return Package(robot(**table(name)), Loading(tuple(loads), Motion(0.7, 0.4))), loads
+    return Package(model_of(name), Loading(tuple(loads), Motion(0.7, 0.4))), loads
 
 
 class Feasible(NamedTuple):

@@ -16,14 +16,9 @@ Value = float | Array
 Table = Mapping[str, Any]
 
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-}
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow, ast.USub: operator.neg, ast.UAdd: operator.pos,
+}  # fmt: skip
 
 
 def unit(vector: Array) -> Array:
@@ -31,17 +26,10 @@ def unit(vector: Array) -> Array:
 
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "sqrt": math.sqrt,
-    "atan2": math.atan2,
-    "abs": abs,
-    "cross": np.cross,
-    "dot": lambda a, b: float(np.dot(a, b)),
-    "norm": lambda a: float(np.linalg.norm(a)),
+    "sin": math.sin, "cos": math.cos, "tan": math.tan, "sqrt": math.sqrt, "atan2": math.atan2, "abs": abs,
+    "cross": np.cross, "dot": lambda a, b: float(np.dot(a, b)), "norm": lambda a: float(np.linalg.norm(a)),
     "unit": unit,
-}
+}  # fmt: skip
 
 #: Number of directions in ``axis`` or ``axes`` of each type of joint.
 DIRECTIONS = {"R": 1, "P": 1, "H": 1, "C": 1, "Pa": 1, "U": 2, "S": 0}

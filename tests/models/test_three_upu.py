@@ -17,7 +17,6 @@ from screwsynth.nlp import (
     PointKind,
     RobotState,
     Rotation,
-    Solution,
     StartStatus,
     Status,
     Task,
@@ -76,14 +75,9 @@ class Drawn:
                 given[f"u1_{k + 1}"] = self.u1[k].tolist()
             if axes == "free":
                 given[f"u2_{k + 1}"] = self.u2[k].tolist()
-        return Case(
-            model=three_upu(axes=axes),
-            parameters=given,
-            position=self.p.tolist(),
-            rotation=Rotation(self.axis, self.angle),
-            tasks=[Task(self.twist)],
-            characteristic_length=self.length,
-        )
+        turn = Rotation(self.axis, self.angle)
+        model, task = three_upu(axes=axes), Task(self.twist)
+        return Case(model, given, self.p.tolist(), [task], turn, characteristic_length=self.length)
 
     def force_rows(self) -> Array:
         b = on_circle(self.base)
@@ -121,10 +115,8 @@ def test_the_snu_robot_at_home_turns_freely_about_horizontal_lines_through_the_l
     assert found.is_zero
     assert found.F < 1e-28  # rates of 1e-16 each: rounding alone
     # The free twists span these rotations: this one is a combination of them.
-    left = (
-        task.twist - found.free_twists.T @ np.linalg.lstsq(found.free_twists.T, np.asarray(task.twist), rcond=None)[0]
-    )
-    assert np.max(np.abs(left)) < 1e-12
+    parts = np.linalg.lstsq(found.free_twists.T, np.asarray(task.twist), rcond=None)[0]
+    assert np.max(np.abs(task.twist - found.free_twists.T @ parts)) < 1e-12
 
 
 @pytest.mark.parametrize("changed", [{"pitch": 0.1}, {"point": [0, 0, 1.3]}, {"axis": [1, 0, 0.1]}])
@@ -183,13 +175,9 @@ def test_rows_come_force_by_force_and_then_couple_by_couple() -> None:
     assert [row.kind for row in rows] == [WrenchKind.FORCE] * 3 + [WrenchKind.COUPLE] * 3
 
 
-@pytest.fixture(scope="module", params=["paper-4.4-min", "paper-4.4-max"])
-def many(request: pytest.FixtureRequest) -> Solution:
-    return solve(load_case(request.param), starts=64)
-
-
-def test_free_directions_have_no_poles(many: Solution) -> None:
-    maximum = many.nlp.case.name == "paper-4.4-max"
+@pytest.mark.parametrize("name", ["paper-4.4-min", "paper-4.4-max"])
+def test_free_directions_have_no_poles(name: str) -> None:
+    many, maximum = solve(load_case(name), starts=64), name == "paper-4.4-max"
     assert many.status is Status.OPTIMAL
     assert len(many.starts) == 64
     goal = 3.0 if maximum else 0.0
@@ -205,28 +193,18 @@ def test_free_directions_have_no_poles(many: Solution) -> None:
             assert examine(many.nlp, start.x).kind is PointKind.SADDLE
             assert goal - 1e-6 > start.F
 
-
-def test_free_directions_end_as_unit_and_orthogonal(many: Solution) -> None:
-    for start in many.starts:
-        if start.status is not StartStatus.CONVERGED:
-            continue
-        found = evaluate(many.nlp, start.x).parameters
+    # Directions end as unit and orthogonal, and the largest couples are along the axis.
+    omega = np.asarray(many.nlp.case.tasks[0].twist)[:3]
+    for start in converged:
+        state = evaluate(many.nlp, start.x)
         for k in "123":
-            first, second = found[f"u1_{k}"], found[f"u2_{k}"]
+            first, second = state.parameters[f"u1_{k}"], state.parameters[f"u2_{k}"]
             assert abs(np.linalg.norm(first) - 1) < 1e-12
             assert abs(np.linalg.norm(second) - 1) < 1e-12
             assert abs(float(first @ second)) < 1e-12
-
-
-def test_the_largest_couples_are_along_the_axis(many: Solution) -> None:
-    case = many.nlp.case
-    omega = np.asarray(case.tasks[0].twist)[:3]
-    for start in many.starts:
-        if start.status is StartStatus.CONVERGED:
-            cosines = evaluate(many.nlp, start.x).jacobian[3:, 3:] @ omega
-            goal = 1.0 if case.name == "paper-4.4-max" else 0.0
-            # F is flat there, of second order at the maximum, where 1e-12 in F is 1e-12 in cosines.
-            np.testing.assert_allclose(np.abs(cosines), goal, atol=1e-6 if goal == 0.0 else 1e-12)
+        # F is flat there, of second order at the maximum, where 1e-12 in F is 1e-12 in cosines.
+        cosines = np.abs(state.jacobian[3:, 3:] @ omega)
+        np.testing.assert_allclose(cosines, float(maximum), atol=1e-12 if maximum else 1e-6)
 
 
 @pytest.mark.parametrize("length", [1e-20, 1e-3, 0.2, 0.999999, 1.0, 7.0, 1e20])
@@ -245,15 +223,12 @@ def one_axis_given(u1: Sequence[float], axes: Axes = "free") -> Case:
     return replace(case, parameters={**case.parameters, "u1_1": list(u1)})
 
 
-def test_a_zero_direction_is_refused() -> None:
+def test_a_direction_that_is_zero_or_no_number_is_refused() -> None:
     with pytest.raises(CaseError, match=r"robot\.parameters\.u1_1.*must not be zero"):
         one_axis_given([0, 0, 0], "limb")
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_direction_that_is_no_number_is_refused(bad: float) -> None:
-    with pytest.raises(CaseError, match=r"u1_1.*finite"):
-        one_axis_given([bad, 0, 1], "limb")
+    for bad in (math.nan, math.inf):
+        with pytest.raises(CaseError, match=r"u1_1.*finite"):
+            one_axis_given([bad, 0, 1], "limb")
 
 
 def test_fixed_axes_that_are_not_orthogonal_are_refused() -> None:

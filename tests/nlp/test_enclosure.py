@@ -157,26 +157,17 @@ ENGINE_NAMES = ("numpy", "c")
 N = 3
 #: Products, quotients, roots and others of numbers that may be very small or very large.
 GRAPHS = {
-    "product": lambda v: v[0] * v[1],
-    "products": lambda v: v[0] * v[1] * v[2],
-    "square": lambda v: v[0] ** 2,
-    "squares": lambda v: v[0] * v[0] + v[1] * v[1] - v[2] * v[2],
-    "quotient": lambda v: v[0] / v[1],
-    "quotients": lambda v: (v[0] * v[1]) / (v[1] + v[2]),
-    "inverse": lambda v: 1 / v[0],
-    "root": lambda v: ca.sqrt(v[0]) * v[1],
-    "length": ca.norm_2,
-    "unit": lambda v: v[0] / ca.norm_2(v[:2]),
+    "product": lambda v: v[0] * v[1], "products": lambda v: v[0] * v[1] * v[2], "square": lambda v: v[0] ** 2,
+    "squares": lambda v: v[0] * v[0] + v[1] * v[1] - v[2] * v[2], "quotient": lambda v: v[0] / v[1],
+    "quotients": lambda v: (v[0] * v[1]) / (v[1] + v[2]), "inverse": lambda v: 1 / v[0],
+    "root": lambda v: ca.sqrt(v[0]) * v[1], "length": ca.norm_2, "unit": lambda v: v[0] / ca.norm_2(v[:2]),
     "work": lambda v: (v[0] * v[1] - v[2] * v[2]) ** 2 / ca.sumsqr(v[:2]),
     "turned": lambda v: (v[0] * v[1] + v[2] ** 2) ** 2 / (v[0] * v[0] + v[1] * v[2] + v[1] ** 2),
-    "arm": lambda v: v[0] ** 2 / v[1],
-    "logarithm": lambda v: ca.log(v[0]) * v[1],
-    "exponential": lambda v: ca.exp(v[0]) - ca.exp(v[1]),
-    "waves": lambda v: ca.sin(v[0]) * v[1] + ca.cos(v[2]),
-    "angle": lambda v: ca.atan(v[0] / v[1]) * v[2],
-    "pieces": lambda v: ca.fmax(v[0], v[1]) * ca.fabs(v[2]),
+    "arm": lambda v: v[0] ** 2 / v[1], "logarithm": lambda v: ca.log(v[0]) * v[1],
+    "exponential": lambda v: ca.exp(v[0]) - ca.exp(v[1]), "waves": lambda v: ca.sin(v[0]) * v[1] + ca.cos(v[2]),
+    "angle": lambda v: ca.atan(v[0] / v[1]) * v[2], "pieces": lambda v: ca.fmax(v[0], v[1]) * ca.fabs(v[2]),
     "determinant": lambda v: (v[0] ** 2 - v[1] * v[2]) * (v[0] * v[1] - v[2] ** 2) - (v[0] * v[2] - v[1] ** 2) ** 2,
-}
+}  # fmt: skip
 
 
 def function_of(name: str) -> ca.Function:

@@ -219,14 +219,10 @@ THREE_UPU: dict[str, Any] = case_tables(
 
 def test_a_three_legged_robot_with_couples_keeps_limits_too() -> None:
     limits = {
-        "leg_length": {"max": 50},
-        "base_joint_angle": 40,
-        "radius_ratio": {"min": 0.4},
-        "joint_spacing": {"min": 20},
-        "leg_clearance": {"min": 18},
-        "rate_share": {"max": 0.6},
+        "leg_length": {"max": 50}, "base_joint_angle": 40, "radius_ratio": {"min": 0.4}, "joint_spacing": {"min": 20},
+        "leg_clearance": {"min": 18}, "rate_share": {"max": 0.6},
         "smallest_singular_value": {"min": 0.015, "length": 30},
-    }
+    }  # fmt: skip
     result = json_data(result_of(solved(case_with(limits, THREE_UPU), starts=16)))
     assert result["status"] == "optimal"
     radii = {plate: result["parameters"][f"{plate}_radius"] for plate in ("base", "platform")}

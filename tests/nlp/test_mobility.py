@@ -1,33 +1,29 @@
-"""Mobility of robots joint by joint: singularities against closed forms, and platforms behind a loop and driven joints."""
+"""Mobility of robots joint by joint: singularities against closed forms, platforms behind loops and driven joints."""
 
 import json
+import math
 import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from builders import case_file, case_tables
 from typer.testing import CliRunner
+
 from screwsynth.models import Dimension, Model, robot, robot_function
-from screwsynth.nlp import Case, Free, PointKind, Status, Task, evaluate, formulate, json_data, result_of, solve
-from screwsynth.nlp.cli.app import app
-from screwsynth.nlp.evidence.mobility import mobility_of
-from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists, is_passive_singular
-import math
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
-import numpy as np
-import pytest
-from screwsynth.models import Model, robot
-from screwsynth.nlp import Case, Free, Limits, Task, evaluate, formulate, solve
+from screwsynth.nlp import Case, Free, Limits, PointKind, Status, Task, evaluate, formulate, json_data, result_of, solve
 from screwsynth.nlp.case.limits.rates import ActuatorRate
 from screwsynth.nlp.case.workspace import Workspace
+from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.margins import margins_of
 from screwsynth.nlp.evidence.mobility import Mobility, mobility_of
+from screwsynth.nlp.evidence.singularities import Singularity, SingularityKind, _null_twists, is_passive_singular
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
-from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.summary import case_summary
 
 TURN = [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=0)]
@@ -262,11 +258,9 @@ def five_bar(wrist: Sequence[object] = ("z",)) -> Model:
     bodies = ["left", *(f"wrist{k}" for k in range(1, len(wrist))), "platform"]
     joints = [
         hinge("m1", ("base", "arm1"), (-0.4, 0, 0), driven=True),
-        hinge("m2", ("base", "arm2"), (0.4, 0, 0), driven=True),
-        hinge("e1", ("arm1", "left"), (-0.8, 0.6, 0)),
-        hinge("e2", ("arm2", "right"), (0.8, 0.6, 0)),
-        hinge("middle", ("left", "right"), (0, 1, 0)),
-    ]
+        hinge("m2", ("base", "arm2"), (0.4, 0, 0), driven=True), hinge("e1", ("arm1", "left"), (-0.8, 0.6, 0)),
+        hinge("e2", ("arm2", "right"), (0.8, 0.6, 0)), hinge("middle", ("left", "right"), (0, 1, 0)),
+    ]  # fmt: skip
     pairs = zip(wrist, bodies, bodies[1:], strict=False)
     joints += [hinge(f"w{k}", (one, other), (0, 1, 0), axis, driven=True) for k, (axis, one, other) in enumerate(pairs)]
     return robot("five-bar", home=(0, 1, 0), links=["base", "arm1", "arm2", "right", *bodies], joint=joints)
@@ -333,12 +327,10 @@ def test_the_constraints_keep_their_rank_over_a_workspace() -> None:
 def overdriven(*, driven: bool) -> Model:
     """A four-bar whose two cranks are driven, with the platform on a hinge of its coupler, driven or not."""
     joints = [
-        hinge("m1", ("base", "a"), (0, 0, 0), driven=True),
-        hinge("m2", ("base", "b"), (1, 0, 0), driven=True),
-        hinge("e1", ("a", "coupler"), (0.1, 0.5, 0)),
-        hinge("e2", ("b", "coupler"), (1.3, 0.8, 0)),
+        hinge("m1", ("base", "a"), (0, 0, 0), driven=True), hinge("m2", ("base", "b"), (1, 0, 0), driven=True),
+        hinge("e1", ("a", "coupler"), (0.1, 0.5, 0)), hinge("e2", ("b", "coupler"), (1.3, 0.8, 0)),
         hinge("spin", ("coupler", "platform"), (0.5, 1, 0), "x", driven=driven),
-    ]
+    ]  # fmt: skip
     return robot("overdriven", home=(0.5, 1, 0), links=["base", "a", "b", "coupler", "platform"], joint=joints)
 
 

@@ -14,20 +14,8 @@ from builders import Array
 from casadi import SX
 from numpy.typing import ArrayLike
 
-from screwsynth.models import (
-    Closure,
-    Dimension,
-    Model,
-    PoseSymbols,
-    Unknown,
-    Wrench,
-    WrenchKind,
-    axis_from_screw,
-    couple_about,
-    hexapod,
-    stewart_gough,
-    three_upu,
-)
+from screwsynth import models
+from screwsynth.models import Closure, Dimension, Model, Unknown, Wrench, axis_from_screw, hexapod, stewart_gough
 from screwsynth.nlp import (
     Case,
     Evidence,
@@ -243,15 +231,17 @@ def some_of_a_hexapod(rotation: Rotation) -> Case:
 
 def closed_by_equations() -> Case:
     """Two legs whose lengths are unknowns, and a couple: closure equations beside the ball of the rotation."""
-    pose = PoseSymbols()
+    pose = models.PoseSymbols()
     rows, unknowns, closure = [], [], []
     for name, base, end in (("a", (9.0, 1.0, 0.0), (5.0, -2.0, 1.0)), ("b", (-8.0, 3.0, 0.0), (-4.0, 4.0, 0.0))):
         length = ca.SX.sym(f"l{name}")
         span = pose.position + pose.rotation @ ca.DM(end) - ca.DM(base)
-        rows.append(Wrench(name, WrenchKind.FORCE, span, ca.cross(ca.DM(base), span), length**2))
+        rows.append(Wrench(name, models.WrenchKind.FORCE, span, ca.cross(ca.DM(base), span), length**2))
         unknowns.append(Unknown(f"l{name}", length, Dimension.LENGTH, "length of a leg", 15, 60))
         closure.append(Closure(f"close_{name}", length**2 - ca.sumsqr(span)))
-    rows.append(couple_about("c", pose.rotation @ ca.DM([1.0, 2.0, 0.5]) + ca.cross(pose.position, ca.DM([0, 0, 0.1]))))
+    rows.append(
+        models.couple_about("c", pose.rotation @ ca.DM([1.0, 2.0, 0.5]) + ca.cross(pose.position, ca.DM([0, 0, 0.1])))
+    )
     model = Model(
         "closed", "a toy", (), pose, (0.0, 0.0, 30.0), tuple(rows), unknowns=tuple(unknowns),
         closure=tuple(closure),
@@ -443,15 +433,8 @@ def degenerate_jacobian(kind: str) -> Array:
     return np.vstack([J, J[:2], random_jacobian(9, 3)])  # eleven rows, two of them twice
 
 
-DEGENERATE = (
-    "planar forces",
-    "parallel forces",
-    "couples only",
-    "one row",
-    "two rows",
-    "forces through a point",
-    "many rows",
-)
+DEGENERATE = ["planar forces", "parallel forces", "couples only", "one row", "two rows", "forces through a point"]
+DEGENERATE.append("many rows")
 JACOBIANS = [pytest.param(random_jacobian(seed), id=f"random {seed}") for seed in range(6)]
 JACOBIANS += [pytest.param(degenerate_jacobian(kind), id=kind) for kind in DEGENERATE]
 
@@ -582,7 +565,7 @@ def test_the_frame_of_moments_does_not_matter() -> None:
 def test_the_snu_robot_has_two_free_rotations_about_horizontal_lines_where_the_limbs_meet() -> None:
     task, radii = Task.screw("min", axis=[0, 0, 1], point=[0, 0, 0], pitch=0), (0.57735, 0.288675)
     parameters = dict(zip(("base_radius", "platform_radius"), radii, strict=True))
-    case = Case(three_upu(axes="snu"), parameters, [0, 0, 0.7], [task])
+    case = Case(models.three_upu(axes="snu"), parameters, [0, 0, 0.7], [task])
     nlp = formulate(case)
     found = analyse_tasks(evaluate(nlp, nlp.start).jacobian)
     for motion in found.rotations[:2]:

@@ -80,7 +80,8 @@ TOGETHER = f'[combine]\nmethod = "weighted-sum"\n{LIFT}{TASK}{SOLVE}'.replace("S
 
 
 def text_of(poses: str, over: str = "sum", limits: str = "", sense: str = "max") -> str:
-    return HEAD + poses + TASK.replace("SENSE", sense) + SOLVE + f'[combine]\nover_poses = "{over}"\n' + limits
+    combine = f'[combine]\nover_poses = "{over}"\n' if over else ""
+    return HEAD + poses + TASK.replace("SENSE", sense) + SOLVE + combine + limits
 
 
 def poses_case(poses: str, over: str = "sum", limits: str = "", sense: str = "max") -> Case:
@@ -169,7 +170,7 @@ def test_what_a_stroke_costs_is_what_moving_it_does() -> None:
 
 def test_one_listed_pose_is_that_pose() -> None:
     one = LISTED.rpartition("[[pose]]")[0]
-    first, second = (solve(poses_case(pose)) for pose in (one, one.replace("[[pose]]", "[pose]")))
+    first, second = (solve(poses_case(pose, "")) for pose in (one, one.replace("[[pose]]", "[pose]")))
     assert first.F == second.F
     assert "poses" not in json_data(result_of(first))
 

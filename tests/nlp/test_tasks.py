@@ -145,15 +145,13 @@ class Setting:
 
 
 SETTINGS = [
-    Setting(("p_x", "p_y"), ("max", "max"), (1, 1), 1),
-    Setting(("p_x", "p_y"), ("min", "min"), (1, 1), 2),
-    Setting(("p_x", "p_y"), ("max", "min"), (1, 1), 3),
-    Setting(("x2", "x4"), ("max", "max", "max"), (1, 3, 2), 4),
+    Setting(("p_x", "p_y"), ("max", "max"), (1, 1), 1), Setting(("p_x", "p_y"), ("min", "min"), (1, 1), 2),
+    Setting(("p_x", "p_y"), ("max", "min"), (1, 1), 3), Setting(("x2", "x4"), ("max", "max", "max"), (1, 3, 2), 4),
     Setting(("x2", "x4", "p_z"), ("min", "min"), (0.5, 1.5), 5),
     Setting(("p_x", "p_y", "angle"), ("max", "max"), (1, 2), 6),
     Setting(("p_x", "p_y", "angle"), ("min", "max", "min"), (2, 1, 3), 7),
     Setting(("p_y", "p_z", "angle"), ("min", "min", "min"), (5, 1, 1), 8),
-]
+]  # fmt: skip
 
 
 def solved(setting: Setting, method: Method) -> Solution:
@@ -298,11 +296,8 @@ def test_an_average_that_turns_too_little_is_reported() -> None:
 
 COS = math.sqrt(0.75)
 PARK: dict[str, Any] = {
-    "base_radius": 50.0,
-    "platform_radius": 25.0,
-    "u1_2": [-0.5, COS, 0.0],
-    "u1_3": [-0.5, -COS, 0.0],
-}
+    "base_radius": 50.0, "platform_radius": 25.0, "u1_2": [-0.5, COS, 0.0], "u1_3": [-0.5, -COS, 0.0],
+}  # fmt: skip
 PARK |= {"u2_2": [COS, 0.5, 0.0], "u2_3": [-COS, 0.5, 0.0]}
 
 
