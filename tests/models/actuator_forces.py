@@ -5,9 +5,7 @@ space. With actuator forces tau, a load W and a feasible motion with rates qdot 
 
     tau . qdot + W . chi = 0,        W . chi = force . v + moment . omega    (moments and v about the platform's origin)
 
-which is solved for tau over a basis of all feasible motions, spins of rods included. The engine's poses are closed by
-Newton's method to rounding (``mujoco_robots``), and the package gets rotation and position of the platform alone, whose
-unknowns a Newton method of this file closes.
+which is solved for tau over a basis of all feasible motions, spins of rods included.
 """
 
 from __future__ import annotations

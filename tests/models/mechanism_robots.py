@@ -73,11 +73,7 @@ def geared() -> Table:
 
 
 class Engine:
-    """A mechanism in MuJoCo: every link a free body, every joint a set of rows built on the engine's Jacobians.
-
-    The engine supplies the Jacobian of each body at each joint's point; the rows say that the two bodies of a joint
-    move together but for its axis. Loops, trees and members need no description of their own.
-    """
+    """A mechanism in MuJoCo: every link a free body, every joint a set of rows built on the engine's Jacobians."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -127,10 +123,7 @@ class Engine:
         return column_space(self.motion(self.mechanism.platform, np.zeros(3)) @ motions, 1.0)
 
     def rates(self, chi: Array) -> Array:
-        """Rates of the actuated joints for a twist that the platform can make with free actuators.
-
-        They are not numbers for joints that can move while the platform stands still.
-        """
+        """Rates of the actuated joints for a feasible twist; NaN where they can move with the platform at rest."""
         free = null_space(self.rows(locked=False))
         platform = self.motion(self.mechanism.platform, np.zeros(3)) @ free[: self.model.nv]
         weights = np.linalg.lstsq(platform, chi, rcond=1e-9)[0]

@@ -15,18 +15,7 @@ from casadi import SX
 from robot_gallery import CHI, LENGTH, RANKS, REFERENCE, snu, table
 
 from screwsynth import models
-from screwsynth.models import (
-    Model,
-    Velocities,
-    constraint_rows,
-    hexapod,
-    instantiate,
-    rank_of_rows,
-    robot,
-    robot_function,
-    stewart_gough,
-    three_upu,
-)
+from screwsynth.models import Model, Velocities, hexapod, instantiate, rank_of_rows, robot, stewart_gough
 from screwsynth.models.basis import basis_of_member
 from screwsynth.models.expression import ExpressionError, evaluate
 from screwsynth.models.joints.motion import AxisKind, JointAxis, Motion
@@ -148,7 +137,7 @@ def test_robots_have_the_numbers_of_an_independent_computation(name: str) -> Non
     here = Robot(model)
     home = here.at(here.home)
     assert pytest.approx(F, abs=1e-10) == home.F
-    constraints = constraint_rows(model, home.velocities, home.position)
+    constraints = models.constraint_rows(model, home.velocities, home.position)
     _, values, right = np.linalg.svd(work(constraints))
     rank = int(np.count_nonzero(values > 1e-9))
     assert rank == ranks.constraints == rank_of_rows(constraints, np.zeros(3), 1.0)
@@ -178,7 +167,7 @@ def test_published_facts_of_the_three_upu_hold() -> None:
     here = other.at(other.home)
     assert rank_of_rows(here.J, np.zeros(3), 1.0) == 4
     # Constraint singularity: the constraints have rank 1 where they have 3 elsewhere.
-    assert rank_of_rows(constraint_rows(other.model, here.velocities, here.position), np.zeros(3), 1.0) == 1
+    assert rank_of_rows(models.constraint_rows(other.model, here.velocities, here.position), np.zeros(3), 1.0) == 1
     assert other.model.generic.constraints == 3
     assert pytest.approx(3.0, abs=1e-12) == other.at(other.home, about_z).F
     for angle in (0.0, 0.7, 2.0):
@@ -201,7 +190,7 @@ def test_inverse_kinematics_of_the_delta_are_those_of_williams(name: str) -> Non
 
 def test_isotropic_robots_are_isotropic() -> None:
     # Agile Eye: the actuators turn as the platform does, and F = l^2 |omega|^2 for a rotation.
-    eye = Robot(robot_function("spherical-3-rrr")())
+    eye = Robot(models.robot_function("spherical-3-rrr")())
     turning = eye.at(eye.home, np.hstack([CHI[:3], np.zeros(3)]))
     assert pytest.approx(LENGTH**2 * float(CHI[:3] @ CHI[:3]), abs=1e-14) == turning.F
     assert actuator_rates(eye.model, turning) == pytest.approx(CHI[:3], abs=1e-14)
@@ -213,7 +202,7 @@ def test_isotropic_robots_are_isotropic() -> None:
         ("tripteron", np.zeros(3), True),
         ("tripteron", np.array([0.05, -0.08, 0.1]), True),
     ):
-        here = Robot(robot_function(name)())
+        here = Robot(models.robot_function(name)())
         numbers = here.at(here.reached(place), moving)
         assert (pytest.approx(float(CHI[3:] @ CHI[3:]), abs=1e-12) == numbers.F) is same
         assert (actuator_rates(here.model, numbers) == pytest.approx(CHI[3:], abs=1e-12)) is same
@@ -286,7 +275,7 @@ def test_the_projector_is_that_of_a_singular_value_decomposition(size: int, coun
         assert function(a, x).full() == pytest.approx(space @ space.T @ x, abs=1e-7)
 
 
-def test_a_small_resistance_is_not_lost_in_rounding() -> None:
+def test_a_small_resistance_is_not_lost_and_scaled_coordinates_give_the_work_rate() -> None:
     columns, vectors = SX.sym("columns", 6, 5), SX.sym("vectors", 6, 1)
     function = ca.Function("parts", [columns, vectors], [resisted_parts(columns, 5, vectors)])
     rng = np.random.default_rng(0)
@@ -297,9 +286,6 @@ def test_a_small_resistance_is_not_lost_in_rounding() -> None:
         found = function(a, small).full().ravel()
         # The difference of two squares would have a relative error of 1e-3 here.
         assert float(found @ found) == pytest.approx(1e-12, rel=1e-8)
-
-
-def test_scaled_coordinates_give_the_work_rate() -> None:
     rng = np.random.default_rng(1)
     twist, centre, length = rng.normal(size=6), rng.normal(size=3), 0.7
     f, m = rng.normal(size=3), rng.normal(size=3)
@@ -560,7 +546,7 @@ def gradient(nlp: Nlp, x: Array, count: int) -> Array:
         (lambda: stewart_gough(layout="octahedral"), lambda: six_six(math.pi / 3, -1), Rotation(None, Free(-1.0, 1.0))),
         (hexapod, twelve_points, Rotation(None, Free(-1.0, 1.0))),
         # The rows of the 3-UPU take the lower joints to be parallel to the upper ones: where the platform translates.
-        (lambda: three_upu(axes="tsai"), upu, Rotation()),
+        (lambda: models.three_upu(axes="tsai"), upu, Rotation()),
     ],
     ids=["stewart-gough", "octahedral", "hexapod", "three-upu"],
 )

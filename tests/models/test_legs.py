@@ -309,7 +309,7 @@ def test_a_symmetric_hexapod_is_the_hexapod_with_its_images(symmetry: str) -> No
     assert [mark.parameter for mark in model.scene.marks] == list(given)
 
 
-def test_free_numbers_keep_the_symmetry_and_move_every_leg() -> None:
+def test_free_numbers_keep_a_symmetry_that_exists_and_move_every_leg() -> None:
     model = hexapod(symmetry="threefold-mirror")
     parameters = {"base_1": [Free(8, 13), Free(-5, -3), 0.0], "platform_1": [5.5, -5.5, 0.0]}
     case = Case(model, parameters, (0, 0, 30), [Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=3)])
@@ -320,8 +320,5 @@ def test_free_numbers_keep_the_symmetry_and_move_every_leg() -> None:
     assert np.allclose(rates[0::2], rates[0], rtol=1e-9)
     assert np.allclose(rates[1::2], rates[1], rtol=1e-9)
     assert solution.nlp.n == 2
-
-
-def test_a_symmetry_that_does_not_exist() -> None:
     with pytest.raises(ModelError, match="symmetry"):
         hexapod(symmetry="fourfold")  # type: ignore[arg-type]

@@ -25,22 +25,16 @@ from screwsynth.models import GenericRanks, Model, RobotError, Substitution, axi
 from screwsynth.models.joints.chain import Joint as ChainJoint
 from screwsynth.models.joints.motion import AxisKind, JointAxis
 from screwsynth.models.mechanism import (
-    Coupling,
-    Mechanism,
-    MechanismError,
-    MechanismJoint,
-    MechanismLink,
-    SingularityType,
     check_mechanism,
     close,
-    generic_ranks,
     limbs_of,
     links_of,
     mechanism_of,
     robot_tables,
-    singularities_of,
     wrenches_of,
 )
+from screwsynth.models.mechanism.graph import Coupling, Mechanism, MechanismError, MechanismJoint, MechanismLink
+from screwsynth.models.mechanism.singularities import SingularityType, generic_ranks, singularities_of
 from screwsynth.nlp.evidence.assembly import unknowns_from_home
 
 

@@ -64,7 +64,7 @@ def parts() -> Parts:
     )
 
 
-def test_a_sound_model_is_accepted_and_lists_its_limbs_once() -> None:
+def test_a_sound_model_is_accepted_with_a_copy_of_its_options() -> None:
     toy = parts()
     model = toy.model(wrenches=(toy.leg, toy.couple, toy.leg))
     assert model.limbs == ("leg", "guide")
@@ -73,9 +73,6 @@ def test_a_sound_model_is_accepted_and_lists_its_limbs_once() -> None:
     assert toy.base.components == ("base_x", "base_y", "base_z")
     assert models.component_names("x1", 1) == ("x1",)
     assert models.component_names("p", 3) == ("p_x", "p_y", "p_z")
-
-
-def test_options_are_a_copy_that_cannot_be_written_to() -> None:
     options = {"layout": "aligned"}
     model = parts().model(options=options)
     options["layout"] = "other"

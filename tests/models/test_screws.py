@@ -13,19 +13,8 @@ from builders import Array, turn_about
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from screwsynth.models import (
-    Screw,
-    axis_angle_from_matrix,
-    axis_from_screw,
-    line_through,
-    matrix_from_axis_angle,
-    matrix_from_cayley,
-    matrix_from_quaternion_vector,
-    moved_screw,
-    reciprocal_product,
-    screw_from_axis,
-    unit_vector,
-)
+from screwsynth import models
+from screwsynth.models import axis_angle_from_matrix, axis_from_screw, line_through, reciprocal_product, screw_from_axis
 
 Triple = tuple[float, float, float]
 
@@ -143,12 +132,9 @@ def test_pitch_is_infinite_only_where_the_direction_is_rounding_error() -> None:
     noise = axis_from_screw([1e-16, -1e-16, 0, 0, 3, 4])
     assert (noise.pitch, noise.intensity) == (math.inf, 5.0)
     np.testing.assert_allclose(noise.axis, [0, 0.6, 0.8], rtol=1e-15)
-
-
-def test_a_pure_rotation_has_pitch_zero_and_a_couple_no_point() -> None:
     for screw, pitch in (([0, 0, 2, 0, 0, 0], 0.0), ([0, 0, 0, 0, -3, 0], math.inf)):
         found = axis_from_screw(screw)
-        assert isinstance(found, Screw)
+        assert isinstance(found, models.Screw)
         assert found.pitch == pitch
         np.testing.assert_array_equal(found.point, np.zeros(3))
 
@@ -210,9 +196,9 @@ def test_a_moved_screw_is_the_screw_of_the_moved_axis(
     n: Array, s0: Array, h: float, about: Array, angle: float, shift: Array
 ) -> None:
     R = turn_about(about, angle)
-    moved = moved_screw(screw_from_axis(n, s0, h, 2), R, shift)
+    moved = models.moved_screw(screw_from_axis(n, s0, h, 2), R, shift)
     np.testing.assert_allclose(moved, screw_from_axis(R @ n, R @ s0 + shift, h, 2), rtol=0, atol=5e-13)
-    translation = moved_screw(screw_from_axis(n, s0, math.inf, 2), R, shift)
+    translation = models.moved_screw(screw_from_axis(n, s0, math.inf, 2), R, shift)
     np.testing.assert_allclose(translation, [0, 0, 0, *(2 * R @ unit(n))], rtol=0, atol=2e-15)
 
 
@@ -240,7 +226,7 @@ def test_no_screw_without_axis_or_with_numbers_that_are_none(
         screw_from_axis(axis, point, pitch, intensity)
 
 
-def test_nothing_comes_back_from_no_screw() -> None:
+def test_no_screw_has_no_axis_and_one_point_no_line() -> None:
     with pytest.raises(ValueError, match="six zeros"):
         axis_from_screw(np.zeros(6))
     for bad in (math.nan, math.inf, -math.inf):
@@ -248,18 +234,6 @@ def test_nothing_comes_back_from_no_screw() -> None:
             axis_from_screw([1, 0, 0, 0, bad, 0])
     with pytest.raises(ValueError, match="shape"):
         axis_from_screw([1, 0, 0])
-
-
-@many
-@given(directions, st.integers(-300, 300))
-def test_a_direction_is_found_from_a_vector_of_any_length(n: Array, exponent: int) -> None:
-    # Squares of such components would overflow or vanish.
-    vector = n / np.linalg.norm(n) * 10.0**exponent
-    np.testing.assert_allclose(unit_vector(vector), unit(n), rtol=0, atol=1e-15)
-    np.testing.assert_allclose(screw_from_axis(vector, (0, 0, 0), math.inf)[3:], unit(n), rtol=0, atol=1e-15)
-
-
-def test_no_line_through_one_point() -> None:
     with pytest.raises(ValueError, match="not zero"):
         line_through((1, 2, 3), (1, 2, 3))
     with warnings.catch_warnings():
@@ -270,16 +244,22 @@ def test_no_line_through_one_point() -> None:
                 line_through(bad, (1, 2, 3))
 
 
-def test_results_cannot_be_written_to() -> None:
+@many
+@given(directions, st.integers(-300, 300))
+def test_a_direction_is_found_from_a_vector_of_any_length(n: Array, exponent: int) -> None:
+    # Squares of such components would overflow or vanish.
+    vector = n / np.linalg.norm(n) * 10.0**exponent
+    np.testing.assert_allclose(models.unit_vector(vector), unit(n), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(screw_from_axis(vector, (0, 0, 0), math.inf)[3:], unit(n), rtol=0, atol=1e-15)
+
+
+def test_results_cannot_be_written_to_and_arguments_are_left_alone() -> None:
     screw = screw_from_axis((0, 0, 1), (1, 0, 0), 1)
     parts = axis_from_screw(screw)
-    others = (line_through((0, 0, 0), (1, 0, 0)), moved_screw(screw, np.eye(3), screw[:3]))
+    others = (line_through((0, 0, 0), (1, 0, 0)), models.moved_screw(screw, np.eye(3), screw[:3]))
     for array in (screw, parts.axis, parts.point, *others):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 7
-
-
-def test_arguments_are_left_alone() -> None:
     axis, point = np.array([0.0, 0.0, 4.0]), np.array([1.0, 0.0, 0.0])
     screw_from_axis(axis, point, 1)
     np.testing.assert_array_equal(axis, [0, 0, 4])
@@ -289,9 +269,9 @@ def test_arguments_are_left_alone() -> None:
 often = settings(derandomize=True, deadline=None, max_examples=80)
 
 _vector, _angle = ca.SX.sym("vector", 3), ca.SX.sym("angle")
-_FROM_QUATERNION = ca.Function("q", [_vector], [matrix_from_quaternion_vector(_vector)])
-_FROM_CAYLEY = ca.Function("c", [_vector], [matrix_from_cayley(_vector)])
-_FROM_AXIS_ANGLE = ca.Function("a", [_vector, _angle], [matrix_from_axis_angle(_vector, _angle)])
+_FROM_QUATERNION = ca.Function("q", [_vector], [models.matrix_from_quaternion_vector(_vector)])
+_FROM_CAYLEY = ca.Function("c", [_vector], [models.matrix_from_cayley(_vector)])
+_FROM_AXIS_ANGLE = ca.Function("a", [_vector, _angle], [models.matrix_from_axis_angle(_vector, _angle)])
 
 #: Entries of a rotation matrix are sums of three or four products below 2.
 ROUNDING = 2e-15

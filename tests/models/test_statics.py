@@ -285,7 +285,7 @@ def legs_at(loading: Loading, legs: Legs) -> tuple[Array, Array, Array]:
     return Package(hexapod(), loading).at(legs.R, legs.p, legs.vector)
 
 
-def test_six_straight_legs_carry_what_their_directions_say() -> None:
+def test_six_straight_legs_carry_what_their_directions_say_and_push_with_positive_forces() -> None:
     rng = np.random.default_rng(1)
     loads = random_loads(rng)
     package = Package(hexapod(), Loading(tuple(loads)))
@@ -295,10 +295,7 @@ def test_six_straight_legs_carry_what_their_directions_say() -> None:
         _, found, _ = package.at(legs.R, legs.p, legs.vector)
         scale = np.linalg.cond(legs.rows) * np.abs(expected).max()
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14 * scale)
-
-
-def test_a_leg_that_pushes_has_a_positive_force() -> None:
-    """A weight on legs that stand below the platform, symmetric about the vertical: each pushes by its sixth."""
+    # A weight on legs that stand below the platform, symmetric about the vertical: each pushes by its sixth.
     at, up = np.radians([[-10.0, 10, 110, 130, 230, 250], [-50.0, 50, 70, 170, 190, 290]])
     base, platform = (r * np.column_stack([np.cos(a), np.sin(a), 0 * a]) for r, a in ((1.0, at), (0.6, up)))
     legs = Legs(base, platform, np.eye(3), np.array([0, 0, 0.8]))
@@ -332,8 +329,9 @@ def about_z(yaw: float) -> Array:
     return turn_about([0, 0, 1.0], yaw)
 
 
-def test_the_forces_of_a_translational_three_upu_have_a_closed_form() -> None:
-    """Also written as ``L_i (2 (w_z (q_x c_i + q_y s_i) - q_z (w_x c_i + w_y s_i)) / d + w_z) / (3 q_z)``, negated."""
+def test_the_forces_of_a_three_upu_by_rows_and_joint_by_joint_have_a_closed_form() -> None:
+    # Also written as ``L_i (2 (w_z (q_x c_i + q_y s_i) - q_z (w_x c_i + w_y s_i)) / d + w_z) / (3 q_z)``,
+    # negated.
     rng = np.random.default_rng(3)
     for _ in range(60):
         loads = random_loads(rng, 4)
@@ -352,9 +350,6 @@ def test_the_forces_of_a_translational_three_upu_have_a_closed_form() -> None:
         for k, (wx, wy, wz) in enumerate(w):
             written = L * (2 * (wz * (x * c + y * s) - z * (wx * c + wy * s)) / d + wz) / (3 * z)
             np.testing.assert_allclose(found[:, k], -written, rtol=0, atol=1e-12 * np.abs(expected).max())
-
-
-def test_the_same_closed_form_holds_for_the_robot_given_joint_by_joint() -> None:
     rng = np.random.default_rng(4)
     loads = random_loads(rng, 6)
     package = Package(model_of("3-upu"), Loading(tuple(loads)))
@@ -435,16 +430,13 @@ def test_a_load_may_be_moved_along_its_line_of_action() -> None:
     assert np.abs(legs_at(Loading(tuple(beside)), legs)[1] - one).max() > 1e-2 * np.abs(one).max()
 
 
-def test_loads_in_the_platforms_directions_turn_with_it() -> None:
+def test_loads_turn_with_the_platform_and_a_mass_is_its_weight_at_its_centre() -> None:
     rng = np.random.default_rng(10)
     legs, loads = random_legs(rng), random_loads(rng)
     own = [Load(each.name, each.force, each.moment, each.point, in_platform=True) for each in loads]
     world = [Load(each.name, legs.R @ each.force, legs.R @ each.moment, each.point) for each in loads]
     one, other = (legs_at(Loading(tuple(given)), legs)[1] for given in (own, world))
     np.testing.assert_allclose(other, one, rtol=0, atol=1e-13 * np.abs(one).max())
-
-
-def test_a_mass_is_the_force_of_its_weight_at_its_centre() -> None:
     legs = random_legs(np.random.default_rng(11))
     centre, gravity = (0.1, -0.2, 0.5), (0.5, 1.0, -8.0)
     for stated, acting in ((None, (0.0, 0.0, -9.81)), (gravity, gravity)):
@@ -455,7 +447,7 @@ def test_a_mass_is_the_force_of_its_weight_at_its_centre() -> None:
 
 
 def test_opposite_loads_and_loads_that_are_always_there() -> None:
-    """Each load with each sign, on top of all that are always there with each of theirs."""
+    # Each load with each sign, on top of all that are always there with each of theirs.
     rng = np.random.default_rng(12)
     legs = random_legs(rng)
     cut, push, weight, hose = random_loads(rng, 4)
@@ -486,9 +478,6 @@ def test_opposite_loads_and_loads_that_are_always_there() -> None:
         assert ("hose reversed" in match) == ("hose reversed" in name)
         assert ("cut reversed" in match) == ("cut reversed" in name)
         left.pop(match)
-
-
-def test_what_is_always_there_stands_alone_without_another_load() -> None:
     rng = np.random.default_rng(13)
     legs, (one, two) = random_legs(rng), random_loads(rng, 2)
     loading = Loading(tuple(Load(each.name, each.force, each.moment, each.point, always=True) for each in (one, two)))
@@ -517,9 +506,6 @@ def test_the_largest_speeds_of_six_legs_are_reached() -> None:
                 ends = legs.p + time * worst[3:] + legs.platform[leg] @ R.T
                 lengths.append(np.linalg.norm(ends - legs.base[leg]))
             assert (lengths[1] - lengths[0]) / (2 * t) == pytest.approx(speeds[leg], rel=1e-8)
-
-
-def test_a_motion_that_only_turns_or_only_moves_along() -> None:
     legs = random_legs(np.random.default_rng(17))
     rows = legs.rows
     for linear, angular in ((0.5, 0.0), (0.0, 1.2)):

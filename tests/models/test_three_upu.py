@@ -10,22 +10,9 @@ import pytest
 from builders import Array, turn_about
 
 from screwsynth.models import WrenchKind, three_upu
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    Free,
-    PointKind,
-    RobotState,
-    Rotation,
-    StartStatus,
-    Status,
-    Task,
-    evaluate,
-    examine,
-    formulate,
-    load_case,
-    solve,
-)
+from screwsynth.nlp import Case, CaseError, Free, Rotation, StartStatus, Status, Task, formulate, load_case, solve
+from screwsynth.nlp.evidence.optimality import PointKind, examine
+from screwsynth.nlp.evidence.state import RobotState, evaluate
 
 Axes = Literal["free", "limb", "snu", "tsai"]
 AZIMUTHS = [2 * math.pi * k / 3 for k in range(3)]
@@ -95,7 +82,7 @@ def symmetric(axes: Axes, task: Task = ABOUT_Z, height: float = 0.7, platform_ra
     return state(Case(model=three_upu(axes=axes), parameters=parameters, position=[0, 0, height], tasks=[task]))
 
 
-def test_tsais_robot_at_home_has_full_rank_and_known_singular_values() -> None:
+def test_tsais_robot_at_home_has_known_singular_values_and_f() -> None:
     found = symmetric("tsai")
     assert found.rank == 6
     assert found.free_twists.shape == (0, 6)
@@ -104,6 +91,15 @@ def test_tsais_robot_at_home_has_full_rank_and_known_singular_values() -> None:
     np.testing.assert_allclose(values, [1.601, 1.601, 0.897, 0.897, 0.243, 0.243], atol=5e-4)
     # Three-fold symmetry makes them pairs, as exactly as the radius 0.57735 allows: exactly, since it is any radius.
     np.testing.assert_allclose(values[::2], values[1::2], rtol=1e-12)
+    found = symmetric("tsai", height=1.0, platform_radius=0.57735)
+    assert found.rank == 4
+    np.testing.assert_allclose(found.singular_values[4:], 0, atol=1e-15)
+    # Vertical couples and limbs that meet the axis: exactly 3.
+    assert pytest.approx(3.0, rel=1e-14) == symmetric("snu").F
+    assert pytest.approx(2.564, abs=5e-4) == symmetric("tsai").F
+    # The part of a unit limb vector perpendicular to the tangent is the limb itself: its couple is s, F = 3 s_z^2.
+    rise = 0.7 / math.hypot(0.7, 0.57735 - 0.288675)
+    assert pytest.approx(3 * rise**2, rel=1e-14) == symmetric("tsai").F
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -125,21 +121,6 @@ def test_the_snu_robot_resists_every_neighbour_of_those_motions(changed: dict[st
     found = symmetric("snu", Task.screw("min", **given))  # type: ignore[arg-type]
     assert found.F > 1e-3
     assert not found.is_zero
-
-
-def test_tsais_robot_with_equal_radii_is_singular() -> None:
-    found = symmetric("tsai", height=1.0, platform_radius=0.57735)
-    assert found.rank == 4
-    np.testing.assert_allclose(found.singular_values[4:], 0, atol=1e-15)
-
-
-def test_turning_about_the_vertical() -> None:
-    # Vertical couples and limbs that meet the axis: exactly 3.
-    assert pytest.approx(3.0, rel=1e-14) == symmetric("snu").F
-    assert pytest.approx(2.564, abs=5e-4) == symmetric("tsai").F
-    # The part of a unit limb vector perpendicular to the tangent is the limb itself: its couple is s, F = 3 s_z^2.
-    rise = 0.7 / math.hypot(0.7, 0.57735 - 0.288675)
-    assert pytest.approx(3 * rise**2, rel=1e-14) == symmetric("tsai").F
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -169,10 +150,12 @@ def test_rows_are_those_made_by_hand(axes: Axes, seed: int) -> None:
     np.testing.assert_allclose(np.sum(J[3:, 3:] * first, axis=1) / drawn.length * np.ravel(lengths), 0, atol=2e-15)
 
 
-def test_rows_come_force_by_force_and_then_couple_by_couple() -> None:
+def test_rows_come_force_by_force_and_an_unknown_choice_of_axes_is_refused() -> None:
     rows = three_upu().wrenches
     assert [row.limb for row in rows] == ["1", "2", "3"] * 2
     assert [row.kind for row in rows] == [WrenchKind.FORCE] * 3 + [WrenchKind.COUPLE] * 3
+    with pytest.raises(ValueError, match="axes must be"):
+        three_upu(axes="park")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["paper-4.4-min", "paper-4.4-max"])
@@ -231,7 +214,7 @@ def test_a_direction_that_is_zero_or_no_number_is_refused() -> None:
             one_axis_given([bad, 0, 1], "limb")
 
 
-def test_fixed_axes_that_are_not_orthogonal_are_refused() -> None:
+def test_fixed_axes_are_orthogonal_to_eleven_digits_or_refused() -> None:
     drawn = Drawn(401)
     tilted = turn_about(np.cross(drawn.u1[0], drawn.u2[0]), math.radians(80)) @ drawn.u2[0]
     case = one_axis_given(tilted.tolist())
@@ -241,9 +224,6 @@ def test_fixed_axes_that_are_not_orthogonal_are_refused() -> None:
     assert "u1_1 . u2_1" in said
     assert f"{math.cos(math.radians(80)):.6g}" in said
     assert "must be 0" in said
-
-
-def test_fixed_axes_of_eleven_digits_are_good_enough() -> None:
     drawn = Drawn(402)
     drawn.u1, drawn.u2 = drawn.u1.round(11), drawn.u2.round(11)
     assert np.max(np.abs(np.sum(drawn.u1 * drawn.u2, axis=1))) > 1e-13
@@ -266,8 +246,3 @@ def test_a_free_direction_with_a_held_component_keeps_it() -> None:
     reached = (solution.state.rates[3] / drawn.length) ** 2
     # Half a step from its top a parabola of this height has lost at most about (pi / 3600)^2 times a small number.
     assert best * (1 - 1e-12) <= reached <= best * (1 + 1e-5)
-
-
-def test_an_unknown_choice_of_axes_is_refused() -> None:
-    with pytest.raises(ValueError, match="axes must be"):
-        three_upu(axes="park")  # type: ignore[arg-type]

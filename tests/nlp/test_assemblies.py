@@ -11,29 +11,16 @@ import pytest
 from builders import EACH_KIND, Run, case_from, output_of, saved, unbroken
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import (
-    Case,
-    CertificateStatus,
-    Free,
-    Nlp,
-    Rotation,
-    Search,
-    Task,
-    certify,
-    evaluate,
-    formulate,
-    result_of,
-    solve,
-)
+from screwsynth.nlp import Case, CertificateStatus, Free, Nlp, Rotation, Search, Task, formulate, result_of, solve
 from screwsynth.nlp.evidence.assembly import NEAR_SINGULAR, assembly_of
 from screwsynth.nlp.evidence.closing import closed_in_place, closed_start
 from screwsynth.nlp.evidence.kkt import close_equations
-from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.evidence.state import evaluate, loops_are_closed
 from screwsynth.nlp.evidence.workingmode import _about
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.statement.standard_form import Kind, is_in_home_mode, standard_form
-from screwsynth.nlp.solver.certified import proof_of
+from screwsynth.nlp.solver.certified import certify, proof_of
 
 
 def free_pose(name: str, reach: float, turn: float = 2.0) -> Case:
@@ -86,7 +73,7 @@ def test_another_mode_of_a_three_upu_is_reached_past_a_singularity() -> None:
         assert each.sentences[0].startswith("not reached from home without passing near a singularity")
 
 
-def test_poses_near_home_are_reached_from_there() -> None:
+def test_poses_near_home_are_reached_and_joints_put_in_place_as_on_the_path_from_there() -> None:
     nlp = formulate(free_pose("3-rps", 0.3))
     rng = np.random.default_rng(2)
     (rotation,) = nlp.program.places.rotations
@@ -99,9 +86,6 @@ def test_poses_near_home_are_reached_from_there() -> None:
         assert found.is_home
         assert found.nearness > 0.5
         assert not found.brief
-
-
-def test_joints_are_put_in_place_as_on_the_path_from_home() -> None:
     nlp, rng, count = formulate(free_pose("6-rus", 0.6)), np.random.default_rng(0), 0
     (rotation,), own = nlp.program.places.rotations, list(range(3))
     for _ in range(12):

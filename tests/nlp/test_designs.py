@@ -17,23 +17,13 @@ import pytest
 from builders import Array, Run, case_from, output_of, refusal_of, saved, shipped_tables, unbroken
 from measures import leg_measures, placed_joints
 
-from screwsynth.nlp import (
-    Search,
-    Solution,
-    Status,
-    certify,
-    formulate,
-    json_data,
-    result_of,
-    round_design,
-    solve,
-    solve_program,
-)
+from screwsynth.nlp import Search, Solution, Status, certify, formulate, json_data, result_of, round_design, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.writer import case_text
 from screwsynth.nlp.evidence.tolerance import BuiltRobot
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.compromise import solution_of_one_task
+from screwsynth.nlp.solver.multistart import solve_program
 
 TABLES = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))
 

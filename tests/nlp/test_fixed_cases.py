@@ -198,14 +198,11 @@ def test_many_poses_reach_the_best_of_each_by_itself(count: int, over_poses: str
     assert found.evidence.stationarity <= 1e-7
 
 
-def test_without_the_quick_search_the_best_parts_of_all_ends_are_put_together() -> None:
+def test_blocks_are_the_poses_whose_best_parts_are_put_together() -> None:
     each = np.array([best_at(at) for at in np.linspace(0, 2 * math.pi, 8)])
     found = solve(circling(8, "mean", 12, screen=False))
     assert found.status is Status.OPTIMAL
     assert each.mean() * (1 - 1e-9) <= found.F <= each.mean() * (1 + 1e-5)
-
-
-def test_blocks_are_the_poses_unless_dimensions_are_free() -> None:
     blocks = Blocks(formulate(circling(6, "mean", 2))).blocks
     assert [each.variables for each in blocks] == [(k,) for k in range(6)]
     assert [each.terms for each in blocks] == [(k,) for k in range(6)]

@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from builders import EACH_KIND, FEW_KINDS, Array, case_from, edited, soaked, starter, starter_tables, turn_about
@@ -373,12 +372,9 @@ def test_exported_actuators_hold_the_loads_with_the_programs_forces(name: str) -
 
 def virtual_work(tree: Tree, wrenches: list[Array]) -> tuple[Array, Array]:
     """Rates (n, a) of the actuators, and work (n, k) of wrenches about the world origin, in each feasible motion."""
-    constraints = np.array(tree.data.efc_J).reshape(tree.data.nefc, tree.model.nv)
-    linear, angular = np.zeros((3, tree.model.nv)), np.zeros((3, tree.model.nv))
-    mujoco.mj_jac(tree.model, tree.data, linear, angular, np.zeros(3), tree.model.body("platform").id)
+    constraints, of_platform = tree.jacobians
     motions = null_space(constraints) if len(constraints) else np.eye(tree.model.nv)
-    W = np.array(wrenches).T
-    return motions[tree.driven].T, motions.T @ (linear.T @ W[:3] + angular.T @ W[3:])
+    return motions[tree.driven].T, motions.T @ of_platform.T @ np.roll(np.array(wrenches).T, 3, axis=0)
 
 
 #: Of an angle that is written in degrees.

@@ -116,11 +116,13 @@ def planar(folder: Path, *edits: tuple[str, str], half: float = 0.2) -> str:
     return saved_with_robot(folder, PLANAR, edited(rails, *edits))
 
 
-def test_the_written_geometry_is_that_of_home() -> None:
+def test_the_written_geometry_is_that_of_home_and_other_robots_have_no_free_joints() -> None:
     for limb in LIMBS:
         _, elbow, _ = elbows(limb, np.zeros(1), (0.0, 0.0))
         turn = turn_about([0, 0, 1], 2 * math.pi * limb / 3)[:2, :2]
         np.testing.assert_allclose(elbow[0], turn @ np.array([1.5, 1.0]), atol=1e-14)
+    for name in ("planar-3-rrr", "delta", "five-bar", "6-pus"):
+        assert robot_function(name)().free_joints == ()
 
 
 @pytest.mark.parametrize("sense", ["max", "min"])
@@ -345,11 +347,6 @@ def test_robots_say_which_joints_are_free(tmp_path: Path, cli: Run) -> None:
         assert evaluated[0] == 0
     certified = unbroken(output_of(cli("certify", planar(tmp_path))))
     assert "limbs 1, 2, 3 need 2 joint positions each and the loop equations, in home's working mode" in certified
-
-
-def test_a_robot_whose_pose_determines_all_joints_has_none() -> None:
-    for name in ("planar-3-rrr", "delta", "five-bar", "6-pus"):
-        assert robot_function(name)().free_joints == ()
 
 
 @pytest.mark.slow

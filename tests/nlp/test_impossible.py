@@ -33,7 +33,7 @@ def unit_force_rows(generator: np.random.Generator, kind: int) -> Array:
     return np.hstack([f, np.cross(arms, f)])
 
 
-def test_one_more_of_pitch_moves_the_root_of_f_by_at_most_root_6() -> None:
+def test_one_more_of_pitch_moves_the_root_of_f_by_at_most_root_6_and_two_printed_maxima_by_more() -> None:
     for seed in range(200):
         generator = np.random.default_rng(seed)
         J = unit_force_rows(generator, seed % 2)
@@ -51,9 +51,6 @@ def test_one_more_of_pitch_moves_the_root_of_f_by_at_most_root_6() -> None:
     twists = [np.asarray(Task.screw("max", axis=[0, 0, 1], point=[0, 0, 0], pitch=h).twist) for h in (1, 2)]
     rates = [float(np.linalg.norm(J[:, :3] @ twist[3:])) for twist in twists]
     assert rates[1] - rates[0] == pytest.approx(math.sqrt(6), rel=1e-15)
-
-
-def test_the_two_maxima_printed_in_section_4_1_contradict_each_other() -> None:
     # Where F is 400.3 with pitch 1, it is at least this with pitch 0, at the same pose; the maximum is no less.
     least = (math.sqrt(PRINTED_PITCH_1) - math.sqrt(6)) ** 2
     assert least == pytest.approx(308.3, abs=0.05)
@@ -146,9 +143,6 @@ def test_no_three_fold_symmetric_robot_reaches_the_value_printed_in_section_4_3(
     assert 2 * T.max() == pytest.approx(417.49, abs=0.01)
     assert bound < 440
     assert bound < PRINTED_4_3
-
-
-def test_the_lipschitz_constants_hold_and_the_grid_covers_its_torus() -> None:
     b, a = grid()
     T = triple(b, a)
     assert b.shape == (240, 720)
@@ -205,11 +199,8 @@ def test_the_limbs_of_section_4_4_do_no_work_in_its_task(name: str) -> None:
     assert ceiling < 3 + 1e-12 < PRINTED_4_4
 
 
-def test_the_program_attains_the_ceiling_and_no_more() -> None:
+def test_the_program_attains_the_ceiling_and_the_printed_axes_give_next_to_nothing() -> None:
     assert pytest.approx(3, abs=1e-13) == solve(load_case("paper-4.4-max"), starts=2).F
-
-
-def test_the_printed_axes_are_no_universal_joints_and_give_next_to_nothing() -> None:
     first = np.array([[0, -0.989, 0.012], [0.887, 0.51, 0], [-0.855, 0.49, 0]])
     second = np.array([[0.91, 0, 0.03], [-0.52, 0.856, 0], [-0.498, -0.846, 0]])
     lengths = np.linalg.norm([first, second], axis=-1)

@@ -33,34 +33,20 @@ from measures import circle_joints, leg_measures, segment_distance
 
 import screwsynth.models
 from screwsynth.models import Model, Substitution, robot, stewart_gough
-from screwsynth.nlp import (
-    ActuatorRate,
-    Case,
-    CaseError,
-    CertificateStatus,
-    JointCone,
-    JointMotion,
-    Limits,
-    LinkClearance,
-    Nlp,
-    Search,
-    Status,
-    Task,
-    certify,
-    evaluate,
-    formulate,
-    load_case,
-    load_compiled,
-    margins_of,
-    sensitivities,
-    solve,
-)
+from screwsynth.nlp import Case, Limits, Nlp, Search, Status, Task, certify, evaluate, formulate, load_case, solve
+from screwsynth.nlp.case.limits.clearance import LinkClearance
 from screwsynth.nlp.case.limits.constraint import NUMBER, BoundedConstraint, Constraint
+from screwsynth.nlp.case.limits.joint_motion import JointCone, JointMotion
+from screwsynth.nlp.case.limits.rates import ActuatorRate
+from screwsynth.nlp.embedding.library import load_compiled
+from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.evidence.kkt import close_equations
-from screwsynth.nlp.evidence.sensitivity import Hindrance
+from screwsynth.nlp.evidence.margins import margins_of
+from screwsynth.nlp.evidence.sensitivity import Hindrance, sensitivities
 from screwsynth.nlp.program.places import FreeRotation
 from screwsynth.nlp.program.repeated import without_repeated
 from screwsynth.nlp.program.sampling import starting_points
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 
 Place = tuple[Array, Array]
 
@@ -369,11 +355,20 @@ def test_limits_that_mean_nothing_are_refused_in_one_sentence(tmp_path: Path) ->
         Case(rods, {}, (0.0, 0.0, 0.0), legs.tasks, limits=Limits(JointMotion("1:1", max=1.0)))
 
 
-def test_rates_of_straight_legs_are_their_work_rates() -> None:
+def test_rates_of_legs_are_work_rates_and_a_proof_treats_ranges_cones_and_clearance() -> None:
     case = case_from(starter_tables(stewart_gough()), "legs")
     nlp = formulate(replace(case, limits=Limits(ActuatorRate(2.0))))
     rows = [row.value for row in margins_of(nlp, nlp.start, optimal=False)]
     assert sorted(rows) == pytest.approx(sorted(np.abs(evaluate(nlp, nlp.start).rates)), rel=1e-12)
+    # The angle of the joint at which a hinged limb is opened has a proof too: it is written without an arc
+    # tangent.
+    model = robot(name="hinges", limb=[{"joints": LIMBS["hinge"]}, {"joints": LIMBS["universal"]}])
+    turn = [Task.screw("max", axis=[0, 1, 0], point=[0, 0, 0], pitch=0)]
+    case = Case(model, {}, (0.0, 0.0, 0.0), turn, limits=Limits(JointMotion("1:2", max=1.0), JointCone("2:1", 1.0)))
+    assert certify(case).certificate.status is CertificateStatus.PROVED
+    # Distances of links are made of pieces, which are covered too; this box has no design that keeps the limit.
+    apart = certify(replace(case, limits=Limits(LinkClearance(2.0)))).certificate
+    assert apart.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
 
 
 def test_numbers_of_joints_are_set_on_the_command_line(tmp_path: Path, cli: Run) -> None:
@@ -385,17 +380,6 @@ def test_numbers_of_joints_are_set_on_the_command_line(tmp_path: Path, cli: Run)
     ):
         out = output_of(cli("evaluate", name, "--set", setting, "--set", "rb=1", "--set", "p_z=1.1"))
         assert shown in out
-
-
-def test_a_proof_treats_ranges_cones_and_clearance() -> None:
-    """The angle of the joint at which a hinged limb is opened has a proof too: it is written without an arc tangent."""
-    model = robot(name="hinges", limb=[{"joints": LIMBS["hinge"]}, {"joints": LIMBS["universal"]}])
-    turn = [Task.screw("max", axis=[0, 1, 0], point=[0, 0, 0], pitch=0)]
-    case = Case(model, {}, (0.0, 0.0, 0.0), turn, limits=Limits(JointMotion("1:2", max=1.0), JointCone("2:1", 1.0)))
-    assert certify(case).certificate.status is CertificateStatus.PROVED
-    # Distances of links are made of pieces, which are covered too; this box has no design that keeps the limit.
-    apart = certify(replace(case, limits=Limits(LinkClearance(2.0)))).certificate
-    assert apart.status in (CertificateStatus.PROVED, CertificateStatus.INFEASIBLE)
 
 
 def test_links_begin_on_the_body_that_moves_with_a_slide() -> None:

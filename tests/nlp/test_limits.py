@@ -25,33 +25,19 @@ from hypothesis import strategies as st
 from measures import leg_measures, placed_joints, segment_distance
 
 from screwsynth.models import Model, hexapod, robot_function, stewart_gough, three_upu
-from screwsynth.nlp import (
-    BaseJointAngle,
-    Case,
-    CaseError,
-    Free,
-    JointSpacing,
-    LegClearance,
-    LegLength,
-    Limits,
-    QuantityLimit,
-    Relations,
-    Solution,
-    Status,
-    Task,
-    json_data,
-    margins_of,
-    result_of,
-    solve,
-)
-from screwsynth.nlp.case.limits.clearance import squared_distance
+from screwsynth.nlp import Case, Free, LegLength, Limits, Relations, Solution, Status, Task, json_data, result_of, solve
+from screwsynth.nlp.case.limits.clearance import LegClearance, squared_distance
 from screwsynth.nlp.case.limits.constraint import LENGTH, BoundedConstraint, between
-from screwsynth.nlp.case.limits.interval import IntervalLimit
+from screwsynth.nlp.case.limits.interval import IntervalLimit, QuantityLimit
+from screwsynth.nlp.case.limits.joints import BaseJointAngle
 from screwsynth.nlp.case.limits.limit import PosedRobot
+from screwsynth.nlp.case.limits.plates import JointSpacing
 from screwsynth.nlp.case.limits.registry import LIMIT_TYPES
 from screwsynth.nlp.case.limits.singular_values import largest_eigenvalue, smallest_eigenvalue
 from screwsynth.nlp.case.settings import Search
 from screwsynth.nlp.case.wholeschema import WholeDocument
+from screwsynth.nlp.errors import CaseError
+from screwsynth.nlp.evidence.margins import margins_of
 from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.solver.compromise import solution_of_one_task
 from screwsynth.nlp.solver.multistart import solve_program
@@ -177,14 +163,11 @@ def test_a_custom_relation_costs_what_moving_its_right_hand_side_does(relation: 
     assert "==" in relation or row["cost"] < 0
 
 
-def test_an_equation_that_cannot_hold_says_by_how_much() -> None:
+def test_what_cannot_hold_says_by_how_much_and_what_is_fixed_and_holds_costs_nothing() -> None:
     apart = solved(case_with({"custom": ["x1 == 5*x2"]}))
     assert apart.status is Status.INFEASIBLE
     # x1 is at most 16 and x2 at least 4: 4 short.
     assert [(row.key, round(abs(row.needed), 4)) for row in apart.relaxation] == [("custom[0]", 4.0)]
-
-
-def test_a_design_with_nothing_free_is_held_to_its_limits_too() -> None:
     fixed = {"x1": 12, "x2": 8, "x3": 20, "x4": 8}
     tables = HEXAPOD | {"pose": {"position": [0, 0, 35]}}
     assert solved(case_with({"leg_length": {"max": 45}}, tables, **fixed)).status is Status.EVALUATED
@@ -193,6 +176,14 @@ def test_a_design_with_nothing_free_is_held_to_its_limits_too() -> None:
     longest = solution.state.quantities["leg_length"].max()
     needed = [(row.key, row.needed) for row in solution.relaxation]
     assert needed == [("leg_length.max", pytest.approx(longest, rel=1e-6))]
+    plates, limits = {"x1": 12, "x3": 20}, {"footprint": {"base": 13}, "leg_length": {"max": 45}}
+    result = json_data(result_of(solved(case_with(limits, **plates))))
+    row = next(row for row in result["limits"] if row["key"] == "footprint.base")
+    assert (row["cost"], row["active"]) == (0.0, [])
+    assert row["margin"] == pytest.approx(1, rel=1e-9)
+    solution = solved(case_with(limits | {"footprint": {"base": 11}}, **plates))
+    assert solution.status is Status.INFEASIBLE
+    assert [(row.key, round(row.needed, 4)) for row in solution.relaxation] == [("footprint.base", 12.0)]
 
 
 def test_the_same_design_in_radians_costs_the_same_per_radian() -> None:
@@ -291,17 +282,6 @@ def test_limits_in_python_are_those_of_a_file() -> None:
     assert not Limits()
     with pytest.raises(CaseError, match=r"limits\.leg_length: is given more than once"):
         Limits(LegLength(max=45.0), LegLength(min=20.0))
-
-
-def test_what_is_fixed_and_holds_costs_nothing_and_what_does_not_is_infeasible() -> None:
-    plates, limits = {"x1": 12, "x3": 20}, {"footprint": {"base": 13}, "leg_length": {"max": 45}}
-    result = json_data(result_of(solved(case_with(limits, **plates))))
-    row = next(row for row in result["limits"] if row["key"] == "footprint.base")
-    assert (row["cost"], row["active"]) == (0.0, [])
-    assert row["margin"] == pytest.approx(1, rel=1e-9)
-    solution = solved(case_with(limits | {"footprint": {"base": 11}}, **plates))
-    assert solution.status is Status.INFEASIBLE
-    assert [(row.key, round(row.needed, 4)) for row in solution.relaxation] == [("footprint.base", 12.0)]
 
 
 def test_evaluate_shows_margins_and_exits_with_1_outside_of_a_limit(cli: Run, tmp_path: Path) -> None:
@@ -403,7 +383,7 @@ PAGE = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
 KEYS = [key for kind in LIMIT_TYPES for key in kind.fields()]
 
 
-def test_schema_and_documentation_have_every_limit_and_no_other() -> None:
+def test_registry_schema_and_documentation_have_every_limit_and_no_other() -> None:
     table = WholeDocument.model_json_schema()["$defs"]["LimitsTable"]
     assert list(table["properties"]) == ["over", *KEYS]
     assert all(field["description"] for field in table["properties"].values())
@@ -411,9 +391,6 @@ def test_schema_and_documentation_have_every_limit_and_no_other() -> None:
     assert table["additionalProperties"] == {"$ref": "#/$defs/IntervalTable"}
     (written, *_) = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
     assert list(tomllib.loads(written)["limits"]) == KEYS
-
-
-def test_every_limit_type_has_a_key_a_description_and_a_file_of_its_room() -> None:
     named = [kind.key for kind in LIMIT_TYPES if kind.key]
     assert len(set(named)) == len(named) == len(LIMIT_TYPES) - 1
     for kind in LIMIT_TYPES:

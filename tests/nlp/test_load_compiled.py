@@ -157,12 +157,20 @@ def test_wrong_arguments_are_refused_in_a_sentence(compiled: CompiledCase) -> No
         assert "\n" not in str(error.value)
 
 
-def test_a_pickle_has_the_folder_alone(compiled: CompiledCase, folder: Path) -> None:
+def test_a_pickle_has_the_folder_alone_and_the_manifest_what_it_holds(compiled: CompiledCase, folder: Path) -> None:
     text = pickle.dumps(compiled)
     assert str(folder).encode() in text
     assert len(text) < 500
     again = pickle.loads(text)  # noqa: S301 - made above
     assert (again.solve().x == compiled.solve().x).all()
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    assert set(manifest["files"]) == {path.name for path in folder.iterdir()}
+    header = (folder / f"{manifest['prefix']}.h").read_text(encoding="utf-8")
+    assert all(f"SCREWSYNTH_{each['name']}" in header for each in manifest["statuses"])
+    assert [each["code"] for each in manifest["statuses"]] == list(range(len(manifest["statuses"])))
+    assert all(each["c_name"] in header for each in manifest["limits"])
+    (task,) = manifest["tasks"]
+    assert [each["default"] for each in manifest["parameters"]][-6:] == task["twist"]
 
 
 def test_other_folders_are_refused_in_a_sentence(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,17 +199,6 @@ def test_other_folders_are_refused_in_a_sentence(folder: Path, tmp_path: Path, m
             refused("compiler")
     source.rename(copy / "elsewhere")
     refused(r"-sqp\.c cannot be read")
-
-
-def test_the_manifest_says_what_the_folder_holds(folder: Path) -> None:
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    assert set(manifest["files"]) == {path.name for path in folder.iterdir()}
-    header = (folder / f"{manifest['prefix']}.h").read_text(encoding="utf-8")
-    assert all(f"SCREWSYNTH_{each['name']}" in header for each in manifest["statuses"])
-    assert [each["code"] for each in manifest["statuses"]] == list(range(len(manifest["statuses"])))
-    assert all(each["c_name"] in header for each in manifest["limits"])
-    (task,) = manifest["tasks"]
-    assert [each["default"] for each in manifest["parameters"]][-6:] == task["twist"]
 
 
 def test_a_budget_ends_each_problem_by_itself(compiled: CompiledCase) -> None:

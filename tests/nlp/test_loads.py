@@ -215,8 +215,11 @@ OF_ROBOTS = [
 ]
 
 
-def test_the_case_without_a_fault_is_read() -> None:
+def test_cases_without_a_fault_are_read(tmp_path: Path) -> None:
     assert case_from(f"{CASE}{LOAD}{MOVED}[limits]\nactuator_force = {{ max = 3 }}").loading.loads
+    limits = '[limits]\nactuator_force = { "1" = { max = 3 }, "3" = { min = -5 } }\nactuator_power = { max = 9 }'
+    case = load_case(saved_with_robot(tmp_path, MIXED, f"{PLANE}{LOAD}{MOVED}{limits}"))
+    assert [each.name for each in case.limits] == ["actuator_force.1", "actuator_force.3", "actuator_power"]
 
 
 @pytest.mark.parametrize("tables", FAULTS)
@@ -231,12 +234,6 @@ def test_what_a_robot_does_not_have_is_one_sentence(
 ) -> None:
     err = refusal_of(cli("solve", saved_with_robot(tmp_path, robot, PLANE + tables)))
     assert err.startswith(f"screwsynth: case.toml: {sentence}"), err
-
-
-def test_a_robot_with_actuators_of_two_kinds_has_limits_by_actuator_and_one_power(tmp_path: Path) -> None:
-    limits = '[limits]\nactuator_force = { "1" = { max = 3 }, "3" = { min = -5 } }\nactuator_power = { max = 9 }'
-    case = load_case(saved_with_robot(tmp_path, MIXED, f"{PLANE}{LOAD}{MOVED}{limits}"))
-    assert [each.name for each in case.limits] == ["actuator_force.1", "actuator_force.3", "actuator_power"]
 
 
 #: The same in Python: a loading, limits, and the sentence.
@@ -480,15 +477,12 @@ def test_arrows_of_slides_do_the_opposite_work_of_those_of_the_load(name: str, t
     assert work == pytest.approx(-float(force @ (v + np.cross(omega, point)) + moment @ omega), rel=1e-8)
 
 
-def test_a_picture_of_an_objective_of_actuators_has_no_rates_of_a_motion() -> None:
+def test_pictures_of_forces_have_no_rates_and_arrows_the_name_of_their_load() -> None:
     drawing = drawings_of(handling(), 3)[0]
     assert drawing.motion is None
     assert drawing.rows == ()
     assert "smallest F = 7.532144 N (largest over 8 poses). Shown: pose 3" in drawing.headline
-
-
-def test_an_arrow_has_the_name_of_its_load_and_not_of_the_load_case() -> None:
-    """A force of any direction has no arrow, and the weight that acts with it has one."""
+    # A force of any direction has no arrow, and the weight that acts with it has one.
     loads = '[[load]]\nname = "tool"\nmass = 2\nalways = true\n[[load]]\nname = "cut"\nany = { force = 5 }\n'
     (drawing,) = drawings_of(solve(case_from(DELTA + loads)))
     assert drawing.forces is not None

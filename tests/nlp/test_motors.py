@@ -391,12 +391,19 @@ def test_the_motor_sheet_is_in_all_outputs(tmp_path: Path) -> None:
     assert "motors" not in plain
 
 
-def test_a_numbers_bound_that_is_missing_is_said_in_the_sheet() -> None:
+def test_bounds_that_are_missing_are_said_in_the_sheet_or_open_with_the_reason() -> None:
     found = judge_workspace(replace(at_home("3-rrs"), loading=Loading((Load("w", (0.0, 0.0, -1.0)),))), time_limit=1e-4)
     (table,) = motor_tables(found.case, workspace_of(found).motors or ())
     assert [header.partition("\n")[0] for header in table.headers][3:5] == ["largest torque", "backwards"]
     assert {str(row[3]) for row in table.rows} == {"no bound"}
     assert "without a limit stay open" in verdict_words(workspace_of(found))
+    case = replace(at_home("exechon"), loading=Loading((Load("push", (0.0, 0.0, -10.0)),)))
+    found = list(motor_extremes(Subject(case, case.model, None, "errors take freedoms from the robot")))
+    assert len(found) == 6
+    for each in found:
+        assert each.outcome is Outcome.OPEN
+        assert math.isinf(each.bound)
+        assert each.reason == "errors take freedoms from the robot"
 
 
 def test_with_a_tolerance_every_machine_keeps_the_bounds() -> None:
@@ -427,16 +434,6 @@ def test_with_a_tolerance_every_machine_keeps_the_bounds() -> None:
     assert any(worst[key] > key[3].sign * exact[key].bound for key in forces)
     changes = [key[3].sign * (found[key].bound - exact[key].reached) for key in forces]
     assert max(changes) <= 0.08 * max(abs(found[key].bound) for key in forces)
-
-
-def test_machines_that_are_not_judged_leave_their_motors_open_with_the_reason() -> None:
-    case = replace(at_home("exechon"), loading=Loading((Load("push", (0.0, 0.0, -10.0)),)))
-    found = list(motor_extremes(Subject(case, case.model, None, "errors take freedoms from the robot")))
-    assert len(found) == 6
-    for each in found:
-        assert each.outcome is Outcome.OPEN
-        assert math.isinf(each.bound)
-        assert each.reason == "errors take freedoms from the robot"
 
 
 def test_slices_show_where_limits_on_actuators_hold() -> None:

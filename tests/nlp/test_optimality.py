@@ -16,24 +16,11 @@ from numpy.typing import ArrayLike
 
 from screwsynth import models
 from screwsynth.models import Closure, Dimension, Model, Unknown, Wrench, axis_from_screw, hexapod, stewart_gough
-from screwsynth.nlp import (
-    Case,
-    Evidence,
-    Free,
-    Nlp,
-    PointKind,
-    Rotation,
-    Task,
-    TaskAnalysis,
-    analyse_tasks,
-    evaluate,
-    examine,
-    formulate,
-    load_case,
-)
+from screwsynth.nlp import Case, Free, Nlp, Rotation, TaskAnalysis, analyse_tasks, evaluate, formulate, load_case
 from screwsynth.nlp.case.limits.constraint import Constraint, Reading
-from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.case.task import Sense, Task
 from screwsynth.nlp.evidence.linalg import echelon_basis, nonnegative_least_squares
+from screwsynth.nlp.evidence.optimality import Evidence, PointKind, examine
 from screwsynth.nlp.program.places import Places, Scalar
 from screwsynth.nlp.program.program import Program
 
@@ -67,13 +54,16 @@ def examined(
     return examine(nlp, np.array(at, dtype=float))
 
 
-def test_strict_minimum_inside() -> None:
+def test_strict_minimum_inside_and_not_stationary_away_from_it() -> None:
     evidence = examined(lambda x: (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MIN, [(-2, 2), (-2, 2)], [1.0, 0.0])
     assert evidence.kind is PointKind.STRICT_MINIMUM
     # Half ranges are 2: second derivatives 2 and 8 in scaled variables are 8 and 32.
     np.testing.assert_allclose(evidence.eigenvalues, [8, 32])
     assert evidence.active == ()
     assert evidence.licq
+    evidence = examined(lambda x: x**2, Sense.MIN, [(-1, 3)], [0.5])
+    assert evidence.kind is PointKind.NOT_STATIONARY
+    assert evidence.stationarity == pytest.approx(2 * 0.5 * 2)
 
 
 @pytest.mark.parametrize(
@@ -91,12 +81,6 @@ def test_kinds_of_points(
     objective: Callable[[SX], SX], sense: Sense, bounds: list[tuple[float, float]], at: list[float], kind: PointKind
 ) -> None:
     assert examined(objective, sense, bounds, at).kind is kind
-
-
-def test_not_stationary_away_from_the_optimum() -> None:
-    evidence = examined(lambda x: x**2, Sense.MIN, [(-1, 3)], [0.5])
-    assert evidence.kind is PointKind.NOT_STATIONARY
-    assert evidence.stationarity == pytest.approx(2 * 0.5 * 2)
 
 
 def test_multiplier_is_the_gain_per_unit_of_room() -> None:
@@ -129,10 +113,13 @@ def test_an_equation_is_active_and_its_multiplier_may_be_negative() -> None:
     assert side.multiplier == pytest.approx(-2)  # improvement of a minimum: minus its growth
 
 
-def test_outside_a_limit_is_infeasible_and_names_it() -> None:
+def test_outside_a_limit_is_infeasible_and_at_a_vertex_there_is_no_direction_left() -> None:
     evidence = examined(lambda x: x[0], Sense.MAX, [(-9, 9), (-9, 9)], [1.5, 0.0], [("disc", ca.sumsqr, -np.inf, 1.0)])
     assert evidence.kind is PointKind.INFEASIBLE
     assert evidence.violated == ("disc",)
+    evidence = examined(lambda x: x[0] + 2 * x[1], Sense.MAX, [(0, 1), (0, 1)], [1.0, 1.0])
+    assert evidence.kind is PointKind.STRICT_MAXIMUM
+    assert evidence.eigenvalues.size == 0
 
 
 @pytest.mark.parametrize(
@@ -154,14 +141,11 @@ def test_minima_that_are_not_isolated_name_their_flat_directions(
     assert along["v0"] / along["v1"] == slope
 
 
-def test_a_direction_along_active_bounds_is_named() -> None:
+def test_a_direction_along_active_bounds_is_flat_and_a_quartic_minimum_is_not() -> None:
     bounds = [(0, 4), (-1, 1), (-1, 1), (-2, 3)]
     evidence = examined(lambda x: x[0] + x[1] ** 2 - x[3], Sense.MIN, bounds, [0.0, 0.0, 0.3, 3.0])
     assert evidence.kind is PointKind.NOT_ISOLATED
     assert [set(direction) for direction in evidence.flat] == [{"v2"}]
-
-
-def test_a_quartic_minimum_is_not_called_flat() -> None:
     evidence = examined(lambda x: x**4, Sense.MIN, [(-1, 1)], [0.0])
     assert evidence.kind is PointKind.UNDECIDED
     assert evidence.flat == ()
@@ -176,13 +160,7 @@ def test_dependent_active_normals_lose_licq_and_still_certify() -> None:
     assert sum(side.multiplier for side in evidence.active) == pytest.approx(1)
 
 
-def test_at_a_vertex_there_is_no_direction_left() -> None:
-    evidence = examined(lambda x: x[0] + 2 * x[1], Sense.MAX, [(0, 1), (0, 1)], [1.0, 1.0])
-    assert evidence.kind is PointKind.STRICT_MAXIMUM
-    assert evidence.eigenvalues.size == 0
-
-
-def test_nonnegative_least_squares_satisfies_its_optimality_conditions() -> None:
+def test_least_squares_are_optimal_and_an_echelon_basis_spans_the_same_space() -> None:
     generator = np.random.default_rng(5)
     for _ in range(200):
         n, k = generator.integers(1, 8, size=2)
@@ -194,9 +172,6 @@ def test_nonnegative_least_squares_satisfies_its_optimality_conditions() -> None
         assert y.min() >= 0
         assert slope.min() >= -1e-9
         assert abs(slope @ y) <= 1e-9
-
-
-def test_echelon_basis_spans_the_same_space() -> None:
     generator = np.random.default_rng(6)
     for _ in range(50):
         vectors = generator.normal(size=(3, 6))
@@ -530,16 +505,13 @@ def test_every_principal_rotation_is_stationary(J: Array) -> None:
             assert abs(slope) < 1e-7 * size
 
 
-def test_a_direction_in_which_nothing_pushes_has_no_resistance() -> None:
+def test_motions_that_no_force_resists_are_those_known_by_hand() -> None:
     found = analyse_tasks(degenerate_jacobian("planar forces"))
     assert found.translations[0].F < 1e-30
     np.testing.assert_allclose(np.abs(found.translations[0].twist), [0, 0, 0, 0, 0, 1], atol=1e-14)
     # Where no force stops a translation, the rotation that goes with it has none of it.
     for motion in found.rotations:
         assert abs(motion.twist[5]) < 1e-12
-
-
-def test_forces_through_a_point_let_the_platform_turn_about_it() -> None:
     found = analyse_tasks(degenerate_jacobian("forces through a point"))
     for motion in found.rotations:
         assert motion.F < 1e-28

@@ -16,21 +16,11 @@ from numpy_engine.tangent_bounds import tangent_forms
 from random_graphs import N, random_function
 
 from screwsynth.models import robot_function
-from screwsynth.nlp import (
-    Case,
-    CertificateStatus,
-    Free,
-    Rotation,
-    Search,
-    Sense,
-    Task,
-    UncoveredError,
-    certify_program,
-    formulate,
-    load_case,
-    solve_program,
-)
+from screwsynth.nlp import Case, Search, Sense, Task, UncoveredError, formulate, load_case, solve_program
+from screwsynth.nlp.case.pose import Free, Rotation
 from screwsynth.nlp.proof.boxes.engine import Engine, Verdict, value_tape
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.arithmetic import PolynomialArithmetic
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.polymodels import forms_of, polynomial_sum, reaching_part

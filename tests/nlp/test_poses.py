@@ -15,29 +15,16 @@ from builders import Array, Run, case_from, case_of, edited, output_of, refusal_
 from measures import exponential, placed_joints
 
 from screwsynth.models import matrix_from_axis_angle, screw_from_axis
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    PointKind,
-    Solution,
-    Status,
-    certify,
-    evaluate,
-    examine,
-    formulate,
-    json_data,
-    result_of,
-    solve,
-)
+from screwsynth.nlp import Case, CaseError, PointKind, Solution, certify, evaluate, examine, json_data, result_of, solve
 from screwsynth.nlp.case.pose import along_screw, over_grid
 from screwsynth.nlp.evidence.kkt import linearise
 from screwsynth.nlp.evidence.tolerance import BuiltRobot, tolerance_loss
 from screwsynth.nlp.program import limits as program_limits
-from screwsynth.nlp.program.formulation import formulate_each
+from screwsynth.nlp.program.formulation import formulate, formulate_each
 from screwsynth.nlp.program.pairs import with_all_pairs, with_pairs_at
 from screwsynth.nlp.program.sampling import starting_points
 from screwsynth.nlp.proof.statement.standard_form import standard_form
-from screwsynth.nlp.solver.status import Phase
+from screwsynth.nlp.solver.status import Phase, Status
 
 HEAD = """
 units.length = "cm"
@@ -97,7 +84,7 @@ def by_hand(result: dict[str, Any], pose: dict[str, Any], twist: Array) -> tuple
     return float(rates @ rates), lengths
 
 
-def test_displacements_along_a_screw_are_its_exponential() -> None:
+def test_poses_along_a_screw_are_its_exponential() -> None:
     twist = screw_from_axis([1, 2, 2], [3, -1, 4], 0.7)
     for amount, step in zip((-0.8, 0.0, 1.3), along_screw(twist, (-0.8, 0.0, 1.3)), strict=True):
         series = exponential(twist, amount)
@@ -106,6 +93,19 @@ def test_displacements_along_a_screw_are_its_exponential() -> None:
     (moved,) = along_screw(screw_from_axis([0, 0, 3], [0, 0, 0], math.inf), [2.5])
     np.testing.assert_allclose(moved.translation, [0, 0, 2.5])
     assert len(over_grid([[0, 1], [0], [2, 3, 4]])) == 6
+    solution = solve(poses_case(ALONG))
+    result = json_data(result_of(solution))
+    twist = np.array(result["task"]["twist"])
+    stated = result["pose"]
+    R0, p0 = np.array(stated["rotation_matrix"]), np.array(stated["position"])
+    s = twist[:3]
+    for degrees, pose in zip((-15, 0, 15), result["poses"], strict=True):
+        angle = math.radians(degrees)
+        Q = ca.evalf(matrix_from_axis_angle(ca.SX(s.tolist()), ca.SX(angle))).full()
+        through = np.cross(s, twist[3:])
+        np.testing.assert_allclose(np.array(pose["pose"]["rotation_matrix"]), Q @ R0, atol=1e-12)
+        expected = through + Q @ (p0 - through) + angle * (s @ twist[3:]) * s
+        np.testing.assert_allclose(pose["pose"]["position"], expected, atol=1e-10)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -124,22 +124,6 @@ def test_objective_over_poses_is_the_sum_mean_or_worst_of_what_each_has(kind: st
     assert result["F"] == pytest.approx(expected, rel=1e-9)
     for value, pose in zip(found, result["poses"], strict=True):
         assert pose["F"] == pytest.approx(value, rel=1e-9)
-
-
-def test_poses_along_the_task_are_moved_with_it() -> None:
-    solution = solve(poses_case(ALONG))
-    result = json_data(result_of(solution))
-    twist = np.array(result["task"]["twist"])
-    stated = result["pose"]
-    R0, p0 = np.array(stated["rotation_matrix"]), np.array(stated["position"])
-    s = twist[:3]
-    for degrees, pose in zip((-15, 0, 15), result["poses"], strict=True):
-        angle = math.radians(degrees)
-        Q = ca.evalf(matrix_from_axis_angle(ca.SX(s.tolist()), ca.SX(angle))).full()
-        through = np.cross(s, twist[3:])
-        np.testing.assert_allclose(np.array(pose["pose"]["rotation_matrix"]), Q @ R0, atol=1e-12)
-        expected = through + Q @ (p0 - through) + angle * (s @ twist[3:]) * s
-        np.testing.assert_allclose(pose["pose"]["position"], expected, atol=1e-10)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -173,15 +157,6 @@ def test_one_listed_pose_is_that_pose() -> None:
     first, second = (solve(poses_case(pose, "")) for pose in (one, one.replace("[[pose]]", "[pose]")))
     assert first.F == second.F
     assert "poses" not in json_data(result_of(first))
-
-
-def test_starting_points_lie_in_every_poses_ball() -> None:
-    nlp = formulate(poses_case(LISTED.replace("{ axis = [0, 1, 0], angle", "{ angle")))
-    for name in ("pose1_q_x", "pose2_q_x"):
-        at = [variable.name for variable in nlp.program.variables].index(name)
-        sizes = np.linalg.norm(starting_points(nlp, 60, 1)[:, at : at + 3], axis=1)
-        assert sizes.max() <= math.sin(math.radians(10)) + 1e-12
-        assert np.median(sizes) > 0.7 * math.sin(math.radians(10))
 
 
 def test_several_tasks_over_several_poses_are_brought_together() -> None:
@@ -219,12 +194,18 @@ def test_limits_of_tasks_brought_together_have_the_cost_of_their_value() -> None
     assert row["cost"] == pytest.approx((high - low) / 2e-2, rel=0.01)
 
 
-def test_an_optimum_over_poses_has_its_evidence() -> None:
+def test_an_optimum_over_poses_has_its_evidence_and_starts_lie_in_every_poses_ball() -> None:
     solution = solve(poses_case(ALONG, "worst"))
     assert solution.evidence.kind is PointKind.STRICT_MAXIMUM
     names = {side.name for side in solution.evidence.active}
     assert {"F pose 1", "F pose 3"} & names
     assert not any(side.name == "level" for side in solution.evidence.active)
+    nlp = formulate(poses_case(LISTED.replace("{ axis = [0, 1, 0], angle", "{ angle")))
+    for name in ("pose1_q_x", "pose2_q_x"):
+        at = [variable.name for variable in nlp.program.variables].index(name)
+        sizes = np.linalg.norm(starting_points(nlp, 60, 1)[:, at : at + 3], axis=1)
+        assert sizes.max() <= math.sin(math.radians(10)) + 1e-12
+        assert np.median(sizes) > 0.7 * math.sin(math.radians(10))
 
 
 def test_commands_and_generated_code_have_every_pose(cli: Run, tmp_path: Path) -> None:
@@ -354,14 +335,11 @@ def test_an_impossible_stroke_is_relaxed_by_what_all_poses_need() -> None:
     assert solve(hexapod_at(12, needed.needed * (1 - 1e-3), starts=2)).status is Status.INFEASIBLE
 
 
-def test_a_certificate_states_every_pair() -> None:
+def test_a_certificate_states_every_pair_and_is_proved() -> None:
     nlp = formulate(hexapod_at(5, 4.0))
     from_few, from_start = (standard_form(each) for each in (with_pairs_at(nlp, [nlp.lower]), nlp))
     assert len(from_few.conditions) == len(from_start.conditions) == 2 * 6 * 5 * 4
     assert [each.name for each in from_few.conditions] == [each.name for each in from_start.conditions]
-
-
-def test_the_box_of_a_case_with_pairs_is_proved() -> None:
     case = hexapod_at(5, 3.5, free_legs=1)
     certified = certify(case, gap=1e-3)
     assert certified.is_proved

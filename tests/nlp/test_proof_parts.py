@@ -1,4 +1,4 @@
-"""Parts of searches and proofs: branch and bound by itself, symmetries, signs, rules that must hold, a missing kernel."""
+"""Parts of searches and proofs: branch and bound, symmetries, signs, rules that must hold, a missing kernel."""
 
 import json
 import math
@@ -17,25 +17,11 @@ from casadi import SX
 from limb_cases import machine
 
 from screwsynth.models import Dimension, hexapod
-from screwsynth.nlp import (
-    Case,
-    CertificateStatus,
-    Free,
-    InputError,
-    Nlp,
-    Sense,
-    Task,
-    certify,
-    certify_program,
-    formulate,
-    judge_workspace,
-    largest_scale,
-    load_case,
-)
+from screwsynth.nlp import Case, Free, Nlp, Sense, Task, formulate, judge_workspace, largest_scale, load_case
 from screwsynth.nlp.case.limits.constraint import BoundedConstraint, Constraint, Reading
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp.errors import InputError, UncoveredError
 from screwsynth.nlp.program.layout import assemble, lay_out
 from screwsynth.nlp.proof.boxes.engine import Engine
 from screwsynth.nlp.proof.boxes.search import (
@@ -55,6 +41,8 @@ from screwsynth.nlp.proof.boxes.search import (
 from screwsynth.nlp.proof.boxes.symmetry import grouped, halved, mirrors
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
+from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.checker.check import check_proof
 from screwsynth.nlp.proof.checker.premises import fingerprint
 from screwsynth.nlp.proof.checker.proof_file import ProofClaim
@@ -70,7 +58,7 @@ from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.slices.slices import slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome
-from screwsynth.nlp.solver.certified import proof_of
+from screwsynth.nlp.solver.certified import certify, proof_of
 
 
 class Peak(Rule[np.ndarray]):
@@ -115,7 +103,12 @@ def test_every_order_closes_the_same_boxes_which_cover_the_whole(order: Order) -
     assert (search.left, search.is_open) == (0, False)
 
 
-def test_boxes_that_are_too_small_keep_their_bound() -> None:
+def test_boxes_that_are_too_small_and_those_of_a_search_that_ends_keep_their_bound() -> None:
+    search = search_of(Peak(1e-9), Order.LARGEST_CHUNK)
+    assert Effort(most_boxes=100).run(search, lambda: None) == f"stopped after {search.boxes} boxes"
+    left = [each.upper - each.lower for each in search.state.left]
+    assert search.bound >= 1.0
+    assert sum(float(each.prod(axis=1).sum()) for each in left) < 1.0
     search = search_of(Peak(0.0), Order.LARGEST, least=2.0**-6)
     assert Effort().run(search, lambda: None if search.is_open else TOO_SMALL) == TOO_SMALL
     assert search.left
@@ -126,14 +119,6 @@ def test_boxes_that_are_too_small_keep_their_bound() -> None:
     assert ((small.upper - small.lower).max(axis=1) < 2.0**-6).all()
     # Each carries how often it was bisected, which its size tells.
     assert (2.0**-small.more == (small.upper - small.lower).prod(axis=1)).all()
-
-
-def test_a_search_ends_at_its_largest_number_of_boxes() -> None:
-    search = search_of(Peak(1e-9), Order.LARGEST_CHUNK)
-    assert Effort(most_boxes=100).run(search, lambda: None) == f"stopped after {search.boxes} boxes"
-    left = [each.upper - each.lower for each in search.state.left]
-    assert search.bound >= 1.0
-    assert sum(float(each.prod(axis=1).sum()) for each in left) < 1.0
 
 
 class Better(Peak):

@@ -113,7 +113,7 @@ def test_the_kernel_agrees_with_the_reference_box_by_box(tolerance: float) -> No
     assert 0.1 < theirs.is_regular.mean() < 0.9
 
 
-def test_a_few_steps_find_poses_with_extreme_determinants() -> None:
+def test_a_few_steps_find_extreme_determinants_and_their_signs_are_exact() -> None:
     problem = hexapod(TURNS, 45)
     signs = DeterminantSigns(problem, problem.locked)
     poses = problem.box.random(5000, np.random.default_rng(0))[:, list(problem.free)]
@@ -121,30 +121,21 @@ def test_a_few_steps_find_poses_with_extreme_determinants() -> None:
     # The largest is at the ends of the box, the smallest near its middle.
     assert found.max() > 1.1 * sampled.max() > 0
     assert found.min() < 0.97 * sampled.min() < 0
-
-
-def test_signs_of_determinants_are_exact() -> None:
     for each in np.random.default_rng(4).integers(-1, 2, (100, 6, 6)).astype(float):
         assert _sign_of_determinant(each) == np.sign(np.round(np.linalg.det(each)))
 
 
-def test_a_matrix_may_have_many_columns() -> None:
+def test_matrices_known_by_hand_are_regular_or_not() -> None:
     x = ca.SX.sym("x", 1)
     test = RankTest(RankMatrix(x * ca.SX.eye(100), 0), x, np.ones(1))
     forms = Encloser(x, test.entries)(np.array([[0.5, -0.5]]), np.array([[1.5, 1.5]]))
     assert test.examine(forms, 1, 0).is_regular.tolist() == [True, False]
-
-
-def test_a_large_entry_beside_a_constant_row_hides_no_singular_matrix() -> None:
-    """The spectral radius of ``[[0, 0], [1e9, r]]`` is r, as a positive vector shows and no other may."""
+    # The spectral radius of ``[[0, 0], [1e9, r]]`` is r, as a positive vector shows and no other may.
     x = ca.SX.sym("x", 2)
     test = RankTest(RankMatrix(ca.vertcat(ca.SX([[1, 0]]), x.T), 0), x, np.array([0.0, 1.0]))
     rest = np.array([[1e9, 0.5], [1e9, 1.5]])
     found = test.examine(Forms(np.array([[0.0, 1.0]] * 2), np.zeros((2, 2, 1)), rest), 1, 0)
     assert found.is_regular.tolist() == [True, False]
-
-
-def test_the_errors_of_a_centre_are_a_vector_of_unit_length() -> None:
     x = ca.SX.sym("x", 1)
     test = RankTest(RankMatrix(x, 0), x, np.ones(1))
     # The sums of two vectors' lengths are 0.99 and 1.01; those of their parts would be 1.3 and more.
@@ -152,9 +143,6 @@ def test_the_errors_of_a_centre_are_a_vector_of_unit_length() -> None:
     a = np.hstack([np.repeat(parts, 3, axis=1), 0 * parts, 0.49 + 0 * parts, 0 * parts])[:, None]
     found = test.examine(Forms(np.ones((2, 1)), a, np.zeros((2, 1))), 0, 6)
     assert found.is_regular.tolist() == [True, False]
-
-
-def test_a_sum_that_overflows_shows_nothing() -> None:
     x = ca.SX.sym("x", 1)
     test = RankTest(RankMatrix(x * (ca.SX.eye(2) + 0.5 * ca.SX.ones(2, 2)), 0), x, np.ones(1))
     for rest, is_regular in ((0.1, 1), (1e308, 0)):

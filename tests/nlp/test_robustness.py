@@ -15,27 +15,13 @@ from measures import circle_joints
 
 from screwsynth import models
 from screwsynth.models import Closure, Dimension, Model, PoseSymbols, Unknown, force_along, hexapod, stewart_gough
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    Free,
-    Method,
-    PointKind,
-    Rotation,
-    Search,
-    Status,
-    Task,
-    evaluate,
-    examine,
-    formulate,
-    json_data,
-    load_case,
-    result_of,
-    solve,
-)
+from screwsynth.nlp import Case, CaseError, Search, Status, evaluate, formulate, json_data, load_case, result_of, solve
+from screwsynth.nlp.case.pose import Free, Rotation
+from screwsynth.nlp.case.task import Method, Task
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.kkt import close_equations, linearise
 from screwsynth.nlp.evidence.margins import margins_of
+from screwsynth.nlp.evidence.optimality import PointKind, examine
 from screwsynth.nlp.results.point import violations
 
 
@@ -138,13 +124,14 @@ def test_a_robot_is_assembled_before_it_is_evaluated_and_infeasible_if_it_cannot
     assert linearise(nlp, close_equations(nlp, nlp.start)).violation > 0.1
 
 
-def test_evaluate_puts_free_directions_on_the_sphere(cli: Run) -> None:
+def test_evaluate_puts_free_directions_on_the_sphere_and_standard_output_takes_one_document(cli: Run) -> None:
     result = json.loads(cli("evaluate", "paper-4.4-max", "--json", "-")[1])
     assert result["violated"] == []
     for i in (1, 2, 3):
         u1, u2 = np.array(result["parameters"][f"u1_{i}"]), np.array(result["parameters"][f"u2_{i}"])
         assert np.linalg.norm(u1) == pytest.approx(1, abs=1e-12)
         assert u1 @ u2 == pytest.approx(0, abs=1e-12)
+    refusal_of(cli("check", "paper-4.2-rotation", "--json", "-", "--markdown"), "standard output")
 
 
 @pytest.mark.parametrize(("key", "value"), [("starts", 0), ("seed", -1), ("max_iterations", 0)])
@@ -154,10 +141,6 @@ def test_a_search_that_cannot_be_is_refused(key: str, value: int) -> None:
     if key != "max_iterations":
         with pytest.raises(CaseError, match=f"solve.{key}"):
             solve(load_case("paper-4.3"), **{key: value})  # type: ignore[arg-type]
-
-
-def test_standard_output_takes_one_document(cli: Run) -> None:
-    refusal_of(cli("check", "paper-4.2-rotation", "--json", "-", "--markdown"), "standard output")
 
 
 def test_a_failed_compromise_is_no_answer(tmp_path: Path, cli: Run) -> None:

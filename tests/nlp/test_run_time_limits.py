@@ -18,31 +18,18 @@ import pytest
 from builders import case_from, starter
 
 from screwsynth.models import screw_from_axis
-from screwsynth.nlp import (
-    ActuatorRate,
-    Case,
-    CaseError,
-    JointCone,
-    JointMotion,
-    Limits,
-    LinkClearance,
-    OverPoses,
-    Pose,
-    QuantityLimit,
-    RateShare,
-    __version__,
-    formulate,
-    generate_c,
-    solve,
-)
+from screwsynth.nlp import Case, CaseError, Limits, LinkClearance, QuantityLimit, __version__, generate_c, solve
 from screwsynth.nlp.case.limits.constraint import LENGTH
+from screwsynth.nlp.case.limits.joint_motion import JointCone, JointMotion
 from screwsynth.nlp.case.limits.limit import Limit
+from screwsynth.nlp.case.limits.rates import ActuatorRate, RateShare
+from screwsynth.nlp.case.pose import OverPoses, Pose
 from screwsynth.nlp.embedding.calls import find_calls
 from screwsynth.nlp.embedding.ctext import c_names
 from screwsynth.nlp.embedding.loops import find_loops
 from screwsynth.nlp.embedding.runtimelimits import RunTimeLimits, run_time_limits
 from screwsynth.nlp.evidence.kkt import linearise, multipliers
-from screwsynth.nlp.program.formulation import formulate_weighted, scaled_weights
+from screwsynth.nlp.program.formulation import formulate, formulate_weighted, scaled_weights
 from screwsynth.nlp.program.layout import lay_out
 from screwsynth.nlp.program.pairs import with_all_pairs
 

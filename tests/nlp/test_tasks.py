@@ -13,22 +13,9 @@ import pytest
 from builders import Array, Run, output_of
 
 from screwsynth.models import stewart_gough, three_upu
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    Combination,
-    EvaluationError,
-    Free,
-    Method,
-    PointKind,
-    Rotation,
-    Solution,
-    Status,
-    Task,
-    load_case,
-    solve,
-)
-from screwsynth.nlp.case.pose import Value
+from screwsynth.nlp import Case, Combination, Method, PointKind, Solution, Status, Task, load_case, solve
+from screwsynth.nlp.case.pose import Free, Rotation, Value
+from screwsynth.nlp.errors import CaseError, EvaluationError
 
 Objective = Callable[[Array], Array]
 Word = Literal["max", "min"]

@@ -20,25 +20,15 @@ from numpy_engine.second_order import enclose_second
 
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED
-from screwsynth.nlp import (
-    Case,
-    CertificateStatus,
-    Outcome,
-    certify,
-    json_data,
-    judge_workspace,
-    load_case,
-    pareto,
-    result_of,
-    solve,
-)
-from screwsynth.nlp.case.reader import read_case
+from screwsynth.nlp import Case, Outcome, certify, json_data, judge_workspace, pareto, result_of, solve
+from screwsynth.nlp.case.reader import load_case, read_case
 from screwsynth.nlp.case.toml import toml_document
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.front.goals import program_of, read_goals
 from screwsynth.nlp.output.report.sweep import sweep_page
 from screwsynth.nlp.program.formulation import formulate_each
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
 from screwsynth.nlp.results.evaluation import evaluation_of
@@ -284,26 +274,17 @@ def test_a_condition_whose_gradient_is_rounding_has_no_weight() -> None:
     assert multipliers(gradients, rounding, high, equation, 1).ravel().tolist() == [1.0, 0.0, -2.0]
 
 
-def test_rounding_chooses_no_optimum() -> None:
-    """Optima with the same F are named in the order of the starts."""
+def test_rounding_has_no_digits_and_decides_on_no_order_or_optimum() -> None:
+    assert residual(4.6e-17) == residual(0.0) == "below 1e-12"
+    assert residual(2.34e-9) == "2.3e-09"
+    assert ordered(0.8339443) == ordered(0.8339443 * (1 + 1e-12))
+    assert ordered(0.8339443) < ordered(0.83395)
+    # Optima with the same F are named in the order of the starts.
     case = case_from(tables_of(robot_function("tripteron")(), "m"), "t")
     solution = solve(case)
     best = solution.optima[0]
     first = next(each for each in solution.starts if abs(each.F - best.F) <= 1e-9 * best.F)
     assert np.array_equal(best.x, first.x)
-
-
-def test_residuals_that_are_rounding_have_no_digits() -> None:
-    assert residual(4.6e-17) == residual(0.0) == "below 1e-12"
-    assert residual(2.34e-9) == "2.3e-09"
-
-
-def test_rounding_decides_on_no_order() -> None:
-    assert ordered(0.8339443) == ordered(0.8339443 * (1 + 1e-12))
-    assert ordered(0.8339443) < ordered(0.83395)
-
-
-def test_a_page_of_a_sweep_shows_rounding_as_zero() -> None:
     points = Points(("x4",), np.array([[5.0]]))
     sweep = Sweep.of(CaseSource.from_file(read_case("paper-4.1-helical")), points)
     found = columns_of(sweep, [Row(0, "optimal", 1.0, x=tuple(1.234e-17 for _ in sweep.variables))])
