@@ -60,15 +60,16 @@ def hexapod(kind: TurnKind, degrees: float) -> Problem:
     return build_problem(CASE, CASE.model, pose_box(Workspace(place, turns)))
 
 
-def gallery(name: str, part: float, degrees: float) -> Problem:
-    """A robot of the gallery about its home."""
+def problem_of(name: str, part: float, degrees: float) -> Problem:
+    """A robot of the gallery about its home: positions within a part of its size, and rotations by each angle."""
     model = build_model(name)
     values = {item.name: item.typical[0] for item in model.parameters}
     size = max(abs(each) for each in (*model.home, *values.values()))
-    angle = Free(-math.radians(degrees), math.radians(degrees))
+    angle = math.radians(degrees)
     place = [Free(each - part * size, each + part * size) for each in model.home]
+    workspace = Workspace(place, Turns(TurnKind.ROLL_PITCH_YAW, (Free(-angle, angle),) * 3))
     case = Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])])
-    return build_problem(case, closed_form(model).model, pose_box(Workspace(place, Turns(TURNS, (angle,) * 3))))
+    return build_problem(case, closed_form(model).model, pose_box(with_dependent(case, workspace)))
 
 
 def boxes_of(problem: Problem) -> int:
@@ -94,7 +95,7 @@ def test_a_search_that_ends_at_once_leaves_the_whole_box_open() -> None:
     ("name", "part", "degrees", "most"), [("6-rss", 0.02, 5, 103), ("6-rus", 0.05, 10, 87), ("6-ups", 0.1, 20, 39)]
 )
 def test_other_robots_take_few_boxes_too(name: str, part: float, degrees: float, most: int) -> None:
-    assert boxes_of(gallery(name, part, degrees)) <= 1.02 * most
+    assert boxes_of(problem_of(name, part, degrees)) <= 1.02 * most
 
 
 @pytest.mark.parametrize("tolerance", [0.0, 0.3])
@@ -244,7 +245,7 @@ def is_found(copy: Copy, meant: Problem) -> bool:
 @cache
 def attacked() -> tuple[list[Problem], Problem]:
     """Robots over boxes of poses, and machines like the first one."""
-    problems = [hexapod(ALL_AXES, 30), hexapod(TURNS, 25), gallery("6-rus", 0.1, 20)]
+    problems = [hexapod(ALL_AXES, 30), hexapod(TURNS, 25), problem_of("6-rus", 0.1, 20)]
     return problems, family_of(CASE, built_model(CASE.model), problems[0], 0.5)
 
 
@@ -282,18 +283,6 @@ balls = pytest.importorskip("balls")
 
 #: A robot of each kind: cranks, slides, members, parasitic motions, parallel rods, a platform in a plane.
 ROBOTS = ("6-rus", "6-pus", "delta", "3-rps", "3-upu", "exechon", "tricept", "planar-3-rrr", "4-upu", "spherical-3-rrr")
-
-
-def problem_of(name: str, part: float, degrees: float) -> Problem:
-    """A robot of the gallery about its home: positions within a part of its size, and rotations by each angle."""
-    model = build_model(name)
-    values = {item.name: item.typical[0] for item in model.parameters}
-    size = max(abs(each) for each in (*model.home, *values.values()))
-    angle = math.radians(degrees)
-    place = [Free(each - part * size, each + part * size) for each in model.home]
-    workspace = Workspace(place, Turns(TurnKind.ROLL_PITCH_YAW, (Free(-angle, angle),) * 3))
-    case = Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])])
-    return build_problem(case, closed_form(model).model, pose_box(with_dependent(case, workspace)))
 
 
 def random_cells(problem: Problem, count: int, width: float, rng: np.random.Generator) -> LoopBoxes:
