@@ -38,7 +38,6 @@ BESIDE = "cannot stand beside mass; write another [[load]]"
 
 #: What is added to the case, and the sentence after the file's name, or its beginning.
 FAULTS = {
-    # -- masses and gravity
     '[units]\nlength = "mm"\n[[load]]\nmass = 2': (
         "gravity.acceleration: is missing: a mass times it is a weight in N, [0, 0, -9.81] for a mass in kg\n"
     ),
@@ -53,42 +52,10 @@ FAULTS = {
     "[gravity]\naccelerations = [0, 0, 1]": (
         "gravity.accelerations: no such key; did you mean 'acceleration'? allowed: acceleration"
     ),
-    "[[load]]\nmass = -2": "load[0].mass = -2: must be greater than 0",
-    "[[load]]\nmass = 0": "load[0].mass = 0: must be greater than 0",
-    "[[load]]\nmass = nan": "load[0].mass = nan: must be finite",
-    '[[load]]\nmass = "2 kg"': 'load[0].mass = "2 kg": must be a number',
-    "[[load]]\nmass = 1e31": "load[0].mass = 1e+31: must be at most 1e+30 in size",
-    "[[load]]\nmass = 2\nforce = [1, 2, 3]": f"load[0].force: {BESIDE}",
-    "[[load]]\nmass = 2\nmoment = [1, 2, 3]": f"load[0].moment: {BESIDE}",
-    "[[load]]\nmass = 2\npoint = [1, 2, 3]": f"load[0].point: {BESIDE}",
-    "[[load]]\nmass = 2\nany = { force = 1 }": f"load[0].any: {BESIDE}",
-    '[[load]]\nmass = 2\nsign = "both"': f"load[0].sign: {BESIDE}",
-    '[[load]]\nmass = 2\nframe = "platform"': f"load[0].frame: {BESIDE}",
-    "[[load]]\nforce = [0, 0, 1]\ncentre = [0, 0, 1]": (
-        "load[0].centre: means nothing without mass; a force acts at point"
-    ),
-    # -- loads
     "[[load]]": NO_LOAD,
     '[[load]]\nname = "a"': NO_LOAD,
     "[[load]]\nforce = [0, 0, 0]\nmoment = [0, 0, 0]": NO_LOAD,
     "[[load]]\nany = { force = 0 }": NO_LOAD,
-    "[[load]]\nforce = [nan, 0, 0]": "load[0].force[0] = nan: must be finite",
-    "[[load]]\nmoment = [0, inf, 0]": "load[0].moment[1] = inf: must be finite",
-    "[[load]]\nforce = [1, 2]": "load[0].force: must have 3 entries, got 2",
-    "[[load]]\nforce = 5": f"load[0].force = 5: {VECTOR}",
-    "[[load]]\nmoment = 5": f"load[0].moment = 5: {VECTOR}",
-    "[[load]]\nmass = 1\ncentre = 5": f"load[0].centre = 5: {VECTOR}",
-    '[[load]]\nforce = [1, "a", 3]': 'load[0].force[1] = "a": must be a number',
-    "[[load]]\nforce = [1e300, 0, 0]": "load[0].force[0] = 1e+300: must be at most 1e+30 in size",
-    "[[load]]\nany = { force = -1 }": "load[0].any.force = -1: must be greater than or equal to 0",
-    "[[load]]\nany = { moment = nan }": "load[0].any.moment = nan: must be finite",
-    "[[load]]\nany = 3": "load[0].any = 3: must be a table",
-    "[[load]]\nany = { forces = 3 }": "load[0].any.forces: no such key; did you mean 'force'? allowed: force, moment",
-    '[[load]]\nany = { force = 2 }\nsign = "both"': 'load[0].sign = "both": means nothing without force or moment',
-    '[[load]]\nforce = [1, 0, 0]\nsign = "plus"': "load[0].sign = \"plus\": must be one of 'given' or 'both'",
-    '[[load]]\nforce = [1, 0, 0]\nframe = "tool"': "load[0].frame = \"tool\": must be one of 'world' or 'platform'",
-    "[[load]]\nforce = [1, 0, 0]\nalways = 1": "load[0].always = 1: must be true or false",
-    "[[load]]\nforces = [1, 0, 0]": "load[0].forces: no such key; did you mean 'force'? allowed: ",
     "[[loads]]\nforce = [1, 0, 0]": "loads: no such key; did you mean 'load'? allowed: ",
     "[load]\nforce = [1, 0, 0]": "load: must be a list of tables: write [[load]], with two brackets",
     '[[load]]\nname = "a"\nforce = [1, 0, 0]\n[[load]]\nname = "a"\nmass = 2': (
@@ -100,11 +67,9 @@ FAULTS = {
     '[[load]]\nname = "cut"\nforce = [1, 0, 0]\nsign = "both"\n[[load]]\nname = "cut reversed"\nforce = [0, 1, 0]': (
         "load: has loads that act together under one name, 'cut reversed', twice; rename a load"
     ),
-    '[[load]]\nname = ""\nforce = [1, 0, 0]': 'load[0].name = "": must not be empty',
-    "[[load]]\nname = 3\nforce = [1, 0, 0]": "load[0].name = 3: must be text in quotes",
-    '[[load]]\nforce = [1, 0, 0]\nsign = "both"\nalways = true\n'
-    * 30: "load: has 30 loads with always and both signs, which act together in 2^30 ways; at most 6",
-    # -- motion
+    '[[load]]\nforce = [1, 0, 0]\nsign = "both"\nalways = true\n' * 30: (
+        "load: has 30 loads with always and both signs, which act together in 2^30 ways; at most 6"
+    ),
     "[motion]": "motion: must have linear, angular, or both, above 0",
     "[motion]\nlinear = 0\nangular = 0": "motion: must have linear, angular, or both, above 0",
     "[motion]\nlinear = -1": "motion.linear = -1: must be greater than or equal to 0",
@@ -113,41 +78,74 @@ FAULTS = {
     "[motion]\nlinear = 1e31": "motion.linear = 1e+31: must be at most 1e+30 in size",
     "[motion]\nliner = 1": "motion.liner: no such key; did you mean 'linear'? allowed: linear, angular",
     "[[motion]]\nlinear = 1": "motion: must be a table",
-    # -- limits
     "[limits]\nactuator_force = { max = 3 }": "limits.actuator_force: means nothing without [[load]]",
-    f"{MOVED}[limits]\nactuator_power = {{ max = 3 }}": "limits.actuator_power: means nothing without [[load]]",
-    f"{LOAD}[limits]\nactuator_power = {{ max = 3 }}": "limits.actuator_power: means nothing without [motion]",
-    f"{LOAD}[limits]\nactuator_speed = {{ max = 3 }}": "limits.actuator_speed: means nothing without [motion]",
-    f"{LOAD}[limits]\nactuator_force = {{}}": "limits.actuator_force: must have min, max, or both",
-    f"{LOAD}{MOVED}[limits]\nactuator_power = {{}}": "limits.actuator_power.max: is missing",
-    f"{LOAD}[limits]\nactuator_force = 3": "limits.actuator_force = 3: must be a table",
-    f"{LOAD}[limits]\nactuator_force = [3]": "limits.actuator_force: must be a table",
-    f"{LOAD}[limits]\nactuator_force = {{ min = 3, max = 2 }}": (
-        "limits.actuator_force.min = 3.0: must be below max = 2 N"
-    ),
-    f'{LOAD}[limits]\nactuator_force = {{ "1+" = {{ min = 3, max = 2 }} }}': (
-        "limits.actuator_force.1+.min = 3.0: must be below max = 2 N"
-    ),
-    f"{LOAD}[limits]\nactuator_force = {{ max = 0 }}": "limits.actuator_force.max = 0.0: must be above 0 N",
-    f"{LOAD}[limits]\nactuator_force = {{ max = nan }}": "limits.actuator_force.max = nan: must be finite",
-    f"{MOVED}[limits]\nactuator_speed = {{ max = -1 }}": "limits.actuator_speed.max = -1.0: must be above 0 m/s",
-    f"{LOAD}{MOVED}[limits]\nactuator_power = {{ max = 0 }}": "limits.actuator_power.max = 0.0: must be above 0 N m/s",
-    f"{MOVED}[limits]\nactuator_speed = {{ min = 1 }}": "limits.actuator_speed.min: no such key; allowed: max",
-    f"{LOAD}[limits]\nactuator_force = {{ maxi = 3 }}": (
-        "limits.actuator_force.maxi: no such key; did you mean 'max'? allowed: min, max"
-    ),
-    f'{LOAD}[limits]\nactuator_force = {{ "1+" = {{ maxi = 3 }} }}': (
-        "limits.actuator_force.1+.maxi: no such key; did you mean 'max'? allowed: min, max"
-    ),
-    f'{LOAD}[limits]\nactuator_force = {{ "3*" = {{ max = 3 }} }}': (
-        "limits.actuator_force.3*: is no actuator of 'stewart-gough'; "
-    ),
-    f'{LOAD}[limits]\nactuator_force = {{ max = 4, "1+" = {{ max = 3 }} }}': (
-        "limits.actuator_force: has numbers for all actuators beside a table for one; "
-        "write one table for each actuator\n"
-    ),
     "[units]\nforce = 3": "units.force = 3: must be text in quotes",
 }
+#: What is written below [[load]], and the rest of the sentence.
+OF_LOADS = {
+    "mass = -2": ".mass = -2: must be greater than 0",
+    "mass = 0": ".mass = 0: must be greater than 0",
+    "mass = nan": ".mass = nan: must be finite",
+    'mass = "2 kg"': '.mass = "2 kg": must be a number',
+    "mass = 1e31": ".mass = 1e+31: must be at most 1e+30 in size",
+    "mass = 2\nforce = [1, 2, 3]": f".force: {BESIDE}",
+    "mass = 2\nmoment = [1, 2, 3]": f".moment: {BESIDE}",
+    "mass = 2\npoint = [1, 2, 3]": f".point: {BESIDE}",
+    "mass = 2\nany = { force = 1 }": f".any: {BESIDE}",
+    'mass = 2\nsign = "both"': f".sign: {BESIDE}",
+    'mass = 2\nframe = "platform"': f".frame: {BESIDE}",
+    "force = [0, 0, 1]\ncentre = [0, 0, 1]": ".centre: means nothing without mass; a force acts at point",
+    "force = [nan, 0, 0]": ".force[0] = nan: must be finite",
+    "moment = [0, inf, 0]": ".moment[1] = inf: must be finite",
+    "force = [1, 2]": ".force: must have 3 entries, got 2",
+    "force = 5": f".force = 5: {VECTOR}",
+    "moment = 5": f".moment = 5: {VECTOR}",
+    "mass = 1\ncentre = 5": f".centre = 5: {VECTOR}",
+    'force = [1, "a", 3]': '.force[1] = "a": must be a number',
+    "force = [1e300, 0, 0]": ".force[0] = 1e+300: must be at most 1e+30 in size",
+    "any = { force = -1 }": ".any.force = -1: must be greater than or equal to 0",
+    "any = { moment = nan }": ".any.moment = nan: must be finite",
+    "any = 3": ".any = 3: must be a table",
+    "any = { forces = 3 }": ".any.forces: no such key; did you mean 'force'? allowed: force, moment",
+    'any = { force = 2 }\nsign = "both"': '.sign = "both": means nothing without force or moment',
+    'force = [1, 0, 0]\nsign = "plus"': ".sign = \"plus\": must be one of 'given' or 'both'",
+    'force = [1, 0, 0]\nframe = "tool"': ".frame = \"tool\": must be one of 'world' or 'platform'",
+    "force = [1, 0, 0]\nalways = 1": ".always = 1: must be true or false",
+    "forces = [1, 0, 0]": ".forces: no such key; did you mean 'force'? allowed: ",
+    'name = ""\nforce = [1, 0, 0]': '.name = "": must not be empty',
+    "name = 3\nforce = [1, 0, 0]": ".name = 3: must be text in quotes",
+}
+FAULTS |= {f"[[load]]\n{table}": f"load[0]{sentence}" for table, sentence in OF_LOADS.items()}
+#: What stands before [limits], a limit, and the rest of the sentence.
+OF_LIMITS = [
+    (MOVED, "actuator_power = { max = 3 }", "actuator_power: means nothing without [[load]]"),
+    (LOAD, "actuator_power = { max = 3 }", "actuator_power: means nothing without [motion]"),
+    (LOAD, "actuator_speed = { max = 3 }", "actuator_speed: means nothing without [motion]"),
+    (LOAD, "actuator_force = {}", "actuator_force: must have min, max, or both"),
+    (LOAD + MOVED, "actuator_power = {}", "actuator_power.max: is missing"),
+    (LOAD, "actuator_force = 3", "actuator_force = 3: must be a table"),
+    (LOAD, "actuator_force = [3]", "actuator_force: must be a table"),
+    (LOAD, "actuator_force = { min = 3, max = 2 }", "actuator_force.min = 3.0: must be below max = 2 N"),
+    (LOAD, 'actuator_force = { "1+" = { min = 3, max = 2 } }', "actuator_force.1+.min = 3.0: must be below max = 2 N"),
+    (LOAD, "actuator_force = { max = 0 }", "actuator_force.max = 0.0: must be above 0 N"),
+    (LOAD, "actuator_force = { max = nan }", "actuator_force.max = nan: must be finite"),
+    (MOVED, "actuator_speed = { max = -1 }", "actuator_speed.max = -1.0: must be above 0 m/s"),
+    (LOAD + MOVED, "actuator_power = { max = 0 }", "actuator_power.max = 0.0: must be above 0 N m/s"),
+    (MOVED, "actuator_speed = { min = 1 }", "actuator_speed.min: no such key; allowed: max"),
+    (LOAD, "actuator_force = { maxi = 3 }", "actuator_force.maxi: no such key; did you mean 'max'? allowed: min, max"),
+    (
+        LOAD,
+        'actuator_force = { "1+" = { maxi = 3 } }',
+        "actuator_force.1+.maxi: no such key; did you mean 'max'? allowed: min, max",
+    ),
+    (LOAD, 'actuator_force = { "3*" = { max = 3 } }', "actuator_force.3*: is no actuator of 'stewart-gough'; "),
+    (
+        LOAD,
+        'actuator_force = { max = 4, "1+" = { max = 3 } }',
+        "actuator_force: has numbers for all actuators beside a table for one; write one table for each actuator\n",
+    ),
+]
+FAULTS |= {f"{given}[limits]\n{limit}": f"limits.{sentence}" for given, limit, sentence in OF_LIMITS}
 
 #: A plane robot with two cranks and a driven slide; and with two more motors.
 MIXED = """\
