@@ -12,21 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import builders
 import casadi as ca
 import numpy as np
 import pytest
-from builders import (
-    Array,
-    Run,
-    case_from,
-    case_of,
-    edited,
-    output_of,
-    saved_with_robot,
-    soaked,
-    starter_tables,
-    turn_about,
-)
+from builders import Array, Run, case_from, case_of, edited, saved_with_robot, soaked, starter_tables, turn_about
 from casadi import SX
 from generated import COMPILERS, written
 from measures import circle_joints, leg_measures, segment_distance
@@ -378,7 +368,7 @@ def test_numbers_of_joints_are_set_on_the_command_line(tmp_path: Path, cli: Run)
         ("limits.joint.1:1.min=-7", "joint.1:1.min"),
         ("limits.joint.ball.cone=30", "joint.ball.cone"),
     ):
-        out = output_of(cli("evaluate", name, "--set", setting, "--set", "rb=1", "--set", "p_z=1.1"))
+        out = builders.output_of(cli("evaluate", name, "--set", setting, "--set", "rb=1", "--set", "p_z=1.1"))
         assert shown in out
 
 

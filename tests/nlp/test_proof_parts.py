@@ -23,21 +23,9 @@ from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.errors import InputError, UncoveredError
 from screwsynth.nlp.program.layout import assemble, lay_out
+from screwsynth.nlp.proof.boxes import search as boxes_search
 from screwsynth.nlp.proof.boxes.engine import Engine
-from screwsynth.nlp.proof.boxes.search import (
-    SMALL,
-    TOO_SMALL,
-    WHOLE,
-    Boxes,
-    Effort,
-    Order,
-    Rule,
-    Search,
-    Verdicts,
-    bisected,
-    joined,
-    some,
-)
+from screwsynth.nlp.proof.boxes.search import TOO_SMALL, WHOLE, Boxes, Effort, Order, Rule, Search, Verdicts, some
 from screwsynth.nlp.proof.boxes.symmetry import grouped, halved, mirrors
 from screwsynth.nlp.proof.boxes.tree import TreeRecord
 from screwsynth.nlp.proof.certificate import branch_and_bound
@@ -71,7 +59,7 @@ class Peak(Rule[np.ndarray]):
         self.gap, self.seen = gap, list[np.ndarray]()
 
     def divided(self, boxes: Boxes[np.ndarray]) -> Boxes[np.ndarray]:
-        parts = bisected(boxes)
+        parts = boxes_search.bisected(boxes)
         return parts._replace(more=parts.more + 1)
 
     def examine(self, boxes: Boxes[np.ndarray]) -> Verdicts[np.ndarray]:
@@ -113,8 +101,8 @@ def test_boxes_that_are_too_small_and_those_of_a_search_that_ends_keep_their_bou
     assert Effort().run(search, lambda: None if search.is_open else TOO_SMALL) == TOO_SMALL
     assert search.left
     assert not search.state.waiting
-    small = joined(search.state.small)
-    assert (small.split == SMALL).all()
+    small = boxes_search.joined(search.state.small)
+    assert (small.split == boxes_search.SMALL).all()
     assert small.bound.max() == search.bound > 1.0
     assert ((small.upper - small.lower).max(axis=1) < 2.0**-6).all()
     # Each carries how often it was bisected, which its size tells.
