@@ -1,6 +1,6 @@
 """The sections "How to add ..." of docs/development.md, each followed in a temporary module.
 
-A limit is added in tests/nlp/test_limit_types.py, a robot of another package in tests/nlp/test_plugins.py.
+A limit is added in tests/nlp/test_limits.py, a robot of another package in tests/nlp/test_plugins.py.
 """
 
 from __future__ import annotations

@@ -5,9 +5,7 @@ space. With actuator forces tau, a load W and a feasible motion with rates qdot 
 
     tau . qdot + W . chi = 0,        W . chi = force . v + moment . omega    (moments and v about the platform's origin)
 
-which is solved for tau over a basis of all feasible motions, spins of rods included. The engine's poses are closed by
-Newton's method to rounding (``mujoco_robots``), and the package gets rotation and position of the platform alone, whose
-unknowns a Newton method of this file closes.
+which is solved for tau over a basis of all feasible motions, spins of rods included.
 """
 
 from __future__ import annotations
@@ -21,9 +19,9 @@ import numpy as np
 from builders import Array
 from casadi import SX
 from mujoco_robots import Oracle, null_space
-from robot_gallery import LENGTH, table
+from robot_gallery import LENGTH, model_of
 
-from screwsynth.models import Model, Substitution, robot
+from screwsynth.models import Model, Substitution
 from screwsynth.models.instance import instantiate
 from screwsynth.models.statics import posed_statics
 from screwsynth.nlp.case.forces import forces_at
@@ -77,7 +75,7 @@ def random_loads(rng: np.random.Generator, count: int = LOADS) -> list[Load]:
 @cache
 def scene(name: str) -> tuple[Package, list[Load]]:
     loads = random_loads(np.random.default_rng([11, *name.encode()]))
-    return Package(robot(**table(name)), Loading(tuple(loads), Motion(0.7, 0.4))), loads
+    return Package(model_of(name), Loading(tuple(loads), Motion(0.7, 0.4))), loads
 
 
 class Feasible(NamedTuple):

@@ -6,6 +6,21 @@ from numpy_engine.first_order import Enclosures
 
 from screwsynth.nlp.proof.enclosure.tape import Op, Tape
 
+
+def arb(value: float) -> flint.arb:
+    return flint.arb(float(value))
+
+
+def steps(point: np.ndarray, centre: np.ndarray, radius: np.ndarray) -> list[flint.arb]:
+    """Exact ``e_i`` of a point of a box."""
+    flint.ctx.prec = 200
+    return [(arb(x) - arb(c)) / arb(r) if r > 0 else arb(0) for x, c, r in zip(point, centre, radius, strict=True)]
+
+
+def linear(c: float, a: np.ndarray, e: list[flint.arb]) -> flint.arb:
+    return sum((arb(each) * step for each, step in zip(a, e, strict=True)), arb(c))
+
+
 BINARY = (Op.ADD, Op.SUB, Op.MUL, Op.DIV)
 
 
@@ -75,10 +90,7 @@ def violations(
         Violations and checks; an undefined result must be poisoned, which is a check too.
     """
     flint.ctx.prec = 200
-    e = [
-        (flint.arb(float(x)) - flint.arb(float(c))) / flint.arb(float(r)) if r > 0 else flint.arb(0)
-        for x, c, r in zip(point, centre, radius, strict=True)
-    ]
+    e = steps(point, centre, radius)
     t = max((abs(each) for each in e), key=lambda ball: float(ball.mid()), default=flint.arb(0))
     bad = checks = 0
     for k, (ball, is_sharp) in enumerate(zip(*decided_balls(tape, point), strict=True)):
@@ -88,16 +100,10 @@ def violations(
         if not ball.is_finite():
             bad += 2 * int(np.isfinite(forms.s[k, box]))
             continue
-        bad += int(bool(ball < flint.arb(float(forms.lo[k, box]))) or bool(ball > flint.arb(float(forms.hi[k, box]))))
+        bad += int(bool(ball < arb(forms.lo[k, box])) or bool(ball > arb(forms.hi[k, box])))
         if not np.isfinite(forms.s[k, box]):
             continue
-        linear = flint.arb(float(forms.c[k, box]))
-        for i, step in enumerate(e):
-            linear += flint.arb(float(forms.a[k, i, box])) * step
-        s = flint.arb(float(forms.s[k, box]))
-        low, high = (
-            (linear + t * t * flint.arb(float(forms.p[k, box])) - s),
-            (linear + t * t * flint.arb(float(forms.q[k, box])) + s),
-        )
+        value, s = linear(forms.c[k, box], forms.a[k, :, box], e), arb(forms.s[k, box])
+        low, high = value + t * t * arb(forms.p[k, box]) - s, value + t * t * arb(forms.q[k, box]) + s
         bad += int(bool(ball < low) or bool(ball > high))
     return bad, checks

@@ -87,9 +87,8 @@ def unknowns_at(model: Model, home: Mechanism, there: Mechanism) -> Array:
                 rows.append(own.value)
                 wanted.append(coordinate(home, there, name))
     residual = ca.vertcat(SX0, *rows) - ca.DM(wanted)
-    function = ca.Function(
-        "at", symbols.all, [ca.densify(residual), ca.densify(ca.jacobian(residual, symbols.unknowns))]
-    )
+    outputs = [ca.densify(each) for each in (residual, ca.jacobian(residual, symbols.unknowns))]
+    function = ca.Function("at", symbols.all, outputs)
     found = np.zeros(len(model.unknowns))
     for _ in range(100):
         values, slopes = (each.full() for each in function([], found, plate.rotation, plate.position))
@@ -121,10 +120,7 @@ def with_twist(nlp: Nlp, twist: Array) -> Nlp:
 def objective(mechanism: Mechanism, centres: dict[tuple[str, ...], Array], chi: Array) -> float:
     """F: of each part that is left of the locked mechanism, the engine's twists give the projector.
 
-    Args:
-        mechanism: with closed loops.
-        centres: of its members, by the names of joints: a convention that the engine does not know.
-        chi: (6,) twist.
+    The centres of members, by the names of their joints, are a convention that the engine does not know.
     """
     names = {each.name for each in mechanism.joints if each.kind == "weld" or each.actuated}
     while True:  # a coupling all of whose joints but one stand still holds that one
@@ -185,11 +181,7 @@ def joined(sets: list[set[str]], more: list[set[str]]) -> list[set[str]]:
 
 
 def compare(tables: dict[str, Any], driven: int = 3, regular: float = REGULAR) -> Differences:
-    """Compare a robot's model, and its numbers as a mechanism, with the engine at home and at random configurations.
-
-    Raises:
-        AssertionError: ranks, freedoms, or which rates are determined, differ.
-    """
+    """Compare a robot's model, and its numbers as a mechanism, with the engine at home and at random configurations."""
     model, home = robot(**tables), mechanism_of(tables)
     worst, count = np.zeros(3), 0
     for there in (home, *closed_configurations(home, count=driven)):
@@ -224,14 +216,11 @@ def compare(tables: dict[str, Any], driven: int = 3, regular: float = REGULAR) -
         expected = expected[[names.index(each.name) for each in model.joints if each.name in names]]
         assert np.array_equal(np.isfinite(found), np.isfinite(expected)), (found, expected)
         known = np.isfinite(expected)
-        rates = np.abs(found - expected)[known].max(initial=0.0) / max(1.0, np.abs(expected[known]).max(initial=0.0))
-        worst[1] = max(worst[1], rates)
         # The numbers of the mechanism, which import goes by, are those of the model.
         by_name = numbers.rates(chi)
         again = np.array([by_name[each.name] for each in model.joints if each.name in names])
         assert np.array_equal(np.isfinite(again), known)
-        worst[1] = max(
-            worst[1],
-            np.abs(again - expected)[known].max(initial=0.0) / max(1.0, np.abs(expected[known]).max(initial=0.0)),
-        )
+        size = max(1.0, np.abs(expected[known]).max(initial=0.0))
+        off = [np.abs(each - expected)[known].max(initial=0.0) / size for each in (found, again)]
+        worst[1] = max(worst[1], *off)
     return Differences(*map(float, worst), count)

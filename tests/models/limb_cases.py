@@ -30,29 +30,18 @@ def machine(width: float, pose_is_free: bool = False) -> Case:
 def poses(seed: int) -> Case:
     """A platform at two or three poses that are free, whose dimensions are free too, half of them with limits."""
     rng = np.random.default_rng(seed)
+    parameters = {"x1": {"min": 8, "max": 12}, "x2": float(rng.uniform(4, 8)), "x3": 0.3, "x4": 0.2}
+    turn = {"rotation": {"axis": [0, 0, 1], "angle": {"min": -0.3, "max": 0.3} if seed % 3 == 0 else 0.1}}
     tables: dict[str, object] = {
         "units": {"angle": "rad"},
-        "robot": {
-            "model": "stewart-gough",
-            "parameters": {"x1": {"min": 8, "max": 12}, "x2": float(rng.uniform(4, 8)), "x3": 0.3, "x4": 0.2},
-        },
+        "robot": {"model": "stewart-gough", "parameters": parameters},
         "pose": [
-            {
-                "position": [{"min": -2, "max": 2}, float(rng.uniform(-3, 3)), {"min": 25 + k, "max": 31 + k}],
-                "rotation": {"axis": [0, 0, 1], "angle": {"min": -0.3, "max": 0.3} if seed % 3 == 0 else 0.1},
-            }
+            {"position": [{"min": -2, "max": 2}, float(rng.uniform(-3, 3)), {"min": 25 + k, "max": 31 + k}]} | turn
             for k in range(2 + seed % 2)
         ],
-        "task": [
-            {
-                "name": "t",
-                "sense": ("max", "min")[seed % 2],
-                "axis": rng.normal(size=3).tolist(),
-                "point": rng.normal(size=3).tolist(),
-                "pitch": 1,
-            }
-        ],
     }
+    axis, point = (rng.normal(size=3).tolist() for _ in range(2))
+    tables["task"] = [{"name": "t", "sense": ("max", "min")[seed % 2], "axis": axis, "point": point, "pitch": 1}]
     if seed % 4 > 1:
         tables["limits"] = {"leg_length": {"min": 24, "max": 34}, "base_joint_angle": 0.6, "footprint": {"base": 11}}
     return case_from(tables, "poses")

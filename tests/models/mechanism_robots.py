@@ -33,13 +33,9 @@ def four_bar_delta(platform: str = "plate") -> Table:
         n = str(k + 1)
         links += [f"{name}{n}" for name in ("crank", "coupler", "rocker", "rod_a", "rod_b")]
         points |= {
-            f"O{n}": f"rb*{r}",
-            f"C{n}": f"(rb + 0.05)*{r} + 0.12*z",
-            f"D{n}": f"(rb + 0.3)*{r} + 0.15*z",
-            f"M{n}": f"(rb + 0.25)*{r}",
-            f"E{n}": f"(rb + 0.25 + arm)*{r} - 0.1*z",
-            f"A{n}": f"rp*{r} + h*z",
-        }
+            f"O{n}": f"rb*{r}", f"C{n}": f"(rb + 0.05)*{r} + 0.12*z", f"D{n}": f"(rb + 0.3)*{r} + 0.15*z",
+            f"M{n}": f"(rb + 0.25)*{r}", f"E{n}": f"(rb + 0.25 + arm)*{r} - 0.1*z", f"A{n}": f"rp*{r} + h*z",
+        }  # fmt: skip
         joints += [
             joint(f"motor{n}", "R", ("ground", f"crank{n}"), f"O{n}", t, actuated=True),
             joint(f"knee{n}", "R", (f"crank{n}", f"coupler{n}"), f"C{n}", t),
@@ -53,15 +49,10 @@ def four_bar_delta(platform: str = "plate") -> Table:
             ]
     typical = {"rb": 0.2, "rp": 0.1, "arm": 0.3, "h": -0.8, "w": 0.1}
     return {
-        "name": "four-bar delta",
-        "home": [0, 0, "h"],
-        "dimensions": {name: {"typical": value} for name, value in typical.items()},
-        "base": "ground",
-        "platform": platform,
-        "links": links,
-        "points": points,
-        "joint": joints,
-    }
+        "name": "four-bar delta", "home": [0, 0, "h"],
+        "dimensions": {name: {"typical": value} for name, value in typical.items()}, "base": "ground",
+        "platform": platform, "links": links, "points": points, "joint": joints,
+    }  # fmt: skip
 
 
 def geared() -> Table:
@@ -82,11 +73,7 @@ def geared() -> Table:
 
 
 class Engine:
-    """A mechanism in MuJoCo: every link a free body, every joint a set of rows built on the engine's Jacobians.
-
-    The engine supplies the Jacobian of each body at each joint's point; the rows say that the two bodies of a joint
-    move together but for its axis. Loops, trees and members need no description of their own.
-    """
+    """A mechanism in MuJoCo: every link a free body, every joint a set of rows built on the engine's Jacobians."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -136,10 +123,7 @@ class Engine:
         return column_space(self.motion(self.mechanism.platform, np.zeros(3)) @ motions, 1.0)
 
     def rates(self, chi: Array) -> Array:
-        """Rates of the actuated joints for a twist that the platform can make with free actuators.
-
-        They are not numbers for joints that can move while the platform stands still.
-        """
+        """Rates of the actuated joints for a feasible twist; NaN where they can move with the platform at rest."""
         free = null_space(self.rows(locked=False))
         platform = self.motion(self.mechanism.platform, np.zeros(3)) @ free[: self.model.nv]
         weights = np.linalg.lstsq(platform, chi, rcond=1e-9)[0]

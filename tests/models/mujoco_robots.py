@@ -17,6 +17,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from builders import Array
+from measures import cross_matrix
 from numpy.typing import NDArray
 from robot_files import Robot
 from robot_mjcf import Loop, Writer
@@ -63,10 +64,6 @@ def null_space(matrix: Array) -> Array:
     return np.asarray(V[singular_rank(matrix) :].T)
 
 
-def cross_matrix(c: Array) -> Array:
-    return np.array([[0.0, -c[2], c[1]], [c[2], 0.0, -c[0]], [-c[1], c[0], 0.0]])
-
-
 def scaled_twists(c: Array, length: float) -> Array:
     """Matrix (6, 6) from ``chi`` to scaled coordinates about ``c``."""
     return np.block([[-cross_matrix(c), np.eye(3)], [length * np.eye(3), np.zeros((3, 3))]])
@@ -74,16 +71,10 @@ def scaled_twists(c: Array, length: float) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A member with its actuators locked.
+    """A member with its actuators locked; ``F_k = |P_k x(chi)|^2`` with its projector ``P_k``."""
 
-    Attributes:
-        centre: (3,) ``c_k`` in the world frame, length.
-        W: (6, d) orthonormal basis of ``W_k`` in scaled coordinates about ``centre``.
-        projector: (6, 6) ``P_k`` in the same coordinates; ``F_k = |P_k x(chi)|^2``.
-    """
-
-    centre: Array
-    W: Array
+    centre: Array  # (3,) c_k in the world frame
+    W: Array  # (6, d) orthonormal basis of W_k in scaled coordinates about the centre
 
     @property
     def projector(self) -> Array:
@@ -91,36 +82,20 @@ class Member:
 
 
 class Ranks(NamedTuple):
-    """Dimensions and ranks of a robot in one configuration.
+    """Dimensions and ranks of a robot in one configuration."""
 
-    Attributes:
-        W: dimension of each member's ``W_k``.
-        C: dimension of each member's ``C_k``.
-        J: rank of all ``W_k`` together.
-        constraints: rank of all ``C_k`` together, those of members that share an actuator taken as one.
-        freedoms: of the platform with actuators free.
-        rotations: number of independent angular velocities among them.
-        locked: freedoms of the platform with actuators locked.
-        mobility: freedoms of the whole mechanism, the spins of rods too.
-    """
-
-    W: tuple[int, ...]
-    C: tuple[int, ...]
-    J: int
-    constraints: int
-    freedoms: int
-    rotations: int
-    locked: int
-    mobility: int
+    W: tuple[int, ...]  # dimension of each member's W_k
+    C: tuple[int, ...]  # dimension of each member's C_k
+    J: int  # rank of all W_k together
+    constraints: int  # rank of all C_k together, those of members that share an actuator taken as one
+    freedoms: int  # of the platform with actuators free
+    rotations: int  # independent angular velocities among them
+    locked: int  # freedoms of the platform with actuators locked
+    mobility: int  # freedoms of the whole mechanism, the spins of rods too
 
 
 class Oracle:
-    """A robot in MuJoCo, at home until driven.
-
-    Args:
-        robot: the robot in numbers.
-        length: characteristic length ``l``.
-    """
+    """A robot in MuJoCo, at home until driven, with a characteristic length."""
 
     def __init__(self, robot: Robot, length: float) -> None:
         self.robot, self.length = robot, length
@@ -131,9 +106,8 @@ class Oracle:
         first = self.model.joint("platform").dofadr[0]
         self.platform_dofs: Index = np.arange(first, first + 6)
         self.actuated: Index = np.array([self.model.joint(name).dofadr[0] for name in writer.actuators], dtype=np.intp)
-        self.actuated_q: Index = np.array(
-            [self.model.joint(name).qposadr[0] for name in writer.actuators], dtype=np.intp
-        )
+        places = [self.model.joint(name).qposadr[0] for name in writer.actuators]
+        self.actuated_q: Index = np.array(places, dtype=np.intp)
         others = np.setdiff1d(np.arange(self.model.nv), self.platform_dofs)
         self.joint_dofs: Index = others
         self.passive: Index = np.setdiff1d(others, self.actuated)
@@ -161,8 +135,6 @@ class Oracle:
     def current(self, loop: Loop) -> Array:
         frame = self.data.body(loop.carrier)
         return np.asarray(frame.xpos + frame.xmat.reshape(3, 3) @ loop.centre)
-
-    # -- configuration
 
     @property
     def closure(self) -> float:
@@ -194,10 +166,7 @@ class Oracle:
                 mujoco.mj_integratePos(self.model, self.data.qpos, change, 1.0)
                 self.update()
             if self.closure >= self.tolerance:
-                message = f"{self.robot.name} does not close: its loops are open by {self.closure:.2g}"
-                raise ValueError(message)
-
-    # -- twists
+                raise ValueError(f"{self.robot.name} does not close: its loops are open by {self.closure:.2g}")
 
     def platform_jacobian(self) -> Array:
         """Matrix (6, 6) from the platform's generalised velocities to ``chi``: the engine's body Jacobian."""
@@ -208,8 +177,6 @@ class Oracle:
 
     def platform_velocity(self, chi: Array) -> Array:
         return np.asarray(np.linalg.solve(self.from_platform, chi))
-
-    # -- members
 
     def components(self, dofs: Index) -> list[Index]:
         """Constraints in groups that share one of these degrees of freedom, directly or through others."""
@@ -268,11 +235,8 @@ class Oracle:
 
     def constraint_dimensions(self) -> tuple[int, ...]:
         """``dim C_k`` of each member: with its actuators free, but apart from other members that share them."""
-        return tuple(
-            self.wrenches(numbers, self.joint_dofs, np.zeros(3)).shape[1] for numbers in self.member_constraints
-        )
-
-    # -- F and rates
+        found = [self.wrenches(numbers, self.joint_dofs, np.zeros(3)) for numbers in self.member_constraints]
+        return tuple(each.shape[1] for each in found)
 
     def member_objectives(self, chi: Array) -> Array:
         """``F_k`` of each member in a twist: squared length of the projection on ``W_k``."""
@@ -293,18 +257,13 @@ class Oracle:
         return np.asarray(basis @ (basis.T @ chi))
 
     def rates(self, chi: Array) -> Array:
-        """Actuator rates of a feasible twist.
-
-        Raises:
-            ValueError: the platform cannot make the twist.
-        """
+        """Actuator rates of a feasible twist."""
         mismatch = self.J[:, self.platform_dofs] @ self.platform_velocity(chi)
         motion = np.zeros(self.model.nv)
         joints = self.J[:, self.joint_dofs]
         motion[self.joint_dofs] = -np.linalg.lstsq(joints, mismatch, rcond=RANK_TOLERANCE)[0]
         if np.max(np.abs(mismatch + joints @ motion[self.joint_dofs])) > RANK_TOLERANCE * np.max(np.abs(chi)):
-            message = f"the platform of {self.robot.name} cannot make the twist {chi}"
-            raise ValueError(message)
+            raise ValueError(f"the platform of {self.robot.name} cannot make the twist {chi}")
         return motion[self.actuated]
 
     def ranks(self) -> Ranks:

@@ -54,23 +54,25 @@ class Tree:
         """Degrees of freedom of the actuators, in order."""
         return [int(self.model.jnt_dofadr[joint]) for joint in self.model.actuator_trnid[:, 0]]
 
+    @property
+    def jacobians(self) -> tuple[Array, Array]:
+        """Rows (n, nv) of the constraints, and the platform's twist (6, nv) at the world origin."""
+        linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
+        mujoco.mj_jac(self.model, self.data, linear, angular, np.zeros(3), self.model.body("platform").id)
+        return np.array(self.data.efc_J).reshape(self.data.nefc, self.model.nv), np.vstack([angular, linear])
+
     def motion(self, twist: Array) -> tuple[Array, float]:
         """All joint rates with which the platform moves by a twist and the loops stay closed, and what is left."""
-        constraints = np.array(self.data.efc_J).reshape(self.data.nefc, self.model.nv)
-        linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-        body = self.model.body("platform").id
-        mujoco.mj_jac(self.model, self.data, linear, angular, np.zeros(3), body)
-        rows = np.vstack([constraints, angular, linear])
+        constraints, of_platform = self.jacobians
+        rows = np.vstack([constraints, of_platform])
         wanted = np.concatenate([np.zeros(len(constraints)), twist])
         rates = np.linalg.lstsq(rows, wanted, rcond=ZERO)[0]
         return rates, float(np.abs(rows @ rates - wanted).max())
 
     def feasible_twists(self) -> Array:
         """Basis (6, d) of the platform's twists with its actuators free."""
-        constraints = np.array(self.data.efc_J).reshape(self.data.nefc, self.model.nv)
-        linear, angular = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-        mujoco.mj_jac(self.model, self.data, linear, angular, np.zeros(3), self.model.body("platform").id)
-        found = np.vstack([angular, linear]) @ null_space(constraints)
+        constraints, of_platform = self.jacobians
+        found = of_platform @ null_space(constraints)
         U, values, _ = np.linalg.svd(found)
         return np.asarray(U[:, : int(np.sum(values > ZERO * values[0]))])
 

@@ -16,14 +16,9 @@ Value = float | Array
 Table = Mapping[str, Any]
 
 OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.Pow: operator.pow,
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-}
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow, ast.USub: operator.neg, ast.UAdd: operator.pos,
+}  # fmt: skip
 
 
 def unit(vector: Array) -> Array:
@@ -31,17 +26,10 @@ def unit(vector: Array) -> Array:
 
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "sqrt": math.sqrt,
-    "atan2": math.atan2,
-    "abs": abs,
-    "cross": np.cross,
-    "dot": lambda a, b: float(np.dot(a, b)),
-    "norm": lambda a: float(np.linalg.norm(a)),
+    "sin": math.sin, "cos": math.cos, "tan": math.tan, "sqrt": math.sqrt, "atan2": math.atan2, "abs": abs,
+    "cross": np.cross, "dot": lambda a, b: float(np.dot(a, b)), "norm": lambda a: float(np.linalg.norm(a)),
     "unit": unit,
-}
+}  # fmt: skip
 
 #: Number of directions in ``axis`` or ``axes`` of each type of joint.
 DIRECTIONS = {"R": 1, "P": 1, "H": 1, "C": 1, "Pa": 1, "U": 2, "S": 0}
@@ -49,31 +37,19 @@ DIRECTIONS = {"R": 1, "P": 1, "H": 1, "C": 1, "Pa": 1, "U": 2, "S": 0}
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint at home, in the world frame.
+    """A joint at home, in the world frame."""
 
-    Attributes:
-        kind: ``R``, ``P``, ``H``, ``C``, ``U``, ``S`` or ``Pa``.
-        point: (3,) a point of its axis, or its centre, length.
-        axes: unit vectors (3,): two for ``U``, none for ``S``, one for the others.
-        actuated: whether it is driven.
-        pitch: of ``H``, length per radian.
-        to: (3,) end of the moving rod of ``Pa``, length.
-    """
-
-    kind: str
-    point: Array
-    axes: tuple[Array, ...]
+    kind: str  # R, P, H, C, U, S or Pa
+    point: Array  # (3,) of its axis, or its centre
+    axes: tuple[Array, ...]  # unit vectors: two for U, none for S, one for the others
     actuated: bool = False
-    pitch: float = 0.0
-    to: Array | None = None
+    pitch: float = 0.0  # of H, length per radian
+    to: Array | None = None  # (3,) end of the moving rod of Pa
 
 
 @dataclass(frozen=True, eq=False)
 class Limb:
-    """Joints from base to platform: a stem, and the branches that follow it.
-
-    A limb without branches has an empty stem and one branch.
-    """
+    """Joints from base to platform: a stem, and branches behind it; without branches no stem and one branch."""
 
     stem: tuple[Joint, ...]
     branches: tuple[tuple[Joint, ...], ...]

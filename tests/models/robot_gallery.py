@@ -16,6 +16,7 @@ from mujoco_robots import Ranks
 from robot_files import Robot, every_joint
 
 import screwsynth.models
+from screwsynth.models import Model, robot
 
 GALLERY = {path.stem: path for path in sorted((Path(screwsynth.models.__file__).parent / "robots").glob("*.toml"))}
 SPECIAL = {path.stem: path for path in sorted((Path(__file__).parent / "special").glob("*.toml"))}
@@ -88,6 +89,11 @@ REFERENCE: dict[str, tuple[dict[str, float], float, float, list[float], float]] 
 @cache
 def table(name: str) -> dict[str, Any]:
     return tomllib.loads(FILES[name].read_text(encoding="utf-8"))
+
+
+@cache
+def model_of(name: str) -> Model:
+    return robot(**table(name))
 
 
 def snu() -> dict[str, Any]:

@@ -1,8 +1,14 @@
+"""Models that contradict themselves are refused; values as frozen dataclasses; graphs by their definitions."""
+
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+import pickle
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import FrozenInstanceError, dataclass, field, replace
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -10,29 +16,10 @@ import pytest
 from builders import Array, turn_about
 from casadi import SX
 
-from screwsynth.models import (
-    Body,
-    Closure,
-    Dimension,
-    Leg,
-    Link,
-    Model,
-    ModelError,
-    Parameter,
-    Point,
-    PoseSymbols,
-    Quantity,
-    Scene,
-    Unknown,
-    Wrench,
-    WrenchKind,
-    component_names,
-    couple_about,
-    force_along,
-    hexapod,
-    stewart_gough,
-    three_upu,
-)
+from screwsynth import models
+from screwsynth.models import Body, Closure, Dimension, Link, Model, ModelError, Point, PoseSymbols, Scene, Wrench
+from screwsynth.models.mechanism.topology import between, bridges_between, path_between, reached, spanning_tree
+from screwsynth.models.values import dataclass as value_class
 from screwsynth.nlp import Case, Nlp, Rotation, Task, evaluate, formulate
 
 
@@ -41,27 +28,20 @@ class Parts:
     """A sound little robot in pieces: one leg from a movable base joint, of unknown length, and one couple."""
 
     pose: PoseSymbols
-    base: Parameter
-    length: Unknown
+    base: models.Parameter
+    length: models.Unknown
     closure: Closure
     leg: Wrench
     couple: Wrench
-    measure: Quantity
+    measure: models.Quantity
     scene: Scene
 
     def model(self, **changed: object) -> Model:
         sound: dict[str, object] = {
-            "name": "toy",
-            "description": "a toy",
-            "parameters": (self.base,),
-            "pose": self.pose,
-            "home": (0.0, 0.0, 1.0),
-            "wrenches": (self.leg, self.couple),
-            "quantities": (self.measure,),
-            "scene": self.scene,
-            "unknowns": (self.length,),
-            "closure": (self.closure,),
-        }
+            "name": "toy", "description": "a toy", "parameters": (self.base,), "pose": self.pose,
+            "home": (0.0, 0.0, 1.0), "wrenches": (self.leg, self.couple), "quantities": (self.measure,),
+            "scene": self.scene, "unknowns": (self.length,), "closure": (self.closure,),
+        }  # fmt: skip
         return Model(**(sound | changed))  # type: ignore[arg-type]
 
 
@@ -71,12 +51,12 @@ def parts() -> Parts:
     span = pose.position + pose.rotation @ ca.DM([1.0, 0.0, 0.0]) - b
     return Parts(
         pose=pose,
-        base=Parameter("base", b, Dimension.LENGTH, "base joint", (1.0, 0.0, 0.0)),
-        length=Unknown("t", t, Dimension.LENGTH, "length of the leg", 0.1, 10.0),
+        base=models.Parameter("base", b, Dimension.LENGTH, "base joint", (1.0, 0.0, 0.0)),
+        length=models.Unknown("t", t, Dimension.LENGTH, "length of the leg", 0.1, 10.0),
         closure=Closure("loop", t**2 - ca.sumsqr(span)),
-        leg=replace(force_along("leg", b, span), square=t**2),
-        couple=couple_about("guide", pose.rotation[:, 2]),
-        measure=Quantity("reach", ("leg",), t, Dimension.LENGTH, "length of the leg"),
+        leg=replace(models.force_along("leg", b, span), square=t**2),
+        couple=models.couple_about("guide", pose.rotation[:, 2]),
+        measure=models.Quantity("reach", ("leg",), t, Dimension.LENGTH, "length of the leg"),
         scene=Scene(
             (Point("B", b, Body.BASE), Point("A", b + span, Body.PLATFORM)),
             (Link("B", "A", Body.LIMB, "leg"), Link("A", "B", Body.BASE)),
@@ -84,16 +64,15 @@ def parts() -> Parts:
     )
 
 
-def test_a_sound_model_is_accepted_and_lists_its_limbs_once() -> None:
+def test_a_sound_model_is_accepted_with_a_copy_of_its_options() -> None:
     toy = parts()
     model = toy.model(wrenches=(toy.leg, toy.couple, toy.leg))
     assert model.limbs == ("leg", "guide")
     assert model.has_couples
     assert not toy.model(wrenches=(toy.leg,)).has_couples
     assert toy.base.components == ("base_x", "base_y", "base_z")
-
-
-def test_options_are_a_copy_that_cannot_be_written_to() -> None:
+    assert models.component_names("x1", 1) == ("x1",)
+    assert models.component_names("p", 3) == ("p_x", "p_y", "p_z")
     options = {"layout": "aligned"}
     model = parts().model(options=options)
     options["layout"] = "other"
@@ -121,17 +100,14 @@ def test_a_declared_symbol_is_known_by_itself_and_not_by_its_name() -> None:
     toy = parts()
     with pytest.raises(ModelError, match="used but not declared: b_0, b_1, b_2"):
         toy.model(parameters=(replace(toy.base, symbol=SX.sym("b", 3)),))
-
-
-def test_pose_symbols_of_another_robot_are_refused() -> None:
     with pytest.raises(ModelError, match=r"used but not declared: .*p_0"):
-        parts().model(pose=PoseSymbols())
+        toy.model(pose=PoseSymbols())
 
 
 def test_names_that_appear_twice_are_refused() -> None:
     toy = parts()
     other = SX.sym("other")
-    scalar = Parameter("base", other, Dimension.LENGTH, "", (1.0,))
+    scalar = models.Parameter("base", other, Dimension.LENGTH, "", (1.0,))
     twins: list[tuple[dict[str, object], str]] = [
         ({"parameters": (toy.base, replace(toy.base, symbol=SX.sym("c", 3)))}, "base_x, base_y, base_z"),
         # A scalar may have the name of one component of a vector.
@@ -154,7 +130,7 @@ def test_a_symbol_that_stands_for_two_things_is_refused() -> None:
     toy = parts()
     for changed in (
         {"parameters": (toy.base, replace(toy.base, name="again"))},
-        {"parameters": (toy.base, Parameter("again", toy.length.symbol, Dimension.LENGTH, "", (1.0,)))},
+        {"parameters": (toy.base, models.Parameter("again", toy.length.symbol, Dimension.LENGTH, "", (1.0,)))},
         {"unknowns": (toy.length, replace(toy.length, name="again"))},
         {"unknowns": (toy.length, replace(toy.length, name="again", symbol=toy.pose.position[1]))},
         {"parameters": (toy.base, replace(toy.base, name="again", symbol=toy.pose.position))},
@@ -199,13 +175,10 @@ def test_a_wrong_shape_is_refused_by_name() -> None:
             toy.model(**changed)
 
 
-def test_a_robot_without_wrenches_is_refused() -> None:
-    with pytest.raises(ModelError, match="model 'toy': it has no wrenches"):
-        parts().model(wrenches=())
-
-
-def test_a_drawing_of_what_does_not_exist_is_refused() -> None:
+def test_no_wrenches_and_a_drawing_of_what_does_not_exist_are_refused() -> None:
     toy = parts()
+    with pytest.raises(ModelError, match="model 'toy': it has no wrenches"):
+        toy.model(wrenches=())
     for link, fault in (
         (Link("C", "A", Body.BASE), "a link ends at 'C', which is no point"),
         (Link("A", "leg", Body.BASE), "a link ends at 'leg', which is no point"),
@@ -215,13 +188,8 @@ def test_a_drawing_of_what_does_not_exist_is_refused() -> None:
             toy.model(scene=Scene(toy.scene.points, (*toy.scene.links, link)))
 
 
-def test_component_names() -> None:
-    assert component_names("x1", 1) == ("x1",)
-    assert component_names("p", 3) == ("p_x", "p_y", "p_z")
-
-
 @pytest.mark.parametrize(
-    "model", [stewart_gough(), stewart_gough(layout="octahedral"), hexapod()], ids=lambda m: m.name
+    "model", [models.stewart_gough(), models.stewart_gough(layout="octahedral"), models.hexapod()], ids=lambda m: m.name
 )
 def test_shipped_robots_draw_every_leg_between_its_own_joints(model: Model) -> None:
     # Scene points are checked in numbers: the leg from B to A is the line of its row in the Jacobian.
@@ -232,11 +200,8 @@ def test_shipped_robots_draw_every_leg_between_its_own_joints(model: Model) -> N
     rng = np.random.default_rng(0)
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     for _ in range(5):
-        numbers = [
-            *(np.array(item.typical) * rng.uniform(0.5, 1, size=len(item.typical)) for item in model.parameters),
-            quarter,
-            rng.uniform(20, 30, size=3),
-        ]
+        sizes = [np.array(item.typical) * rng.uniform(0.5, 1, size=len(item.typical)) for item in model.parameters]
+        numbers = [*sizes, quarter, rng.uniform(20, 30, size=3)]
         for row in model.wrenches:
             link = legs[row.limb]
             ends = [points[link.start].position, points[link.end].position]
@@ -265,8 +230,8 @@ class Legs:
         for i, (b, a) in enumerate(zip(self.base, self.platform, strict=True)):
             t = SX.sym(f"t{i + 1}")
             span = pose.position + pose.rotation @ ca.DM(a) - ca.DM(b)
-            rows.append(Wrench(f"{i + 1}", WrenchKind.FORCE, span, ca.cross(ca.DM(b), span), t**2))
-            unknowns.append(Unknown(f"t{i + 1}", t, Dimension.LENGTH, "length of a leg", 1.0, 100.0))
+            rows.append(Wrench(f"{i + 1}", models.WrenchKind.FORCE, span, ca.cross(ca.DM(b), span), t**2))
+            unknowns.append(models.Unknown(f"t{i + 1}", t, Dimension.LENGTH, "length of a leg", 1.0, 100.0))
             closure.append(Closure(f"loop{i + 1}", t**2 - ca.sumsqr(span)))
         return Model(
             "closed", "a toy", (), pose, (0, 0, 30), tuple(rows), unknowns=tuple(unknowns), closure=tuple(closure)
@@ -274,12 +239,8 @@ class Legs:
 
     def values(self) -> dict[str, tuple[float, ...]]:
         """Parameters of the shipped hexapod with these joints."""
-        rows = zip(self.base.tolist(), self.platform.tolist(), strict=True)
-        return {
-            name: tuple(joint)
-            for i, pair in enumerate(rows, start=1)
-            for name, joint in zip((f"base_{i}", f"platform_{i}"), pair, strict=True)
-        }
+        plates = (("base", self.base), ("platform", self.platform))
+        return {f"{name}_{i + 1}": tuple(joint) for name, plate in plates for i, joint in enumerate(plate.tolist())}
 
 
 def at(nlp: Nlp, named: Mapping[str, float]) -> Array:
@@ -292,7 +253,9 @@ def test_a_robot_given_by_closure_equations_is_the_direct_one_where_they_hold() 
         legs = Legs(rng.uniform([-15, -15, -3], [15, 15, 3], (6, 3)), rng.uniform([-8, -8, -3], [8, 8, 3], (6, 3)))
         position, axis, angle = rng.uniform([-5, -5, 20], [5, 5, 40]), rng.normal(size=3), float(rng.uniform(-1, 1))
         task, place = Task(rng.normal(size=6)), position.tolist()
-        direct = evaluate(formulate(Case(hexapod(), legs.values(), place, [task], Rotation(axis, angle))), np.zeros(0))
+        direct = evaluate(
+            formulate(Case(models.hexapod(), legs.values(), place, [task], Rotation(axis, angle))), np.zeros(0)
+        )
         nlp = formulate(Case(legs.closed(), {}, place, [task], Rotation(axis, angle)))
         assert [constraint.name for constraint in nlp.program.constraints] == [f"loop{i}" for i in range(1, 7)]
         np.testing.assert_array_equal(nlp.g_lower, np.zeros(6))
@@ -320,7 +283,9 @@ def test_the_characteristic_length_means_nothing_to_robots_without_couples() -> 
     rng = np.random.default_rng(14)
     legs = Legs(rng.uniform(-15, 15, (6, 3)), rng.uniform(-8, 8, (6, 3)))
     for length in (1e-3, 1.0, 1e3):
-        case = Case(hexapod(), legs.values(), (0, 0, 60), [Task((1, 2, 3, 4, 5, 6))], characteristic_length=length)
+        case = Case(
+            models.hexapod(), legs.values(), (0, 0, 60), [Task((1, 2, 3, 4, 5, 6))], characteristic_length=length
+        )
         state = evaluate(formulate(case), np.zeros(0))
         forces = state.jacobian[:, :3]
         np.testing.assert_allclose(np.linalg.norm(forces, axis=1), np.ones(6), rtol=1e-15)
@@ -328,7 +293,9 @@ def test_the_characteristic_length_means_nothing_to_robots_without_couples() -> 
         assert pytest.approx(float(rates @ rates), rel=1e-13) == state.F
 
 
-@pytest.mark.parametrize("model", [stewart_gough(), hexapod(), three_upu(axes="tsai"), three_upu()])
+@pytest.mark.parametrize(
+    "model", [models.stewart_gough(), models.hexapod(), models.three_upu(axes="tsai"), models.three_upu()]
+)
 def test_rows_of_a_machine_built_exactly_are_those_of_the_design(model: Model) -> None:
     errors = ca.vertcat(*[error for leg in model.legs for error in (leg.base_error, leg.platform_error)])
     symbols = [ca.vertcat(*[item.symbol for item in model.parameters]), model.pose.rotation, model.pose.position]
@@ -346,14 +313,167 @@ def test_rows_of_a_machine_built_exactly_are_those_of_the_design(model: Model) -
 
 
 def test_legs_and_built_rows_that_fit_no_limb_are_refused() -> None:
-    sound = stewart_gough()
+    sound = models.stewart_gough()
     with pytest.raises(ModelError, match="leg 'x' is no limb"):
-        replace(sound, legs=(*sound.legs, Leg("x", SX.zeros(3), SX.zeros(3))))
+        replace(sound, legs=(*sound.legs, models.Leg("x", SX.zeros(3), SX.zeros(3))))
     with pytest.raises(ModelError, match=r"legs .* are not in the order of their forces"):
         replace(sound, legs=sound.legs[::-1])
     with pytest.raises(ModelError, match="rows of the built machine"):
         replace(sound, built=sound.built[1:])
     with pytest.raises(ModelError, match="leg 1- base should have shape"):
-        replace(sound, legs=(Leg("1-", SX.zeros(2), SX.zeros(3)),))
+        replace(sound, legs=(models.Leg("1-", SX.zeros(2), SX.zeros(3)),))
     with pytest.raises(ModelError, match="symbols are used but not declared"):
         replace(sound, legs=())
+
+
+def _fields() -> dict[str, object]:
+    annotations = {"a": float, "b": tuple, "c": list, "d": float}
+    defaults = {"b": (1.0,), "c": field(default_factory=list, compare=False), "d": field(default=4.0, repr=False)}
+    return {"__annotations__": annotations, "__doc__": "Words.", **defaults}
+
+
+def _pair(*, eq: bool) -> tuple[type, type]:
+    kinds = []
+    for decorate in (value_class, dataclasses.dataclass):
+        make: Callable[..., type] = decorate(frozen=True, eq=eq)  # type: ignore[assignment]
+        kinds.append(make(type("Kind", (), _fields())))
+    return kinds[0], kinds[1]
+
+
+@pytest.mark.parametrize("eq", [True, False])
+def test_values_are_those_of_a_compiled_dataclass(*, eq: bool) -> None:
+    shared, compiled = _pair(eq=eq)
+    for places, named in (((1.0,), {}), ((1.0, (2.0,)), {"d": 5.0}), ((), {"c": [3.0], "a": 2.0})):
+        one, other = shared(*places, **named), compiled(*places, **named)
+        assert vars(one) == vars(other)
+        assert repr(one) == repr(other)
+        assert vars(replace(one, a=7.0)) == vars(replace(other, a=7.0))
+        again = shared(*places, **named)
+        assert (one == again, hash(one) == hash(again)) == (eq, eq)
+        assert one != other
+    assert shared(1.0).c is not shared(1.0).c
+    assert (shared(1.0) == shared(1.0, c=[1])) == eq
+    assert shared(1.0) != shared(2.0)
+    assert inspect.signature(shared).parameters.keys() == inspect.signature(compiled).parameters.keys()
+    words = "(a: float, b: tuple = (1.0,), c: list = <class 'list'>, d: float = 4.0) -> None"
+    assert str(inspect.signature(shared)) == words
+
+
+@pytest.mark.parametrize(
+    ("places", "named", "words"),
+    [
+        ((), {}, "missing a required argument: 'a'"),
+        ((1, 2, 3, 4, 5), {}, "too many positional arguments"),
+        ((1,), {"e": 2}, "unexpected keyword argument 'e'"),
+        ((1,), {"a": 2}, "multiple values for argument 'a'"),
+    ],
+)
+def test_wrong_fields_are_refused(places: tuple[int, ...], named: dict[str, int], words: str) -> None:
+    shared, compiled = _pair(eq=True)
+    with pytest.raises(TypeError, match=words):
+        shared(*places, **named)
+    with pytest.raises(TypeError):
+        compiled(*places, **named)
+
+
+def test_a_value_is_frozen() -> None:
+    for kind in _pair(eq=True):
+        value = kind(1.0)
+        with pytest.raises(FrozenInstanceError, match="cannot assign to field 'a'"):
+            value.a = 2.0
+        with pytest.raises(FrozenInstanceError, match="cannot delete field 'a'"):
+            del value.a
+        assert value.a == 1.0
+
+
+@value_class(frozen=True)
+class Checked:
+    """A value that checks itself, and has words of its own."""
+
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.size < 0:
+            raise ValueError("negative")
+
+    def __repr__(self) -> str:
+        return f"size {self.size}"
+
+
+def test_methods_of_the_class_stay_and_values_are_pickled() -> None:
+    with pytest.raises(ValueError, match="negative"):
+        Checked(-1.0)
+    assert repr(Checked(2.0)) == "size 2.0"
+    assert pickle.loads(pickle.dumps(Checked(2.0))) == Checked(2.0)  # noqa: S301 - its own bytes
+
+
+Edge = tuple[str, str]
+
+
+def simple_paths(edges: list[Edge], node: str, end: str, passed: tuple[str, ...] = ()) -> Iterator[frozenset[int]]:
+    """The edges of each path that passes each node once."""
+    if node == end:
+        yield frozenset()
+        return
+    for k, edge in enumerate(edges):
+        if node in edge and edge[0] != edge[1]:
+            other = edge[1] if edge[0] == node else edge[0]
+            if other not in (*passed, node):
+                for path in simple_paths(edges, other, end, (*passed, node)):
+                    yield path | {k}
+
+
+def test_small_graphs_against_all_their_paths() -> None:
+    rng, loops = np.random.default_rng(8), 0
+    for _ in range(600):
+        n = int(rng.integers(2, 7))
+        edges = [(str(one), str(other)) for one, other in rng.integers(n, size=(rng.integers(10), 2))]
+        first, last = map(str, rng.permutation(n)[:2])
+        paths = list(simple_paths(edges, first, last))
+        loops += len(paths) > 1
+        assert between(edges, first, last) == sorted(frozenset().union(*paths))
+        found, shortest = bridges_between(first, last, edges), path_between(first, last, edges)
+        if not paths:
+            assert (shortest, found.bridges, found.is_open) == (None, [], False)
+            assert last not in reached(first, edges)
+            continue
+        assert shortest is not None
+        assert frozenset(shortest) in paths
+        assert len(shortest) == min(map(len, paths))
+        every = frozenset.intersection(*paths)
+        assert found.bridges == [k for k in shortest if k in every]
+        assert found.is_open == (len(paths) == 1 and len(found.bridges) == len(shortest))
+    assert loops > 100
+
+
+class Counted:
+    """A node that counts how often it is looked at."""
+
+    looks = 0
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __hash__(self) -> int:
+        Counted.looks += 1
+        return hash(self.number)
+
+    def __eq__(self, other: object) -> bool:
+        Counted.looks += 1
+        return isinstance(other, Counted) and self.number == other.number
+
+
+def looks_at(count: int, *, is_ring: bool) -> int:
+    """How often the nodes of a chain or of a ring are looked at by all searches together."""
+    nodes = [Counted(k) for k in range(count)]
+    edges = list(pairwise(nodes)) + ([(nodes[-1], nodes[0])] if is_ring else [])
+    Counted.looks = 0
+    assert len(between(edges, nodes[0], nodes[-1])) == len(edges)
+    assert bridges_between(nodes[0], nodes[-1], edges).is_open != is_ring
+    assert len(spanning_tree([nodes[0]], edges).branches) == count - 1  # type: ignore[list-item, arg-type]
+    return Counted.looks
+
+
+@pytest.mark.parametrize("is_ring", [False, True])
+def test_searches_take_a_number_of_steps_that_grows_linearly(is_ring: bool) -> None:
+    assert looks_at(2000, is_ring=is_ring) < 2.2 * looks_at(1000, is_ring=is_ring)

@@ -1,23 +1,20 @@
+"""Screws, lines and rotations: by hand, by their definitions, and back from their numbers."""
+
 from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 
+import casadi as ca
 import numpy as np
 import pytest
 from builders import Array, turn_about
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from screwsynth.models import (
-    Screw,
-    axis_from_screw,
-    line_through,
-    moved_screw,
-    reciprocal_product,
-    screw_from_axis,
-    unit_vector,
-)
+from screwsynth import models
+from screwsynth.models import axis_angle_from_matrix, axis_from_screw, line_through, reciprocal_product, screw_from_axis
 
 Triple = tuple[float, float, float]
 
@@ -135,12 +132,9 @@ def test_pitch_is_infinite_only_where_the_direction_is_rounding_error() -> None:
     noise = axis_from_screw([1e-16, -1e-16, 0, 0, 3, 4])
     assert (noise.pitch, noise.intensity) == (math.inf, 5.0)
     np.testing.assert_allclose(noise.axis, [0, 0.6, 0.8], rtol=1e-15)
-
-
-def test_a_pure_rotation_has_pitch_zero_and_a_couple_no_point() -> None:
     for screw, pitch in (([0, 0, 2, 0, 0, 0], 0.0), ([0, 0, 0, 0, -3, 0], math.inf)):
         found = axis_from_screw(screw)
-        assert isinstance(found, Screw)
+        assert isinstance(found, models.Screw)
         assert found.pitch == pitch
         np.testing.assert_array_equal(found.point, np.zeros(3))
 
@@ -202,9 +196,9 @@ def test_a_moved_screw_is_the_screw_of_the_moved_axis(
     n: Array, s0: Array, h: float, about: Array, angle: float, shift: Array
 ) -> None:
     R = turn_about(about, angle)
-    moved = moved_screw(screw_from_axis(n, s0, h, 2), R, shift)
+    moved = models.moved_screw(screw_from_axis(n, s0, h, 2), R, shift)
     np.testing.assert_allclose(moved, screw_from_axis(R @ n, R @ s0 + shift, h, 2), rtol=0, atol=5e-13)
-    translation = moved_screw(screw_from_axis(n, s0, math.inf, 2), R, shift)
+    translation = models.moved_screw(screw_from_axis(n, s0, math.inf, 2), R, shift)
     np.testing.assert_allclose(translation, [0, 0, 0, *(2 * R @ unit(n))], rtol=0, atol=2e-15)
 
 
@@ -232,7 +226,7 @@ def test_no_screw_without_axis_or_with_numbers_that_are_none(
         screw_from_axis(axis, point, pitch, intensity)
 
 
-def test_nothing_comes_back_from_no_screw() -> None:
+def test_no_screw_has_no_axis_and_one_point_no_line() -> None:
     with pytest.raises(ValueError, match="six zeros"):
         axis_from_screw(np.zeros(6))
     for bad in (math.nan, math.inf, -math.inf):
@@ -240,18 +234,6 @@ def test_nothing_comes_back_from_no_screw() -> None:
             axis_from_screw([1, 0, 0, 0, bad, 0])
     with pytest.raises(ValueError, match="shape"):
         axis_from_screw([1, 0, 0])
-
-
-@many
-@given(directions, st.integers(-300, 300))
-def test_a_direction_is_found_from_a_vector_of_any_length(n: Array, exponent: int) -> None:
-    # Squares of such components would overflow or vanish.
-    vector = n / np.linalg.norm(n) * 10.0**exponent
-    np.testing.assert_allclose(unit_vector(vector), unit(n), rtol=0, atol=1e-15)
-    np.testing.assert_allclose(screw_from_axis(vector, (0, 0, 0), math.inf)[3:], unit(n), rtol=0, atol=1e-15)
-
-
-def test_no_line_through_one_point() -> None:
     with pytest.raises(ValueError, match="not zero"):
         line_through((1, 2, 3), (1, 2, 3))
     with warnings.catch_warnings():
@@ -262,22 +244,153 @@ def test_no_line_through_one_point() -> None:
                 line_through(bad, (1, 2, 3))
 
 
-def test_results_cannot_be_written_to() -> None:
+@many
+@given(directions, st.integers(-300, 300))
+def test_a_direction_is_found_from_a_vector_of_any_length(n: Array, exponent: int) -> None:
+    # Squares of such components would overflow or vanish.
+    vector = n / np.linalg.norm(n) * 10.0**exponent
+    np.testing.assert_allclose(models.unit_vector(vector), unit(n), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(screw_from_axis(vector, (0, 0, 0), math.inf)[3:], unit(n), rtol=0, atol=1e-15)
+
+
+def test_results_cannot_be_written_to_and_arguments_are_left_alone() -> None:
     screw = screw_from_axis((0, 0, 1), (1, 0, 0), 1)
     parts = axis_from_screw(screw)
-    for array in (
-        screw,
-        parts.axis,
-        parts.point,
-        line_through((0, 0, 0), (1, 0, 0)),
-        moved_screw(screw, np.eye(3), screw[:3]),
-    ):
+    others = (line_through((0, 0, 0), (1, 0, 0)), models.moved_screw(screw, np.eye(3), screw[:3]))
+    for array in (screw, parts.axis, parts.point, *others):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 7
-
-
-def test_arguments_are_left_alone() -> None:
     axis, point = np.array([0.0, 0.0, 4.0]), np.array([1.0, 0.0, 0.0])
     screw_from_axis(axis, point, 1)
     np.testing.assert_array_equal(axis, [0, 0, 4])
     np.testing.assert_array_equal(point, [1, 0, 0])
+
+
+often = settings(derandomize=True, deadline=None, max_examples=80)
+
+_vector, _angle = ca.SX.sym("vector", 3), ca.SX.sym("angle")
+_FROM_QUATERNION = ca.Function("q", [_vector], [models.matrix_from_quaternion_vector(_vector)])
+_FROM_CAYLEY = ca.Function("c", [_vector], [models.matrix_from_cayley(_vector)])
+_FROM_AXIS_ANGLE = ca.Function("a", [_vector, _angle], [models.matrix_from_axis_angle(_vector, _angle)])
+
+#: Entries of a rotation matrix are sums of three or four products below 2.
+ROUNDING = 2e-15
+
+axes = (
+    st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 3)
+    .filter(lambda n: math.hypot(*n) > 0.1)
+    .map(lambda n: np.array(n) / np.linalg.norm(n))
+)
+
+
+def from_quaternion(axis: Array, angle: float) -> Array:
+    return np.asarray(_FROM_QUATERNION(np.sin(angle / 2) * axis).full())
+
+
+def from_cayley(axis: Array, angle: float) -> Array:
+    return np.asarray(_FROM_CAYLEY(np.tan(angle / 2) * axis).full())
+
+
+def from_axis_angle(axis: Array, angle: float) -> Array:
+    return np.asarray(_FROM_AXIS_ANGLE(axis, angle).full())
+
+
+def turned(n: Array, angle: float, x: Array) -> Array:
+    """Rodrigues' formula for one vector, with 1 - cos free of cancellation."""
+    return np.asarray(np.cos(angle) * x + np.sin(angle) * np.cross(n, x) + 2 * np.sin(angle / 2) ** 2 * (n @ x) * n)
+
+
+def matrix(n: Array, angle: float) -> Array:
+    return np.column_stack([turned(n, angle, e) for e in np.eye(3)])
+
+
+@pytest.mark.parametrize("function", [from_quaternion, from_cayley, from_axis_angle])
+def test_no_rotation_is_the_identity(function: Callable[[Array, float], Array]) -> None:
+    np.testing.assert_array_equal(function(np.array([0.6, 0.0, 0.8]), 0.0), np.eye(3))
+
+
+# Quaternion and Cayley vectors have no half turn: 1 - |q|^2 and 1 / tan lose digits as it is approached.
+@often
+@given(axes, st.floats(-3, 3))
+def test_the_three_matrices_agree_and_are_rotations(n: Array, angle: float) -> None:
+    expected = matrix(n, angle)
+    for function, tolerance in (
+        (from_axis_angle, ROUNDING),
+        (from_cayley, ROUNDING),
+        # q0 = sqrt(1 - |q|^2) is known to 1e-16 / q0, and q0 >= cos(1.5) = 0.07.
+        (from_quaternion, ROUNDING / math.cos(angle / 2)),
+    ):
+        R = function(n, angle)
+        np.testing.assert_allclose(R, expected, rtol=0, atol=tolerance)
+        # A quaternion vector gives a rotation however badly q0 is known, up to q0's own rounding.
+        np.testing.assert_allclose(R.T @ R, np.eye(3), rtol=0, atol=2 * ROUNDING)
+        assert np.linalg.det(R) == pytest.approx(1, rel=0, abs=2 * ROUNDING)
+
+
+@often
+@given(axes, st.floats(-7, 7), st.floats(-7, 7))
+def test_turns_about_one_axis_add_up(n: Array, one: float, other: float) -> None:
+    product = from_axis_angle(n, one) @ from_axis_angle(n, other)
+    # The sum of angles of 7 is rounded by 1e-15 of its own.
+    np.testing.assert_allclose(product, from_axis_angle(n, one + other), rtol=0, atol=2 * ROUNDING)
+
+
+@often
+@given(axes, st.floats(0, math.pi))
+def test_axis_and_angle_come_back_from_the_matrix(n: Array, angle: float) -> None:
+    axis, found = axis_angle_from_matrix(matrix(n, angle))
+    assert 0 <= found <= math.pi
+    assert np.linalg.norm(axis) == pytest.approx(1, rel=4e-16)
+    assert found == pytest.approx(angle, rel=0, abs=ROUNDING)
+    # What counts is the rotation: at no angle the axis may be any, at half a turn its opposite. Within 1e-12 of half a
+    # turn the choice of the axis's sign costs twice that angle.
+    slack = 2 * (math.pi - angle) if math.pi - angle < 2e-12 else 0.0
+    np.testing.assert_allclose(matrix(axis, found), matrix(n, angle), rtol=0, atol=2 * ROUNDING + slack)
+
+
+@often
+@given(axes, st.floats(0.1, 3.1))
+def test_the_axis_itself_comes_back_away_from_no_turn_and_half_a_turn(n: Array, angle: float) -> None:
+    axis, _ = axis_angle_from_matrix(matrix(n, angle))
+    # A matrix known to 1e-16 gives the axis to that over the sine or 1 - cosine: at worst over sin(0.1).
+    np.testing.assert_allclose(axis, n, rtol=0, atol=10 * ROUNDING)
+
+
+TURNS = [(exponent, False) for exponent in (1, 2, 4, 6, 8, 10, 12, 20, 50, 100)]
+TURNS += [(exponent, True) for exponent in (1, 2, 4, 6, 8, 10, 11)]
+
+
+@pytest.mark.parametrize(("exponent", "is_half"), TURNS)
+def test_a_small_turn_and_one_short_of_half_a_turn_are_found_to_full_accuracy(exponent: int, *, is_half: bool) -> None:
+    """An arc cosine of the trace would lose turns below 1e-8; the sine alone an axis to 1e-16 / (pi - angle)."""
+    rng = np.random.default_rng(exponent)
+    for _ in range(20):
+        n = rng.normal(size=3)
+        n /= np.linalg.norm(n)
+        small = rng.uniform(0.1 + 0.1 * is_half, 1) * 10.0**-exponent
+        angle = math.pi - small if is_half else small
+        axis, found = axis_angle_from_matrix(matrix(n, angle))
+        assert found == pytest.approx(angle, rel=0 if is_half else ROUNDING, abs=ROUNDING if is_half else 0)
+        np.testing.assert_allclose(axis, n, rtol=0, atol=ROUNDING)
+
+
+def test_half_a_turn_is_found_with_the_axis_whose_first_component_is_positive() -> None:
+    rng = np.random.default_rng(4)
+    special = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 1], [-1, 0, 1], [-1, 1, 0], [-1, -1, -1], [1e-6, -1, 0]]
+    for given_axis in [*special, *rng.normal(size=(20, 3)).tolist()]:
+        n = np.array(given_axis, dtype=np.float64)
+        n /= np.linalg.norm(n)
+        axis, found = axis_angle_from_matrix(2 * np.outer(n, n) - np.eye(3))
+        assert found == pytest.approx(math.pi, rel=0, abs=ROUNDING)
+        leading = n[np.flatnonzero(n)[0]]
+        np.testing.assert_allclose(axis, math.copysign(1, leading) * n, rtol=0, atol=ROUNDING)
+
+
+def test_no_turn_has_the_z_axis_by_convention_read_only_and_a_matrix_three_rows() -> None:
+    axis, angle = axis_angle_from_matrix(np.eye(3))
+    np.testing.assert_array_equal(axis, [0, 0, 1])
+    assert angle == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        axis[0] = 1
+    with pytest.raises(ValueError, match="shape"):
+        axis_angle_from_matrix(np.eye(2))

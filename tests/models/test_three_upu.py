@@ -10,23 +10,9 @@ import pytest
 from builders import Array, turn_about
 
 from screwsynth.models import WrenchKind, three_upu
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    Free,
-    PointKind,
-    RobotState,
-    Rotation,
-    Solution,
-    StartStatus,
-    Status,
-    Task,
-    evaluate,
-    examine,
-    formulate,
-    load_case,
-    solve,
-)
+from screwsynth.nlp import Case, CaseError, Free, Rotation, StartStatus, Status, Task, formulate, load_case, solve
+from screwsynth.nlp.evidence.optimality import PointKind, examine
+from screwsynth.nlp.evidence.state import RobotState, evaluate
 
 Axes = Literal["free", "limb", "snu", "tsai"]
 AZIMUTHS = [2 * math.pi * k / 3 for k in range(3)]
@@ -76,14 +62,9 @@ class Drawn:
                 given[f"u1_{k + 1}"] = self.u1[k].tolist()
             if axes == "free":
                 given[f"u2_{k + 1}"] = self.u2[k].tolist()
-        return Case(
-            model=three_upu(axes=axes),
-            parameters=given,
-            position=self.p.tolist(),
-            rotation=Rotation(self.axis, self.angle),
-            tasks=[Task(self.twist)],
-            characteristic_length=self.length,
-        )
+        turn = Rotation(self.axis, self.angle)
+        model, task = three_upu(axes=axes), Task(self.twist)
+        return Case(model, given, self.p.tolist(), [task], turn, characteristic_length=self.length)
 
     def force_rows(self) -> Array:
         b = on_circle(self.base)
@@ -101,7 +82,7 @@ def symmetric(axes: Axes, task: Task = ABOUT_Z, height: float = 0.7, platform_ra
     return state(Case(model=three_upu(axes=axes), parameters=parameters, position=[0, 0, height], tasks=[task]))
 
 
-def test_tsais_robot_at_home_has_full_rank_and_known_singular_values() -> None:
+def test_tsais_robot_at_home_has_known_singular_values_and_f() -> None:
     found = symmetric("tsai")
     assert found.rank == 6
     assert found.free_twists.shape == (0, 6)
@@ -110,6 +91,15 @@ def test_tsais_robot_at_home_has_full_rank_and_known_singular_values() -> None:
     np.testing.assert_allclose(values, [1.601, 1.601, 0.897, 0.897, 0.243, 0.243], atol=5e-4)
     # Three-fold symmetry makes them pairs, as exactly as the radius 0.57735 allows: exactly, since it is any radius.
     np.testing.assert_allclose(values[::2], values[1::2], rtol=1e-12)
+    found = symmetric("tsai", height=1.0, platform_radius=0.57735)
+    assert found.rank == 4
+    np.testing.assert_allclose(found.singular_values[4:], 0, atol=1e-15)
+    # Vertical couples and limbs that meet the axis: exactly 3.
+    assert pytest.approx(3.0, rel=1e-14) == symmetric("snu").F
+    assert pytest.approx(2.564, abs=5e-4) == symmetric("tsai").F
+    # The part of a unit limb vector perpendicular to the tangent is the limb itself: its couple is s, F = 3 s_z^2.
+    rise = 0.7 / math.hypot(0.7, 0.57735 - 0.288675)
+    assert pytest.approx(3 * rise**2, rel=1e-14) == symmetric("tsai").F
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -121,10 +111,8 @@ def test_the_snu_robot_at_home_turns_freely_about_horizontal_lines_through_the_l
     assert found.is_zero
     assert found.F < 1e-28  # rates of 1e-16 each: rounding alone
     # The free twists span these rotations: this one is a combination of them.
-    left = (
-        task.twist - found.free_twists.T @ np.linalg.lstsq(found.free_twists.T, np.asarray(task.twist), rcond=None)[0]
-    )
-    assert np.max(np.abs(left)) < 1e-12
+    parts = np.linalg.lstsq(found.free_twists.T, np.asarray(task.twist), rcond=None)[0]
+    assert np.max(np.abs(task.twist - found.free_twists.T @ parts)) < 1e-12
 
 
 @pytest.mark.parametrize("changed", [{"pitch": 0.1}, {"point": [0, 0, 1.3]}, {"axis": [1, 0, 0.1]}])
@@ -133,21 +121,6 @@ def test_the_snu_robot_resists_every_neighbour_of_those_motions(changed: dict[st
     found = symmetric("snu", Task.screw("min", **given))  # type: ignore[arg-type]
     assert found.F > 1e-3
     assert not found.is_zero
-
-
-def test_tsais_robot_with_equal_radii_is_singular() -> None:
-    found = symmetric("tsai", height=1.0, platform_radius=0.57735)
-    assert found.rank == 4
-    np.testing.assert_allclose(found.singular_values[4:], 0, atol=1e-15)
-
-
-def test_turning_about_the_vertical() -> None:
-    # Vertical couples and limbs that meet the axis: exactly 3.
-    assert pytest.approx(3.0, rel=1e-14) == symmetric("snu").F
-    assert pytest.approx(2.564, abs=5e-4) == symmetric("tsai").F
-    # The part of a unit limb vector perpendicular to the tangent is the limb itself: its couple is s, F = 3 s_z^2.
-    rise = 0.7 / math.hypot(0.7, 0.57735 - 0.288675)
-    assert pytest.approx(3 * rise**2, rel=1e-14) == symmetric("tsai").F
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -177,19 +150,17 @@ def test_rows_are_those_made_by_hand(axes: Axes, seed: int) -> None:
     np.testing.assert_allclose(np.sum(J[3:, 3:] * first, axis=1) / drawn.length * np.ravel(lengths), 0, atol=2e-15)
 
 
-def test_rows_come_force_by_force_and_then_couple_by_couple() -> None:
+def test_rows_come_force_by_force_and_an_unknown_choice_of_axes_is_refused() -> None:
     rows = three_upu().wrenches
     assert [row.limb for row in rows] == ["1", "2", "3"] * 2
     assert [row.kind for row in rows] == [WrenchKind.FORCE] * 3 + [WrenchKind.COUPLE] * 3
+    with pytest.raises(ValueError, match="axes must be"):
+        three_upu(axes="park")  # type: ignore[arg-type]
 
 
-@pytest.fixture(scope="module", params=["paper-4.4-min", "paper-4.4-max"])
-def many(request: pytest.FixtureRequest) -> Solution:
-    return solve(load_case(request.param), starts=64)
-
-
-def test_free_directions_have_no_poles(many: Solution) -> None:
-    maximum = many.nlp.case.name == "paper-4.4-max"
+@pytest.mark.parametrize("name", ["paper-4.4-min", "paper-4.4-max"])
+def test_free_directions_have_no_poles(name: str) -> None:
+    many, maximum = solve(load_case(name), starts=64), name == "paper-4.4-max"
     assert many.status is Status.OPTIMAL
     assert len(many.starts) == 64
     goal = 3.0 if maximum else 0.0
@@ -205,28 +176,18 @@ def test_free_directions_have_no_poles(many: Solution) -> None:
             assert examine(many.nlp, start.x).kind is PointKind.SADDLE
             assert goal - 1e-6 > start.F
 
-
-def test_free_directions_end_as_unit_and_orthogonal(many: Solution) -> None:
-    for start in many.starts:
-        if start.status is not StartStatus.CONVERGED:
-            continue
-        found = evaluate(many.nlp, start.x).parameters
+    # Directions end as unit and orthogonal, and the largest couples are along the axis.
+    omega = np.asarray(many.nlp.case.tasks[0].twist)[:3]
+    for start in converged:
+        state = evaluate(many.nlp, start.x)
         for k in "123":
-            first, second = found[f"u1_{k}"], found[f"u2_{k}"]
+            first, second = state.parameters[f"u1_{k}"], state.parameters[f"u2_{k}"]
             assert abs(np.linalg.norm(first) - 1) < 1e-12
             assert abs(np.linalg.norm(second) - 1) < 1e-12
             assert abs(float(first @ second)) < 1e-12
-
-
-def test_the_largest_couples_are_along_the_axis(many: Solution) -> None:
-    case = many.nlp.case
-    omega = np.asarray(case.tasks[0].twist)[:3]
-    for start in many.starts:
-        if start.status is StartStatus.CONVERGED:
-            cosines = evaluate(many.nlp, start.x).jacobian[3:, 3:] @ omega
-            goal = 1.0 if case.name == "paper-4.4-max" else 0.0
-            # F is flat there, of second order at the maximum, where 1e-12 in F is 1e-12 in cosines.
-            np.testing.assert_allclose(np.abs(cosines), goal, atol=1e-6 if goal == 0.0 else 1e-12)
+        # F is flat there, of second order at the maximum, where 1e-12 in F is 1e-12 in cosines.
+        cosines = np.abs(state.jacobian[3:, 3:] @ omega)
+        np.testing.assert_allclose(cosines, float(maximum), atol=1e-12 if maximum else 1e-6)
 
 
 @pytest.mark.parametrize("length", [1e-20, 1e-3, 0.2, 0.999999, 1.0, 7.0, 1e20])
@@ -245,18 +206,15 @@ def one_axis_given(u1: Sequence[float], axes: Axes = "free") -> Case:
     return replace(case, parameters={**case.parameters, "u1_1": list(u1)})
 
 
-def test_a_zero_direction_is_refused() -> None:
+def test_a_direction_that_is_zero_or_no_number_is_refused() -> None:
     with pytest.raises(CaseError, match=r"robot\.parameters\.u1_1.*must not be zero"):
         one_axis_given([0, 0, 0], "limb")
+    for bad in (math.nan, math.inf):
+        with pytest.raises(CaseError, match=r"u1_1.*finite"):
+            one_axis_given([bad, 0, 1], "limb")
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_direction_that_is_no_number_is_refused(bad: float) -> None:
-    with pytest.raises(CaseError, match=r"u1_1.*finite"):
-        one_axis_given([bad, 0, 1], "limb")
-
-
-def test_fixed_axes_that_are_not_orthogonal_are_refused() -> None:
+def test_fixed_axes_are_orthogonal_to_eleven_digits_or_refused() -> None:
     drawn = Drawn(401)
     tilted = turn_about(np.cross(drawn.u1[0], drawn.u2[0]), math.radians(80)) @ drawn.u2[0]
     case = one_axis_given(tilted.tolist())
@@ -266,9 +224,6 @@ def test_fixed_axes_that_are_not_orthogonal_are_refused() -> None:
     assert "u1_1 . u2_1" in said
     assert f"{math.cos(math.radians(80)):.6g}" in said
     assert "must be 0" in said
-
-
-def test_fixed_axes_of_eleven_digits_are_good_enough() -> None:
     drawn = Drawn(402)
     drawn.u1, drawn.u2 = drawn.u1.round(11), drawn.u2.round(11)
     assert np.max(np.abs(np.sum(drawn.u1 * drawn.u2, axis=1))) > 1e-13
@@ -291,8 +246,3 @@ def test_a_free_direction_with_a_held_component_keeps_it() -> None:
     reached = (solution.state.rates[3] / drawn.length) ** 2
     # Half a step from its top a parabola of this height has lost at most about (pi / 3600)^2 times a small number.
     assert best * (1 - 1e-12) <= reached <= best * (1 + 1e-5)
-
-
-def test_an_unknown_choice_of_axes_is_refused() -> None:
-    with pytest.raises(ValueError, match="axes must be"):
-        three_upu(axes="park")  # type: ignore[arg-type]

@@ -1,7 +1,4 @@
-"""Limits on forces, speeds and powers of actuators: their numbers, derivatives, designs that keep them, and their cost.
-
-The numbers come from joint centres and from the platform's equilibrium, in NumPy alone.
-"""
+"""Limits on forces, speeds and powers of actuators: numbers, derivatives, costs, virtual work in MuJoCo, and text."""
 
 from __future__ import annotations
 
@@ -12,34 +9,34 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, case_from, edited, starter_tables, turn_about
+from builders import EACH_KIND, FEW_KINDS, Array, case_from, edited, soaked, starter, starter_tables, turn_about
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from measures import circle_joints
+from mujoco_robots import null_space
+from mujoco_trees import Tree
 
 from screwsynth.models import Dimension
+from screwsynth.models.catalog import SHIPPED
 from screwsynth.nlp import Case, Limits, Margin, Nlp, Status, Units, formulate, json_data, margins_of, result_of, solve
 from screwsynth.nlp.case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
+from screwsynth.nlp.case.loads import Load, Loading, Motion
+from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.kkt import close_equations
+from screwsynth.nlp.formats.solved.mechanism_of import mechanism_of
+from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 LEGS = ("1-", "1+", "2-", "2+", "3-", "3+")
 #: A weight that is always there, a force of both signs at a tool that also has one of any direction, and a gust.
-CASE = """\
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-[robot.parameters]
-x1 = { min = 1.0, max = 2.0, start = 1.4 }
-x2 = { min = 0.5, max = 1.0, start = 0.7 }
-x3 = { min = 2, max = 25, start = 8 }
-x4 = { min = 2, max = 25, start = 12 }
-[pose]
-position = [0.1, { min = -0.4, max = 0.4 }, { min = 1.0, max = 2.0, start = 1.5 }]
-rotation = { angle = { min = -20, max = 20 } }
-[[task]]
-sense = "max"
-axis = [1, 2, 6]
-point = [0.3, 0.1, 1.2]
-pitch = 0.1
+TABLES = """\
+robot = { model = "stewart-gough", layout = "octahedral", parameters = NUMBERS }
+pose = { position = POSITION }
+task = [{ sense = "max", axis = [1, 2, 6], point = [0.3, 0.1, 1.2], pitch = 0.1 }]
+motion = { linear = 0.5, angular = 40 }
+limits = { LIMITS }
+solve.starts = 6
 [[load]]
 name = "payload"
 mass = 40
@@ -57,16 +54,16 @@ any = { force = 30, moment = 2 }
 name = "gust"
 force = [0, 80, 0]
 point = [0, 0, 0.4]
-[motion]
-linear = 0.5
-angular = 40
-[limits]
-actuator_force = { max = 400 }
-actuator_speed = { max = 0.9 }
-actuator_power = { max = 300 }
-[solve]
-starts = 6
 """
+NUMBERS = (
+    "{ x1 = { min = 1.0, max = 2.0, start = 1.4 }, x2 = { min = 0.5, max = 1.0, start = 0.7 }, "
+    "x3 = { min = 2, max = 25, start = 8 }, x4 = { min = 2, max = 25, start = 12 } }"
+)
+PLACE = (
+    "[0.1, { min = -0.4, max = 0.4 }, { min = 1.0, max = 2.0, start = 1.5 }], rotation.angle = { min = -20, max = 20 }"
+)
+FORCE, OTHERS = "actuator_force = { max = 400 }", ", actuator_speed = { max = 0.9 }, actuator_power = { max = 300 }"
+CASE = edited(TABLES, ("NUMBERS", NUMBERS), ("POSITION", PLACE), ("LIMITS", FORCE + OTHERS))
 WEIGHT = np.array([0, 0, -9.81 * 40])
 CASES = ("cut", "cut reversed", "gust")
 
@@ -94,11 +91,8 @@ class Expected:
         tool = np.array([0.0, 0.0, -0.2])
         cut = wrench(R @ [50.0, 20.0, -120.0], R @ [3.0, 4.0, 5.0], tool)
         gust = wrench(np.array([0.0, 80.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 0.4]))
-        self.centre = {
-            "cut": to_forces @ (weight + cut),
-            "cut reversed": to_forces @ (weight - cut),
-            "gust": to_forces @ (weight + gust),
-        }
+        loads = {"cut": weight + cut, "cut reversed": weight - cut, "gust": weight + gust}
+        self.centre = {name: to_forces @ load for name, load in loads.items()}
         # Of a force d at the tool in any direction: its part along the gradient of a leg's force by d.
         at_tool = to_forces @ np.array([wrench(each, np.zeros(3), tool) for each in np.eye(3)]).T
         moments = to_forces[:, 3:]
@@ -150,7 +144,7 @@ def random_points(nlp: Nlp, count: int, seed: int) -> list[Array]:
     return found
 
 
-def test_the_numbers_of_the_limits_are_those_of_the_legs() -> None:
+def test_the_numbers_of_the_limits_and_their_derivatives_are_those_of_the_legs() -> None:
     nlp = legs_nlp()
     names = [each.name for each in nlp.program.constraints]
     for x in random_points(nlp, 30, 1):
@@ -158,15 +152,20 @@ def test_the_numbers_of_the_limits_are_those_of_the_legs() -> None:
         found = dict(zip(names, nlp.evaluate(x).g, strict=True))
         del found["angle"]
         assert found.keys() == expected.keys()
-        scale = max(map(abs, expected.values()))
-        assert [found[name] for name in expected] == pytest.approx(
-            list(expected.values()), rel=1e-10, abs=1e-12 * scale
-        )
+        wanted = pytest.approx(list(expected.values()), rel=1e-10, abs=1e-12 * max(map(abs, expected.values())))
+        assert [found[name] for name in expected] == wanted
+    for x in random_points(nlp, 6, 2):
+        slopes = nlp.program.kernels.derivatives(x, nlp.arguments).jacobian
+        differences = np.zeros_like(slopes)
+        for k, step in enumerate(1e-5 * np.eye(nlp.n)):
+            ends = [expected_at(nlp, x + sign * step).constraints for sign in (1, -1)]
+            differences[1:, k] = [(ends[0][name] - ends[1][name]) / 2e-5 for name in names[1:]]
+        sizes = np.abs(differences[1:]).max(axis=1, keepdims=True)
+        np.testing.assert_allclose(slopes[1:] / sizes, differences[1:] / sizes, rtol=0, atol=1e-6)
 
 
 def test_a_smallest_and_a_largest_force_are_signed_and_may_both_be_below_0() -> None:
-    text = edited(CASE, ("actuator_force = { max = 400 }", "actuator_force = { min = -70, max = -5 }"))
-    nlp = formulate(case_from(text))
+    nlp = formulate(case_from(edited(CASE, (FORCE, "actuator_force = { min = -70, max = -5 }"))))
     index = {each.name: k for k, each in enumerate(nlp.program.constraints)}
     assert not [name for name in index if name.startswith("actuator_force") and "backwards" in name]
     for x in random_points(nlp, 3, 7):
@@ -178,21 +177,6 @@ def test_a_smallest_and_a_largest_force_are_signed_and_may_both_be_below_0() -> 
                 assert g[largest] == pytest.approx(at.centre[load][k] + at.spread[load][k], rel=1e-9, abs=1e-9)
                 assert g[smallest] == pytest.approx(at.centre[load][k] - at.spread[load][k], rel=1e-9, abs=1e-9)
                 assert (nlp.g_upper[largest], nlp.g_lower[smallest]) == (-5.0, -70.0)
-
-
-def test_the_derivatives_of_the_limits_are_differences_of_the_legs_forces() -> None:
-    nlp = legs_nlp()
-    names = [each.name for each in nlp.program.constraints]
-    for x in random_points(nlp, 6, 2):
-        found = nlp.program.kernels.derivatives(x, nlp.arguments).jacobian
-        differences = np.zeros_like(found)
-        for k in range(nlp.n):
-            step = np.zeros(nlp.n)
-            step[k] = 1e-5
-            ends = [expected_at(nlp, x + sign * step).constraints for sign in (1, -1)]
-            differences[1:, k] = [(ends[0][name] - ends[1][name]) / 2e-5 for name in names[1:]]
-        sizes = np.abs(differences[1:]).max(axis=1, keepdims=True)
-        np.testing.assert_allclose(found[1:] / sizes, differences[1:] / sizes, rtol=0, atol=1e-6)
 
 
 #: Robots given joint by joint: actuators that turn and slide, platforms with fewer freedoms, parasitic motions.
@@ -220,10 +204,8 @@ def test_the_derivatives_of_limits_on_robots_joint_by_joint_are_differences(name
         x = nlp.start + 0.01 * nlp.scale * rng.uniform(-1, 1, nlp.n)
         found = nlp.program.kernels.derivatives(x, nlp.arguments).jacobian[own]
         differences = np.zeros_like(found)
-        for k in range(nlp.n):
-            step = np.zeros(nlp.n)
+        for k, step in enumerate(5e-5 * np.diag(nlp.scale)):
             # Fourth order: of the values at 1 and 2 steps to each side.
-            step[k] = 5e-5 * nlp.scale[k]
             values = [nlp.evaluate(x + n * step).g[own] for n in (-2, -1, 1, 2)]
             differences[:, k] = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * step[k])
         sizes = np.abs(differences * nlp.scale).max(axis=1, keepdims=True)
@@ -285,8 +267,10 @@ def test_limits_by_actuator_and_by_sign() -> None:
     assert ends(solution) == pytest.approx((35.0, 230.0), rel=1e-9)
     rows = {row.key: row for row in margins_of(solution.nlp, solution.x, optimal=True) if row.active}
     assert {"actuator_force.3+.min", "actuator_force.1+.max"} <= rows.keys()
-    moved = best(replace(case, limits=Limits(ActuatorForce("3+", min=35.01), ActuatorForce("1+", max=230.0)))).F
-    back = best(replace(case, limits=Limits(ActuatorForce("3+", min=34.99), ActuatorForce("1+", max=230.0)))).F
+    moved, back = (
+        best(replace(case, limits=Limits(ActuatorForce("3+", min=force), ActuatorForce("1+", max=230.0)))).F
+        for force in (35.01, 34.99)
+    )
     assert rows["actuator_force.3+.min"].cost == pytest.approx((moved - back) / 0.02, rel=1e-3)
     assert moved < back
 
@@ -310,20 +294,13 @@ def test_a_robot_joint_by_joint_keeps_an_active_limit(name: str, dimension: Dime
     assert slope > 0
 
 
-# -- over a workspace
-
-BOX = "[{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 1.4, max = 1.6 }]"
+BOX = "[0, 0, 1.5] }\nworkspace = { position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, "
 #: The design's numbers fixed, over a box of positions.
 FIXED = edited(
-    CASE,
-    ("x1 = { min = 1.0, max = 2.0, start = 1.4 }", "x1 = 1.4"),
-    ("x2 = { min = 0.5, max = 1.0, start = 0.7 }", "x2 = 0.7"),
-    ("x3 = { min = 2, max = 25, start = 8 }", "x3 = 8"),
-    ("x4 = { min = 2, max = 25, start = 12 }", "x4 = 12"),
-    ("[0.1, { min = -0.4, max = 0.4 }, { min = 1.0, max = 2.0, start = 1.5 }]", "[0, 0, 1.5]"),
-    ("rotation = { angle = { min = -20, max = 20 } }\n", ""),
-    ("[limits]", f"[workspace]\nposition = {BOX}\n[limits]"),
-    ("actuator_speed = { max = 0.9 }\nactuator_power = { max = 300 }", ""),
+    TABLES,
+    ("NUMBERS", "{ x1 = 1.4, x2 = 0.7, x3 = 8, x4 = 12 }"),
+    ("POSITION", f"{BOX}{{ min = 1.4, max = 1.6 }}]"),
+    ("LIMITS", FORCE),
 )
 
 
@@ -347,40 +324,6 @@ def test_proven_largest_forces_over_a_workspace_are_above_all_samples_and_near_t
         assert sign * claim.reached <= sign * claim.bound
 
 
-#: A published 3-UPU: its largest force in a box of 0.2 x 0.2 x 0.1 is 8.08803 N, at a corner.
-UPU = """\
-[robot]
-model = "three-upu"
-axes = "tsai"
-parameters = { base_radius = 0.5, platform_radius = 0.12 }
-[pose]
-position = [0, 0, 0.45]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[[load]]
-force = [2, 2, -10]
-[limits]
-actuator_force = { max = MAX }
-[workspace]
-position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = 0.4, max = 0.5 }]
-"""
-
-
-def test_the_largest_force_of_a_published_robot_is_proved_and_a_smaller_limit_refuted() -> None:
-    for number, outcome in (("8.09", Outcome.PROVED), ("8.08", Outcome.REFUTED)):
-        claims = judge_workspace(case_from(UPU.replace("MAX", number)), jobs=1).extremes
-        (worst,) = [each for each in claims if each.name == "actuator_force actuator 1 load load 1"]
-        assert worst.outcome is outcome
-        assert worst.reached == pytest.approx(8.08803, abs=5e-6)
-        assert worst.bound >= 8.08803 - 5e-6
-        assert worst.bound <= 8.09 or outcome is Outcome.REFUTED  # where a pose decides
-        assert worst.pose is not None
-        x, y, z = worst.pose.position
-        assert (x, abs(y), z) == pytest.approx((0.1, 0.1, 0.4), abs=1e-6)
-
-
 def test_a_limit_on_the_speed_of_cranks_costs_the_same_in_radians() -> None:
     case = case_from({**starter_tables("6-rus"), **LOADED})
     case = replace(case, limits=Limits(ActuatorSpeed(max=3.4)))
@@ -393,3 +336,151 @@ def test_a_limit_on_the_speed_of_cranks_costs_the_same_in_radians() -> None:
     assert (degrees["value"], radians["value"]) == pytest.approx((np.degrees(3.4), 3.4), rel=1e-9)
     assert radians["cost"] == pytest.approx(np.degrees(degrees["cost"]), rel=1e-6)
     assert radians["cost"] > 0
+
+
+LOADS = 4
+
+
+@pytest.mark.parametrize("name", soaked([*EACH_KIND, *SHIPPED], (*FEW_KINDS, "delta", *list(SHIPPED)[:1])))
+def test_exported_actuators_hold_the_loads_with_the_programs_forces(name: str) -> None:
+    """The null space of the exported tree's constraints has all motions: in each, actuators and loads do no work."""
+    rng = np.random.default_rng([5, *name.encode()])
+    own = [[tuple(rng.normal(size=3).tolist()) for _ in range(3)] for _ in range(LOADS)]
+    loading = Loading(tuple(Load(f"{k}", *parts) for k, parts in enumerate(own)))
+    nlp = formulate(replace(starter(name), loading=loading, limits=Limits(ActuatorForce(max=1e9))))
+    part = np.array([0.01 if each.name.startswith("q") else 0.1 for each in nlp.program.variables])
+    x = close_equations(nlp, closed_start(nlp) + part * rng.uniform(-1, 1, nlp.n) * (nlp.upper - nlp.lower))
+    values = dict(zip((each.name for each in nlp.program.constraints), nlp.evaluate(x).g, strict=True))
+    exported = mechanism_of(nlp, x)
+    actuators = [joint.actuator for joint in exported.joints if joint.actuator]
+    found = np.array([[values[f"actuator_force actuator {each} load {k}"] for k in range(LOADS)] for each in actuators])
+    backwards = [
+        [values[f"actuator_force actuator {each} backwards load {k}"] for k in range(LOADS)] for each in actuators
+    ]
+    np.testing.assert_array_equal(-found, backwards)
+
+    tree = Tree(mjcf_text(exported.mechanism), exported.size)
+    assert tree.open < 1e-12
+    state = nlp.program.kernels.robot_state(x, nlp.arguments)
+    R, p = (np.array(each) for each in (state.rotation, state.position))
+    rates, work = virtual_work(
+        tree, [np.concatenate([f, m + np.cross(p.ravel() + R @ at, f)]) for f, m, at in map(np.array, own)]
+    )
+    assert np.linalg.matrix_rank(rates, 1e-9) == len(actuators)
+    np.testing.assert_allclose(rates @ found, -work, rtol=0, atol=1e-10 * np.abs(found).max())
+
+
+def virtual_work(tree: Tree, wrenches: list[Array]) -> tuple[Array, Array]:
+    """Rates (n, a) of the actuators, and work (n, k) of wrenches about the world origin, in each feasible motion."""
+    constraints, of_platform = tree.jacobians
+    motions = null_space(constraints) if len(constraints) else np.eye(tree.model.nv)
+    return motions[tree.driven].T, motions.T @ of_platform.T @ np.roll(np.array(wrenches).T, 3, axis=0)
+
+
+#: Of an angle that is written in degrees.
+ULP = 3e-16
+SIX, TURNING = starter("stewart-gough"), starter("delta")
+
+NUMBER = st.floats(-1e30, 1e30) | st.integers(-1000, 1000).map(float) | st.sampled_from([0.0, -0.0, 5e-324, 1e-7, 0.1])
+SIZE = st.floats(0, 1e30) | st.sampled_from([0.0, 1.0, 12.5])
+POSITIVE = st.floats(1e-300, 1e30) | st.sampled_from([1.0, 2.5])
+VECTOR = st.tuples(NUMBER, NUMBER, NUMBER) | st.just((0.0, 0.0, 0.0))
+#: No half of a pair of surrogates, which no text file has.
+NAME = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=12) | st.sampled_from(["cut", "a b", '"'])
+
+
+@st.composite
+def drawn_loads(draw: st.DrawFn, name: str) -> Load:
+    always = draw(st.booleans())
+    if draw(st.booleans()):
+        return Load(name, point=draw(VECTOR), mass=draw(POSITIVE), always=always)
+    force, moment, size, turn = draw(VECTOR), draw(VECTOR), draw(SIZE), draw(SIZE)
+    if not (any(force) or any(moment) or size or turn):
+        force = (0.0, 0.0, -1.0)
+    is_fixed = any(force) or any(moment)
+    both = is_fixed and draw(st.booleans())
+    return Load(name, force, moment, draw(VECTOR), draw(st.booleans()), both, size, turn, always=always)
+
+
+@st.composite
+def loadings(draw: st.DrawFn) -> Loading:
+    names = draw(st.lists(NAME.filter(lambda name: "reversed" not in name), max_size=4, unique=True))
+    own = tuple(draw(drawn_loads(name)) for name in names)
+    motion = Motion(*draw(st.tuples(SIZE, st.floats(0, 1e28)))) if draw(st.booleans()) else None
+    if motion is not None and not (motion.linear or motion.angular):
+        motion = Motion(1.0)
+    gravity = draw(st.none() | VECTOR.filter(any))
+    return Loading(own, motion, gravity)
+
+
+def same_but_for_degrees(one: Loading, two: Loading) -> bool:
+    turns = [None if each.motion is None else each.motion.angular for each in (one, two)]
+    left = [replace(each.motion, angular=0.0) if each.motion else None for each in (one, two)]
+    rows = [[vars(load) for load in each.loads] for each in (one, two)]
+    gravities = [None if each.gravity is None else tuple(each.gravity) for each in (one, two)]
+    close = turns[0] == turns[1] or abs(turns[0] - turns[1]) <= ULP * abs(turns[0])
+    return rows[0] == rows[1] and left[0] == left[1] and gravities[0] == gravities[1] and close
+
+
+@given(loadings(), st.sampled_from([("m", "N"), ("mm", "N"), ("in", "lbf")]), st.sampled_from(["deg", "rad"]))
+@settings(max_examples=60, deadline=None)
+def test_random_loads_are_the_same_when_read_again(loading: Loading, units: tuple[str, str], angle: str) -> None:
+    if loading.gravity is None and units != ("m", "N"):
+        loading = loading._replace(gravity=(0.0, 0.0, -1.0))
+    own = Units(units[0], angle, units[1])
+    case = replace(SIX, units=own, loading=loading)
+    text = case.to_toml()
+    again = case_from(text, case.name)
+    assert same_but_for_degrees(case.loading, again.loading)
+    assert again.units == own
+    assert [each.name for each in again.loading.cases] == [each.name for each in loading.cases]
+    if angle == "rad" or loading.motion is None:
+        assert again.to_toml() == text
+
+
+@given(st.data())
+@settings(max_examples=40, deadline=None)
+def test_random_limits_on_actuators_are_the_same_when_they_are_read_again(data: st.DataObject) -> None:
+    case, names = data.draw(st.sampled_from([(SIX, ("1-", "2+", "3+")), (TURNING, ("1", "2", "3"))]))
+    every = data.draw(st.booleans())
+    actuators = [""] if every else data.draw(st.lists(st.sampled_from(names), min_size=1, unique=True))
+    limits: list[ActuatorForce | ActuatorSpeed | ActuatorPower] = []
+    for actuator in actuators:
+        low = data.draw(st.none() | st.floats(-1e6, 1e6))
+        high = data.draw(st.floats(1e-3, 1e3)) + (0.0 if low is None else max(low, 0.0))
+        most = data.draw(st.just(high) | (st.none() if low is not None else st.just(high)))
+        limits.append(ActuatorForce(actuator, min=low, max=most))
+        limits.append(ActuatorSpeed(actuator, max=data.draw(POSITIVE)))
+    limits.append(ActuatorPower("", max=data.draw(POSITIVE)))
+    loading = Loading((Load("tool", (1.0, 2.0, 3.0)),), Motion(1.0))
+    made = replace(case, loading=loading, limits=Limits(*limits))
+    again = case_from(made.to_toml(), made.name)
+    assert len(again.limits.items) == len(limits)
+    for limit in limits:
+        (other,) = [each for each in again.limits if (type(each), each.name) == (type(limit), limit.name)]
+        for key in ("min", "max"):
+            one, two = (getattr(each, key, None) for each in (limit, other))
+            assert one == two or abs(one - two) <= ULP * abs(one)
+
+
+def test_numbers_of_arrays_are_written_as_numbers_and_no_loads_in_no_words() -> None:
+    load = Load("tool", np.array([1.0, 2.0, 3.0]), np.zeros(3), np.array([0.1, 0.2, 0.3]), any_force=np.float64(2.0))
+    loading = Loading((load, Load("payload", mass=np.float64(3.0))), Motion(np.float64(0.5)), np.array([0.0, 0, -9.81]))
+    again = case_from(replace(SIX, loading=loading).to_toml(), SIX.name)
+    assert same_but_for_degrees(loading, again.loading)
+    for word in ("load", "motion", "gravity", "force"):
+        assert word not in SIX.to_toml()
+
+
+@pytest.mark.parametrize("angle", ["deg", "rad"])
+def test_speeds_of_actuators_that_turn_have_the_unit_of_angles(angle: str) -> None:
+    tables = "[motion]\nlinear = 0.5\nangular = 30\n[limits]\nactuator_speed = { max = 90 }\n"
+    own = Units("m", angle)
+    base = replace(TURNING, units=own).to_toml()
+    factor = np.pi / 180 if angle == "deg" else 1.0
+    case = case_from(base + tables)
+    assert case.loading.motion == Motion(0.5, 30 * factor)
+    assert case.limits == Limits(ActuatorSpeed(max=90 * factor))
+    # Legs that slide have a speed of length, whatever the unit of angles.
+    six: Case = case_from(replace(SIX, units=own).to_toml() + tables)
+    assert six.limits == Limits(ActuatorSpeed(max=90.0))

@@ -11,6 +11,7 @@ import pytest
 from builders import Array, Run, edited, output_of, refusal_of, rows_of, saved, saved_with_robot, turn_about, unbroken
 from generated import made, needs_compiler, written
 
+from screwsynth.models import robot_function
 from screwsynth.nlp import CertificateStatus, Status, certify, formulate, inverse, load_case, solve
 from screwsynth.nlp.evidence.closing import closed_starts
 from screwsynth.nlp.evidence.state import loops_are_closed
@@ -35,18 +36,10 @@ joints = [
 """
 CASE = """
 title = "three rails"
-[units]
-length = "m"
-[robot]
-file = "robot.toml"
-[robot.parameters]
-r = 2
-[pose]
-position = [0.1, 0, 0]
-[[task]]
-sense = "max"
-axis = [1, 0, 0]
-pitch = inf
+units.length = "m"
+robot = { file = "robot.toml", parameters = { r = 2 } }
+pose.position = [0.1, 0, 0]
+task = [{ sense = "max", axis = [1, 0, 0], pitch = inf }]
 [solve]
 starts = 3
 [limits.joint]
@@ -80,18 +73,10 @@ joints = [
 """
 LEGS_CASE = """
 title = "legs on rails"
-[robot]
-file = "robot.toml"
-[robot.parameters]
-r = 26.5
-[pose]
-position = [0, 0, { min = 18, max = 22 }]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[solve]
-starts = 4
+robot = { file = "robot.toml", parameters = { r = 26.5 } }
+pose.position = [0, 0, { min = 18, max = 22 }]
+task = [{ sense = "max", axis = [0, 0, 1], pitch = inf }]
+solve.starts = 4
 """
 LIMBS = range(3)
 ROD = math.hypot(1.1, 0.8)
@@ -126,27 +111,24 @@ def best(sense: str, half: float, position: tuple[float, float] = (0.1, 0.0), r:
     return float(sum(each.max() if sense == "max" else each.min() for each in parts))
 
 
-def planar(folder: Path, *edits: tuple[str, str]) -> str:
-    return saved_with_robot(folder, PLANAR, edited(CASE, *edits))
+def planar(folder: Path, *edits: tuple[str, str], half: float = 0.2) -> str:
+    rails = CASE.replace("{ min = -0.2, max = 0.2 }", f"{{ min = {-half}, max = {half} }}")
+    return saved_with_robot(folder, PLANAR, edited(rails, *edits))
 
 
-def with_rails(half: float) -> list[tuple[str, str]]:
-    return [
-        (f'"{k}:1" = {{ min = -0.2, max = 0.2 }}', f'"{k}:1" = {{ min = {-half}, max = {half} }}') for k in (1, 2, 3)
-    ]
-
-
-def test_the_written_geometry_is_that_of_home() -> None:
+def test_the_written_geometry_is_that_of_home_and_other_robots_have_no_free_joints() -> None:
     for limb in LIMBS:
         _, elbow, _ = elbows(limb, np.zeros(1), (0.0, 0.0))
         turn = turn_about([0, 0, 1], 2 * math.pi * limb / 3)[:2, :2]
         np.testing.assert_allclose(elbow[0], turn @ np.array([1.5, 1.0]), atol=1e-14)
+    for name in ("planar-3-rrr", "delta", "five-bar", "6-pus"):
+        assert robot_function(name)().free_joints == ()
 
 
 @pytest.mark.parametrize("sense", ["max", "min"])
 @pytest.mark.parametrize("half", [0.2, 1e-6])
 def test_rails_take_the_places_of_the_best_value(tmp_path: Path, sense: str, half: float) -> None:
-    case = load_case(planar(tmp_path, ('sense = "max"', f'sense = "{sense}"'), *with_rails(half)))
+    case = load_case(planar(tmp_path, ('sense = "max"', f'sense = "{sense}"'), half=half))
     found = certify(case)
     wanted = best(sense, half)
     (certificate,) = found.tasks
@@ -156,13 +138,13 @@ def test_rails_take_the_places_of_the_best_value(tmp_path: Path, sense: str, hal
     assert certificate.status is CertificateStatus.PROVED
     assert "in home's working mode" in certificate.statement
     assert 0 <= case.tasks[0].sense.sign * (certificate.bound - wanted) <= 2e-4
-    (assembly,) = {each.assembly for each in found.solution.outcomes[0].own.optima[:1]}
+    assembly = found.solution.outcomes[0].own.optima[0].assembly
     assert assembly is not None
     assert not assembly.sentences
 
 
 def test_a_bound_over_all_assemblies_covers_elbows_on_both_sides(tmp_path: Path) -> None:
-    every = certify(load_case(planar(tmp_path, *with_rails(0.01))), all_assemblies=True, gap=0.2).tasks[0]
+    every = certify(load_case(planar(tmp_path, half=0.01)), all_assemblies=True, gap=0.2).tasks[0]
     assert every.status is CertificateStatus.PROVED
     assert "in home's working mode" not in every.statement
     rail = np.linspace(-0.01, 0.01, PLACES)
@@ -207,9 +189,8 @@ def test_rows_are_in_every_answer(tmp_path: Path, cli: Run) -> None:
         assert " ".join(row.split()).startswith(f"joint.{joint} {held}")
     assert "fixed point" not in shown
     joints = json.loads(result.read_text())["free_joints"]
-    assert [(each["joint"], each["lower"], each["upper"], each["lower_is_limit"]) for each in joints] == [
-        (f"{k}:1", pytest.approx(-0.2), pytest.approx(0.2), True) for k in (1, 2, 3)
-    ]
+    ends = [(each["joint"], each["lower"], each["upper"], each["lower_is_limit"]) for each in joints]
+    assert ends == [(f"{k}:1", pytest.approx(-0.2), pytest.approx(0.2), True) for k in (1, 2, 3)]
     assert [round(each["value"], 9) for each in joints] == [-0.2, 0.2, 0.2]
     assert "joint.3:1,0.2" in table.read_text()
     page = tmp_path / "page.html"
@@ -238,8 +219,8 @@ def test_the_robot_of_a_result_has_its_rails(tmp_path: Path, cli: Run) -> None:
 
 def test_limits_on_actuators_give_the_ranges(tmp_path: Path) -> None:
     by_joint = CASE[CASE.index("[limits.joint]") :]
-    given = edited(CASE, (by_joint, "[limits]\nactuator_length = { min = -0.2, max = 0.2 }\n"))
-    found = solve(load_case(saved_with_robot(tmp_path, PLANAR, given)))
+    limits = "[limits]\nactuator_length = { min = -0.2, max = 0.2 }\n"
+    found = solve(load_case(planar(tmp_path, (by_joint, limits))))
     assert pytest.approx(best("max", 0.2), rel=1e-9) == found.F
     joints = found.to_dict()["free_joints"]
     assert [(each["lower"], each["upper"]) for each in joints] == [(pytest.approx(-0.2), pytest.approx(0.2))] * 3
@@ -247,20 +228,20 @@ def test_limits_on_actuators_give_the_ranges(tmp_path: Path) -> None:
 
 def test_each_pose_has_rails_of_its_own(tmp_path: Path, cli: Run) -> None:
     places = [(0.1, 0.0), (-0.1, -0.05)]
-    poses = "\n".join(f"[[pose]]\nposition = [{x}, {y}, 0]" for x, y in places)
-    file = planar(tmp_path, ("[pose]\nposition = [0.1, 0, 0]", poses))
+    poses = ", ".join(f"{{ position = [{x}, {y}, 0] }}" for x, y in places)
+    file = planar(tmp_path, ("pose.position = [0.1, 0, 0]", f"pose = [{poses}]"))
     found = solve(load_case(file))
     assert pytest.approx(sum(best("max", 0.2, place) for place in places), rel=1e-9) == found.F
     shown = output_of(cli("solve", file, "--all"))
-    assert [line.split()[:3] for line in shown.splitlines() if line.startswith("joint.2:1 pose")] == [
-        ["joint.2:1", "pose", str(k)] for k in (1, 2)
-    ]
+    rows = [line.split()[:3] for line in shown.splitlines() if line.startswith("joint.2:1 pose")]
+    assert rows == [["joint.2:1", "pose", str(k)] for k in (1, 2)]
 
 
 def test_several_tasks_share_the_rails(tmp_path: Path) -> None:
-    second = '[[task]]\nname = "up"\nsense = "max"\naxis = [0, 1, 0]\npitch = inf\n'
-    combined = f'{second}[combine]\nmethod = "weighted-sum"\n[solve]'
-    found = solve(load_case(planar(tmp_path, ("[solve]", combined))))
+    second = (
+        ', { name = "up", sense = "max", axis = [0, 1, 0], pitch = inf }]\ncombine.method = "weighted-sum"\n[solve]'
+    )
+    found = solve(load_case(planar(tmp_path, ("]\n[solve]", second))))
     # Of a rod in the plane the squares along x and y have the sum 1, so that of three rods is 3 with any rails.
     assert found.to_dict()["combined"]["value"] == pytest.approx(3.0, rel=1e-9)
     assert found.status is Status.OPTIMAL
@@ -300,19 +281,18 @@ def test_one_limit_is_one_end(tmp_path: Path, cli: Run) -> None:
     assert {name: rails[name] for name in wanted} == pytest.approx(wanted, abs=1e-4)
 
 
-WORKSPACE = "[workspace]\nposition = [{ min = -0.05, max = 0.05 }, { min = -0.05, max = 0.05 }, 0]\n"
-
-
 def test_what_is_judged_over_poses_is_refused(tmp_path: Path, cli: Run) -> None:
     poses = str(saved(tmp_path / "poses.csv", "x,y,z\n0,0,0\n0.05,0.02,0\n"))
     words = "the pose does not determine the positions of driven joints 1:1, 2:1, 3:1 of 'three rails'"
-    file = planar(tmp_path, ("[solve]", f"{WORKSPACE}[solve]"))
+    half = "{ min = -0.05, max = 0.05 }"
+    workspace = ("[solve]", f"workspace.position = [{half}, {half}, 0]\n[solve]")
+    file = planar(tmp_path, workspace)
     for arguments in (["workspace", file], ["workspace", file, "--scale"], ["path", file, "--along", poses]):
         refusal_of(cli(*arguments), words)
     refusal_of(cli("path", file, "--range"), words)
-    over = [("[solve]", f"{WORKSPACE}[solve]"), ("[limits.joint]", '[limits]\nover = "workspace"\n[limits.joint]')]
-    refusal_of(cli("solve", planar(tmp_path, *over)), "limits.over", words)
-    load = planar(tmp_path, ("[solve]", "[[load]]\nforce = [10, 0, 0]\n[solve]"))
+    over = ("[limits.joint]", '[limits]\nover = "workspace"\n[limits.joint]')
+    refusal_of(cli("solve", planar(tmp_path, workspace, over)), "limits.over", words)
+    load = planar(tmp_path, ("[solve]", "load = [{ force = [10, 0, 0] }]\n[solve]"))
     refusal_of(cli("solve", load), "6 actuators for 3 freedoms", "can move while its platform stands still")
 
 
@@ -367,13 +347,6 @@ def test_robots_say_which_joints_are_free(tmp_path: Path, cli: Run) -> None:
         assert evaluated[0] == 0
     certified = unbroken(output_of(cli("certify", planar(tmp_path))))
     assert "limbs 1, 2, 3 need 2 joint positions each and the loop equations, in home's working mode" in certified
-
-
-def test_a_robot_whose_pose_determines_all_joints_has_none() -> None:
-    from screwsynth.models import robot_function  # noqa: PLC0415
-
-    for name in ("planar-3-rrr", "delta", "five-bar", "6-pus"):
-        assert robot_function(name)().free_joints == ()
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Derivatives against differences, and the evidence against functions whose optima are known in closed form."""
+"""Derivatives against differences, evidence against optima that are known in closed form, and principal motions."""
 
 from __future__ import annotations
 
@@ -14,24 +14,20 @@ from builders import Array
 from casadi import SX
 from numpy.typing import ArrayLike
 
-from screwsynth.models import (
-    Closure,
-    Dimension,
-    Model,
-    PoseSymbols,
-    Unknown,
-    Wrench,
-    WrenchKind,
-    couple_about,
-    hexapod,
-    stewart_gough,
-)
-from screwsynth.nlp import Case, Evidence, Free, Nlp, PointKind, Rotation, Task, examine, formulate, load_case
+from screwsynth import models
+from screwsynth.models import Closure, Dimension, Model, Unknown, Wrench, axis_from_screw, hexapod, stewart_gough
+from screwsynth.nlp import Case, Free, Nlp, Rotation, TaskAnalysis, analyse_tasks, evaluate, formulate, load_case
 from screwsynth.nlp.case.limits.constraint import Constraint, Reading
-from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp.case.task import Sense, Task
 from screwsynth.nlp.evidence.linalg import echelon_basis, nonnegative_least_squares
+from screwsynth.nlp.evidence.optimality import Evidence, PointKind, examine
 from screwsynth.nlp.program.places import Places, Scalar
 from screwsynth.nlp.program.program import Program
+
+
+@cache
+def donor() -> Nlp:
+    return formulate(load_case("paper-4.1-helical"))
 
 
 def examined(
@@ -42,57 +38,49 @@ def examined(
     constraints: Sequence[tuple[str, Callable[[SX], SX], float, float]] = (),
 ) -> Evidence:
     """The evidence at a point of a program in the variables v0, v1, ..., with these bounds and constraints."""
-    donor = formulate(load_case("paper-4.1-helical"))
+    nlp = donor()
     x, ends = SX.sym("x", len(bounds)), np.array(bounds, dtype=float)
     program = Program(
-        variables=tuple(Scalar(f"v{i}", Dimension.LENGTH) for i in range(len(bounds))),
-        arguments=(Scalar("unused", Dimension.NUMBER),),
-        x=x,
-        p=SX.sym("unused"),
-        objective=objective(x),
+        tuple(Scalar(f"v{i}", Dimension.LENGTH) for i in range(len(bounds))), (Scalar("unused", Dimension.NUMBER),),
+        x=x, p=SX.sym("unused"), objective=objective(x),
         constraints=tuple(Constraint(name, g(x), Reading(Dimension.NUMBER)) for name, g, _, _ in constraints),
-        robots=donor.program.robots,
-        model=donor.program.model,
-        places=Places(numbers=(), rotations=(), unknowns=(), twists=()),
-    )
+        robots=nlp.program.robots, model=nlp.program.model, places=Places((), (), (), ()),
+    )  # fmt: skip
+    g_lower, g_upper = (np.array([each[k] for each in constraints], dtype=float) for k in (2, 3))
     nlp = Nlp(
-        program=program,
-        case=donor.case,
-        sense=sense,
-        arguments=np.zeros(1),
-        lower=ends[:, 0],
-        upper=ends[:, 1],
-        start=ends.mean(axis=1),
-        g_lower=np.array([lower for _, _, lower, _ in constraints], dtype=float),
-        g_upper=np.array([upper for _, _, _, upper in constraints], dtype=float),
-        size=1.0,  # the donor robot's size means nothing here
-    )
+        program, nlp.case, sense, np.zeros(1), lower=ends[:, 0], upper=ends[:, 1], start=ends.mean(axis=1),
+        g_lower=g_lower, g_upper=g_upper, size=1.0,  # the donor robot's size means nothing here
+    )  # fmt: skip
     return examine(nlp, np.array(at, dtype=float))
 
 
-def test_strict_minimum_inside() -> None:
+def test_strict_minimum_inside_and_not_stationary_away_from_it() -> None:
     evidence = examined(lambda x: (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MIN, [(-2, 2), (-2, 2)], [1.0, 0.0])
     assert evidence.kind is PointKind.STRICT_MINIMUM
     # Half ranges are 2: second derivatives 2 and 8 in scaled variables are 8 and 32.
     np.testing.assert_allclose(evidence.eigenvalues, [8, 32])
     assert evidence.active == ()
     assert evidence.licq
-
-
-def test_the_same_point_is_no_maximum() -> None:
-    evidence = examined(lambda x: (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MAX, [(-2, 2), (-2, 2)], [1.0, 0.0])
-    assert evidence.kind is PointKind.SADDLE
-
-
-def test_not_stationary_away_from_the_optimum() -> None:
     evidence = examined(lambda x: x**2, Sense.MIN, [(-1, 3)], [0.5])
     assert evidence.kind is PointKind.NOT_STATIONARY
     assert evidence.stationarity == pytest.approx(2 * 0.5 * 2)
 
 
-def test_a_bound_that_pushes_the_wrong_way_holds_nothing() -> None:
-    for at, kind in ((1, PointKind.STRICT_MINIMUM), (3, PointKind.NOT_STATIONARY)):
-        assert examined(lambda x: x**2, Sense.MIN, [(1, 3)], [at]).kind is kind
+@pytest.mark.parametrize(
+    ("objective", "sense", "bounds", "at", "kind"),
+    [
+        (lambda x: (x[0] - 1) ** 2 + 4 * x[1] ** 2, Sense.MAX, [(-2, 2), (-2, 2)], [1.0, 0.0], PointKind.SADDLE),
+        # A bound that pushes the wrong way holds nothing.
+        (lambda x: x**2, Sense.MIN, [(1, 3)], [1], PointKind.STRICT_MINIMUM),
+        (lambda x: x**2, Sense.MIN, [(1, 3)], [3], PointKind.NOT_STATIONARY),
+        # A minimum of a quartic on a bound is no maximum.
+        (lambda x: (1 + x**2) ** 2, Sense.MAX, [(0, 1)], [0.0], PointKind.SADDLE),
+    ],
+)
+def test_kinds_of_points(
+    objective: Callable[[SX], SX], sense: Sense, bounds: list[tuple[float, float]], at: list[float], kind: PointKind
+) -> None:
+    assert examined(objective, sense, bounds, at).kind is kind
 
 
 def test_multiplier_is_the_gain_per_unit_of_room() -> None:
@@ -125,45 +113,42 @@ def test_an_equation_is_active_and_its_multiplier_may_be_negative() -> None:
     assert side.multiplier == pytest.approx(-2)  # improvement of a minimum: minus its growth
 
 
-def test_outside_a_limit_is_infeasible_and_names_it() -> None:
+def test_outside_a_limit_is_infeasible_and_at_a_vertex_there_is_no_direction_left() -> None:
     evidence = examined(lambda x: x[0], Sense.MAX, [(-9, 9), (-9, 9)], [1.5, 0.0], [("disc", ca.sumsqr, -np.inf, 1.0)])
     assert evidence.kind is PointKind.INFEASIBLE
     assert evidence.violated == ("disc",)
+    evidence = examined(lambda x: x[0] + 2 * x[1], Sense.MAX, [(0, 1), (0, 1)], [1.0, 1.0])
+    assert evidence.kind is PointKind.STRICT_MAXIMUM
+    assert evidence.eigenvalues.size == 0
 
 
-def test_a_manifold_of_minima_is_not_isolated_and_its_direction_is_named() -> None:
-    evidence = examined(lambda x: (x[0] * x[1] - 1) ** 2, Sense.MIN, [(0.1, 4), (0.1, 4), (-1, 1)], [1.0, 1.0, 0.3])
-    assert evidence.kind is PointKind.NOT_ISOLATED
-    directions = [dict(direction) for direction in evidence.flat]
-    assert {frozenset(direction) for direction in directions} == {frozenset({"v2"}), frozenset({"v0", "v1"})}
-    tangent = next(direction for direction in directions if "v0" in direction)
-    assert tangent["v0"] == pytest.approx(-tangent["v1"])
-
-
-def test_a_direction_along_active_bounds_is_named() -> None:
-    bounds = [(0, 4), (-1, 1), (-1, 1), (-2, 3)]
-    evidence = examined(lambda x: x[0] + x[1] ** 2 - x[3], Sense.MIN, bounds, [0.0, 0.0, 0.3, 3.0])
-    assert evidence.kind is PointKind.NOT_ISOLATED
-    assert [set(direction) for direction in evidence.flat] == [{"v2"}]
-
-
-def test_a_quartic_minimum_is_not_called_flat() -> None:
-    evidence = examined(lambda x: x**4, Sense.MIN, [(-1, 1)], [0.0])
-    assert evidence.kind is PointKind.UNDECIDED
-    assert evidence.flat == ()
-
-
-def test_flat_directions_of_a_quartic_valley_are_the_valley_s() -> None:
-    evidence = examined(lambda x: (x[0] - x[1]) ** 4, Sense.MIN, [(-1, 1), (-1, 1), (-1, 1)], [0.1, 0.1, 0.2])
+@pytest.mark.parametrize(
+    ("objective", "ends", "at", "slope"),
+    [
+        (lambda x: (x[0] * x[1] - 1) ** 2, (0.1, 4), [1.0, 1.0, 0.3], pytest.approx(-1)),
+        (lambda x: (x[0] - x[1]) ** 4, (-1, 1), [0.1, 0.1, 0.2], pytest.approx(1, rel=0.05)),
+    ],
+    ids=["manifold", "quartic valley"],
+)
+def test_minima_that_are_not_isolated_name_their_flat_directions(
+    objective: Callable[[SX], SX], ends: tuple[float, float], at: list[float], slope: object
+) -> None:
+    evidence = examined(objective, Sense.MIN, [ends, ends, (-1, 1)], at)
     assert evidence.kind is PointKind.NOT_ISOLATED
     directions = [dict(direction) for direction in evidence.flat]
     assert {frozenset(direction) for direction in directions} == {frozenset({"v2"}), frozenset({"v0", "v1"})}
     along = next(direction for direction in directions if "v0" in direction)
-    assert along["v0"] == pytest.approx(along["v1"], rel=0.05)
+    assert along["v0"] / along["v1"] == slope
 
 
-def test_a_minimum_of_a_quartic_on_a_bound_is_no_maximum() -> None:
-    assert examined(lambda x: (1 + x**2) ** 2, Sense.MAX, [(0, 1)], [0.0]).kind is PointKind.SADDLE
+def test_a_direction_along_active_bounds_is_flat_and_a_quartic_minimum_is_not() -> None:
+    bounds = [(0, 4), (-1, 1), (-1, 1), (-2, 3)]
+    evidence = examined(lambda x: x[0] + x[1] ** 2 - x[3], Sense.MIN, bounds, [0.0, 0.0, 0.3, 3.0])
+    assert evidence.kind is PointKind.NOT_ISOLATED
+    assert [set(direction) for direction in evidence.flat] == [{"v2"}]
+    evidence = examined(lambda x: x**4, Sense.MIN, [(-1, 1)], [0.0])
+    assert evidence.kind is PointKind.UNDECIDED
+    assert evidence.flat == ()
 
 
 def test_dependent_active_normals_lose_licq_and_still_certify() -> None:
@@ -175,13 +160,7 @@ def test_dependent_active_normals_lose_licq_and_still_certify() -> None:
     assert sum(side.multiplier for side in evidence.active) == pytest.approx(1)
 
 
-def test_at_a_vertex_there_is_no_direction_left() -> None:
-    evidence = examined(lambda x: x[0] + 2 * x[1], Sense.MAX, [(0, 1), (0, 1)], [1.0, 1.0])
-    assert evidence.kind is PointKind.STRICT_MAXIMUM
-    assert evidence.eigenvalues.size == 0
-
-
-def test_nonnegative_least_squares_satisfies_its_optimality_conditions() -> None:
+def test_least_squares_are_optimal_and_an_echelon_basis_spans_the_same_space() -> None:
     generator = np.random.default_rng(5)
     for _ in range(200):
         n, k = generator.integers(1, 8, size=2)
@@ -193,9 +172,6 @@ def test_nonnegative_least_squares_satisfies_its_optimality_conditions() -> None
         assert y.min() >= 0
         assert slope.min() >= -1e-9
         assert abs(slope @ y) <= 1e-9
-
-
-def test_echelon_basis_spans_the_same_space() -> None:
     generator = np.random.default_rng(6)
     for _ in range(50):
         vectors = generator.normal(size=(3, 6))
@@ -205,13 +181,10 @@ def test_echelon_basis_spans_the_same_space() -> None:
 
 
 # Derivatives of the program against differences of its values, which need nothing but the values.
-
 POINTS = 3  # of each program
-
 POSITION = (Free(-10, 10), Free(-10, 10), Free(20, 50))
 DIMENSIONS = {"x1": Free(8, 14), "x2": Free(5, 9), "x3": Free(0.05, 0.5), "x4": Free(0.05, 0.5)}
-HELD = Rotation((1, -2, 3), Free(-0.7, 0.7))
-FREE = Rotation(None, Free(-1.2, 1.2))
+HELD, FREE = Rotation((1, -2, 3), Free(-0.7, 0.7)), Rotation(None, Free(-1.2, 1.2))
 SHELL = Rotation(None, Free(0.3, 1.2))
 
 
@@ -233,18 +206,21 @@ def some_of_a_hexapod(rotation: Rotation) -> Case:
 
 def closed_by_equations() -> Case:
     """Two legs whose lengths are unknowns, and a couple: closure equations beside the ball of the rotation."""
-    pose = PoseSymbols()
+    pose = models.PoseSymbols()
     rows, unknowns, closure = [], [], []
     for name, base, end in (("a", (9.0, 1.0, 0.0), (5.0, -2.0, 1.0)), ("b", (-8.0, 3.0, 0.0), (-4.0, 4.0, 0.0))):
         length = ca.SX.sym(f"l{name}")
         span = pose.position + pose.rotation @ ca.DM(end) - ca.DM(base)
-        rows.append(Wrench(name, WrenchKind.FORCE, span, ca.cross(ca.DM(base), span), length**2))
+        rows.append(Wrench(name, models.WrenchKind.FORCE, span, ca.cross(ca.DM(base), span), length**2))
         unknowns.append(Unknown(f"l{name}", length, Dimension.LENGTH, "length of a leg", 15, 60))
         closure.append(Closure(f"close_{name}", length**2 - ca.sumsqr(span)))
-    rows.append(couple_about("c", pose.rotation @ ca.DM([1.0, 2.0, 0.5]) + ca.cross(pose.position, ca.DM([0, 0, 0.1]))))
-    model = Model(
-        "closed", "a toy", (), pose, (0.0, 0.0, 30.0), tuple(rows), unknowns=tuple(unknowns), closure=tuple(closure)
+    rows.append(
+        models.couple_about("c", pose.rotation @ ca.DM([1.0, 2.0, 0.5]) + ca.cross(pose.position, ca.DM([0, 0, 0.1])))
     )
+    model = Model(
+        "closed", "a toy", (), pose, (0.0, 0.0, 30.0), tuple(rows), unknowns=tuple(unknowns),
+        closure=tuple(closure),
+    )  # fmt: skip
     return Case(model, {}, POSITION, [task(4)], FREE, characteristic_length=7.0)
 
 
@@ -271,9 +247,7 @@ def points(nlp: Nlp, seed: int) -> Array:
     """Points well inside the box, the last one without rotation."""
     rng = np.random.default_rng(seed)
     inside = nlp.centre + rng.uniform(-0.6, 0.6, size=(POINTS, nlp.n)) * nlp.scale
-    for index, variable in enumerate(nlp.program.variables):
-        if variable.name in {"angle", "q_x", "q_y", "q_z"}:
-            inside[-1, index] = 0.0
+    inside[-1, [each.name in {"angle", "q_x", "q_y", "q_z"} for each in nlp.program.variables]] = 0.0
     return inside
 
 
@@ -404,3 +378,177 @@ def test_every_kind_of_variable_is_covered() -> None:
     for name in CASES:
         nlp = program(name)
         assert np.all(np.max(np.abs(slopes(nlp, points(nlp, 1)[0])), axis=0) > 1e-3)
+
+
+def random_jacobian(seed: int, rows: int = 6, arm: float = 10.0) -> Array:
+    """Unit forces through random points."""
+    generator = np.random.default_rng(seed)
+    f = generator.normal(size=(rows, 3))
+    f /= np.linalg.norm(f, axis=1, keepdims=True)
+    return np.hstack([f, np.cross(arm * generator.normal(size=(rows, 3)), f)])
+
+
+def degenerate_jacobian(kind: str) -> Array:
+    J = random_jacobian(7)
+    generator = np.random.default_rng(8)
+    if kind == "planar forces":  # no row resists the translation along z
+        f = np.column_stack([generator.normal(size=(6, 2)), np.zeros(6)])
+        f /= np.linalg.norm(f, axis=1, keepdims=True)
+        return np.hstack([f, np.cross(generator.normal(size=(6, 3)), f)])
+    if kind == "parallel forces":
+        f = np.tile([0.6, 0.0, 0.8], (6, 1))
+        return np.hstack([f, np.cross(generator.normal(size=(6, 3)), f)])
+    if kind == "couples only":
+        return np.hstack([np.zeros((3, 3)), generator.normal(size=(3, 3))])
+    if kind in ("one row", "two rows"):
+        return J[: 1 + (kind == "two rows")]
+    if kind == "forces through a point":
+        f = J[:, :3]
+        return np.hstack([f, np.cross(np.array([1.0, 2.0, 3.0]), f)])
+    return np.vstack([J, J[:2], random_jacobian(9, 3)])  # eleven rows, two of them twice
+
+
+DEGENERATE = ["planar forces", "parallel forces", "couples only", "one row", "two rows", "forces through a point"]
+DEGENERATE.append("many rows")
+JACOBIANS = [pytest.param(random_jacobian(seed), id=f"random {seed}") for seed in range(6)]
+JACOBIANS += [pytest.param(degenerate_jacobian(kind), id=kind) for kind in DEGENERATE]
+
+
+def form(J: Array) -> Array:
+    """The quadratic form of F in a twist (omega, v), built entry by entry from Eq. 14."""
+    swapped = np.column_stack([J[:, 3:], J[:, :3]])
+    return np.asarray(sum(np.outer(row, row) for row in swapped))
+
+
+def spectrum(found: TaskAnalysis) -> tuple[Array, Array]:
+    return np.array([m.F for m in found.rotations]), np.array([m.F for m in found.translations])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_rotations_solve_the_generalised_eigenproblem(seed: int) -> None:
+    J = random_jacobian(seed, arm=1.0)
+    K, E = form(J), np.diag([1.0, 1, 1, 0, 0, 0])
+    # K is regular: the three non-zero eigenvalues of K^-1 E are the inverses of F.
+    inverse = np.sort(np.linalg.eigvals(np.linalg.solve(K, E)).real)[::-1][:3]
+    rotations, _ = spectrum(analyse_tasks(J))
+    np.testing.assert_allclose(rotations * inverse, 1, rtol=1e-12 * np.linalg.cond(K))
+    for motion in analyse_tasks(J).rotations:
+        left = K @ motion.twist - motion.F * E @ motion.twist
+        np.testing.assert_allclose(left, 0, atol=1e-13 * np.linalg.norm(K) * np.linalg.norm(motion.twist))
+
+
+@pytest.mark.parametrize("J", JACOBIANS)
+def test_rotations_are_those_of_the_least_squares_translation(J: Array) -> None:
+    # Project: with the best v for each unit omega, F is a form in omega; its matrix column by column from lstsq.
+    left = np.column_stack(
+        [J[:, 3:] @ e - J[:, :3] @ np.linalg.lstsq(J[:, :3], J[:, 3:] @ e, rcond=1e-9)[0] for e in np.eye(3)]
+    )
+    size = float(np.linalg.norm(J[:, 3:]) ** 2)
+    rotations, _ = spectrum(analyse_tasks(J))
+    np.testing.assert_allclose(rotations, np.linalg.eigvalsh(left.T @ left), atol=1e-13 * size)
+
+
+@pytest.mark.parametrize("J", JACOBIANS)
+def test_motions_are_as_they_say_and_translations_are_eigenvectors_of_the_forces(J: Array) -> None:
+    found = analyse_tasks(J)
+    K = form(J)
+    for motion in (*found.rotations, *found.translations):
+        size = float(np.linalg.norm(K) * np.sum(motion.twist**2))
+        assert pytest.approx(float(motion.twist @ K @ motion.twist), abs=1e-14 * size) == motion.F
+        assert motion.F >= 0
+    omegas = np.array([motion.twist[:3] for motion in found.rotations])
+    speeds = np.array([motion.twist[3:] for motion in found.translations])
+    np.testing.assert_allclose(omegas @ omegas.T, np.eye(3), atol=1e-13)
+    np.testing.assert_allclose(speeds @ speeds.T, np.eye(3), atol=1e-13)
+    assert not np.any([motion.twist[:3] for motion in found.translations])
+    for values in spectrum(found):
+        assert np.all(np.diff(values) >= -1e-13 * np.linalg.norm(K))
+    gram = np.asarray(sum(np.outer(row[:3], row[:3]) for row in J))
+    np.testing.assert_allclose(spectrum(found)[1], np.linalg.eigvalsh(gram), atol=1e-14 * len(J))
+    for motion in found.translations:
+        np.testing.assert_allclose(gram @ motion.twist[3:], motion.F * motion.twist[3:], atol=1e-14 * len(J))
+
+
+@pytest.mark.parametrize("J", JACOBIANS)
+def test_no_motion_is_resisted_less_than_the_first(J: Array) -> None:
+    found = analyse_tasks(J)
+    generator = np.random.default_rng(3)
+    omega = generator.normal(size=(20_000, 3))
+    omega /= np.linalg.norm(omega, axis=1, keepdims=True)
+    # Half of the twists anywhere, half near the best motion, where the least F would be crossed if it were wrong.
+    v = generator.normal(size=(20_000, 3)) * 10.0 ** generator.uniform(-2, 2, size=(20_000, 1))
+    first = found.rotations[0].twist
+    near = first[:3] + 1e-2 * generator.normal(size=(10_000, 3))
+    omega[10_000:] = near / np.linalg.norm(near, axis=1, keepdims=True)
+    v[10_000:] = first[3:] + 1e-2 * generator.normal(size=(10_000, 3))
+    F = np.sum((omega @ J[:, 3:].T + v @ J[:, :3].T) ** 2, axis=1)
+    assert F.min() >= found.rotations[0].F - 1e-13 * np.linalg.norm(form(J))
+    speeds = generator.normal(size=(20_000, 3))
+    speeds /= np.linalg.norm(speeds, axis=1, keepdims=True)
+    F = np.sum((speeds @ J[:, :3].T) ** 2, axis=1)
+    assert F.min() >= found.translations[0].F - 1e-13
+    assert F.max() <= found.translations[2].F + 1e-13
+
+
+@pytest.mark.parametrize("J", JACOBIANS)
+def test_every_principal_rotation_is_stationary(J: Array) -> None:
+    def resistance(twist: Array) -> float:
+        scaled = twist / np.concatenate([np.full(3, np.linalg.norm(twist[:3])), np.ones(3)])
+        return float(np.sum((J[:, 3:] @ scaled[:3] + J[:, :3] @ scaled[3:]) ** 2))
+
+    h = 1e-4
+    for motion in analyse_tasks(J).rotations:
+        size = float(np.linalg.norm(form(J)) * np.sum(motion.twist**2))
+        for direction in np.eye(6):
+            # F is quadratic but for the normalisation: central differences err by h^2 and by 1e-16 / h of its size.
+            slope = (resistance(motion.twist + h * direction) - resistance(motion.twist - h * direction)) / (2 * h)
+            assert abs(slope) < 1e-7 * size
+
+
+def test_motions_that_no_force_resists_are_those_known_by_hand() -> None:
+    found = analyse_tasks(degenerate_jacobian("planar forces"))
+    assert found.translations[0].F < 1e-30
+    np.testing.assert_allclose(np.abs(found.translations[0].twist), [0, 0, 0, 0, 0, 1], atol=1e-14)
+    # Where no force stops a translation, the rotation that goes with it has none of it.
+    for motion in found.rotations:
+        assert abs(motion.twist[5]) < 1e-12
+    found = analyse_tasks(degenerate_jacobian("forces through a point"))
+    for motion in found.rotations:
+        assert motion.F < 1e-28
+        screw = axis_from_screw(motion.twist)
+        assert abs(screw.pitch) < 1e-13
+        assert np.linalg.norm(np.cross(np.array([1.0, 2.0, 3.0]) - screw.point, screw.axis)) < 1e-12
+
+
+def test_the_frame_of_moments_does_not_matter() -> None:
+    J = random_jacobian(11)
+    moved = J.copy()
+    moved[:, 3:] += np.cross(np.array([5.0, -7.0, 3.0]), J[:, :3])
+    before, after = analyse_tasks(J), analyse_tasks(moved)
+    # F among unit rotations with any v is the same about any point, though each v is another.
+    np.testing.assert_allclose(spectrum(before)[0], spectrum(after)[0], rtol=1e-11)
+    for one, other in zip(before.rotations, after.rotations, strict=True):
+        # The same motion: with omega the same, v' = v - t x omega, up to the eigenvectors' condition.
+        np.testing.assert_allclose(one.twist[:3], other.twist[:3], atol=1e-10)
+        shifted = one.twist[3:] - np.cross(one.twist[:3], np.array([5.0, -7.0, 3.0]))
+        np.testing.assert_allclose(other.twist[3:], shifted, atol=1e-9)
+
+
+def test_the_snu_robot_has_two_free_rotations_about_horizontal_lines_where_the_limbs_meet() -> None:
+    task, radii = Task.screw("min", axis=[0, 0, 1], point=[0, 0, 0], pitch=0), (0.57735, 0.288675)
+    parameters = dict(zip(("base_radius", "platform_radius"), radii, strict=True))
+    case = Case(models.three_upu(axes="snu"), parameters, [0, 0, 0.7], [task])
+    nlp = formulate(case)
+    found = analyse_tasks(evaluate(nlp, nlp.start).jacobian)
+    for motion in found.rotations[:2]:
+        assert motion.F < 1e-28
+        screw = axis_from_screw(motion.twist)
+        assert abs(screw.axis[2]) < 1e-13
+        assert abs(screw.pitch) < 1e-13
+        assert np.linalg.norm(np.cross(np.array([0, 0, 1.4]) - screw.point, screw.axis)) < 1e-13
+    assert pytest.approx(3.0, rel=1e-13) == found.rotations[2].F
+    np.testing.assert_allclose(found.rotations[2].twist, [0, 0, 1, 0, 0, 0], atol=1e-13)
+    # Three symmetric limbs at this slope: sum s s' is diagonal, 3/2 of the squared run across and 3 of the rise along.
+    run = 0.288675 / math.hypot(0.7, 0.288675)
+    expected = sorted([1.5 * run**2, 1.5 * run**2, 3 * (1 - run**2)])
+    np.testing.assert_allclose([motion.F for motion in found.translations], expected, rtol=1e-13)

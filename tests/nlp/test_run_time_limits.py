@@ -1,4 +1,4 @@
-"""Limits of generated C in their own units, twists from axes, and macros for indices and versions."""
+"""Limits of generated C in their own units, on joints too; twists from axes, and macros for indices and versions."""
 
 from __future__ import annotations
 
@@ -10,19 +10,26 @@ import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, starter
 
 from screwsynth.models import screw_from_axis
-from screwsynth.nlp import Case, CaseError, __version__, formulate, generate_c, solve
+from screwsynth.nlp import Case, CaseError, Limits, LinkClearance, QuantityLimit, __version__, generate_c, solve
 from screwsynth.nlp.case.limits.constraint import LENGTH
+from screwsynth.nlp.case.limits.joint_motion import JointCone, JointMotion
+from screwsynth.nlp.case.limits.limit import Limit
+from screwsynth.nlp.case.limits.rates import ActuatorRate, RateShare
+from screwsynth.nlp.case.pose import OverPoses, Pose
+from screwsynth.nlp.embedding.calls import find_calls
 from screwsynth.nlp.embedding.ctext import c_names
+from screwsynth.nlp.embedding.loops import find_loops
 from screwsynth.nlp.embedding.runtimelimits import RunTimeLimits, run_time_limits
 from screwsynth.nlp.evidence.kkt import linearise, multipliers
-from screwsynth.nlp.program.formulation import formulate_weighted, scaled_weights
+from screwsynth.nlp.program.formulation import formulate, formulate_weighted, scaled_weights
 from screwsynth.nlp.program.layout import lay_out
 from screwsynth.nlp.program.pairs import with_all_pairs
 
@@ -30,9 +37,8 @@ Embedded = Any
 Embed = Callable[..., Embedded]
 
 ROBOT = """
-[units]
-length = "mm"
-angle = "rad"
+units = { length = "mm", angle = "rad" }
+task = [{ sense = "max", axis = [1, 2, 6], point = [3, 1, 12], pitch = 0.1 }]
 [robot]
 model = "stewart-gough"
 layout = "octahedral"
@@ -44,11 +50,6 @@ x4 = { min = 0, max = 0.45 }
 [pose]
 position = [{ min = -6, max = 6 }, { min = -6, max = 6 }, { min = 16, max = 26 }]
 rotation = { angle = { min = 0.02, max = 0.25 } }
-[[task]]
-sense = "max"
-axis = [1, 2, 6]
-point = [3, 1, 12]
-pitch = 0.1
 [limits]
 leg_length = { min = 24, max = 34 }
 footprint = { base = 31, platform = 14 }
@@ -65,12 +66,10 @@ rate_share = { max = 0.6 }
 condition_number = { max = 6, length = 10 }
 smallest_singular_value = { min = 0.2, length = 7 }
 """
-
-
 CLEAR = "leg_clearance.min"
 
 
-def case_of(tables: dict[str, Any]) -> Case:
+def limited_case(tables: dict[str, Any]) -> Case:
     return case_from(tables, "limited")
 
 
@@ -100,7 +99,7 @@ def bounds_of(found: RunTimeLimits, values: list[float], case: Case) -> tuple[np
 
 def test_every_limit_becomes_the_bounds_that_python_gives_it() -> None:
     tables = tomllib.loads(ROBOT + FURTHER)
-    case = case_of(tables)
+    case = limited_case(tables)
     found = run_time_limits(formulate(case), "limited")
     keys = [each.key for each in found.limits]
     assert set(keys) == {
@@ -119,7 +118,7 @@ def test_every_limit_becomes_the_bounds_that_python_gives_it() -> None:
     lower, upper = bounds_of(found, values, case)
     for key, value in zip(keys, values, strict=True):
         tables = tables if key.startswith("custom") else changed(tables, key, value)
-    constraints = lay_out(case_of(tables), case.tasks).constraints
+    constraints = lay_out(limited_case(tables), case.tasks).constraints
     assert [item.constraint.name for item in constraints] == [each.name for each in nlp.program.constraints]
     # Python makes another function for another clearance: there the C's bound must be the distance again.
     for at, item in enumerate(constraints):
@@ -131,7 +130,7 @@ def test_every_limit_becomes_the_bounds_that_python_gives_it() -> None:
 
 def test_what_is_allowed_is_what_a_case_allows() -> None:
     tables = tomllib.loads(ROBOT + FURTHER)
-    for limit in run_time_limits(formulate(case_of(tables)), "limited").limits:
+    for limit in run_time_limits(formulate(limited_case(tables)), "limited").limits:
         if limit.key.startswith(("angle", "custom")):
             continue
         # A sided limit is refused where it crosses, too: the other side goes away.
@@ -140,12 +139,12 @@ def test_what_is_allowed_is_what_a_case_allows() -> None:
         if name in {"leg_length", "radius_ratio"}:
             alone["limits"][name] = {limit.key.partition(".")[2]: limit.default}
         with pytest.raises(CaseError):
-            case_of(changed(alone, limit.key, limit.above))
-        case_of(changed(alone, limit.key, float(np.nextafter(limit.above, math.inf))))
+            limited_case(changed(alone, limit.key, limit.above))
+        limited_case(changed(alone, limit.key, float(np.nextafter(limit.above, math.inf))))
         if math.isfinite(limit.most) and name != "leg_clearance":
-            case_of(changed(alone, limit.key, limit.most))
+            limited_case(changed(alone, limit.key, limit.most))
             with pytest.raises(CaseError):
-                case_of(changed(alone, limit.key, float(np.nextafter(limit.most, math.inf))))
+                limited_case(changed(alone, limit.key, float(np.nextafter(limit.most, math.inf))))
 
 
 def test_limits_on_fixed_numbers_are_set_where_the_c_judges_by_them() -> None:
@@ -153,7 +152,7 @@ def test_limits_on_fixed_numbers_are_set_where_the_c_judges_by_them() -> None:
     tables = tomllib.loads(ROBOT)
     tables["robot"]["parameters"] |= {"x1": 25, "x3": 0.1}
     del tables["limits"]["custom"]
-    nlp = formulate(case_of(tables))
+    nlp = formulate(limited_case(tables))
     of_base = [each for each in nlp.constant_limits if each.constraint.keys[0] == "joint_spacing.min"]
     assert of_base
     (limit,) = [each for each in run_time_limits(nlp, "limited").limits if each.key == "joint_spacing.min"]
@@ -196,7 +195,7 @@ class Bounds:
 
 @pytest.fixture(scope="module")
 def limited(embed: Embed) -> Embedded:
-    return embed(case_of(few(tomllib.loads(ROBOT))))
+    return embed(limited_case(few(tomllib.loads(ROBOT))))
 
 
 def few(tables: dict[str, Any]) -> dict[str, Any]:
@@ -221,7 +220,7 @@ def test_the_solver_keeps_limits_that_were_set(limited: Embedded) -> None:
         assert bounds.set(names[name], value) == 0
         assert bounds.get(names[name]) == (0, value)
         tables = changed(tables, key, value)
-    case = case_of(tables)
+    case = limited_case(tables)
     nlp = formulate(case)
     # The bounds of the free rotation's variables follow from its angle.
     np.testing.assert_allclose(bounds.part(1), nlp.lower, rtol=1e-14)
@@ -242,7 +241,7 @@ def test_units_of_multipliers_are_those_of_a_change_of_the_unit_of_lengths(embed
         table |= {key: twice(table[key]) for key in keys}
     found, powers = [], {"mm": 1, "mm²": 2, "(mm/rad)²": 2, "rad": 0, "": 0}
     for tables in (plain, doubled):
-        c = embed(case_of(tables), "-O0")
+        c = embed(limited_case(tables), "-O0")
         solved = c.solve()
         assert solved.status == 0
         found.append(solved.g_lower_multipliers + solved.g_upper_multipliers)
@@ -281,13 +280,13 @@ def test_limits_hold_at_every_pose_and_for_every_task(embed: Embed) -> None:
     tables["task"].append({"sense": "max", "axis": [0, 0, 1], "point": [1, 0, 0], "pitch": 3.0, "weight": 0.4})
     tables |= {"combine": {"method": "weighted-sum", "over_poses": "mean"}, "solve": {"starts": 1}}
     tables["limits"] |= {"actuator": {"stroke_max": 9.0, "dead_length": 10.0}, "rate_share": {"max": 0.9}}
-    c = embed(case_of(tables), "-O0")
+    c = embed(limited_case(tables), "-O0")
     names, bounds, before = numbers(c), Bounds(c), c.solve()
     new = {"leg_length.max": 33.0, "actuator.stroke_max": 5.0, "actuator.dead_length": 12.0, "rate_share.max": 0.7}
     for key, value in new.items():
         tables = changed(tables, key, value)
         assert bounds.set(names[key.upper().replace(".", "_")], value) == 0
-    case = case_of(tables)
+    case = limited_case(tables)
     nlp = with_all_pairs(formulate_weighted(case, scaled_weights(case)))
     found = [each.name for each in nlp.program.constraints]
     assert sum("poses 2 and 1" in name for name in found) == 12
@@ -353,7 +352,7 @@ def test_twists_from_axes_are_those_of_python(limited: Embedded) -> None:
 
 
 def test_macros_for_indices_limits_and_versions() -> None:
-    case = case_of(tomllib.loads(ROBOT))
+    case = limited_case(tomllib.loads(ROBOT))
     header, nlp = generate_c(case, "")["screwsynth_limited.h"], formulate(case)
     for vector, scalars in (("x", nlp.program.variables), ("p", nlp.program.arguments)):
         found = re.findall(rf"#define SCREWSYNTH_LIMITED_{vector}_(\w+) (\d+)", header)
@@ -371,3 +370,79 @@ def test_macros_for_indices_limits_and_versions() -> None:
     assert line.endswith("/* base_joint_angle.max: 0.6 rad; above 0, at most 3.14159 */")
     (line,) = [line for line in header.splitlines() if "_LIMIT_LEG_LENGTH_MAX = " in line]
     assert line.endswith("/* leg_length.max: 34 mm; above 0 */")
+
+
+JOINT_LIMITS = (
+    LinkClearance(0.05), ActuatorRate(20.0), JointMotion("1:1", min=-math.pi, max=1.4), JointCone("2:3", 1.0),
+    RateShare(0.9), QuantityLimit("actuator_length", min=-3.0, max=3.0),
+)  # fmt: skip
+
+
+def jointed(name: str, *limits: Limit[Any], poses: int = 1) -> Case:
+    case = starter(name)
+    further = [Pose(case.position, case.rotation)] * (poses - 1)
+    return replace(case, limits=Limits(*limits), further=further, over_poses=OverPoses.MEAN)
+
+
+def test_limits_on_joints_can_be_set_within_their_ranges() -> None:
+    nlp = formulate(jointed("3-rps", *JOINT_LIMITS))
+    found = {each.key: each for each in run_time_limits(nlp, "c").limits}
+    assert len({each.name for each in found.values()}) == len(found)
+    for each in found.values():
+        assert each.above < each.default <= each.most, each
+    hinge = found["joint.1:1.max"]
+    assert (hinge.default, hinge.above, hinge.most) == (1.4, -math.pi, math.pi)
+    # A range that the case begins at its own end is allowed, though no smaller one is.
+    assert found["joint.1:1.min"].default == -math.pi
+    assert (found["joint.2:3.cone"].above, found["joint.2:3.cone"].most) == (0.0, math.pi)
+    assert found["actuator_rate.max"].above == 0.0
+
+
+def test_the_page_of_limits_names_what_can_be_set() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "limits.md").read_text(encoding="utf-8")
+    table = page.split("| allowed at run time |")[1].split("Not covered:")[0]
+    rows = [line.split("|")[1:4] for line in table.splitlines() if line.startswith("| `")]
+    stated = {name: allowed.strip() for _, names, allowed in rows for name in re.findall(r"`([A-Z_0-9]+)`", names)}
+    motions = (JointMotion("1:1", min=-1, max=1.4), JointMotion("1:2", min=-3.0, max=3.0), JointCone("2:3", 1.0))
+    motions += (ActuatorRate(20.0), LinkClearance(0.05))
+    second = JointMotion("1:3", part="first", min=-1, max=1.2)
+    found = {
+        each.name: each
+        for nlp in (formulate(jointed("3-rps", *motions)), formulate(jointed("3-upu", second)))
+        for each in run_time_limits(nlp, "c").limits
+    }
+    ranges = {
+        "within half a turn to either side": (-math.pi, math.pi),
+        "any": (-math.inf, math.inf),
+        "above 0, up to half a turn": (0.0, math.pi),
+        "above 0": (0.0, math.inf),
+        "above 0, up to 1.8 times the case's own": (0.0, 1.8 * 0.05),
+    }
+    assert len(stated) == 8
+    for name, allowed in stated.items():
+        assert (found[name].above, found[name].most) == pytest.approx(ranges[allowed]), name
+    # A side that the case does not state is not there.
+    one_sided = run_time_limits(formulate(jointed("3-rps", JointMotion("1:1", max=1.4))), "c").limits
+    assert [each.name for each in one_sided if "JOINT" in each.name] == ["JOINT_1_1_MAX"]
+
+
+def test_links_at_several_poses_are_loops_and_no_value_needs_itself() -> None:
+    """A position of an actuated slide is an unknown of the program: an input and a value of one call."""
+    program = formulate(jointed("3-rps", *JOINT_LIMITS, poses=2)).program
+    calls = find_calls(program)
+    named = [program.constraints[each.place].name for each in calls.final if each.place < len(program.constraints)]
+    assert {"link_clearance", "rate_share"} <= {name.split()[0] for name in named}
+    loops = find_loops(program)
+    assert len(loops.all) >= 2
+    assert loops.entries.numel() > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "poses"),
+    [("3-rps", 2), *(pytest.param(each, 1, marks=pytest.mark.soak) for each in ("3-rps", "planar-3-rrr"))],
+)
+def test_c_has_the_values_of_the_program_with_limits(name: str, poses: int, embed: Callable[..., Any]) -> None:
+    hinges = (RateShare(0.9), JointMotion("1:1", min=-1.4), ActuatorRate(50.0))
+    case = jointed(name, *(JOINT_LIMITS if name == "3-rps" else hinges), poses=poses)
+    embed(case, "-O0").compare(formulate(case), 30, 1e-13)

@@ -13,36 +13,17 @@ import pytest
 from builders import Array, Run, output_of
 
 from screwsynth.models import stewart_gough, three_upu
-from screwsynth.nlp import (
-    Case,
-    CaseError,
-    Combination,
-    EvaluationError,
-    Free,
-    Method,
-    PointKind,
-    Rotation,
-    Solution,
-    Status,
-    Task,
-    load_case,
-    solve,
-)
-from screwsynth.nlp.case.pose import Value
+from screwsynth.nlp import Case, Combination, Method, PointKind, Solution, Status, Task, load_case, solve
+from screwsynth.nlp.case.pose import Free, Rotation, Value
+from screwsynth.nlp.errors import CaseError, EvaluationError
 
 Objective = Callable[[Array], Array]
 Word = Literal["max", "min"]
 
 HALF = math.radians(30)
 FIXED = {"x1": 12.0, "x2": 8.0, "x3": 0.4, "x4": 0.15, "p_x": 1.0, "p_y": -2.0, "p_z": 30.0, "angle": 0.1}
-RANGES: dict[str, tuple[float, float]] = {
-    "x2": (4.0, 12.0),
-    "x4": (0.0, HALF),
-    "p_x": (-15.0, 10.0),
-    "p_y": (-10.0, 15.0),
-    "p_z": (15.0, 50.0),
-    "angle": (-0.7, 0.5),
-}
+RANGES: dict[str, tuple[float, float]] = {"x2": (4.0, 12.0), "x4": (0.0, HALF), "p_x": (-15.0, 10.0)}
+RANGES |= {"p_y": (-10.0, 15.0), "p_z": (15.0, 50.0), "angle": (-0.7, 0.5)}
 NAMES = tuple(FIXED)
 
 
@@ -111,15 +92,11 @@ def random_tasks(seed: int, senses: Sequence[Word], weights: Sequence[float]) ->
     generator = np.random.default_rng(seed)
     return [
         Task.screw(
-            sense,
-            axis=generator.normal(size=3),
-            point=8 * generator.normal(size=3),
-            pitch=4 * generator.normal(),
-            name=f"task {j}",
-            weight=weight,
+            sense, axis=generator.normal(size=3), point=8 * generator.normal(size=3),
+            pitch=4 * generator.normal(), name=f"task {j}", weight=weight,
         )
         for j, (sense, weight) in enumerate(zip(senses, weights, strict=True))
-    ]
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -147,25 +124,21 @@ class Setting:
     @cached_property
     def own(self) -> Array:
         signs = [1.0 if sense == "max" else -1.0 for sense in self.senses]
-        best = []
-        for sign, twist in zip(signs, self.twists, strict=True):
-            best.append(sign * brute_force(partial(self._signed, sign, twist), self.free))
-        return np.array(best)
+        signed = [partial(self._signed, sign, twist) for sign, twist in zip(signs, self.twists, strict=True)]
+        return np.array([sign * brute_force(each, self.free) for sign, each in zip(signs, signed, strict=True)])
 
     def _signed(self, sign: float, twist: Array, x: Array) -> Array:
         return sign * objective_by_hand(x, self.free, twist)
 
 
 SETTINGS = [
-    Setting(("p_x", "p_y"), ("max", "max"), (1, 1), 1),
-    Setting(("p_x", "p_y"), ("min", "min"), (1, 1), 2),
-    Setting(("p_x", "p_y"), ("max", "min"), (1, 1), 3),
-    Setting(("x2", "x4"), ("max", "max", "max"), (1, 3, 2), 4),
+    Setting(("p_x", "p_y"), ("max", "max"), (1, 1), 1), Setting(("p_x", "p_y"), ("min", "min"), (1, 1), 2),
+    Setting(("p_x", "p_y"), ("max", "min"), (1, 1), 3), Setting(("x2", "x4"), ("max", "max", "max"), (1, 3, 2), 4),
     Setting(("x2", "x4", "p_z"), ("min", "min"), (0.5, 1.5), 5),
     Setting(("p_x", "p_y", "angle"), ("max", "max"), (1, 2), 6),
     Setting(("p_x", "p_y", "angle"), ("min", "max", "min"), (2, 1, 3), 7),
     Setting(("p_y", "p_z", "angle"), ("min", "min", "min"), (5, 1, 1), 8),
-]
+]  # fmt: skip
 
 
 def solved(setting: Setting, method: Method) -> Solution:
@@ -274,8 +247,7 @@ def test_only_the_proportions_of_weights_count_and_a_notice_says_so(method: Meth
 
 
 def free_axis(tasks: Sequence[Task], angle: Free) -> Case:
-    case = case_of((), tasks)
-    return replace(case, rotation=Rotation(None, angle))
+    return replace(case_of((), tasks), rotation=Rotation(None, angle))
 
 
 @pytest.mark.parametrize("weights", [(1.0, 1.0), (0.2, 1.8), (0.5, 1.0, 1.5)], ids=str)
@@ -284,10 +256,7 @@ def test_free_orientations_average_on_so3(weights: tuple[float, ...], largest: f
     tasks = random_tasks(23, (["max", "min", "max"])[: len(weights)], weights)  # type: ignore[arg-type]
     case = free_axis(tasks, Free(-largest, largest))
     found = solve(case, starts=6, jobs=1)
-    rotations = []
-    for task in tasks:
-        alone = solve(replace(case, tasks=[task]), starts=6, jobs=1).state
-        rotations.append(alone.rotation)
+    rotations = [solve(replace(case, tasks=[task]), starts=6, jobs=1).state.rotation for task in tasks]
     assert all(outcome.unique for outcome in found.outcomes)
     # The rotation nearest to the weighted mean of the matrices, by its singular values.
     mean = sum(w * R for w, R in zip(weights, rotations, strict=True))
@@ -312,14 +281,11 @@ def test_an_average_that_turns_too_little_is_reported() -> None:
     assert all(outcome.evidence.kind is PointKind.INFEASIBLE for outcome in found.outcomes)
 
 
+COS = math.sqrt(0.75)
 PARK: dict[str, Any] = {
-    "base_radius": 50.0,
-    "platform_radius": 25.0,
-    "u1_2": [-0.5, math.sqrt(0.75), 0.0],
-    "u1_3": [-0.5, -math.sqrt(0.75), 0.0],
-    "u2_2": [math.sqrt(0.75), 0.5, 0.0],
-    "u2_3": [-math.sqrt(0.75), 0.5, 0.0],
-}
+    "base_radius": 50.0, "platform_radius": 25.0, "u1_2": [-0.5, COS, 0.0], "u1_3": [-0.5, -COS, 0.0],
+}  # fmt: skip
+PARK |= {"u2_2": [COS, 0.5, 0.0], "u2_3": [-COS, 0.5, 0.0]}
 
 
 def couple_case(seed: int, count: int, method: Method = Method.AVERAGE) -> Case:
@@ -447,11 +413,9 @@ def test_the_order_of_tasks_does_not_matter(method: Method) -> None:
 
 def test_the_order_of_tasks_does_not_matter_to_an_average_of_optimal_sets() -> None:
     # Three tasks, none with one optimum: x1 = x2 and x3 = x4, or x3 = x4 alone.
-    radii: dict[str, Any] = {"x1": Free(2, 6), "x2": Free(3, 9)}
-    push, _ = load_case("paper-4.2").tasks
     side = Task.screw("min", axis=[1, 0, 0], pitch=math.inf, name="side")
-    tasks = [push, TURN, side]
-    same_but_for_order(peg({**radii, **ANGLES}, tasks), [tasks, tasks[::-1]], 6, 1e-5)
+    tasks = [load_case("paper-4.2").tasks[0], TURN, side]
+    same_but_for_order(peg({"x1": Free(2, 6), "x2": Free(3, 9), **ANGLES}, tasks), [tasks, tasks[::-1]], 6, 1e-5)
 
 
 def test_one_task_alone_has_one_outcome_and_no_combination() -> None:
@@ -484,9 +448,8 @@ def test_the_answer_to_several_tasks_has_no_single_objective(method: Method) -> 
 
 @pytest.mark.parametrize("method", list(Method))
 def test_nothing_free_is_refused(method: Method) -> None:
-    case = case_of((), random_tasks(26, ("max", "min"), (1.0, 1.0)), method)
     with pytest.raises(CaseError, match="nothing free"):
-        solve(case)
+        solve(case_of((), random_tasks(26, ("max", "min"), (1.0, 1.0)), method))
 
 
 @pytest.mark.parametrize("weight", [0.0, -1.0, math.nan, math.inf])
@@ -504,12 +467,9 @@ def test_the_command_line_writes_tasks_and_their_combination_as_strict_json(cli:
     assert [task["task"]["name"] for task in result["tasks"]] == ["push along the normal", "turn about the normal"]
     assert result["tasks"][0]["task"]["pitch"] == "inf"
     combined = result["combined"]
-    assert combined["method"] == "average"
-    assert combined["value"] is None
-    assert combined["violated"] == []
-    assert len(combined["notices"]) == 2
+    assert (combined["method"], combined["value"], combined["violated"]) == ("average", None, [])
+    assert (len(combined["notices"]), combined["rank"]) == (2, 3)
     assert [task["F"] for task in combined["tasks"]] == pytest.approx([6, 0], abs=1e-11)
     assert [task["unique"] for task in combined["tasks"]] == [False, False]
     assert combined["parameters"]["x3"] == pytest.approx(15, abs=1e-6)
     assert combined["parameters"]["x1"] == pytest.approx(combined["parameters"]["x2"], abs=1e-6)
-    assert combined["rank"] == 3

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from builders import EACH_KIND, case_from, soaked, starter_tables
+from builders import EACH_KIND, Run, case_file, case_from, case_tables, output_of, saved, soaked, starter_tables
 from measures import scaled
 from numpy_engine.first_order import enclose
 from numpy_engine.quadratic_models import multipliers
@@ -19,15 +21,21 @@ from numpy_engine.second_order import enclose_second
 
 from screwsynth.models import Dimension, Model, robot_function
 from screwsynth.models.catalog import SHIPPED
-from screwsynth.nlp import Case, CertificateStatus, certify, json_data, judge_workspace, pareto, result_of, solve
-from screwsynth.nlp.case.reader import read_case
+from screwsynth.nlp import Case, Outcome, certify, json_data, judge_workspace, pareto, result_of, solve
+from screwsynth.nlp.case.reader import load_case, read_case
+from screwsynth.nlp.case.toml import toml_document
 from screwsynth.nlp.evidence import state
+from screwsynth.nlp.evidence.assembly import assembly_at, unknowns_from_home
 from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.workingmode import Posture
 from screwsynth.nlp.front.goals import program_of, read_goals
 from screwsynth.nlp.output.report.sweep import sweep_page
+from screwsynth.nlp.path.reader import read_path
 from screwsynth.nlp.program.formulation import formulate_each
+from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.tape import compile_tape
 from screwsynth.nlp.proof.statement.standard_form import standard_form
+from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.results.evaluation import evaluation_of
 from screwsynth.nlp.results.rounding import ordered, residual
 from screwsynth.nlp.results.summary import case_summary, evaluation_summary
@@ -271,26 +279,17 @@ def test_a_condition_whose_gradient_is_rounding_has_no_weight() -> None:
     assert multipliers(gradients, rounding, high, equation, 1).ravel().tolist() == [1.0, 0.0, -2.0]
 
 
-def test_rounding_chooses_no_optimum() -> None:
-    """Optima with the same F are named in the order of the starts."""
+def test_rounding_has_no_digits_and_decides_on_no_order_or_optimum() -> None:
+    assert residual(4.6e-17) == residual(0.0) == "below 1e-12"
+    assert residual(2.34e-9) == "2.3e-09"
+    assert ordered(0.8339443) == ordered(0.8339443 * (1 + 1e-12))
+    assert ordered(0.8339443) < ordered(0.83395)
+    # Optima with the same F are named in the order of the starts.
     case = case_from(tables_of(robot_function("tripteron")(), "m"), "t")
     solution = solve(case)
     best = solution.optima[0]
     first = next(each for each in solution.starts if abs(each.F - best.F) <= 1e-9 * best.F)
     assert np.array_equal(best.x, first.x)
-
-
-def test_residuals_that_are_rounding_have_no_digits() -> None:
-    assert residual(4.6e-17) == residual(0.0) == "below 1e-12"
-    assert residual(2.34e-9) == "2.3e-09"
-
-
-def test_rounding_decides_on_no_order() -> None:
-    assert ordered(0.8339443) == ordered(0.8339443 * (1 + 1e-12))
-    assert ordered(0.8339443) < ordered(0.83395)
-
-
-def test_a_page_of_a_sweep_shows_rounding_as_zero() -> None:
     points = Points(("x4",), np.array([[5.0]]))
     sweep = Sweep.of(CaseSource.from_file(read_case("paper-4.1-helical")), points)
     found = columns_of(sweep, [Row(0, "optimal", 1.0, x=tuple(1.234e-17 for _ in sweep.variables))])
@@ -321,6 +320,142 @@ def test_a_bound_of_F_on_a_front_is_of_the_same_size_in_every_unit() -> None:  #
 def test_a_front_is_the_same_in_every_unit(name: str) -> None:
     fronts = []
     for unit, f in ((unit, UNITS[unit]) for unit in units_of(name)):
-        found = pareto(with_other_task(robot_function(name)(), unit), ["max F:task", "min F:other"], points=4, starts=4)
+        found = pareto(with_other_task(robot_function(name)(), unit), ["max F:task", "min F:other"], points=3, starts=4)
         fronts.append([point.values / f**2 for point in found.points])
     assert all(np.allclose(fronts[0], front, rtol=1e-6) for front in fronts)
+
+
+#: A linear Delta, mm: radius of the rails, half width of a parallelogram, radius of the platform, height of the rods.
+RAIL, HALF, RADIUS, HEIGHT = 234.8, 30.0, 0.0, 408.301310309
+#: Lengths of one unit, in millimetres.
+LENGTHS = {"um": 1e-3, "mm": 1.0, "in": 25.4, "m": 1e3, "km": 1e6}
+
+
+def point_at(azimuth: float, out: float, across: float, height: float, unit: float) -> list[float]:
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    return [(c * out - s * across) / unit, (s * out + c * across) / unit, height / unit]
+
+
+def case_of_robot(
+    folder: Path, limbs: list[dict[str, Any]], home: list[float], box: list[tuple[float, float]], **tables: object
+) -> Case:
+    """The case of a robot file over a box of positions."""
+    saved(folder / "robot.toml", toml_document({"name": "literal", "home": home, "limb": limbs}))
+    tables |= {"pose": {"position": home}, "task": [{"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}]}
+    tables |= {"workspace": {"position": [{"min": low, "max": high} if low < high else low for low, high in box]}}
+    return load_case(str(case_file(folder, case_tables({"file": "robot.toml", "parameters": {}}, **tables))))
+
+
+def linear_delta(folder: Path, unit: float) -> Case:
+    """The case of the robot in a unit, with a workspace and limits of the same sizes."""
+    limbs = []
+    for k in range(3):
+        azimuth = 2 * math.pi * k / 3
+        ends = [
+            [point_at(azimuth, out, side, height, unit) for out, height in ((RAIL, HEIGHT), (RADIUS, 0))]
+            for side in (HALF, -HALF)
+        ]
+        rods = [{"joints": [{"type": "S", "at": end} for end in rod]} for rod in ends]
+        slide = {"type": "P", "at": point_at(azimuth, RAIL, 0, HEIGHT, unit), "axis": "z", "actuated": True}
+        limbs.append({"joints": [slide], "branch": rods})
+    limits = {"actuator_length": {"min": -90 / unit, "max": 90 / unit}}
+    box = [(-half / unit, half / unit) for half in (50, 50, 20)]
+    return case_of_robot(folder, limbs, [0, 0, 0], box, units={"length": "any"}, limits=limits)
+
+
+@pytest.mark.parametrize("units", [("um", "mm", "km"), pytest.param(tuple(LENGTHS), marks=pytest.mark.soak)])
+def test_a_robot_of_literal_numbers_has_the_same_verdicts_in_every_unit(units: tuple[str, ...], tmp_path: Path) -> None:
+    found = [judge_workspace(linear_delta(tmp_path, LENGTHS[unit]), jobs=1) for unit in units]
+    ends = []
+    for judged in found:
+        assert judged.is_proved
+        assert {each.outcome for each in judged.extremes} == {Outcome.PROVED}
+        ends.append([each.bound for each in judged.extremes if each.name == "F"])
+    # F of a translation does not depend on the unit; its bounds are found to 1e-3.
+    assert len(ends[0]) == 2
+    np.testing.assert_allclose(ends, [ends[1]] * len(units), rtol=2e-3)
+
+
+def test_a_structure_with_fewer_than_six_rows_is_singular_at_every_pose(tmp_path: Path) -> None:
+    feet = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1)]
+    ends = [(x, y, 0.4 * y - 0.5 * x, -0.5 * y + 0.1) for x, y in feet]
+    limbs = [
+        {"joints": [
+            {"type": "S", "at": [x, y, 0]},
+            {"type": "P", "at": [x, y, 0], "axis": [a, b, 1], "actuated": True},
+            {"type": "S", "at": [x + a, y + b, 1]},
+        ]}
+        for x, y, a, b in ends
+    ]  # fmt: skip
+    for count in (5, 3):
+        case = case_of_robot(tmp_path, limbs[:count], [0, 0, 1], [(-0.1, 0.1), (-0.1, 0.1), (0.9, 1.1)])
+        judged = judge_workspace(case, time_limit=5)
+        assert judged.regularity.outcome is Outcome.REFUTED
+        assert "below six at all dimensions and poses" in judged.regularity.reason
+
+
+def test_the_condition_number_of_a_planar_robot_on_a_path_is_proved_in_each_unit(tmp_path: Path) -> None:
+    """Where an inverse of J is zero, rounding decides nothing: in metres all was proved, in micrometres not."""
+    found = []
+    for unit in (LENGTHS["um"], LENGTHS["in"], LENGTHS["m"]):
+        rail, at = [1000 / unit, -300 / unit, 0], [175 / unit, 303.1088913245535 / unit, 0]
+        slide = {"type": "P", "at": rail, "axis": "y", "actuated": True}
+        limb = {
+            "repeat": {"count": 3},
+            "joints": [slide, *({"type": "R", "at": each, "axis": "z"} for each in (rail, at))],
+        }
+        robot = {"file": "robot.toml", "parameters": {}, "characteristic_length": 350 / unit}
+        limits = {"condition_number": {"max": 2.6, "length": 350 / unit}}
+        box = [*[(-60 / unit, 60 / unit)] * 2, (0.0, 0.0)]
+        case = case_of_robot(tmp_path, [limb], [0, 0, 0], box, units={"length": "any"}, limits=limits, robot=robot)
+        points = [[0, 0], [24, 12], [-18, 30], [6, -24]]
+        rows = "".join(f"{x / unit!r},{y / unit!r},0,{t}\n" for t, (x, y) in enumerate(points))
+        judged = judge_path(case, read_path(saved(tmp_path / "path.csv", "x,y,z,t\n" + rows), case.units))
+        (number,) = [each for each in judged.extremes if each.name == "condition_number"]
+        assert number.outcome is Outcome.PROVED
+        found.append(number.bound)
+    np.testing.assert_allclose(found, found[0], rtol=1e-9)
+
+
+def test_the_assembly_of_a_robot_whose_home_is_the_origin_is_the_same_in_every_unit(tmp_path: Path) -> None:
+    found = []
+    for unit in LENGTHS.values():
+        limbs = []
+        for k in range(3):
+            axis, other = np.roll([1.0, 0, 0], k), np.roll([0, 1.0, 0], k)
+            ends = [[side * 30 * other + far * axis for far in (240, 0)] for side in (1, -1)]
+            rods = [{"joints": [{"type": "S", "at": (end / unit).tolist()} for end in rod]} for rod in ends]
+            at, along = (240 * axis / unit).tolist(), axis.tolist()
+            slide = {"type": "P", "at": at, "axis": along, "actuated": True}
+            limbs.append({"joints": [slide], "branch": rods})
+        model = case_of_robot(tmp_path, limbs, [0, 0, 0], [(-1 / unit, 1 / unit)] * 3, units={"length": "any"}).model
+        at = np.array([-60.0, 60.0, 60.0]) / unit
+        unknowns = unknowns_from_home(model, np.zeros(0), np.concatenate([np.zeros(3), at]))
+        assembly = assembly_at(model, Posture(np.zeros(0), unknowns, np.eye(3), at))
+        assert assembly.is_home
+        found.append(assembly.nearness)
+    assert 0.1 < found[0] <= 1
+    np.testing.assert_allclose(found, found[0], rtol=1e-6)
+
+
+def test_the_force_that_a_limit_bounds_is_that_of_the_load_in_every_unit(cli: Run, tmp_path: Path) -> None:
+    """Minors of six rows are ninth powers of a length: beside them nothing is small by itself."""
+    found, out = [], tmp_path / "out.json"
+    for unit in LENGTHS.values():
+        tables = case_tables(
+            {"model": "stewart-gough", "layout": "octahedral"}
+            | {"parameters": {"x1": 300 / unit, "x2": 120 / unit, "x3": 0, "x4": 5}},
+            units={"length": "any", "force": "N"},
+            pose={"position": [10 / unit, 20 / unit, 220 / unit]},
+            task=[{"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}],
+            load=[{"any": {"force": 20, "moment": 300 / unit}, "point": [0, 0, 50 / unit]}],
+            motion={"linear": 50 / unit, "angular": 20},
+            limits={"actuator_force": {"max": 400}, "actuator_speed": {"max": 1e3 / unit}},
+        )
+        output_of(cli("evaluate", str(case_file(tmp_path, tables)), "--json", str(out)))
+        data = json.loads(out.read_text(encoding="utf-8"))
+        force, speed = (row["value"] for row in data["limits"])
+        assert force == pytest.approx(max(each["largest"] for each in data["loads"][0]["actuators"]), rel=1e-9)
+        assert speed == pytest.approx(max(each["value"] for each in data["speeds"]), rel=1e-9)
+        found.append([force, speed * unit])
+    np.testing.assert_allclose(found, [found[0]] * len(LENGTHS), rtol=1e-9)
