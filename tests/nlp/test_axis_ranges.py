@@ -3,41 +3,23 @@
 import itertools
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
-from builders import Array, case_from, output_of, refusal_of, rows_of, shipped_tables, starter_tables
-from measures import circle_joints
+from builders import Array, Run, case_from, case_of, output_of, refusal_of, rows_of, shipped_tables
+from path_cases import BASE, LEGS, PLATFORM, lengths_at, robot_of
 
 from screwsynth.nlp import Case, InputError, Outcome, json_data, load_result
 from screwsynth.nlp.proof.workspace.axis_ranges import AxisRange, axis_ranges
 from screwsynth.nlp.results.axisranges import AxisRangesResult
 from screwsynth.nlp.results.schema import result_schema
 
-Run = Callable[..., tuple[int, str, str]]
-BASE, PLATFORM = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
-NAMES = ["1-", "1+", "2-", "2+", "3-", "3+"]
-
 
 def hexapod(**limits: object) -> Case:
     """LinuxCNC's hexapod with these limits."""
-    return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": limits})
-
-
-def lengths(poses: Array) -> Array:
-    """Lengths (N, 6) of the hexapod's legs at poses (N, 6) of position, roll, pitch and yaw."""
-    (a, b, c), (d, e, f) = np.cos(poses[:, 3:]).T, np.sin(poses[:, 3:]).T
-    rows = [
-        [c * b, c * e * d - f * a, c * e * a + f * d],
-        [f * b, f * e * d + c * a, f * e * a - c * d],
-        [-e, b * d, b * a],
-    ]
-    turns = np.moveaxis(np.array(rows), 2, 0)
-    spans = poses[:, None, :3] + np.einsum("nij,kj->nki", turns, PLATFORM) - BASE
-    return np.asarray(np.linalg.norm(spans, axis=2))
+    return case_of("hexapod-linuxcnc", limits=limits)
 
 
 def moved(start: Array, axis: int, values: Array) -> Array:
@@ -76,7 +58,7 @@ def test_every_axis_of_a_hexapod_keeps_its_legs_to_the_end_and_no_farther() -> N
     for each in found.axes:
         axis = places[each.axis]
         assert each.lower.value < each.at == here[axis] < each.upper.value
-        inside = lengths(moved(here, axis, np.linspace(each.lower.value, each.upper.value, 20_001)))
+        inside = lengths_at(moved(here, axis, np.linspace(each.lower.value, each.upper.value, 20_001)))
         assert inside.min() >= 24
         assert inside.max() <= 38
         for end in (each.lower, each.upper):
@@ -84,7 +66,7 @@ def test_every_axis_of_a_hexapod_keeps_its_legs_to_the_end_and_no_farther() -> N
                 assert abs(end.value - each.at) == pytest.approx(found.most[axis // 3])
                 continue
             limited += 1
-            beyond = lengths(moved(here, axis, np.array([end.failed])))[0, NAMES.index(end.stop.name.split()[-1])]
+            beyond = lengths_at(moved(here, axis, np.array([end.failed])))[0, LEGS.index(end.stop.name.split()[-1])]
             assert beyond > 38 if end.stop.extreme.sense.value == "max" else beyond < 24
             assert beyond == pytest.approx(end.stop.value, abs=1e-9)
     assert limited > 3
@@ -98,7 +80,7 @@ def test_every_axis_of_a_hexapod_keeps_its_legs_to_the_end_and_no_farther() -> N
                 poses[:, places[each.axis]] += part * (
                     each.lower.value - each.at + u * (each.upper.value - each.lower.value)
                 )
-            return lengths(poses)
+            return lengths_at(poses)
 
         inside = box(pair.factor, rng.uniform(size=(4000, 2)))
         corners = np.array(list(itertools.product([0, 1], repeat=2)))
@@ -122,10 +104,8 @@ def test_a_turn_ends_where_the_platform_is_singular() -> None:
 
 
 def test_a_translational_robot_slides_and_does_not_turn() -> None:
-    tables = starter_tables("three-upu")
-    tables["robot"]["parameters"]["base_radius"] = 50
-    case = case_from(tables | {"pose": {"position": [0, 0, 50]}, "limits": {"leg_length": {"min": 40, "max": 70}}})
-    found = axis_ranges(case)
+    case = robot_of("three-upu", {"leg_length": {"min": 40, "max": 70}}, base_radius=50)
+    found = axis_ranges(case, [0, 0, 50, 0, 0, 0])
     assert [each.axis for each in found.axes] == ["x", "y", "z"]
     z = found.axes[2]
     assert z.lower.value == pytest.approx(math.sqrt(40**2 - 25**2), abs=1e-6 * found.most[0])
@@ -137,7 +117,7 @@ def test_ranges_of_strokes_are_cut_on_both_sides() -> None:
     (z,) = axis_ranges(hexapod(**limits), axes=["z"], most=(8, 1)).axes
 
     def stroke(ends: tuple[float, float]) -> float:
-        return float(np.ptp(lengths(moved(np.array([0, 0, 20, 0, 0, 0.0]), 2, np.array(ends))), axis=0).max())
+        return float(np.ptp(lengths_at(moved(np.array([0, 0, 20, 0, 0, 0.0]), 2, np.array(ends))), axis=0).max())
 
     assert stroke((12, 28)) > 6
     assert 5.98 < stroke((z.lower.value, z.upper.value)) <= 6 < stroke((z.lower.failed, z.upper.failed))
@@ -175,9 +155,9 @@ def test_ranges_are_the_same_a_third_of_a_turn_farther() -> None:
 
 def test_a_pose_beyond_a_limit_has_no_ranges_and_says_which() -> None:
     found = axis_ranges(hexapod(leg_length={"min": 17, "max": 30}), [5, 0, 20, 0, 0, 0])
-    legs = lengths(np.array([[5, 0, 20, 0, 0, 0.0]]))[0]
+    legs = lengths_at(np.array([[5, 0, 20, 0, 0, 0.0]]))[0]
     assert {each.name: each.value for each in found.stops} == pytest.approx(
-        {f"leg_length limb {name}": length for name, length in zip(NAMES, legs, strict=True) if length > 30}
+        {f"leg_length limb {name}": length for name, length in zip(LEGS, legs, strict=True) if length > 30}
     )
     assert found.axes == found.pairs == ()
     singular = axis_ranges(hexapod(), [0, 0, 20, 0, 0, math.pi / 2])
@@ -185,9 +165,7 @@ def test_a_pose_beyond_a_limit_has_no_ranges_and_says_which() -> None:
 
 
 def test_dependent_coordinates_move_with_those_that_the_robot_chooses() -> None:
-    tables = starter_tables("3-rps")
-    tables["robot"]["parameters"]["rb"] = 1.0
-    case = case_from(tables)
+    case = robot_of("3-rps", rb=1.0)
     found = axis_ranges(case, [*map(float, case.model.home), 0, 0, 0], most=(0.01, 0.01))
     assert [each.axis for each in found.axes] == ["z", "roll", "pitch"]
     assert found.others == ("x", "y", "yaw")

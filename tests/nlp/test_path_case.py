@@ -2,15 +2,16 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
-from builders import DOCS, Array, case_from, docs_script, output_of, refusal_of, saved, shipped_tables, turn_about
+from builders import DOCS, Array, Run, case_from, case_of, docs_script, output_of, refusal_of, saved, shipped_tables
 from measures import circle_joints
+from path_cases import BASE, PLATFORM, turns_of
 
 from screwsynth.nlp import (
     CaseError,
@@ -31,8 +32,6 @@ from screwsynth.nlp.path.path import Kind, Poses
 from screwsynth.nlp.path.reader import path_of_case
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.status import Status
-
-Run = Callable[..., tuple[int, str, str]]
 
 #: An arc of a quarter, in a program's own coordinates.
 PROGRAM = "G20\nG55 G0 X1 Y0 Z20\nG94 F60\nG3 X0 Y1 I-1 A5\nM2\n"
@@ -105,7 +104,7 @@ def test_other_commands_read_a_case_with_a_path_that_is_not_there(cli: Run, tmp_
 )
 def test_faults_of_the_table_are_told(keys: dict[str, object], words: str) -> None:
     with pytest.raises(CaseError) as error:
-        case_from(shipped_tables("hexapod-linuxcnc") | {"path": keys})
+        case_of("hexapod-linuxcnc", path=keys)
     assert words in str(error.value).replace('"', "'")
 
 
@@ -115,7 +114,7 @@ def test_a_path_is_written_as_it_was_stated() -> None:
         "offsets": {"G59.1": [0.5, 0, 0, 0, 0, 90]},
     }  # fmt: skip
     for keys in (stated, {"file": "part.csv"}):
-        case = case_from(shipped_tables("hexapod-linuxcnc") | {"path": keys})
+        case = case_of("hexapod-linuxcnc", path=keys)
         assert case.path == PathFile(**keys)
         assert case_from(case.to_toml()).path == case.path
 
@@ -174,9 +173,8 @@ def design_along(folder: Path, **keys: object) -> dict[str, object]:
 
 def legs_along(radius: Array, positions: Array, rotations: Array) -> Array:
     """Lengths (R, N, 6) of the legs of hexapods with bases of these radii at poses, from the joints alone."""
-    _, platform = circle_joints({"x1": 1.0, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     base = np.array([circle_joints({"x1": each, "x2": 11.5, "x3": 0.0, "x4": 0.1})[0] for each in radius])
-    tips = positions[:, None, :] + np.einsum("nij,kj->nki", rotations, platform)
+    tips = positions[:, None, :] + np.einsum("nij,kj->nki", rotations, PLATFORM)
     return np.asarray(np.linalg.norm(tips[None] - base[:, None], axis=3))
 
 
@@ -232,7 +230,7 @@ STRAIGHT, QUARTER = LINE.replace(" A4", ""), "G20\nG94 F60\nG1 X3 Y0 Z0\nG3 X0 Y
 
 def at_place(place: Sequence[float], poses: Poses) -> Poses:
     """Poses with a frame that is moved and turned by roll, pitch and yaw."""
-    R = turn_about((0, 0, 1), place[5]) @ turn_about((0, 1, 0), place[4]) @ turn_about((1, 0, 0), place[3])
+    R = turns_of(np.array([place[3:]]))[0]
     return Poses(poses.positions @ R.T + np.array(place[:3]), np.einsum("ij,njk->nik", R, poses.rotations))
 
 
@@ -256,7 +254,7 @@ def test_a_path_in_another_place(tmp_path: Path, text: str, place: tuple[float, 
     keys = {
         name: math.degrees(each) if k > 2 else each for k, (name, each) in enumerate(zip(names, place, strict=True))
     }
-    case = case_from(shipped_tables("hexapod-linuxcnc") | {"path": {"file": str(tmp_path / "part.ngc"), "place": keys}})
+    case = case_of("hexapod-linuxcnc", path={"file": str(tmp_path / "part.ngc"), "place": keys})
     again = case_from(case.to_toml()).path
     assert again is not None
     assert again.place == pytest.approx(place, abs=1e-15)
@@ -357,7 +355,6 @@ def test_the_least_force_over_the_places_of_a_path_is_that_of_a_grid(tmp_path: P
     assert proof is not None
     assert proof.is_proved
 
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     s = np.linspace(0, 1, 41)
     own = read_path(tmp_path / "line.ngc", case.units).poses_at(np.zeros(len(s), dtype=np.intp), s)
 
@@ -365,8 +362,8 @@ def test_the_least_force_over_the_places_of_a_path_is_that_of_a_grid(tmp_path: P
         """Largest force of a leg along the path in its place, by the balance of forces and moments."""
         sizes = []
         for position, rotation in zip(*at_place((x, 0, 19, 0, 0, math.radians(20)), own), strict=True):
-            arms = platform @ rotation.T
-            along = position + arms - base
+            arms = PLATFORM @ rotation.T
+            along = position + arms - BASE
             along /= np.linalg.norm(along, axis=1)[:, None]
             wrenches = np.hstack([along, np.cross(arms, along)])
             sizes.append(np.abs(np.linalg.solve(wrenches.T, np.array([*push, 0, 0, 0]))).max())

@@ -9,36 +9,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
-from measures import circle_joints
+from builders import Array, Run, case_from, output_of, refusal_of, saved, shipped_tables
+from path_cases import BASE, HOME, LEGS, PLATFORM, delta_angles, hexapod, program, robot_of, table
 
-import screwsynth.cases
 from screwsynth.nlp import Case, Outcome, inverse
+from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.task import Sense
-from screwsynth.nlp.path.gcode import read_program
-from screwsynth.nlp.path.options import Between, PathOptions
+from screwsynth.nlp.path.options import Between
 from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.path import ProgrammedPath
-from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
 from screwsynth.nlp.proof.workspace.path_knots import Knots, Sampling
 from screwsynth.nlp.proof.workspace.robot.path_cover import PathCover
 from screwsynth.nlp.proof.workspace.robot.path_turns import Tangents
 
-Run = Callable[..., tuple[int, str, str]]
 #: Parameters of the points of each segment at which coordinates are computed.
 SAMPLES = np.linspace(0, 1, 801)
-
-
-def table(case: Case, rows: Array, seconds: Array) -> ProgrammedPath:
-    """A path through rows of x, y, z, roll, pitch, yaw, at given times."""
-    text = "\n".join(",".join(map(repr, [*row, t])) for row, t in zip(rows.tolist(), seconds.tolist(), strict=True))
-    return read_poses(f"x,y,z,roll,pitch,yaw,t\n{text}", "poses.csv", case.units, PathOptions())
-
-
-def program(case: Case, text: str, start: tuple[float, ...]) -> ProgrammedPath:
-    return read_program(text.split("\n"), "part.ngc", case.units, PathOptions(start=start))
 
 
 def coordinates(case: Case, path: ProgrammedPath, k: int, s: Array = SAMPLES) -> Array:
@@ -59,23 +46,13 @@ def largest(judged: PathJudgement, number: str) -> list[Extreme]:
     return [each for each in judged.extremes if each.name.startswith(number) and each.sense is Sense.MAX]
 
 
-def hexapod() -> Case:
-    return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": {}})
-
-
-def robot(name: str, **parameters: float) -> Case:
-    tables = starter_tables(name)
-    tables["robot"]["parameters"] |= parameters
-    return case_from(tables | {"limits": {}})
-
-
 #: Robots, with the middle of a random path and the largest changes from it.
 ROBOTS = {
-    "legs": (hexapod(), (0, 0, 20, 0, 0, 0), (3, 3, 3, 15, 15, 30)),
-    "cranks": (robot("delta", rb=0.164), (0, 0, -1.1, 0, 0, 0), (0.2, 0.2, 0.15, 0, 0, 0)),
-    "cranks in space": (robot("6-rss", rb=0.12), (0, 0, 0.17, 0, 0, 0), (0.01, 0.01, 0.01, 5, 5, 5)),
-    "slides": (robot("planar-3-prr", rb=1.0), (0.05, 0.05, 0, 0, 0, 0), (0.1, 0.1, 0, 0, 0, 8)),
-    "loops": (robot("planar-3-rrr", rb=1.0), (0.0, 0.0, 0, 0, 0, 0), (0.1, 0.1, 0, 0, 0, 8)),
+    "legs": (hexapod(), HOME, (3, 3, 3, 15, 15, 30)),
+    "cranks": (robot_of("delta", rb=0.164), (0, 0, -1.1, 0, 0, 0), (0.2, 0.2, 0.15, 0, 0, 0)),
+    "cranks in space": (robot_of("6-rss", rb=0.12), (0, 0, 0.17, 0, 0, 0), (0.01, 0.01, 0.01, 5, 5, 5)),
+    "slides": (robot_of("planar-3-prr", rb=1.0), (0.05, 0.05, 0, 0, 0, 0), (0.1, 0.1, 0, 0, 0, 8)),
+    "loops": (robot_of("planar-3-rrr", rb=1.0), (0.0, 0.0, 0, 0, 0, 0), (0.1, 0.1, 0, 0, 0, 8)),
 }
 
 
@@ -107,7 +84,7 @@ def test_speeds_on_arcs_are_those_of_dense_samples_and_rapid_motions_have_none()
         case,
         "G94 F60\nG3 X0 Y0 Z22 A3 C9 I2 J1 P2\nG18 G2 X0 Z25 K1.5 I0\nG4 P1\nG0 X3\n"
         "G19 G3 Y3 Z22 J0 K-3 B4\nG93 G1 X0 C-5 F20\nM2",
-        (0, 0, 20, 0, 0, 0),
+        HOME,
     )
     assert np.isnan(path.durations).tolist() == [False, False, False, True, False, False]
     judged, sampled = judge_path(case, path), sampled_speeds(case, path).max(axis=0)
@@ -115,7 +92,7 @@ def test_speeds_on_arcs_are_those_of_dense_samples_and_rapid_motions_have_none()
         assert most <= found.bound * (1 + 1e-9)
         assert found.bound <= 1.01 * most
     # Without any time there are no speeds.
-    rapid = judge_path(case, program(case, "G0 X3 Y1\nM2", (0, 0, 20, 0, 0, 0)))
+    rapid = judge_path(case, program(case, "G0 X3 Y1\nM2", HOME))
     assert not largest(rapid, "actuator_speed")
 
 
@@ -123,7 +100,7 @@ def test_a_limit_on_speeds_is_that_of_the_path_and_names_the_first_line_beyond_i
     case, part, out = hexapod(), tmp_path / "part.ngc", tmp_path / "path.json"
     text = "G20 G94 F60 G90\nG0 X0 Y0 Z20 A0 B0 C0\nG1 X1\nG0 Z21\nF120 G1 X1.5 Z20\nG1 A3\nF300 X-2 Y1\nM2"
     saved(part, text)
-    path = read_program(text.split("\n"), "part.ngc", case.units, PathOptions())
+    path = program(case, text)
     sampled = [
         np.abs(np.diff(coordinates(case, path, k), axis=0)).max() * (len(SAMPLES) - 1) / path.durations[k]
         for k in range(len(path))
@@ -152,12 +129,9 @@ def test_a_limit_on_speeds_is_that_of_the_path_and_names_the_first_line_beyond_i
 
 def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cli: Run, tmp_path: Path) -> None:
     tables = shipped_tables("hexapod-linuxcnc")
-    text = (Path(screwsynth.cases.__file__).parent / "hexapod-linuxcnc.toml").read_text(encoding="utf-8")
+    text = find_case("hexapod-linuxcnc").read_text(encoding="utf-8")
     text = f"{text.partition('[limits]')[0]}\n[workspace]\nposition = [0, 0, {{ min = 20, max = 21 }}]\n"
-    case, start = (
-        str(saved(tmp_path / "case.toml", f"{text}[limits]\nactuator_speed = {{ max = 2 }}\n")),
-        (0, 0, 20, 0, 0, 0),
-    )
+    case = str(saved(tmp_path / "case.toml", f"{text}[limits]\nactuator_speed = {{ max = 2 }}\n"))
     timed, rapid = (
         str(saved(tmp_path / f"{word}.ngc", f"G20 {word} X1 Y0 Z20\n{word} Z21\nM2")) for word in ("G1 F60", "G0")
     )
@@ -170,24 +144,15 @@ def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cl
     code, shown, err = cli("evaluate", case, "--set", "p_z=20.5")
     assert (code, err) == (0, "limits.actuator_speed: left out, as the case has no [motion]\n")
     assert "F" in shown
-    refusal_of(
-        cli(
-            "workspace",
-            str(
-                saved(
-                    tmp_path / "power.toml",
-                    f"{text}[[load]]\nforce = [0, 0, 9]\n[limits]\nactuator_power = {{ max = 2 }}\n",
-                )
-            ),
-        ),
-        "limits.actuator_power: means nothing without [motion]",
-    )
+    power = f"{text}[[load]]\nforce = [0, 0, 9]\n[limits]\nactuator_power = {{ max = 2 }}\n"
+    refused = cli("workspace", str(saved(tmp_path / "power.toml", power)))
+    refusal_of(refused, "limits.actuator_power: means nothing without [motion]")
     # Powers are the same whether the case has a motion, which is not used, or none.
     tables |= {"limits": {"actuator_power": {"max": 1e3}}, "load": [{"name": "cut", "force": [3, -2, 10]}]}
     found = []
     for each in ({}, {"motion": {"linear": 100}}):
         made = case_from(tables | each)
-        judged = judge_path(made, program(made, "G94 F60\nG1 X3 A2\nM2", start))
+        judged = judge_path(made, program(made, "G94 F60\nG1 X3 A2\nM2", HOME))
         assert judged.is_proved
         found.append([(each.name, each.bound, each.limit) for each in largest(judged, "actuator_power")])
     assert found[0] == found[1]
@@ -202,24 +167,12 @@ def knots_along(case: Case, path: ProgrammedPath, within: float) -> Knots:
 
 def leg_lengths(x: Array) -> Array:
     """Lengths (N, 6) of LinuxCNC's hexapod at positions and rotation vectors (N, 6), small ones."""
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     angle = np.linalg.norm(x[:, 3:], axis=1)[:, None, None]
     axis = x[:, None, 3:] / np.maximum(angle, 1e-300)
     # Rodrigues' formula.
-    along = np.sum(axis * platform, axis=2)[:, :, None] * axis
-    turned = np.cos(angle) * (platform - along) + np.sin(angle) * np.cross(axis, platform) + along
-    return np.asarray(np.linalg.norm(x[:, None, :3] + turned - base, axis=2))
-
-
-def crank_angles(p: Array) -> Array:
-    """Angles (N, 3) of the delta's cranks from home."""
-    found = []
-    for k in range(3):
-        c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
-        v = np.stack([c * p[:, 0] + s * p[:, 1] + 0.044 - 0.164, c * p[:, 1] - s * p[:, 0], p[:, 2]], 1)
-        reach, size = ((v**2).sum(1) + 0.524**2 - 1.244**2) / (2 * 0.524), np.hypot(v[:, 0], v[:, 2])
-        found.append(np.arctan2(-v[:, 2], v[:, 0]) - np.arccos(reach / size) - math.radians(20))
-    return np.stack(found, axis=1)
+    along = np.sum(axis * PLATFORM, axis=2)[:, :, None] * axis
+    turned = np.cos(angle) * (PLATFORM - along) + np.sin(angle) * np.cross(axis, PLATFORM) + along
+    return np.asarray(np.linalg.norm(x[:, None, :3] + turned - BASE, axis=2))
 
 
 def poses_with(measure: Callable[[Array], Array], q: Array, x: Array) -> Array:
@@ -240,7 +193,7 @@ def test_the_platform_stays_within_the_tolerance_between_knots(name: str) -> Non
     path = table(case, rows, np.cumsum(rng.uniform(0.5, 2, 4)))
     if name == "legs":
         text = "G20 G94 F60\nG3 X0 Y0 Z22 A3 C9 I2 J1\nG4 P1\nG18 G2 X0 Z25 K1.5 I0\nG0 X3 A20 B-10\nM2"
-        path = program(case, text, (0, 0, 20, 0, 0, 0))
+        path = program(case, text, HOME)
     knots = knots_along(case, path, within)
     assert not knots.reason
     assert knots.deviation <= within
@@ -249,7 +202,7 @@ def test_the_platform_stays_within_the_tolerance_between_knots(name: str) -> Non
     begin, end = np.where(k == knots.segments[:-1], knots.parameters[:-1], 0.0), knots.parameters[1:]
     q = np.stack([(1 - r) * knots.coordinates[:-1] + r * knots.coordinates[1:] for r in part])
     poses = path.poses_at(np.tile(k, 101), np.concatenate([begin + r * (end - begin) for r in part]))
-    start, measure = poses.positions, crank_angles
+    start, measure = poses.positions, delta_angles
     if name == "legs":
         start = np.hstack([start, [rotation_vector(R) for R in poses.rotations]])
         measure = leg_lengths
@@ -286,7 +239,7 @@ def test_knots_of_robots_with_loops_are_near_enough_at_points_between_them(name:
 
 
 def test_knots_that_cannot_be_shown_are_said_to_be_open() -> None:
-    case = robot("delta", rb=0.164)
+    case = robot_of("delta", rb=0.164)
     # Arms and rods are 1.768 long together.
     path = table(case, np.array([[0, 0, -1.2, 0, 0, 0], [0, 0, -3.0, 0, 0, 0]]), np.array([0.0, 1.0]))
     judged = judge_path(case, path, sampling=Sampling(within=1e-3))
@@ -340,14 +293,13 @@ def test_speeds_are_those_of_every_machine_within_the_tolerance() -> None:
     case, rng = case_from(tables), np.random.default_rng(5)
     path = table(case, ROBOTS["legs"][1] + ROBOTS["legs"][2] * rng.uniform(-1, 1, (3, 6)), np.array([0.0, 1.0, 2.0]))
     bounds = np.array([each.bound for each in largest(judge_path(case, path), "actuator_speed")])
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     most = np.zeros(6)
     for _ in range(200):
         e, f = rng.normal(size=(2, 6, 3))
         e, f = (tolerance * each / np.linalg.norm(each, axis=1)[:, None] for each in (e, f))
         for k in range(2):
             p, R = path.poses_at([k] * 101, np.linspace(0, 1, 101))
-            spans = p[:, None] + np.einsum("nij,kj->nki", R, platform + f) - base - e
+            spans = p[:, None] + np.einsum("nij,kj->nki", R, PLATFORM + f) - BASE - e
             q = np.linalg.norm(spans, axis=2)
             most = np.maximum(most, np.abs(np.diff(q, axis=0)).max(axis=0) * 100 / path.durations[k])
     assert (most <= bounds).all()
@@ -357,7 +309,7 @@ def test_speeds_are_those_of_every_machine_within_the_tolerance() -> None:
 def test_powers_are_forces_times_the_speeds_of_the_path() -> None:
     tables = shipped_tables("hexapod-linuxcnc") | {"limits": {}, "motion": {"linear": 100}}
     case = case_from(tables | {"load": [{"name": "cut", "force": [3, -2, 10], "moment": [5, 0, 2]}]})
-    path = program(case, "G94 F60\nG3 X0 Y0 Z22 A3 C9 I2 J1\nG1 X3\nM2", (0, 0, 20, 0, 0, 0))
+    path = program(case, "G94 F60\nG3 X0 Y0 Z22 A3 C9 I2 J1\nG1 X3\nM2", HOME)
     judged = judge_path(case, path)
     assert len(largest(judged, "actuator_speed")) == 6
     found = []
@@ -371,7 +323,7 @@ def test_powers_are_forces_times_the_speeds_of_the_path() -> None:
     sampled = np.concatenate(found, axis=1).max(axis=1)
     # Gaps are parts of the largest power.
     gap = 0.02 * sampled.max()
-    for k, leg in enumerate(("1-", "1+", "2-", "2+", "3-", "3+")):
+    for k, leg in enumerate(LEGS):
         forward, backward = (each.bound for each in largest(judged, f"actuator_power actuator {leg}"))
         assert sampled[0, k] * (1 - 1e-4) <= forward <= 1.01 * sampled[0, k] + gap
         assert sampled[1, k] * (1 - 1e-4) <= backward <= 1.01 * sampled[1, k] + gap

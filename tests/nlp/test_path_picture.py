@@ -3,14 +3,13 @@
 import json
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, case_from, refusal_of, saved, shipped_tables, starter_tables
-from measures import circle_joints
+from builders import Array, Run, case_from, refusal_of, saved, shipped_tables
+from path_cases import BASE, PLATFORM, leg_lengths, robot_of, turns_of
 
 from screwsynth.nlp import Case, inverse
 from screwsynth.nlp.output.pictures.pathpanels import PathPicture, path_picture
@@ -23,7 +22,6 @@ from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.path_samples import samples_of
 from screwsynth.nlp.results.path import path_result
 
-Run = Callable[..., tuple[int, str, str]]
 #: Seconds, positions and angles of a path on which legs of the hexapod become longer than 43 in.
 KNOTS = np.array(
     [[0, 0, 0, 20, 0, 0, 0], [1, 2, -1, 22, 8, 0, 5], [4, 16, 0, 22, 8, -4, 0], [6, -18, 1, 19, 0, 0, 0]], dtype=float
@@ -45,27 +43,20 @@ def spindle() -> PathPicture:
 
 
 def poses_at(t: Array) -> tuple[Array, Array]:
-    """Positions and rotations Rz(c) Ry(b) Rx(a) at times."""
+    """Positions and rotations at times."""
     p = np.stack([np.interp(t, KNOTS[:, 0], column) for column in KNOTS[:, 1:].T], axis=1)
-    found = []
-    for a, b, c in np.radians(p[:, 3:]):
-        x = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
-        y = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
-        z = np.array([[math.cos(c), -math.sin(c), 0], [math.sin(c), math.cos(c), 0], [0, 0, 1]])
-        found.append(z @ y @ x)
-    return p[:, :3], np.array(found)
+    return p[:, :3], turns_of(np.radians(p[:, 3:]))
+
+
+def lengths(t: Array) -> Array:
+    return leg_lengths(*poses_at(t))
 
 
 def spans(t: Array) -> tuple[Array, Array]:
     """Vectors (N, 6, 3) along the legs, and their ends on the platform from its origin."""
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     p, R = poses_at(t)
-    arms = np.einsum("nij,kj->nki", R, platform)
-    return p[:, None] + arms - base, arms
-
-
-def lengths(t: Array) -> Array:
-    return np.asarray(np.linalg.norm(spans(t)[0], axis=2))
+    arms = np.einsum("nij,kj->nki", R, PLATFORM)
+    return p[:, None] + arms - BASE, arms
 
 
 def panel(picture: PathPicture, title: str) -> Array:
@@ -226,9 +217,7 @@ def test_the_page_has_the_postures_of_the_path(spindle: PathPicture) -> None:
 
 
 def test_a_delta_on_a_page_keeps_its_arms_and_rods() -> None:
-    tables = starter_tables("delta")
-    tables["robot"]["parameters"]["rb"] = 0.164
-    case = case_from(tables | {"limits": {"actuator_angle": {"min": -30, "max": 60}}})
+    case = robot_of("delta", {"actuator_angle": {"min": -30, "max": 60}}, rb=0.164)
     rows = np.array([[0, 0, -1.1], [0.2, 0.1, -1.2], [0, 0, -1.9], [-0.2, 0.1, -1.0]])
     picture = pictured(case, rows, "x,y,z", 0.1)
     view = data_of(path_page(picture, "", lambda _: ""))["view"]

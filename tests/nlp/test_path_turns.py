@@ -3,23 +3,21 @@
 import itertools
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, case_from, commands_in, output_of, refusal_of, saved, shipped_tables, starter_tables
+from builders import Array, Run, case_from, commands_in, output_of, refusal_of, saved, shipped_tables
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from measures import circle_joints
+from path_cases import hexapod, leg_lengths, program, robot_of, table
 
 from screwsynth.nlp import Case, InputError, Outcome
 from screwsynth.nlp.case.loads import Load, Loading
 from screwsynth.nlp.case.workspace import TurnKind
 from screwsynth.nlp.path.frame import PathFrame
-from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.path import ProgrammedPath
@@ -30,7 +28,6 @@ from screwsynth.nlp.proof.workspace.robot.long_turns import LongTurns, turns_of_
 from screwsynth.nlp.proof.workspace.robot.path_turns import LinearAngles, PathTurns, Tangents
 from screwsynth.nlp.proof.workspace.robot.pose_box import UNTURNED
 
-Run = Callable[..., tuple[int, str, str]]
 Quaternion = list[Decimal]
 SAMPLES = np.linspace(0, 1, 2001)
 
@@ -261,30 +258,6 @@ def turned(start: Array, end: Array) -> tuple[Array, Array]:
     return start[:3] + SAMPLES[:, None] * (end - start)[:3], about(axis, SAMPLES * angle) @ first
 
 
-def hexapod(limits: str | dict[str, float] = "") -> Case:
-    """LinuxCNC's hexapod, whose legs have these limits."""
-    return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": {"leg_length": limits} if limits else {}})
-
-
-def lengths(poses: tuple[Array, Array]) -> Array:
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
-    positions, rotations = poses
-    return np.asarray(np.linalg.norm(positions[:, None] + np.einsum("nij,kj->nki", rotations, platform) - base, axis=2))
-
-
-def table(case: Case, rows: Array, between: Between | None = None) -> ProgrammedPath:
-    """A path through rows of x, y, z, roll, pitch, yaw, in degrees."""
-    text = "\n".join(["x,y,z,roll,pitch,yaw", *(",".join(map(repr, row)) for row in rows.tolist())])
-    return read_poses(text, "poses.csv", case.units, PathOptions(between=between))
-
-
-def program(case: Case, rows: Array, order: str) -> ProgrammedPath:
-    words = [" ".join(f"{x}{value!r}" for x, value in zip("XYZABC", row, strict=True)) for row in rows.tolist()]
-    return read_program(
-        ["F60", *(f"G1 {each}" for each in words), "M2"], "p.ngc", case.units, PathOptions(angles=order)
-    )
-
-
 WAY = np.array([(0, 0, 20, 0, 0, 0), (2, 1, 21, 12, -8, 20), (-1, 2, 19, -15, 10, -25.0)])
 #: The same about half a turn about x of the platform, with the plates inside out.
 OVER = WAY + np.array([0, 0, 0, 170, 0, 0])
@@ -293,12 +266,14 @@ OVER = WAY + np.array([0, 0, 0, 170, 0, 0])
 @pytest.mark.parametrize(("how", "rows"), [("slerp", WAY), ("xyz", WAY), ("yzx", WAY), ("rpy", OVER), ("slerp", OVER)])
 def test_legs_are_those_of_dense_samples(how: str, rows: Array) -> None:
     case = hexapod()
-    path = table(case, rows, Between.SLERP) if how == "slerp" else program(case, rows, how)
+    path = table(case, rows, between=Between.SLERP) if how == "slerp" else lines(case, rows, how)
     judged = judge_path(case, path)
     radians = np.hstack([rows[:, :3], np.radians(rows[:, 3:])])
     pairs = list(itertools.pairwise(radians))
     order = "zyx" if how == "rpy" else how
-    sampled = np.concatenate([lengths(turned(*each) if how == "slerp" else angled(*each, order)) for each in pairs])
+    sampled = np.concatenate(
+        [leg_lengths(*(turned(*each) if how == "slerp" else angled(*each, order))) for each in pairs]
+    )
     found = [each for each in judged.extremes if each.name.startswith("leg_length limb")]
     assert len(found) == 12
     for k, each in enumerate(found):
@@ -306,11 +281,16 @@ def test_legs_are_those_of_dense_samples(how: str, rows: Array) -> None:
         assert each.sense.sign * (each.bound - end) > -1e-9
         assert each.bound == pytest.approx(end, rel=2e-3)
         # The pose that reaches it is one of the path.
-        here = lengths((each.pose.position[None], each.pose.rotation[None]))[0, k // 2]
+        here = leg_lengths(each.pose.position[None], each.pose.rotation[None])[0, k // 2]
         assert here == pytest.approx(each.reached, rel=1e-12)
         s = each.place.parameter
         near = sampled[each.place.segment * len(SAMPLES) + round(s * 2000), k // 2]
         assert near == pytest.approx(each.reached, abs=0.05)
+
+
+def lines(case: Case, rows: Array, order: str) -> ProgrammedPath:
+    words = [" ".join(f"{x}{value!r}" for x, value in zip("XYZABC", row, strict=True)) for row in rows.tolist()]
+    return program(case, "\n".join(["F60", *(f"G1 {each}" for each in words), "M2"]), angles=order)
 
 
 def outcomes(judged: PathJudgement) -> list[tuple[str, Outcome]]:
@@ -371,19 +351,17 @@ def test_a_singular_pose_is_crossed_or_touched_by_turns(between: Between) -> Non
     # The octahedral platform is singular where it is turned by a right angle.
     case = hexapod()
     rows = np.array([(0, 0, 20, 0, 0, 70), (0, 0, 20, 0, 0, 110.0)])
-    crossed = judge_path(case, table(case, rows, between)).ranks[0]
+    crossed = judge_path(case, table(case, rows, between=between)).ranks[0]
     assert crossed.outcome is Outcome.REFUTED
     assert crossed.place.parameter == pytest.approx(0.5, abs=1e-9)
     rows = np.array([(0, 0, 20, 0, 0, 60), (0, 0, 20, 0, 0, 90), (0, 0, 20, 0, 0, 80.0)])
-    touched = judge_path(case, table(case, rows, between)).ranks[0]
+    touched = judge_path(case, table(case, rows, between=between)).ranks[0]
     assert touched.outcome is Outcome.REFUTED
     assert math.degrees(touched.pose.angle) == pytest.approx(90, abs=1e-5)
 
 
 def test_a_planar_robot_turns_by_slerp() -> None:
-    tables = starter_tables("planar-3-rpr")
-    tables["robot"]["parameters"]["rb"] = 1.0
-    case = case_from(tables | {"limits": {}})
+    case = robot_of("planar-3-rpr", rb=1.0)
     text = "x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n0.1,0.05,0,0.96,0,0,0.28\n0,0.1,0,0.8,0,0,0.6"
     path = read_poses(text, "q.csv", case.units, PathOptions())
     assert path.between is Between.SLERP

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from decimal import Decimal, localcontext
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, case_from, saved, shipped_tables, starter_tables, turn_about
+from builders import Array, Run, case_from, saved, shipped_tables, starter_tables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
+from path_cases import BASE, LEGS, PLATFORM, delta_angles, extreme, hexapod, turns_of
 
 from screwsynth.nlp import Case, load_case
 from screwsynth.nlp.case.task import Sense
@@ -29,7 +30,6 @@ from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, covered, ju
 from screwsynth.nlp.proof.workspace.robot.long_turns import turns_of_path
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
-Run = Callable[..., tuple[int, str, str]]
 Matrix = list[list[Decimal]]
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 #: A quarter of a circle and a helix in tilted planes, a line with a turn, in inches; all motions have times.
@@ -193,35 +193,28 @@ def test_a_path_that_does_not_turn_has_its_exact_roll_pitch_and_yaw(
 
 
 def matrix(place: Sequence[float]) -> Array:
-    return np.asarray(
-        turn_about((0, 0, 1), place[5]) @ turn_about((0, 1, 0), place[4]) @ turn_about((1, 0, 0), place[3])
-    )
+    return np.asarray(turns_of(np.array([place[3:]]))[0])
 
 
 def case_at(folder: Path, text: str, place: Sequence[float], **keys: object) -> Case:
     """LinuxCNC's hexapod with a program in a place, angles in degrees."""
     saved(folder / "part.ngc", text)
     names = ("x", "y", "z", "roll", "pitch", "yaw")
-    tables = shipped_tables("hexapod-linuxcnc") | {"limits": {}} | keys
     table = {"file": str(folder / "part.ngc"), "place": dict(zip(names, place, strict=True))}
-    return case_from(tables | {"path": table})
+    return hexapod(**keys, path=table)
 
 
 def legs(own: ProgrammedPath, place: Sequence[float], count: int = 401) -> Array:
     """Lengths (N, 6) of the legs of LinuxCNC's hexapod at points of a path in its frame, from the joints alone."""
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     k, s = np.repeat(np.arange(len(own)), count), np.tile(np.linspace(0, 1, count), len(own))
     poses, R = own.poses_at(k, s), matrix(place)
-    tips = poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, platform)
-    return np.asarray(np.linalg.norm(tips @ R.T + np.array(place[:3]) - base, axis=2))
+    tips = poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, PLATFORM)
+    return np.asarray(np.linalg.norm(tips @ R.T + np.array(place[:3]) - BASE, axis=2))
 
 
 def range_of(judged: PathJudgement, name: str) -> tuple[float, float]:
-    ends = {each.sense: each.bound for each in judged.extremes if each.name == name}
-    return ends[Sense.MIN], ends[Sense.MAX]
-
-
-LIMBS = ("1-", "1+", "2-", "2+", "3-", "3+")
+    low, high = (extreme(judged, name, sense).bound for sense in (Sense.MIN, Sense.MAX))
+    return low, high
 
 
 @pytest.mark.parametrize(
@@ -246,22 +239,15 @@ def test_legs_along_a_placed_path_are_those_of_dense_samples(
     found = legs(own, radians)
     judged = judge_path(case, path)
     assert judged.ranks[0].outcome is Outcome.PROVED
-    for k, name in enumerate(LIMBS):
+    for k, name in enumerate(LEGS):
         low, high = range_of(judged, f"leg_length limb {name}")
         assert found[:, k].min() * (1 - 2e-3) <= low <= found[:, k].min() + 1e-9
         assert found[:, k].max() * (1 + 2e-3) >= high >= found[:, k].max() - 1e-9
     # Speeds are those of differences of lengths between samples; each segment has a time.
     sampled = np.abs(np.diff(found.reshape(len(own), -1, 6), axis=1)) / (own.durations[:, None, None] / 400)
-    for k, name in enumerate(LIMBS):
-        speed = range_of_speed(judged, name)
+    for k, name in enumerate(LEGS):
+        speed = extreme(judged, f"actuator_speed actuator {name}", Sense.MAX).bound
         assert sampled[:, :, k].max() * (1 - 1e-6) <= speed <= sampled[:, :, k].max() * 1.01
-
-
-def range_of_speed(judged: PathJudgement, name: str) -> float:
-    (found,) = (
-        each.bound for each in judged.extremes if each.name.startswith("actuator_speed") and each.name.endswith(name)
-    )
-    return found
 
 
 def test_a_delta_follows_an_arc_in_a_tilted_plane(tmp_path: Path) -> None:
@@ -271,7 +257,7 @@ def test_a_delta_follows_an_arc_in_a_tilted_plane(tmp_path: Path) -> None:
     words = " ".join(f"{letter}{angle:.12f}" for letter, angle in zip("ABC", back, strict=True))
     saved(tmp_path / "arc.ngc", f"G21\nG94 F60000\nG1 X200 Y0 Z0 {words}\nG3 X-200 Y0 Z50 I-200\nM2\n")
     tables = starter_tables("delta")
-    tables["robot"]["parameters"]["rb"] = rb = 0.164
+    tables["robot"]["parameters"]["rb"] = 0.164
     place = {"x": 0.02, "y": -0.03, "z": -1.1, "roll": 15, "pitch": -10, "yaw": 30}
     case = case_from(tables | {"limits": {}, "path": {"file": str(tmp_path / "arc.ngc"), "place": place}})
     path = path_of_case(case)
@@ -281,11 +267,7 @@ def test_a_delta_follows_an_arc_in_a_tilted_plane(tmp_path: Path) -> None:
     turn = np.linspace(0, math.pi, 4001)
     own = np.stack([0.2 * np.cos(turn), 0.2 * np.sin(turn), 0.05 * turn / math.pi], axis=1)
     p = own @ R + [0.02, -0.03, -1.1]
-    for k in range(3):
-        c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
-        v = np.stack([c * p[:, 0] + s * p[:, 1] + 0.044 - rb, c * p[:, 1] - s * p[:, 0], p[:, 2]], 1)
-        reach, size = ((v**2).sum(1) + 0.524**2 - 1.244**2) / (2 * 0.524), np.hypot(v[:, 0], v[:, 2])
-        angles = np.arctan2(-v[:, 2], v[:, 0]) - np.arccos(reach / size) - math.radians(20)
+    for k, angles in enumerate(delta_angles(p).T):
         low, high = range_of(judged, f"actuator_angle limb {k + 1}")
         assert angles.min() - 2e-3 <= low <= angles.min() + 1e-9
         assert angles.max() + 2e-3 >= high >= angles.max() - 1e-9
@@ -309,18 +291,18 @@ def test_rolls_and_pitches_of_a_path_and_the_design_are_the_best_of_a_grid(cli: 
     radius, grid = np.linspace(15, 35, 161), np.linspace(-12, 12, 49)
     k, s = np.repeat(np.arange(len(own)), 41), np.tile(np.linspace(0, 1, 41), len(own))
     poses = own.poses_at(k, s)
-    bases = [circle_joints({"x1": each, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)}) for each in radius]
+    bases = [circle_joints({"x1": each, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})[0] for each in radius]
 
     def kept(roll: float, pitch: float) -> Array:
         """Whether designs keep their limits at all samples."""
         R = matrix((0, 0, 0, *np.radians([roll, pitch, 0])))
-        tips = (poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, bases[0][1])) @ R.T + [1, 1, 19]
-        lengths = np.linalg.norm(tips[None] - np.array([base for base, _ in bases])[:, None], axis=3)
+        tips = (poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, PLATFORM)) @ R.T + [1, 1, 19]
+        lengths = np.linalg.norm(tips[None] - np.array(bases)[:, None], axis=3)
         return np.asarray((lengths.min(axis=(1, 2)) >= 21) & (lengths.max(axis=(1, 2)) <= 30))
 
     every = np.array([[kept(roll, pitch) for pitch in grid] for roll in grid])
-    home = np.array([20, 0, 0])[::-1] + bases[0][1]
-    at_home = np.array([np.linalg.norm(home - base, axis=1)[0] for base, _ in bases])
+    home = np.array([0, 0, 20]) + PLATFORM
+    at_home = np.array([np.linalg.norm(home - base, axis=1)[0] for base in bases])
     every &= (at_home >= 21) & (at_home <= 30)
     best = int(np.argmax(every.any(axis=(0, 1))))
     untilted = int(np.argmax(every[24, 24])) if every[24, 24].any() else len(radius)
@@ -334,10 +316,10 @@ def test_rolls_and_pitches_of_a_path_and_the_design_are_the_best_of_a_grid(cli: 
 
 def kept_design(result: dict[str, Any], positions: Array, rotations: Array) -> bool:
     """Return whether the design of a result keeps its limits at the samples, in the place of the result."""
-    base, platform = circle_joints({"x1": result["parameters"]["x1"], "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
+    base, _ = circle_joints({"x1": result["parameters"]["x1"], "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     place = result["path"]["place"]
     R = matrix((0, 0, 0, *np.radians([place["roll"], place["pitch"], 0])))
-    tips = (positions[:, None] + np.einsum("nij,kj->nki", rotations, platform)) @ R.T + [1, 1, 19]
+    tips = (positions[:, None] + np.einsum("nij,kj->nki", rotations, PLATFORM)) @ R.T + [1, 1, 19]
     lengths = np.linalg.norm(tips - base, axis=2)
     return bool(lengths.min() >= 21 - 1e-6 and lengths.max() <= 30 + 1e-6)
 

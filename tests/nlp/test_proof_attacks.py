@@ -11,8 +11,10 @@ from typing import Any
 import pytest
 from builders import Run, case_from, refusal_of, saved
 from hexapods import hexapod_text
+from workspace_cases import TRIPOD
+from workspace_cases import written as paper_proof
 
-from screwsynth.nlp import Case, certify, judge_workspace
+from screwsynth.nlp import Case, certify
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.proof.checker import packed, proof_file, tree
 from screwsynth.nlp.proof.checker.check import check_proof
@@ -22,13 +24,12 @@ from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, Statement
 from screwsynth.nlp.proof.checker.tree import Node
 from screwsynth.nlp.proof.checker.workspace import loop_claims
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.solver.certified import proof_of
 
 #: Largest memory beyond that of the check of an honest proof, MB: the budget of trees, the file, and blocks of boxes.
 ROOM = 450
-NAME = "paper-4.1-rotation-axis-z"
+UNPROVED = {"name": "n", "sense": "", "reason": "open"}
+ROTATION = "paper-4.1-rotation-axis-z"
 MACHINE = (
     hexapod_text(1, 5, "")
     + """[[task]]
@@ -42,20 +43,6 @@ position = [{ min = -4, max = 4 }, 0.5, { min = 18, max = 22 }]
 rotation = { axis = [0, 0, 1], angle = { min = -9, max = 9 } }
 """
 )
-ROBOT = """
-[robot]
-model = "3-rps"
-parameters = { rb = 1, rp = 0.6, h = 1.1 }
-[pose]
-position = [0, 0, 1.1]
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[workspace]
-position = [{ min = -0.01, max = 0.01 }, { min = -0.01, max = 0.01 }, { min = 1.1, max = 1.11 }]
-rotation = { roll = { min = -1, max = 1 }, pitch = { min = -1, max = 1 }, yaw = { min = -1, max = 1 } }
-"""
 #: Checks a proof, and prints the largest memory that this took, MB.
 MEASURE = """import resource, subprocess, sys
 ended = subprocess.run(sys.argv[1:], capture_output=True, text=True)
@@ -67,31 +54,20 @@ print(ended.returncode, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss /
 
 @pytest.fixture(scope="module")
 def optimum() -> tuple[Case, Proof]:
-    file = read_case(NAME)
+    file = read_case(ROTATION)
     return file.case, proof_of(certify(file.case, gap=1e-4, with_proof=True), file.text)
 
 
 @pytest.fixture(scope="module")
 def workspace() -> tuple[Case, Proof]:
-    case, record = case_from(MACHINE, "machine"), PaperRecord()
-    return case, paper_of(judge_workspace(case, gap=0.1, paper=record), record, MACHINE)
+    case = case_from(MACHINE, "machine")
+    return case, paper_proof(case, MACHINE, gap=0.1)[1]
 
 
 def checked(file: Path, content: dict[str, Any]) -> tuple[int, int, str]:
     """Status, largest memory in MB, and the words on standard error of a check in a process of its own."""
-    file.write_text(json.dumps(content), encoding="utf-8")
-    words = [
-        sys.executable,
-        "-P",
-        "-c",
-        MEASURE,
-        sys.executable,
-        "-P",
-        "-m",
-        "screwsynth.nlp",
-        "verify-proof",
-        str(file),
-    ]
+    python, given = [sys.executable, "-P"], str(saved(file, json.dumps(content)))
+    words = [*python, "-c", MEASURE, *python, "-m", "screwsynth.nlp", "verify-proof", given]
     ended = subprocess.run(words, capture_output=True, text=True, check=True)
     status, memory = map(int, ended.stdout.splitlines()[-1].split())
     return status, memory, ended.stderr
@@ -133,11 +109,16 @@ def test_memory_is_bounded(tmp_path: Path, optimum: tuple[Case, Proof], workspac
 
 @pytest.mark.parametrize(
     ("text", "fault"),
-    [('{"claims": [' + "[]," * 2**20 + "[]]}", "commas and brackets"), (" " * (2**26 + 1), "larger than 64 MB")],
-    ids=["lists", "size"],
+    [
+        ('{"claims": [' + "[]," * 2**20 + "[]]}", "commas and brackets"),
+        (" " * (2**26 + 1), "larger than 64 MB"),
+        *((text, "proof.json") for text in ("", "{}", "[]", '{"format": 1}', "\x00")),
+    ],
+    ids=range(7),
 )
-def test_a_file_without_end_is_refused(cli: Run, tmp_path: Path, text: str, fault: str) -> None:
-    refusal_of(cli("verify-proof", str(saved(tmp_path / "proof.json", text))), "proof.json", fault)
+def test_a_file_that_is_no_proof_or_has_no_end_is_refused(cli: Run, tmp_path: Path, text: str, fault: str) -> None:
+    file = str(saved(tmp_path / "proof.json", text))
+    refusal_of(cli("verify-proof", file), file, fault)
 
 
 def test_all_trees_of_a_file_have_one_budget(workspace: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -177,8 +158,8 @@ def test_a_tree_that_is_read_in_blocks_shows_the_same(
 
 
 def test_boxes_with_closed_loops_are_not_kept_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    case, record = case_from(ROBOT, "3-rps"), PaperRecord()
-    proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
+    case = case_from(TRIPOD, "3-rps")
+    proof = paper_proof(case, with_limits=False)[1]
     check_workspace_proof(proof, case)
     monkeypatch.setattr(loop_claims, "_MOST_KEPT", 10)
     with pytest.raises(ProofError, match="more than 0 boxes with closed loops"):
@@ -207,14 +188,8 @@ def test_what_a_case_does_not_claim_is_refused_packed(
     ("change", "fault"),
     [
         (lambda content: content["claims"].append(content["claims"][0]), "has the name and sense of another entry"),
-        (
-            lambda content: content["not_on_paper"].extend([UNPROVED, UNPROVED]),
-            "has the name and sense of another entry",
-        ),
-        (
-            lambda content: content["not_on_paper"].extend({**UNPROVED, "name": f"{k}"} for k in range(20_001)),
-            "entries",
-        ),
+        (lambda content: content["not_on_paper"].extend([UNPROVED] * 2), "has the name and sense of another entry"),
+        (lambda content: content["not_on_paper"].extend(UNPROVED | {"name": f"{k}"} for k in range(20_001)), "entries"),
         (lambda content: content["claims"][0].update(name="x" * 2**24), "claims[0].name: has 16777216 characters"),
         (lambda content: content["claims"][0].update(graph="1 " * 2**23), "claims[0].graph: has 16777216 characters"),
         (lambda content: content.update(name="x" * 2**24), "name: has 16777216 characters"),
@@ -229,9 +204,5 @@ def test_lists_and_texts_without_end_are_refused(
 ) -> None:
     content = json.loads(workspace[1].as_text())
     change(content)
-    file = tmp_path / "proof.json"
-    file.write_text(json.dumps(content), encoding="utf-8")
-    refusal_of(cli("verify-proof", str(file)), str(file), fault)
-
-
-UNPROVED = {"name": "n", "sense": "", "reason": "open"}
+    file = str(saved(tmp_path / "proof.json", json.dumps(content)))
+    refusal_of(cli("verify-proof", file), file, fault)

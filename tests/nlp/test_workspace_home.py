@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from builders import EACH_KIND, case_from, soaked
+from workspace_cases import box_of, on_paper, problem_of, root_of
 
 from screwsynth.models import Dimension
 from screwsynth.models.joints.closedform import closed_form
@@ -17,21 +18,17 @@ from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import RobotState
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.program.formulation import formulate
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
+from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot, motion_matrix
-from screwsynth.nlp.proof.checker.workspace.pose_boxes import pose_root
-from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
 from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank, prove_ranks
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularSearch
-from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
-from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError, build_problem
+from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers
+from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError
 from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 #: Robots whose platform does not turn.
@@ -55,12 +52,7 @@ def turns(*ends: tuple[float, float]) -> str:
 
 
 def case_over(
-    name: str,
-    position: str,
-    rotation: str = "",
-    limit: float = 0.0,
-    spread: float = 0.0,
-    seed: int = 0,
+    name: str, position: str, rotation: str = "", limit: float = 0.0, spread: float = 0.0, seed: int = 0
 ) -> Case:
     """A robot of the gallery over a workspace, with dimensions off by a part, and a limit on its actuators.
 
@@ -106,7 +98,6 @@ def check_shown(case: Case, judged: Judgement) -> int:
     for rank, is_of_constraints in zip(judged.ranks, (False, True), strict=False):
         if rank.outcome is Outcome.REFUTED and rank.y is not None:
             found, freedoms = shown(case, rank.box.pose(rank.y))
-            assert case.model.generic is not None
             assert freedoms > 6 - case.model.generic.constraints if is_of_constraints else found.is_singular
             count += 1
     for each in judged.extremes:
@@ -128,17 +119,11 @@ def verdicts(judged: Judgement) -> list[tuple[str, str, Outcome]]:
     return [*ranks, *((each.name, each.sense.value, each.outcome) for each in judged.extremes)]
 
 
-def judged_on_paper(case: Case, *, with_limits: bool = True) -> tuple[Judgement, Proof]:
-    record = PaperRecord()
-    judged = judge_workspace(case, with_limits=with_limits, with_objective=False, jobs=1, paper=record)
-    return judged, read_proof(paper_of(judged, record, "").as_text(), "again")
-
-
 def check_agreement(name: str, part: float, degrees: float, limit: float) -> int:
     """Check that verdicts are the same with a proof on paper and without, and refutations those that are shown."""
     case = about_home(name, part, degrees, limit)
     judged = judge_workspace(case, with_objective=False, jobs=1)
-    again, _ = judged_on_paper(case)
+    again, _ = on_paper(case, with_objective=False, jobs=1)
     assert verdicts(judged) == verdicts(again)
     assert {each.outcome for each in judged.extremes if each.limit} <= {Outcome.PROVED, Outcome.REFUTED}
     count = check_shown(case, judged)
@@ -155,11 +140,10 @@ def test_limits_are_judged_alike_with_a_proof_and_without(name: str) -> None:
 def test_limits_that_only_another_assembly_passes_are_proved_and_not_refuted() -> None:
     """The arms of a five-bar linkage by the law of cosines, elbows outside; one inside is beyond the limit."""
     case = about_home("five-bar", 0.02, 5, 0.4)
-    judged, proof = judged_on_paper(case)
+    judged, proof = on_paper(case, with_objective=False, jobs=1)
     limits = [each for each in judged.extremes if each.limit is not None and not each.key.startswith("workspace.")]
     assert [each.outcome for each in limits] == [Outcome.PROVED] * 4
-    assert case.workspace is not None
-    box = pose_box(workspace_of_case(case))
+    box = box_of(case)
     base, link, reach = 0.3, 0.25, 0.4
     points = np.vstack([[0, reach], np.random.default_rng(0).uniform(box.lower[:2], box.upper[:2], (20_000, 2))])
     for limb, side in (("1", -1.0), ("2", 1.0)):
@@ -186,37 +170,25 @@ def planar(part: float, degrees: float, seed: int) -> Case:
 
 def test_a_singular_pose_of_another_working_mode_refutes_nothing() -> None:
     case = planar(0.44809968, 21.472688, 9)
-    assert case.workspace is not None
-    box = pose_box(workspace_of_case(case))
-    problem, homes = build_problem(case, closed_form(case.model).model, box), Homes(case, box, (), None)
+    box = box_of(case)
+    problem, homes = problem_of(case), Homes(case, box, (), None)
     # Newton's method alone finds a pose that is singular with an arm bent the other way.
     other = prove_rank(problem, problem.locked, most_boxes=4000)
     assert other.outcome is Outcome.REFUTED
-    assert other.y is not None
     assert not shown(case, box.pose(other.y))[0].is_singular
     assert not homes.is_singular(other.y, None, constraints=False)
-    found = prove_rank(
-        problem,
-        problem.locked,
-        most_boxes=4000,
-        look=SingularSearch(
-            problem, problem.locked, lambda at: homes.is_singular(at.y, at.errors, constraints=False)
-        ).look,
-    )
+    search = SingularSearch(problem, problem.locked, lambda at: homes.is_singular(at.y, at.errors, constraints=False))
+    found = prove_rank(problem, problem.locked, most_boxes=4000, look=search.look)
     assert found.outcome is Outcome.REFUTED
-    assert found.y is not None
     assert shown(case, box.pose(found.y))[0].is_singular
 
 
 def test_ranks_are_refuted_by_what_is_shown_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     case = planar(0.13426, 19.47242, 3)
-    assert case.workspace is not None
-    homes = Homes(case, pose_box(workspace_of_case(case)), (), None)
-    problem = build_problem(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
+    problem, homes = problem_of(case), Homes(case, box_of(case), (), None)
     found = prove_ranks(problem, homes.is_singular)
     judged = Judgement(case, case.workspace, found.regular, (), found.constraints)
     assert check_shown(case, judged) == 1
-    assert found.regular.y is not None
     assert [homes.is_singular(found.regular.y, None, constraints=each) for each in (False, True)] == [True, False]
     monkeypatch.setattr(Homes, "is_singular", lambda *_, **__: False)
     with within(0.2):
@@ -234,7 +206,7 @@ def test_proofs_about_robots_that_do_not_turn_are_accepted(name: str, away: tupl
     middle = [each + part * size for each, part in zip(home, away, strict=True)]
     position = spans(*((each - 0.02 * size, each + 0.02 * size) for each in middle))
     case = case_over(name, position, spread=0.03, seed=seed)
-    judged, proof = judged_on_paper(case, with_limits=False)
+    judged, proof = on_paper(case, with_limits=False, with_objective=False, jobs=1)
     assert judged.is_regular
     assert [each.name for each in check_workspace_proof(proof, case).claims] == ["regular", "constraints regular"]
 
@@ -244,14 +216,14 @@ def test_a_proof_over_a_narrow_range_of_poses_is_accepted() -> None:
     size = size_of("3-rps")
     position = spans((-0.1 * size, 0.1 * size), (-0.1 * size, 0.1 * size), (1.13, 1.13 + 2e-6 * size))
     case = case_over("3-rps", position, turns((0.05, 0.0502), (-1.15, -1.1498), (0.3, 0.3002)), spread=0.03)
-    judged, proof = judged_on_paper(case, with_limits=False)
+    judged, proof = on_paper(case, with_limits=False, with_objective=False, jobs=1)
     assert judged.is_regular
     assert len(check_workspace_proof(proof, case).claims) == 2
 
 
 def test_a_proof_of_loops_that_are_closed_box_by_box_is_accepted() -> None:
     case = about_home("3-rps", 0.1, 20)
-    judged, proof = judged_on_paper(case, with_limits=False)
+    judged, proof = on_paper(case, with_limits=False, with_objective=False, jobs=1)
     assert judged.ranks[0].boxes > 10
     assert len(check_workspace_proof(proof, case).claims) == 2
 
@@ -260,8 +232,7 @@ def test_a_proof_of_loops_that_are_closed_box_by_box_is_accepted() -> None:
 def test_freedoms_in_the_check_are_those_that_are_known(name: str, arm: float) -> None:
     """At home the platform rises, and turns about horizontal lines: through its origin, or an arm below it."""
     case = about_home(name, 0.05, 10)
-    assert case.workspace is not None
-    robot = PosedRobot(case, case.model, pose_root(workspace_of_case(case)))
+    robot = PosedRobot(case, case.model, root_of(case))
     start = start_of(robot)
     matrix, freedoms = motion_matrix(robot, start, is_locked=False)
     motions = np.linalg.svd(robot.at(matrix, start))[2][-freedoms:, :6]
@@ -281,14 +252,13 @@ def test_the_check_begins_in_the_working_mode_of_home() -> None:
         middle = np.array(build_model("4-ruu").home) + rng.uniform(-0.5, 0.5, 3) * size
         position = spans(*((each - 0.01 * size, each + 0.01 * size) for each in middle.tolist()))
         case = case_over("4-ruu", position, turns((-1, 1), (-1, 1), (-1, 1)))
-        assert case.workspace is not None
-        model = closed_form(case.model).model
+        robot = PosedRobot(case, closed_form(case.model).model, root_of(case))
         try:
-            build_problem(case, model, pose_box(workspace_of_case(case)))
+            problem_of(case)
         except NotJudgedError:
             with pytest.raises(ProofError, match="in the assembly of home"):
-                start_of(PosedRobot(case, model, pose_root(workspace_of_case(case))))
+                start_of(robot)
             tried += 1
         else:
-            start_of(PosedRobot(case, model, pose_root(workspace_of_case(case))))
+            start_of(robot)
     assert 0 < tried < 6

@@ -3,18 +3,20 @@
 import itertools
 import json
 import math
+import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from builders import case_from
+from builders import PUSH_UP, Run, case_file, case_of, ends
+from hexapods import hexapod_text
 from numpy.typing import NDArray
-from typer.testing import CliRunner
+from path_cases import delta_angles
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Solution, load_case, pareto, solve
 from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.cli.app import app
 from screwsynth.nlp.errors import CaseError
 from screwsynth.nlp.front.data import front_result
 from screwsynth.nlp.output.fronttable import front_words
@@ -26,109 +28,30 @@ from screwsynth.nlp.solver.semi_infinite import WorkspaceProof
 
 NOTICE = "the limits are taken at the stated pose alone, not over the workspace"
 
-DELTA = """
-[units]
-length = "m"
-[robot]
-model = "delta"
-[robot.parameters]
-rb = 0.164
-rp = 0.044
-arm = {arm}
-rod = {rod}
-w = 0.131
-tilt = 20
-[pose]
-position = [0, 0, -0.9]
-[[task]]
-name = "vertical"
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[limits]
-{over}
-actuator_angle = {{ min = -60, max = 60 }}
-[workspace]
-position = [{{ min = -0.25, max = 0.25 }}, {side}, {{ min = -1.0, max = -0.8 }}]
-[solve]
-starts = 1
-"""
-TRIPOD = """
-[units]
-length = "m"
-[robot]
-model = "3-rps"
-[robot.parameters]
-rb = {rb}
-rp = {rp}
-h = 1.1
-[pose]
-position = [{{ min = -0.2, max = 0.2 }}, {{ min = -0.2, max = 0.2 }}, 1.1]
-rotation = {{ axis = [1, 0, 0], angle = 0 }}
-[[task]]
-name = "tilt"
-sense = "max"
-axis = [0, 1, 0]
-point = [0, 0, 1.1]
-pitch = 0
-[limits]
-{over}
-actuator_length = {{ min = -0.2, max = 0.2 }}
-[workspace]
-position = [{{ min = -0.2, max = 0.2 }}, {{ min = -0.2, max = 0.2 }}, {height}]
-rotation = {{ roll = {{ min = -10, max = 10 }}, pitch = {{ min = -10, max = 10 }}, yaw = {{ min = -5, max = 5 }} }}
-[solve]
-starts = 1
-"""
-OVER = 'over = "workspace"'
-HEXAPOD = f"""
-[units]
-length = "in"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-[robot.parameters]
-x1 = {{ min = 20, max = 32 }}
-x2 = 11
-x3 = 4
-x4 = 9
-[pose]
-position = [0, 0, 20]
-[[task]]
-name = "tap"
-sense = "max"
-axis = [1, 2, 6]
-point = [3, 1, 12]
-pitch = 0.1
-[limits]
-{OVER}
-footprint = {{ base = 28 }}
-[workspace]
-position = [0, 0, {{ min = 19, max = 21 }}]
-"""
-THREE_UPU = """
-[robot]
-model = "three-upu"
-axes = "tsai"
-characteristic_length = 1
-[robot.parameters]
-base_radius = { min = 30, max = 60 }
-platform_radius = 25
-[pose]
-position = [0, 0, 50]
-[[task]]
-name = "lift"
-sense = "max"
-axis = [0, 1, 2]
-point = [0, 0, 50]
-pitch = 2
-[workspace]
-position = [0, 0, { min = 45, max = 55 }]
-"""
+
+def delta(arm: float, rod: object, **limits: object) -> Case:
+    """A Delta that moves in a plane."""
+    robot = {"rb": 0.164, "rp": 0.044, "arm": arm, "rod": rod, "w": 0.131, "tilt": 20}
+    given = {"units": {"length": "m"}, "pose": {"position": [0, 0, -0.9]}, "task": [PUSH_UP], "solve": {"starts": 1}}
+    place = {"position": [ends(0.25), 0, ends(0.1, -0.9)]}
+    limits |= {"actuator_angle": ends(60)}
+    return case_of({"model": "delta", "parameters": robot}, **given, limits=limits, workspace=place)
 
 
-def case_of(text: str, **values: str) -> Case:
-    return case_from(text.format(**values), "mine")
+def tripod_case(rb: object = 1.0, rp: object = 0.6, height: object = 1.1, **tables: Any) -> Case:  # noqa: ANN401
+    """A 3-RPS whose position, roll, pitch and yaw are within ranges about home."""
+    limits = {"actuator_length": ends(0.2)} | tables.pop("limits", {})
+    given = {"units": {"length": "m"}, "solve": {"starts": 1}, "limits": limits}
+    given["pose"] = {"position": [ends(0.2), ends(0.2), 1.1], "rotation": {"axis": [1, 0, 0], "angle": 0}}
+    given["task"] = [{"sense": "max", "axis": [0, 1, 0], "point": [0, 0, 1.1], "pitch": 0}]
+    turns = {"roll": ends(10), "pitch": ends(10), "yaw": ends(5)}
+    given["workspace"] = {"position": [ends(0.2), ends(0.2), height], "rotation": turns}
+    return case_of({"model": "3-rps", "parameters": {"rb": rb, "rp": rp, "h": 1.1}}, **given | tables)
+
+
+#: Free dimensions of it, and a range of heights.
+FREE = {"rb": {"min": 0.7, "max": 1.5}, "rp": {"min": 0.4, "max": 1.0}, "height": {"min": 1.0, "max": 1.2}}
+OVER = {"over": "workspace"}
 
 
 def number(case: Case, name: str) -> float:
@@ -139,17 +62,7 @@ def number(case: Case, name: str) -> float:
 
 def arms(case: Case, p: FloatArray) -> FloatArray:
     """Angles (N, 3) of a Delta's arms away from home at positions (N, 3), in home's branch; NaN out of reach."""
-    rb, rp, arm, rod = (number(case, name) for name in ("rb", "rp", "arm", "rod"))
-    tilt, found = math.radians(20), []
-    for azimuth in (0, 2 * math.pi / 3, 4 * math.pi / 3):
-        x = math.cos(azimuth) * p[:, 0] + math.sin(azimuth) * p[:, 1] + rp - rb
-        y = -math.sin(azimuth) * p[:, 0] + math.cos(azimuth) * p[:, 1]
-        z = p[:, 2]
-        K, R = (x * x + y * y + z * z + arm**2 - rod**2) / (2 * arm), np.hypot(x, z)
-        with np.errstate(invalid="ignore"):
-            # The elbow is outside: at home the angle below the horizontal is that of the tilt.
-            found.append(np.arctan2(-z, x) - np.arccos(K / R) - tilt)
-    return np.stack(found, axis=1)
+    return delta_angles(p, *(number(case, name) for name in ("rb", "rp", "arm", "rod")))
 
 
 def tripod(case: Case, roll: FloatArray, pitch: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -185,9 +98,19 @@ def drawn(each: Slice, rng: np.random.Generator) -> tuple[FloatArray, NDArray[np
     return points, each.binding, list(each.regions)
 
 
+def assert_beyond(found: Slice, limit: NDArray[np.int16], values: FloatArray) -> None:
+    """Where a limit on actuators is violated at points, a number of theirs is beyond it."""
+    for k, each in enumerate(found.limits):
+        if each.key.startswith("workspace."):
+            continue
+        own = values[limit == k]
+        beyond = own > each.limit if each.key.endswith("max") else own < each.limit
+        assert len(own) > 20
+        assert beyond.any(axis=1).all()
+
+
 def test_a_design_of_a_delta_is_exchanged_until_it_is_proved() -> None:
-    text = {"rod": "{ min = 0.7, max = 1.3 }", "arm": "0.25", "side": "0"}
-    solution = solve(case_of(DELTA, over=OVER, **text))
+    solution = solve(delta(0.25, {"min": 0.7, "max": 1.3}, **OVER))
     proof = proof_of(solution)
     assert proof.is_proved
     assert len(proof.history) > 1
@@ -207,8 +130,7 @@ def test_a_design_of_a_delta_is_exchanged_until_it_is_proved() -> None:
 
 @pytest.mark.slow
 def test_a_design_of_a_robot_with_loops_is_exchanged_until_it_is_proved() -> None:
-    text = {"rb": "{ min = 0.7, max = 1.5 }", "rp": "{ min = 0.4, max = 1.0 }"}
-    solution = solve(case_of(TRIPOD, over=OVER, height="{ min = 1.0, max = 1.2 }", **text))
+    solution = solve(tripod_case(**FREE, limits=OVER))
     proof = proof_of(solution)
     assert proof.is_proved
     assert proof.first.is_regular
@@ -225,7 +147,7 @@ def test_a_design_of_a_robot_with_loops_is_exchanged_until_it_is_proved() -> Non
 
 
 def test_slices_of_a_delta_hold_at_every_point() -> None:
-    case = case_of(DELTA, over="", rod="0.94", arm="0.22", side="0")
+    case = delta(0.22, 0.94)
     (found,) = slices_of(case)
     assert found.names == ("p_x", "p_z")
     assert {each.key for each in found.limits} == {"actuator_angle.min", "actuator_angle.max"}
@@ -237,13 +159,7 @@ def test_slices_of_a_delta_hold_at_every_point() -> None:
     is_unreached = np.array([region is Region.UNREACHED for region in regions])
     assert kept[is_regular & (limit == KEPT)].all()
     assert not reached[is_unreached].any()
-    for k, each in enumerate(found.limits):
-        own = angles[limit == k]
-        beyond = own > each.limit if each.key.endswith("max") else own < each.limit
-        if each.key.startswith("workspace."):
-            continue
-        assert len(own) > 20
-        assert beyond.any(axis=1).all()
+    assert_beyond(found, limit, angles)
     # What is undecided lies along curves.
     size = np.prod(found.boxes[:, 2:] - found.boxes[:, :2], axis=1)
     assert size[limit == UNDECIDED][~is_unreached[limit == UNDECIDED]].sum() < 0.1 * size.sum()
@@ -252,7 +168,7 @@ def test_slices_of_a_delta_hold_at_every_point() -> None:
 
 @pytest.mark.slow
 def test_slices_and_limits_of_a_robot_with_loops_hold_at_every_point() -> None:
-    case = case_of(TRIPOD, over="", rb="1.0", rp="0.6", height="1.1")
+    case = tripod_case()
     (found,) = slices_of(case)
     assert found.names == ("roll", "pitch")
     points, limit, regions = drawn(found, np.random.default_rng(1))
@@ -262,21 +178,14 @@ def test_slices_and_limits_of_a_robot_with_loops_hold_at_every_point() -> None:
     # Boxes that touch are of one assembly.
     size = np.prod(found.boxes[:, 2:] - found.boxes[:, :2], axis=1)
     assert size[[region is Region.REGULAR for region in found.regions]].sum() > 0.9 * size.sum()
-    for k, each in enumerate(found.limits):
-        own = lengths[limit == k]
-        beyond = own > each.limit if each.key.endswith("max") else own < each.limit
-        if each.key.startswith("workspace."):
-            continue
-        assert len(own) > 20
-        assert beyond.any(axis=1).all()
+    assert_beyond(found, limit, lengths)
     judged = judge_workspace(case, with_objective=False)
     assert judged.is_proved
     largest = max(abs(each.bound) for each in judged.extremes if each.limit is not None)
     rng = np.random.default_rng(0)
     roll, pitch = rng.uniform(-math.radians(10), math.radians(10), (2, 10_000))
     assert np.abs(tripod(case, roll, pitch, np.full(10_000, 1.1))[0]).max() < largest <= 0.2 * (1 + 1e-9)
-    tight = case_of(TRIPOD.replace("min = -0.2, max = 0.2 }}\n[work", "min = -0.08, max = 0.2 }}\n[work"), over="",
-                    rb="1.0", rp="0.6", height="1.1")  # fmt: skip
+    tight = tripod_case(limits={"actuator_length": {"min": -0.08, "max": 0.2}})
     refuted = [each for each in judge_workspace(tight, with_objective=False).extremes if each.limit is not None]
     assert {each.outcome for each in refuted if each.limit == -0.08} == {Outcome.REFUTED}
     worst = tripod(case, roll, pitch, np.full(10_000, 1.1))[0].min()
@@ -286,25 +195,26 @@ def test_slices_and_limits_of_a_robot_with_loops_hold_at_every_point() -> None:
 def test_a_slice_is_drawn_where_no_loops_close_at_its_ends() -> None:
     """The legs reach no further than the sum of their lengths, and the slice is wider than the workspace."""
     lengths = {item.name: item.typical[0] for item in build_model("planar-3-rrr").parameters}
-    text = "[robot]\nmodel = 'planar-3-rrr'\n[robot.parameters]\n"
-    text += "".join(f"{name} = {value}\n" for name, value in lengths.items())
-    text += "[pose]\nposition = [0, 0, 0]\n[[task]]\nsense = 'max'\naxis = [0, 0, 1]\npoint = [0, 0, 0]\npitch = 0.1\n"
-    half = sum(lengths.values())
-    text += f"[workspace]\nposition = [{{min = -{half}, max = {half}}}, {{min = -{half}, max = {half}}}, 0]\n"
-    (found,) = slices_of(case_from(text, "mine"))
+    half, task = ends(sum(lengths.values())), PUSH_UP | {"point": [0, 0, 0], "pitch": 0.1}
+    robot, place = {"model": "planar-3-rrr", "parameters": lengths}, {"position": [half, half, 0]}
+    (found,) = slices_of(case_of(robot, pose={"position": [0, 0, 0]}, task=[task], workspace=place))
     assert {Region.UNKNOWN} <= set(found.regions)
 
 
 def test_slices_need_two_numbers_that_the_robot_can_choose() -> None:
-    text = TRIPOD.replace("roll = {{ min = -10, max = 10 }}, ", "")
+    turns = {"pitch": ends(10), "yaw": ends(5)}
+    case = tripod_case(workspace={"position": [ends(0.2), ends(0.2), 1.1], "rotation": turns})
     with pytest.raises(CaseError, match="two numbers of the pose"):
-        slices_of(case_of(text, over="", rb="1.0", rp="0.6", height="1.1"))
+        slices_of(case)
 
 
 def test_a_design_of_three_legs_keeps_its_strokes_over_the_workspace() -> None:
-    text = THREE_UPU.replace("min = 45, max = 55", "min = 47, max = 53")
-    text += f"[limits]\n{OVER}\nactuator = {{ stroke_max = 5.5 }}\n"
-    proof = proof_of(solve(case_from(text, "mine")))
+    robot = {"model": "three-upu", "axes": "tsai", "characteristic_length": 1}
+    robot["parameters"] = {"base_radius": {"min": 30, "max": 60}, "platform_radius": 25}
+    task = {"sense": "max", "axis": [0, 1, 2], "point": [0, 0, 50], "pitch": 2}
+    given = {"pose": {"position": [0, 0, 50]}, "workspace": {"position": [0, 0, ends(3, 50)]}}
+    case = case_of(robot, **given, task=[task], limits=OVER | {"actuator": {"stroke_max": 5.5}})
+    proof = proof_of(solve(case))
     assert proof.is_proved
     # Without rotation the platform's joints stay above those of the base by the difference of the radii.
     stroke = np.diff(np.hypot(number(proof.judgement.case, "base_radius") - 25, [47, 53]))[0]
@@ -313,9 +223,9 @@ def test_a_design_of_three_legs_keeps_its_strokes_over_the_workspace() -> None:
 
 @pytest.mark.slow
 def test_a_design_of_a_robot_with_loops_is_proved_for_every_machine_within_a_tolerance() -> None:
-    text = TRIPOD.replace("[solve]", "[tolerance]\njoint_centre = 0.0005\n[solve]")
-    free = {"rb": "{ min = 0.7, max = 1.5 }", "rp": "{ min = 0.4, max = 1.0 }", "height": "{ min = 1.0, max = 1.2 }"}
-    proof, exact = (proof_of(solve(case_of(each, over=OVER, **free))) for each in (text, TRIPOD))
+    proof, exact = (
+        proof_of(solve(tripod_case(**FREE, limits=OVER, tolerance=each))) for each in ({"joint_centre": 0.0005}, None)
+    )
     assert proof.is_proved
     errors = [each.errors for each in proof.poses if each.errors is not None]
     assert errors
@@ -330,17 +240,19 @@ def test_a_design_of_a_robot_with_loops_is_proved_for_every_machine_within_a_tol
     assert longest < exactly
 
 
-def test_a_front_and_a_compiled_sweep_say_that_limits_hold_at_the_stated_pose(tmp_path: Path) -> None:
-    path = tmp_path / "hexapod.toml"
-    path.write_text(HEXAPOD, encoding="utf-8")
+def test_a_front_and_a_compiled_sweep_say_that_limits_hold_at_the_stated_pose(cli: Run, tmp_path: Path) -> None:
+    tables = tomllib.loads(hexapod_text(4, 9)) | {"workspace": {"position": [0, 0, ends(1, 20)]}}
+    tables["robot"]["parameters"] |= {"x1": {"min": 20, "max": 32}, "x2": 11}
+    tables["task"] = [{"sense": "max", "axis": [1, 2, 6], "point": [3, 1, 12], "pitch": 0.1}]
+    path = case_file(tmp_path, tables | {"limits": OVER | {"footprint": {"base": 28}}})
     front = pareto(load_case(str(path)), ["max F", "min limits.footprint.base"], points=2, starts=1)
     assert front_result(front).notice == NOTICE
     assert NOTICE in front_words(front)
     table, data = tmp_path / "sweep.csv", tmp_path / "sweep.json"
     options = ("--over", "task.pitch=0.1,0.2", "--starts", "1", "--engine", "compiled", "--out", str(table))
-    run = CliRunner().invoke(app, ["sweep", str(path), *options, "--json", str(data)])
-    assert run.exit_code == 0, run.output
-    assert NOTICE in run.output
+    code, out, err = cli("sweep", str(path), *options, "--json", str(data))
+    assert code == 0
+    assert NOTICE in out + err
     result = json.loads(data.read_text(encoding="utf-8"))
     assert result["notice"] == NOTICE
     assert result["notes"] == [NOTICE, NOTICE]
