@@ -82,9 +82,7 @@ def test_numbers_that_are_only_shown_decide_nothing(monkeypatch: pytest.MonkeyPa
     assert half.is_proved
 
 
-def test_a_number_that_is_only_shown_does_not_end_the_search_for_a_fault(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_number_that_is_only_shown_does_not_end_the_search_for_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trap: lengths without a limit come before the limits on strokes, which would then never be judged."""
     monkeypatch.setattr(judge, "prove_extreme", opened)
     found = judged("actuator = { stroke_max = 0.01 }", until_fault=True, with_objective=False)

@@ -137,11 +137,16 @@ def claim(proof: Proof, name: str, sense: str | None = None) -> ProofClaim:
     return next(each for each in every if each.name == name and sense in (None, each.sense))
 
 
+def altered(given: ProofClaim, **values: object) -> ProofClaim:
+    """The claim with other values; a tree takes the place of the one in its file."""
+    return replace(given, **({"packed": None} if "tree" in values else {}) | values)
+
+
 def changed(proof: Proof, name: str, sense: str | None = None, **values: object) -> Proof:
     """The proof with other values in one of its claims, or lemmas."""
     old = claim(proof, name, sense)
     claims, lemmas = (
-        tuple(replace(each, **values) if each is old else each for each in part)
+        tuple(altered(each, **values) if each is old else each for each in part)
         for part in (proof.claims, proof.lemmas)
     )
     return replace(proof, claims=claims, lemmas=lemmas)
@@ -158,7 +163,7 @@ def only(proof: Proof, name: str, sense: str | None = None, **values: object) ->
     """The proof with one claim alone, and other values in it."""
     own = claim(proof, name, sense)
     others = (Unproved(each.name, each.sense, "left out") for each in proof.claims if each is not own)
-    return replace(proof, claims=(replace(own, **values),), unproved=(*proof.unproved, *others))
+    return replace(proof, claims=(altered(own, **values),), unproved=(*proof.unproved, *others))
 
 
 def rejected(proof: Proof, case: Case) -> str:
