@@ -1,21 +1,17 @@
 """What tests of paths share: LinuxCNC's hexapod and a Delta, closed forms of both, and short ways to write a path."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from builders import Array, case_from, case_of, starter_tables
 from measures import circle_joints
 from numpy.typing import ArrayLike
 
-from screwsynth.nlp import Case
-from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp import Case, Extreme, PathJudgement, ProgrammedPath, Sense
 from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import Between, PathOptions
-from screwsynth.nlp.path.path import ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
-from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
-from screwsynth.nlp.proof.workspace.path_judge import PathJudgement
 
 #: Joints of LinuxCNC's hexapod in inches, its legs, and its pose.
 BASE, PLATFORM = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
@@ -73,8 +69,16 @@ def delta_angles(p: Array, rb: float = 0.164, rp: float = 0.044, arm: float = 0.
     return np.stack(found, axis=1)
 
 
+def halved(halves: Iterable[bool]) -> tuple[float, float]:
+    """The part of 0 to 1 that is left of halves, lower or upper ones."""
+    low, high = 0.0, 1.0
+    for is_upper in halves:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_upper else (low, middle)
+    return low, high
+
+
 def program(case: Case, text: str, start: Sequence[float] | None = None, angles: str = "rpy") -> ProgrammedPath:
-    """The path of a program in the case's units."""
     return read_program(text.split("\n"), "part.ngc", case.units, PathOptions(start=start, angles=angles))
 
 
@@ -89,6 +93,5 @@ def table(
 
 
 def extreme(judged: PathJudgement, name: str, sense: Sense) -> Extreme:
-    """The smallest or largest value of a number."""
     (found,) = (each for each in judged.extremes if (each.name, each.sense) == (name, sense))
     return found

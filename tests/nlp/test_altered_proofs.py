@@ -102,7 +102,6 @@ class Kind(NamedTuple):
 
 
 def combined(sense: str, method: str) -> str:
-    """The second task, and how both are combined."""
     motion = "axis = [0, 1, 1]\npoint = [1, 0, 3]\npitch = 2\nweight = 3"
     return f'[[task]]\nname = "other"\nsense = "{sense}"\n{motion}\n[combine]\nmethod = "{method}"\n'
 
@@ -126,7 +125,6 @@ KINDS = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Files of cases and proofs."""
     return tmp_path_factory.mktemp("proofs")
 
 
@@ -149,7 +147,6 @@ def _lines_are_whole(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def checked(cli: Run, folder: Path, name: str, content: object) -> tuple[int, str, str]:
-    """The check of a content of a proof's file."""
     file = saved(folder / "altered.json", json.dumps(content))
     return cli("verify-proof", str(file), str(folder / f"{name}.toml"), *KINDS[name].checks, "--all")
 
@@ -181,12 +178,10 @@ def others_of(value: object, rng: np.random.Generator) -> list[object]:
 
 
 def at_place(content: Any, place: Place) -> Any:  # noqa: ANN401 - any JSON
-    """The value at a place in a file's content."""
     return reduce(lambda inner, key: inner[key], place, content)
 
 
 def with_value(content: object, place: Place, value: object) -> Any:  # noqa: ANN401 - any JSON
-    """A copy of a file's content with another value at a place."""
     if not place:
         return value
     found = copy.deepcopy(content)

@@ -8,22 +8,19 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, case_of, output_of, refusal_of, rows_of, shipped_tables
+from builders import Array, Run, case_from, case_of, case_tables, ends, output_of, refusal_of, rows_of
 from path_cases import BASE, LEGS, PLATFORM, lengths_at, robot_of
 
-from screwsynth.nlp import Case, InputError, Outcome, json_data, load_result
-from screwsynth.nlp.proof.workspace.axis_ranges import AxisRange, axis_ranges
+from screwsynth.nlp import AxisRange, Case, InputError, Outcome, axis_ranges, json_data, load_result
 from screwsynth.nlp.results.axisranges import AxisRangesResult
 from screwsynth.nlp.results.schema import result_schema
 
 
 def hexapod(**limits: object) -> Case:
-    """LinuxCNC's hexapod with these limits."""
     return case_of("hexapod-linuxcnc", limits=limits)
 
 
 def moved(start: Array, axis: int, values: Array) -> Array:
-    """The pose with one of its coordinates at other values."""
     poses = np.tile(start, (len(values), 1))
     poses[:, axis] = values
     return poses
@@ -127,15 +124,11 @@ def test_ranges_of_strokes_are_cut_on_both_sides() -> None:
 
 
 def test_ranges_do_not_depend_on_the_unit_of_length() -> None:
-    tables = shipped_tables("hexapod-linuxcnc")
-    tables["limits"] = {"leg_length": {"min": 17, "max": 43}}
-    inches = axis_ranges(case_from(tables), [1, 2, 21, 0, 0.1, 0], axes=["x", "pitch"])
-    robot = tables["robot"] | {"parameters": {"x1": 26500, "x2": 11543, "x3": 0, "x4": 5}}
-    scaled = tables | {"units": {"length": "mm"}, "robot": robot, "pose": {"position": [0, 0, 20000]}}
-    scaled["limits"] = {"leg_length": {"min": 17000, "max": 43000}}
-    scaled["workspace"] = tables["workspace"] | {"position": [0, 0, 20000]}
-    scaled.pop("expect", None)
-    other = axis_ranges(case_from(scaled), [1000, 2000, 21000, 0, 0.1, 0], axes=["x", "pitch"])
+    inches = axis_ranges(hexapod(leg_length={"min": 17, "max": 43}), [1, 2, 21, 0, 0.1, 0], axes=["x", "pitch"])
+    tables = case_tables("hexapod-linuxcnc", units={"length": "mm"}, limits={"leg_length": ends(13000, 30000)})
+    tables["robot"]["parameters"] = {"x1": 26500, "x2": 11543, "x3": 0, "x4": 5}
+    tables["pose"]["position"] = tables["workspace"]["position"] = [0, 0, 20000]
+    other = axis_ranges(case_from(tables), [1000, 2000, 21000, 0, 0.1, 0], axes=["x", "pitch"])
     assert other.most == pytest.approx((1000 * inches.most[0], inches.most[1]))
     for one, two, scale in zip(inches.axes, other.axes, (1000, 1), strict=True):
         for end in ("lower", "upper"):
@@ -147,7 +140,7 @@ def test_ranges_do_not_depend_on_the_unit_of_length() -> None:
 
 def test_ranges_are_the_same_a_third_of_a_turn_farther() -> None:
     case, most = hexapod(leg_length={"min": 24, "max": 38}), (30, 0.5)
-    starts = [(4, 0, 20, 0, 0, 0), (4 * math.cos(math.radians(120)), 4 * math.sin(math.radians(120)), 20, 0, 0, 0)]
+    starts = [(4 * math.cos(turn), 4 * math.sin(turn), 20, 0, 0, 0) for turn in (0, 2 * math.pi / 3)]
     one, other = (axis_ranges(case, start, axes=["z", "yaw"], most=most).axes for start in starts)
     for a, b in zip(one, other, strict=True):
         assert (a.lower.value, a.upper.value) == pytest.approx((b.lower.value, b.upper.value), abs=1e-9)
@@ -173,27 +166,22 @@ def test_dependent_coordinates_move_with_those_that_the_robot_chooses() -> None:
 
 
 def test_what_is_no_pose_is_refused() -> None:
-    case = hexapod()
-    for start, words in (
-        ((0, 0, 20), "six finite"),
-        ((0, 0, 20, 0, 2.6, 0), "pitch = 148.969 deg: must be within 148"),
+    case, free = hexapod(), case_of("hexapod-linuxcnc", pose={"position": [0, 0, {"min": 1, "max": 2}]})
+    for given, options, words in (
+        (case, {"start": (0, 0, 20)}, "six finite"),
+        (case, {"start": (0, 0, 20, 0, 2.6, 0)}, "pitch = 148.969 deg: must be within 148"),
+        (case, {"axes": ["jaw"]}, "axis 'jaw'"),
+        (case, {"most": (1, 0)}, "positive"),
+        (free, {}, "free"),
     ):
         with pytest.raises(InputError, match=words):
-            axis_ranges(case, start)
-    with pytest.raises(InputError, match="axis 'jaw'"):
-        axis_ranges(case, axes=["jaw"])
-    with pytest.raises(InputError, match="positive"):
-        axis_ranges(case, most=(1, 0))
-    with pytest.raises(InputError, match="free"):
-        axis_ranges(
-            case_from(shipped_tables("hexapod-linuxcnc") | {"pose": {"position": [0, 0, {"min": 1, "max": 2}]}})
-        )
+            axis_ranges(given, **options)
 
 
 def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     out, table = tmp_path / "ranges.json", tmp_path / "ranges.csv"
-    given = ("path", "hexapod-linuxcnc", "--range", "--start", "1,0,20,0,0,10", "--most", "3,5")
-    shown = output_of(cli(*given, "--json", str(out), "--csv", str(table)))
+    command = ("path", "hexapod-linuxcnc", "--range", "--json", str(out), "--start")
+    shown = output_of(cli(*command, "1,0,20,0,0,10", "--most", "3,5", "--csv", str(table)))
     assert len(shown.splitlines()) <= 25
     assert "1, 0, 20 in; roll, pitch, yaw 0, 0, 10 deg" in shown
     result = json.loads(out.read_text())
@@ -206,20 +194,21 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     assert [each["factor"] for each in result["pairs"]] == [1.0] * 15
     axes = table.read_text().partition("\n\n")[0].partition("\n")[2]
     assert [row["limited below by"] for row in rows_of(axes)] == ["the largest range"] * 6
-    status, shown, _ = cli(
-        "path", "hexapod-linuxcnc", "--range", "--start", "0,0,50,0,0,0", "--json", str(tmp_path / "none.json")
-    )
+    status, shown, _ = cli(*command, "0,0,50,0,0,0")
     assert status == 1
-    none = json.loads((tmp_path / "none.json").read_text())
+    none = json.loads(out.read_text())
     jsonschema.validate(none, result_schema())
     assert none["faults"]
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--of", str(out)), "is no result of solve or evaluate")
     assert "leg_length limb 3+ above 43 in: 54.63139 in" in shown
-    refusal_of(cli("path", "hexapod-linuxcnc"), "the table [path], or the file of a path")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--along", "a.ngc"), "--along: is not for --range")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--unit", "mm"), "--unit: is not for --range")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--along", "a.ngc", "--most", "1,1"), "--most: needs --range")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--most", "1,-1"), "--most 1,-1: must be two positive")
+    for options, words in (
+        ("", "the table [path], or the file of a path"),
+        (f"--range --of {out}", "is no result of solve or evaluate"),
+        ("--range --along a.ngc", "--along: is not for --range"),
+        ("--range --unit mm", "--unit: is not for --range"),
+        ("--along a.ngc --most 1,1", "--most: needs --range"),
+        ("--range --most 1,-1", "--most 1,-1: must be two positive"),
+    ):
+        refusal_of(cli("path", "hexapod-linuxcnc", *options.split()), words)
     free = cli("path", "paper-4.1-helical", "--range")
     refusal_of(free, "paper-4.1-helical", "pose: has free numbers", "state it with --start")
 

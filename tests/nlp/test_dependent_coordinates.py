@@ -45,7 +45,6 @@ def bench() -> ModuleType:
 
 
 def asked(bench: ModuleType, name: str, *, position: Any = None, limits: Any = None, **rotation: Any) -> Any:
-    """A workspace of a robot, some of it stated otherwise."""
     home, place, turns, chosen, allowed = ROBOTS[name]
     file = f"{name}.toml"
     tables: dict[str, Any] = {

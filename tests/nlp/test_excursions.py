@@ -14,11 +14,10 @@ from builders import PUSH_UP, Array, Run, case_file, case_from, ends, output_of,
 from measures import circle_joints
 from path_cases import turns_of
 
-from screwsynth.nlp import Case, CaseError, case_text, compare, judge_workspace, solve
+from screwsynth.nlp import Case, CaseError, Solution, case_text, compare, judge_workspace, solve
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.solver.frames import pose_of
-from screwsynth.nlp.solver.solution import Solution
 
 LEGS = (0.7, 1.2)
 BASE: dict[str, Any] = {
@@ -60,13 +59,11 @@ def lengths_at(design: Case, excursions: list[tuple[float, ...]]) -> Array:
 
 
 def design_of(solution: Solution) -> Case:
-    """The design over the workspace of a solution."""
     assert solution.workspace.is_proved
     return solution.workspace.judgement.case
 
 
 def numbers_of(solution: Solution) -> dict[str, float]:
-    """The free numbers of a solution, by their names."""
     own = solution.outcomes[0].own
     return dict(zip((each.name for each in own.nlp.program.variables), own.x.tolist(), strict=True))
 
@@ -74,7 +71,6 @@ def numbers_of(solution: Solution) -> dict[str, float]:
 def test_the_workspace_moves_with_a_free_pose() -> None:
     solution = solve(case_from(tables()))
     design = design_of(solution)
-    # Limits hold at a dense sample, and one is reached.
     rng = np.random.default_rng(0)
     inside = rng.uniform([-0.1, -0.1, -0.1, -10, -10], [0.1, 0.1, 0.1, 10, 10], (20_000, 5))
     corners = itertools.product((-0.1, 0.1), (-0.1, 0.1), (-0.1, 0.1), (-10, 10), (-10, 10))
@@ -139,7 +135,6 @@ def test_a_robot_whose_loops_decide_numbers_of_the_pose() -> None:
     solution = solve(case_from(given))
     position = list(design_of(solution).position)
     assert len(position) == 3
-    # Constraints at further poses lowered F, and the same robot with the workspace in world coordinates is as good.
     assert len(solution.workspace.history) > 1
     place = [ends(0.04), ends(0.04), ends(0.05, position[2])]
     fixed = given | {"pose": {"position": position}, "workspace": {"position": place, "rotation": turns}}
@@ -188,7 +183,6 @@ def test_the_box_in_world_coordinates_is_that_of_all_excursions(
 
 
 def _stated(case: Case) -> tuple[Array, Array, float]:
-    """Rotation matrix, axis and angle of the stated pose."""
     axis, angle = np.array(case.rotation.axis, dtype=float), float(case.rotation.angle)
     return turn_about(axis, angle), axis, angle
 
@@ -198,21 +192,18 @@ def _names(rotation: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _ends(rotation: dict[str, Any], name: str) -> tuple[float, float]:
-    """Ends of an angle, radians."""
     stated = rotation.get(name, 0.0)
     low, high = (stated["min"], stated["max"]) if isinstance(stated, dict) else (stated, stated)
     return math.radians(low), math.radians(high)
 
 
 def _turn(rotation: dict[str, Any], angles: list[float], axis: Array) -> Array:
-    """The rotation of an excursion."""
     if len(angles) == 3:
         return turns_of(np.array([angles]))[0]
     return turn_about(rotation.get("axis", axis), angles[0])
 
 
 def _random_turn(rotation: dict[str, Any], rng: np.random.Generator) -> Array:
-    """The rotation of a random excursion."""
     if not rotation:
         return np.eye(3)
     return _turn(rotation, [rng.uniform(*_ends(rotation, name)) for name in _names(rotation)], rng.normal(size=3))
@@ -302,11 +293,10 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     assert high >= height + 0.1
     code, _, err = cli("verify-proof", proof, str(file), "--of", result, "--set", "p_z=0.8")
     assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
-    assert "scale  1" in output_of(cli("workspace", str(file), "--of", result, "--scale", "--time", "20"))
+    assert "scale  1" in output_of(cli("workspace", str(file), "--of", result, "--scale", "--time", "8"))
     assert cli("path", str(file), "--range", "--of", result, "--time", "3")[::2] in ((0, ""), (1, ""))
     output_of(cli("codegen", str(file), "--out", str(tmp_path / "c"), "--no-measure"))
     assert cli("evaluate", str(file), "--of", result)[0] == 0
-    # A result of a case with another name has the pose too.
     other = case_file(tmp_path, BASE, "other.toml")
     code, out, err = cli("workspace", str(other), "--of", result)
     assert (code, err) == (0, f"--of {result}: has the dimensions and the pose of the case 'base'\n")

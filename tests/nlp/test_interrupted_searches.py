@@ -22,13 +22,9 @@ from workspace_cases import problem_of
 import screwsynth.nlp
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Nlp, load_case, solve, sweep
-from screwsynth.nlp.case.limits.limits import Limits
-from screwsynth.nlp.case.pose import Free
-from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp import Case, Free, Limits, Nlp, build_model, certify, formulate, load_case, solve, sweep
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import STOPPED, is_requested, one_call
-from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.boxes.optimum import OptimumRule
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
@@ -47,7 +43,6 @@ from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
-from screwsynth.nlp.solver.certified import certify
 
 ROOT = Path(screwsynth.nlp.__file__).parent
 #: The code whose instructions are counted: all of the searches, or their loops alone, where most mistakes would be.
@@ -116,7 +111,6 @@ def six_legs_problem() -> Problem:
 
 
 def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> RankVerdict:
-    """The verdict on the rank of the rows of these legs."""
     problem = six_legs_problem()
     return prove_rank(problem, problem.locked, most_boxes=most_boxes, progress=progress)
 
@@ -136,7 +130,6 @@ def any_rank() -> Claim:
 
 
 def workspace_case(name: str, width: float, turn: float, tolerance: float | None = None, **limits: object) -> Case:
-    """A robot of the gallery about its home."""
     model = build_model(name)
     home, numbers = model.home, {item.name: item.typical[0] for item in model.parameters}
     task = PUSH_UP | {"point": [0, 0, 0], "pitch": 0.1}
@@ -279,7 +272,6 @@ each_search = pytest.mark.parametrize("search", SEARCHES, ids=lambda each: each.
 @each_search
 def test_an_interrupted_search_claims_no_more_than_a_complete_one(search: Search) -> None:
     assert interrupted(search, KeyboardInterrupt, LOOPS, 32 if search in QUICK else 3, 0) > 0
-    # Other errors are answered by no search.
     assert interrupted(search, MemoryError, LOOPS, 1, 1) == 0
 
 

@@ -10,15 +10,11 @@ import pytest
 from builders import Array, Run, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from path_cases import HOME, delta_angles, extreme, hexapod, lengths_at, program, robot_of, table, turns_of
+from path_cases import HOME, delta_angles, extreme, halved, hexapod, lengths_at, program, robot_of, table, turns_of
 
-from screwsynth.nlp import Outcome, interruption, judge_workspace
-from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp import Outcome, PathOptions, ProgrammedPath, Sense, Units, interruption, judge_workspace
 from screwsynth.nlp.path.gcode import read_program
-from screwsynth.nlp.path.options import PathOptions
-from screwsynth.nlp.path.path import ProgrammedPath
 from screwsynth.nlp.proof.workspace.path_judge import covered, judge_path
-from screwsynth.nlp.units import Units
 
 #: Points of each segment at which machines are measured.
 SAMPLES = np.linspace(0, 1, 4001)
@@ -40,7 +36,6 @@ def points_of(path: ProgrammedPath, k: int, s: Array) -> Array:
 
 
 def sampled_lengths(path: ProgrammedPath) -> Array:
-    """Lengths (N, 6) of the legs at samples of all segments."""
     return np.concatenate([lengths_at(points_of(path, k, SAMPLES)) for k in range(len(path))])
 
 
@@ -53,11 +48,7 @@ def sampled_lengths(path: ProgrammedPath) -> Array:
     st.floats(0, 1),
 )
 def test_boxes_of_pieces_hold_their_points(
-    ends: tuple[float, ...],
-    plane: tuple[int, str],
-    arc: tuple[float, float, float, int],
-    halves: list[bool],
-    part: float,
+    ends: tuple[float, ...], plane: tuple[int, str], arc: tuple[float, ...], halves: list[bool], part: float
 ) -> None:
     (code, letters), (radius, angle, sweep, turns) = plane, arc
     first, second = {17: "XY", 18: "ZX", 19: "YZ"}[code]
@@ -71,10 +62,7 @@ def test_boxes_of_pieces_hold_their_points(
     start = (*ends[:3], *ends[6:9])
     path = read_program(text.split("\n"), "part.ngc", Units("mm"), PathOptions(start=start))
     cover = covered(path, 1.0)[0]
-    low, high = 0.0, 1.0
-    for is_upper in halves:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if is_upper else (low, middle)
+    low, high = halved(halves)
     for k in range(len(path)):
         lower, upper = cover.boxes(np.array([[k, low, high]]))
         s = np.array([low, high, min(max(low + part * (high - low), low), high)])
@@ -119,7 +107,6 @@ def test_a_limit_is_refuted_in_the_first_line_that_leaves_it() -> None:
     of_longest = [each for each in lengths_alone if each.sense is Sense.MAX]
     sampled = sampled_lengths(path)
     assert [each.outcome is Outcome.REFUTED for each in of_longest] == (sampled.max(axis=0) > 33.5).tolist()
-    # Without time nothing is proved.
     stopped = judge_path(hexapod({"max": 50}), path, time_limit=0)
     assert {each.outcome for each in (*stopped.ranks, *stopped.extremes)} == {Outcome.OPEN}
     assert not stopped.is_proved
@@ -337,15 +324,15 @@ def test_the_command_writes_a_result_and_says_how_it_ended(cli: Run, tmp_path: P
 @pytest.mark.parametrize("turn", [1e-8, 1e-6])
 def test_a_turn_that_is_too_small_for_ranks_is_one_all_the_same(turn: float) -> None:
     """A Delta cannot turn, however little: a path that turns it stays open, and over a workspace its angle is 0."""
-    tables = starter_tables("delta")
+    tables = starter_tables("delta") | {"limits": {}}
     tables["robot"]["parameters"] |= {"rb": 0.164, "arm": 0.2, "rod": 0.9}
-    case = case_from(tables | {"limits": {}})
+    case = case_from(tables)
     judged = judge_path(case, table(case, [(0, 0, -0.95, 0, 0, 0), (0.1, 0.01, -0.95, 0, 0, turn)]))
     assert not judged.is_proved
     position = [{"min": -0.05, "max": 0.05}, 0, {"min": -0.96, "max": -0.94}]
     for most in (turn, 0.1):
         turns = {"axis": [0, 0, 1], "angle": {"min": -most, "max": most}}
-        case = case_from(tables | {"limits": {}, "workspace": {"position": position, "rotation": turns}})
+        case = case_from(tables | {"workspace": {"position": position, "rotation": turns}})
         found = judge_workspace(case, time_limit=1 if most == turn else 60, with_objective=False)
         # Bounds tell nothing as small as rounding.
         assert not found.is_refuted

@@ -12,13 +12,10 @@ import pytest
 from builders import Array, Run, case_from, output_of, refusal_of, saved, shipped_tables
 from path_cases import BASE, HOME, LEGS, PLATFORM, delta_angles, hexapod, program, robot_of, table
 
-from screwsynth.nlp import Case, Outcome, inverse
+from screwsynth.nlp import Case, Extreme, Outcome, ProgrammedPath, Sense, inverse
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.path.options import Between
 from screwsynth.nlp.path.orientation import ORDERS
-from screwsynth.nlp.path.path import ProgrammedPath
-from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
 from screwsynth.nlp.proof.workspace.path_knots import Knots, Sampling
 from screwsynth.nlp.proof.workspace.robot.path_cover import PathCover
@@ -35,11 +32,13 @@ def coordinates(case: Case, path: ProgrammedPath, k: int, s: Array = SAMPLES) ->
     return np.asarray(found.coordinates)
 
 
+def speeds_on(case: Case, path: ProgrammedPath, k: int) -> Array:
+    return np.abs(np.diff(coordinates(case, path, k), axis=0)) * (len(SAMPLES) - 1) / path.durations[k]
+
+
 def sampled_speeds(case: Case, path: ProgrammedPath) -> Array:
     """Mean speeds (N, a) between samples: none is above the largest speed."""
-    timed = [k for k in range(len(path)) if np.isfinite(path.durations[k])]
-    steps = [np.abs(np.diff(coordinates(case, path, k), axis=0)) / path.durations[k] for k in timed]
-    return np.concatenate(steps) * (len(SAMPLES) - 1)
+    return np.concatenate([speeds_on(case, path, k) for k in np.flatnonzero(np.isfinite(path.durations))])
 
 
 def largest(judged: PathJudgement, number: str) -> list[Extreme]:
@@ -91,7 +90,6 @@ def test_speeds_on_arcs_are_those_of_dense_samples_and_rapid_motions_have_none()
     for found, most in zip(largest(judged, "actuator_speed"), sampled, strict=True):
         assert most <= found.bound * (1 + 1e-9)
         assert found.bound <= 1.01 * most
-    # Without any time there are no speeds.
     rapid = judge_path(case, program(case, "G0 X3 Y1\nM2", HOME))
     assert not largest(rapid, "actuator_speed")
 
@@ -101,10 +99,7 @@ def test_a_limit_on_speeds_is_that_of_the_path_and_names_the_first_line_beyond_i
     text = "G20 G94 F60 G90\nG0 X0 Y0 Z20 A0 B0 C0\nG1 X1\nG0 Z21\nF120 G1 X1.5 Z20\nG1 A3\nF300 X-2 Y1\nM2"
     saved(part, text)
     path = program(case, text)
-    sampled = [
-        np.abs(np.diff(coordinates(case, path, k), axis=0)).max() * (len(SAMPLES) - 1) / path.durations[k]
-        for k in range(len(path))
-    ]
+    sampled = [speeds_on(case, path, k).max() for k in range(len(path))]
     limit = 1.5 * sampled[0]
     line = int(path.lines[next(k for k, each in enumerate(sampled) if each > limit)])
     tables = shipped_tables("hexapod-linuxcnc")
@@ -160,16 +155,13 @@ def test_limits_on_speeds_and_powers_need_a_motion_of_the_case_or_of_the_path(cl
 
 
 def knots_along(case: Case, path: ProgrammedPath, within: float) -> Knots:
-    knots = judge_path(case, path, sampling=Sampling(within=within)).knots
-    assert knots is not None
-    return knots
+    return judge_path(case, path, sampling=Sampling(within=within)).knots
 
 
 def leg_lengths(x: Array) -> Array:
     """Lengths (N, 6) of LinuxCNC's hexapod at positions and rotation vectors (N, 6), small ones."""
     angle = np.linalg.norm(x[:, 3:], axis=1)[:, None, None]
     axis = x[:, None, 3:] / np.maximum(angle, 1e-300)
-    # Rodrigues' formula.
     along = np.sum(axis * PLATFORM, axis=2)[:, :, None] * axis
     turned = np.cos(angle) * (PLATFORM - along) + np.sin(angle) * np.cross(axis, PLATFORM) + along
     return np.asarray(np.linalg.norm(x[:, None, :3] + turned - BASE, axis=2))
@@ -243,7 +235,6 @@ def test_knots_that_cannot_be_shown_are_said_to_be_open() -> None:
     # Arms and rods are 1.768 long together.
     path = table(case, np.array([[0, 0, -1.2, 0, 0, 0], [0, 0, -3.0, 0, 0, 0]]), np.array([0.0, 1.0]))
     judged = judge_path(case, path, sampling=Sampling(within=1e-3))
-    assert judged.knots is not None
     assert judged.knots.reason
     assert judged.knots.deviation is None
     assert not judged.is_proved

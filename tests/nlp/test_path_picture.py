@@ -11,11 +11,10 @@ import pytest
 from builders import Array, Run, case_from, refusal_of, saved, shipped_tables
 from path_cases import BASE, PLATFORM, leg_lengths, robot_of, turns_of
 
-from screwsynth.nlp import Case, inverse
+from screwsynth.nlp import Case, PathOptions, inverse
 from screwsynth.nlp.output.pictures.pathpanels import PathPicture, path_picture
 from screwsynth.nlp.output.pictures.paths import path_figure
 from screwsynth.nlp.output.report.path import path_page
-from screwsynth.nlp.path.options import PathOptions
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.path.sampling import WayKind, spread_points, way_of
 from screwsynth.nlp.proof.workspace.path_judge import judge_path
@@ -43,7 +42,6 @@ def spindle() -> PathPicture:
 
 
 def poses_at(t: Array) -> tuple[Array, Array]:
-    """Positions and rotations at times."""
     p = np.stack([np.interp(t, KNOTS[:, 0], column) for column in KNOTS[:, 1:].T], axis=1)
     return p[:, :3], turns_of(np.radians(p[:, 3:]))
 
@@ -60,7 +58,6 @@ def spans(t: Array) -> tuple[Array, Array]:
 
 
 def panel(picture: PathPicture, title: str) -> Array:
-    """The values (N, curves) of a panel."""
     (found,) = (each for each in picture.panels if each.title == title)
     return np.stack([each.values for each in found.curves], axis=1)
 

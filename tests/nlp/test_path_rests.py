@@ -11,15 +11,13 @@ from builders import PUSH_UP, Array, Run, case_of, output_of, rows_of, saved
 from measures import circle_joints, segment_distance
 from path_cases import hexapod, program, robot_of
 
-from screwsynth.nlp import Case, InputError, Outcome
-from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp import Case, InputError, Outcome, Sense, Units
 from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.path import Kind, ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace import path_faults
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
-from screwsynth.nlp.units import Units
 
 MM = Units("mm", "deg", "N")
 SLERP = PathOptions(between=Between.SLERP)
@@ -69,7 +67,6 @@ def test_rounding_is_neither_a_motion_nor_a_time(
     path = table("\n".join(rows), columns)
     assert [Kind(each) for each in path.kinds] == kinds
     np.testing.assert_allclose(path.durations, seconds, rtol=1e-12)
-    # A dwell is at one pose.
     for k in np.flatnonzero(path.kinds == Kind.DWELL):
         assert np.array_equal(path.knots[k], path.knots[k + 1])
 
@@ -319,7 +316,6 @@ def test_a_hexapod_is_singular_on_the_way_round() -> None:
     assert rank.place.parameter == pytest.approx(1 / 8, abs=1e-9)
     lengths = [each for each in judged.extremes if each.name.startswith("leg_length")]
     assert len(lengths) == 12
-    # All legs take part in the same motion.
     for sense in Sense:
         ends = [each.reached for each in lengths if each.sense is sense]
         np.testing.assert_allclose(ends, ends[0], rtol=2e-3)

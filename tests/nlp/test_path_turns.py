@@ -9,18 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, commands_in, output_of, refusal_of, saved, shipped_tables
+from builders import Array, Run, commands_in, output_of, refusal_of, saved, turn_about
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from path_cases import hexapod, leg_lengths, program, robot_of, table
 
-from screwsynth.nlp import Case, InputError, Outcome
-from screwsynth.nlp.case.loads import Load, Loading
-from screwsynth.nlp.case.workspace import TurnKind
+from screwsynth.nlp import Case, InputError, Load, Loading, Outcome, ProgrammedPath, TurnKind
 from screwsynth.nlp.path.frame import PathFrame
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.orientation import ORDERS
-from screwsynth.nlp.path.path import ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace import path_judge
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
@@ -237,9 +234,7 @@ def test_velocities_hold_those_of_small_turns(between: Between, order: str, plac
 
 
 def about(axis: Array, angles: Array) -> Array:
-    """Rotations (n, 3, 3) about a unit axis, by the series of Rodrigues."""
-    K = np.cross(np.eye(3), axis)
-    return np.eye(3) + np.sin(angles)[:, None, None] * K + (1 - np.cos(angles))[:, None, None] * (K @ K)
+    return np.array([turn_about(axis, angle) for angle in angles])
 
 
 def angled(start: Array, end: Array, order: str) -> tuple[Array, Array]:
@@ -280,7 +275,6 @@ def test_legs_are_those_of_dense_samples(how: str, rows: Array) -> None:
         end = each.sense.sign * (each.sense.sign * sampled[:, k // 2]).max()
         assert each.sense.sign * (each.bound - end) > -1e-9
         assert each.bound == pytest.approx(end, rel=2e-3)
-        # The pose that reaches it is one of the path.
         here = leg_lengths(each.pose.position[None], each.pose.rotation[None])[0, k // 2]
         assert here == pytest.approx(each.reached, rel=1e-12)
         s = each.place.parameter
@@ -313,23 +307,22 @@ def test_both_rules_of_roll_pitch_and_yaw_give_the_same_verdicts(
         same = other.faults[claim]
         assert same.place.segment == fault.place.segment
         assert same.place.parameter == pytest.approx(fault.place.parameter, abs=1e-9)
-    # Forces, speeds and powers too.
     assert len(own.extremes) == 12 + 6 * (1 + 2 + 2)
     for one, also in zip(own.extremes, other.extremes, strict=True):
         assert one.reached == pytest.approx(also.reached, rel=2e-3, abs=1e-3)
 
 
 def test_every_number_is_the_same_in_all_coordinates(monkeypatch: pytest.MonkeyPatch) -> None:
-    tables = shipped_tables("hexapod-linuxcnc")
-    tables["limits"] = {"base_joint_angle": {"max": 60}, "platform_joint_angle": {"max": 80}}
-    tables["load"] = [{"name": "push", "force": [1, 2, -10]}]
-    case = case_from(tables)
+    limits = {"base_joint_angle": {"max": 60}, "platform_joint_angle": {"max": 80}}
+    case = hexapod(limits=limits, load=[{"name": "push", "force": [1, 2, -10]}])
     # Where yaw alone varies, both motions are the same.
     path = table(case, np.array([(0, 0, 20, 0, 0, -20), (1, 1, 21, 0, 0, 25.0)]))
-    every = [turns_of_path(path), turns_of_path(replace(path, between=Between.SLERP))]
-    every.append(LinearAngles(path.knots[:, 3:], path.order, (8, 1, -2, 3)))
     judged = []
-    for turns in every:
+    for turns in (
+        turns_of_path(path),
+        turns_of_path(replace(path, between=Between.SLERP)),
+        LinearAngles(path.knots[:, 3:], path.order, (8, 1, -2, 3)),
+    ):
         monkeypatch.setattr(path_judge, "turns_of_path", lambda _, turns=turns: turns)
         judged.append(judge_path(case, path))
     own, *others = judged
@@ -350,13 +343,12 @@ def test_every_number_is_the_same_in_all_coordinates(monkeypatch: pytest.MonkeyP
 def test_a_singular_pose_is_crossed_or_touched_by_turns(between: Between) -> None:
     # The octahedral platform is singular where it is turned by a right angle.
     case = hexapod()
-    rows = np.array([(0, 0, 20, 0, 0, 70), (0, 0, 20, 0, 0, 110.0)])
-    crossed = judge_path(case, table(case, rows, between=between)).ranks[0]
-    assert crossed.outcome is Outcome.REFUTED
+    crossed, touched = (
+        judge_path(case, table(case, [(0, 0, 20, 0, 0, yaw) for yaw in yaws], between=between)).ranks[0]
+        for yaws in ((70, 110), (60, 90, 80))
+    )
+    assert crossed.outcome is touched.outcome is Outcome.REFUTED
     assert crossed.place.parameter == pytest.approx(0.5, abs=1e-9)
-    rows = np.array([(0, 0, 20, 0, 0, 60), (0, 0, 20, 0, 0, 90), (0, 0, 20, 0, 0, 80.0)])
-    touched = judge_path(case, table(case, rows, between=between)).ranks[0]
-    assert touched.outcome is Outcome.REFUTED
     assert math.degrees(touched.pose.angle) == pytest.approx(90, abs=1e-5)
 
 

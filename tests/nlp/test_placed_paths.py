@@ -11,16 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, saved, shipped_tables, starter_tables
+from builders import Array, Run, case_file, case_from, output_of, saved, shipped_tables, starter_tables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
-from path_cases import BASE, LEGS, PLATFORM, delta_angles, extreme, hexapod, turns_of
+from path_cases import BASE, LEGS, PLATFORM, delta_angles, extreme, halved, hexapod, turns_of
 
-from screwsynth.nlp import Case, load_case
-from screwsynth.nlp.case.task import Sense
-from screwsynth.nlp.case.toml import toml_document
-from screwsynth.nlp.case.workspace import TurnKind
+from screwsynth.nlp import Case, Outcome, Sense, TurnKind, load_case
 from screwsynth.nlp.path.options import Between
 from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.path import Kind, ProgrammedPath
@@ -28,7 +25,6 @@ from screwsynth.nlp.path.placing import placed
 from screwsynth.nlp.path.reader import path_of_case
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, covered, judge_path
 from screwsynth.nlp.proof.workspace.robot.long_turns import turns_of_path
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 Matrix = list[list[Decimal]]
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
@@ -58,13 +54,11 @@ def product(A: Matrix, B: Matrix) -> Matrix:
 
 
 def turned(angles: Sequence[float]) -> Matrix:
-    """Exact rotation of roll, pitch and yaw."""
     roll, pitch, yaw = map(Decimal, angles)
     return product(product(about(2, yaw), about(1, pitch)), about(0, roll))
 
 
 def moved(place: Sequence[float], point: Sequence[Decimal]) -> list[Decimal]:
-    """Exact position in the world of a point of a frame."""
     R = turned(place[3:])
     return [
         Decimal(t) + sum((a * b for a, b in zip(row, point, strict=True)), Decimal(0))
@@ -99,10 +93,7 @@ def test_boxes_hold_exact_positions_of_arcs_in_tilted_planes(
     """Positions of 40 digits are in the boxes; these are no wider than the way, and rounding."""
     path = placed(arc_of(arc, plane, heights, np.zeros((2, 3))), place)
     cover = covered(path, 1.0)[0]
-    low, high = 0.0, 1.0
-    for is_upper in halves:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if is_upper else (low, middle)
+    low, high = halved(halves)
     lower, upper = (each[0].tolist() for each in cover.boxes(np.array([[0, low, high]])))
     slow, fast = (each[0].tolist() for each in cover.derivatives(np.array([[0, low, high]])))
     first, second, radius, growth, angle, sweep = map(Decimal, path.arcs[0].tolist())
@@ -149,10 +140,7 @@ def test_boxes_hold_exact_positions_of_lines_with_turns(
     path = placed(own, place)
     if path.frame is None:
         return
-    low, high = 0.0, 1.0
-    for is_upper in halves:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if is_upper else (low, middle)
+    low, high = halved(halves)
     cover = covered(path, 1.0)[0]
     lower, upper = (each[0].tolist() for each in cover.boxes(np.array([[0, low, high]])))
     slow, fast = (each[0].tolist() for each in cover.derivatives(np.array([[0, low, high]])))
@@ -282,9 +270,8 @@ def test_rolls_and_pitches_of_a_path_and_the_design_are_the_best_of_a_grid(cli: 
     place = {"x": 1.0, "y": 1.0, "z": 19.0, "roll": free, "pitch": free}
     tables |= {"limits": {"over": "path", "leg_length": {"min": 21, "max": 30}}, "solve": {"starts": 3}}
     tables["path"] = {"file": str(saved(tmp_path / "part.ngc", text)), "place": place}
-    case, out = saved(tmp_path / "case.toml", toml_document(tables)), tmp_path / "out.json"
-    code, shown, error = cli("solve", str(case), "--json", str(out))
-    assert code == 0, (shown, error)
+    case, out = case_file(tmp_path, tables), tmp_path / "out.json"
+    output_of(cli("solve", str(case), "--json", str(out)))
     result = json.loads(out.read_text())
     assert result["path"]["proved"]
     own = path_of_case(load_case(str(case), {f"path.place.{name}": 0.0 for name in ("x", "y", "z", "roll", "pitch")}))
@@ -294,7 +281,6 @@ def test_rolls_and_pitches_of_a_path_and_the_design_are_the_best_of_a_grid(cli: 
     bases = [circle_joints({"x1": each, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})[0] for each in radius]
 
     def kept(roll: float, pitch: float) -> Array:
-        """Whether designs keep their limits at all samples."""
         R = matrix((0, 0, 0, *np.radians([roll, pitch, 0])))
         tips = (poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, PLATFORM)) @ R.T + [1, 1, 19]
         lengths = np.linalg.norm(tips[None] - np.array(bases)[:, None], axis=3)
@@ -310,8 +296,7 @@ def test_rolls_and_pitches_of_a_path_and_the_design_are_the_best_of_a_grid(cli: 
     # The grid has steps of half a degree, and the solve none.
     assert radius[best] * (1 - 2e-2) < result["parameters"]["x1"] < radius[best] * (1 + 5e-3)
     assert kept_design(result, poses.positions, poses.rotations)
-    code, shown, error = cli("path", str(case), "--of", str(out))
-    assert code == 0, (shown, error)
+    output_of(cli("path", str(case), "--of", str(out)))
 
 
 def kept_design(result: dict[str, Any], positions: Array, rotations: Array) -> bool:
@@ -332,7 +317,7 @@ def test_rows_of_actuators_have_poses_in_the_world(cli: Run, tmp_path: Path) -> 
     for text, is_proved in ((PLAIN, True), (PROGRAM, False)):
         saved(tmp_path / "part.ngc", text)
         tables["path"] = {"file": str(tmp_path / "part.ngc"), "place": table}
-        case, rows = saved(tmp_path / "case.toml", toml_document(tables)), tmp_path / "rows.csv"
+        case, rows = case_file(tmp_path, tables), tmp_path / "rows.csv"
         code, shown, error = cli("path", str(case), "--csv", str(rows), "--within", "0.02")
         assert (code == 0) == is_proved, (shown, error)
         head, *lines = rows.read_text().splitlines()

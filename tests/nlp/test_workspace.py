@@ -12,13 +12,22 @@ import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
-from builders import Run, case_from, edited, output_of, refusal_of, saved, soaked, starter_text
-from hexapods import HEXAPOD, bounds_of, case_of_legs, clearance, hexapod_text, smallest, subject_of, values_of
+from builders import Run, case_from, edited, ends, output_of, refusal_of, saved, soaked, starter_text
+from hexapods import (
+    HEXAPOD,
+    bounds_of,
+    case_of_legs,
+    clearance,
+    hexapod_text,
+    singular_part,
+    smallest,
+    subject_of,
+    values_of,
+)
 from workspace_cases import exact_rows, turned
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, CaseError, Free, Limits, json_data, load_result, solve
-from screwsynth.nlp.case.reader import load_case
+from screwsynth.nlp import Case, CaseError, Free, Limits, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.enclosure.forms import Encloser
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of
@@ -31,7 +40,6 @@ from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.slices.slices import Region, slices_of
 from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
-from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
 
@@ -61,7 +69,6 @@ def case(machine: Path) -> Case:
 
 
 def regular(robot: Legs, box: PoseBox, *, most_boxes: int) -> RankVerdict:
-    """The verdict on the rank of the rows of six legs."""
     problem = build_problem(case_of_legs(robot), HEXAPOD, box)
     return prove_rank(problem, problem.locked, most_boxes=most_boxes)
 
@@ -95,12 +102,7 @@ def test_the_machine_is_regular_up_to_an_angle(
         positive, negative = determinants(legs_of(case), box, found.sides)
         assert positive * negative < 0
         assert all(box.holds(y) for y in found.sides)
-        pose = box.pose(found.y)
-        arm = legs_of(case).platform @ pose.rotation.T
-        span = pose.position + arm - legs_of(case).base
-        J = np.hstack([span, np.cross(arm, span)]) / np.linalg.norm(span, axis=1, keepdims=True)
-        values = np.linalg.svd(J, compute_uv=False)
-        assert values[-1] < 1e-10 * values[0]
+        assert singular_part(legs_of(case), box.pose(found.y)) < 1e-10
 
 
 @pytest.mark.parametrize("kind", list(TurnKind))
@@ -113,11 +115,8 @@ def test_expansions_enclose_exact_rows_and_a_wrong_one_does_not(case: Case, kind
     problem = subject_of(robot, box).problem
     c, a, r = Encloser(problem.z, ca.vec(ca.densify(problem.posed.scaled.rows).T)).second(lower.T, upper.T)
     units = np.array([1.0, 1.0, 1.0, *[problem.length] * 3])
-    middle, slopes, rest = (
-        c.reshape(-1, 6, 6) * units,
-        a.reshape(40, 6, 6, -1) * units[:, None],
-        r.reshape(-1, 6, 6) * units,
-    )
+    middle, rest = (each.reshape(-1, 6, 6) * units for each in (c, r))
+    slopes = a.reshape(40, 6, 6, -1) * units[:, None]
     wrong, unrounded = 0, 0
     for k in range(40):
         c = 0.5 * lower[k] + 0.5 * upper[k]
@@ -202,9 +201,9 @@ def test_the_smallest_clearance_is_met_within_the_gap(case: Case) -> None:
 def test_lengths_of_legs_agree_with_samples(case: Case) -> None:
     judged = judge_workspace(case, with_objective=False)
     assert judged.is_proved
-    points = pose_box(judged.workspace).random(100_000, np.random.default_rng(2))
-    robot, box = legs_of(case), pose_box(judged.workspace)
-    lengths = np.linalg.norm(spans(robot, box, points), axis=2)
+    box = pose_box(judged.workspace)
+    points = box.random(100_000, np.random.default_rng(2))
+    lengths = np.linalg.norm(spans(legs_of(case), box, points), axis=2)
     by_name = {(each.name, each.sense.value): each for each in judged.extremes}
     for i, leg in enumerate(case.model.legs):
         short, long = (by_name[f"leg_length limb {leg.name}", sense] for sense in ("min", "max"))
@@ -272,10 +271,7 @@ def test_the_command_proves_and_refutes(cli: Run, machine: Path, tmp_path: Path)
         ({"position": [0, 0, 20], "rotation": {"angle": 10}}, "workspace.rotation.angle"),
         ({"position": [0, 0, 20], "rotation": {"angle": {"min": -5, "max": 9}}}, "workspace.rotation.angle"),
         ({"position": [0, 0, 20], "rotation": {"roll": 5, "axis": [0, 0, 1]}}, "workspace.rotation.roll"),
-        (
-            {"position": [0, 0, 20], "rotation": {"axis": [0, 0, 0], "angle": {"min": 0, "max": 9}}},
-            "workspace.rotation.axis",
-        ),
+        ({"position": [0, 0, 20], "rotation": {"axis": [0] * 3, "angle": ends(4, 5)}}, "workspace.rotation.axis"),
         ({"position": [0, 0, 20], "rotation": {"pitch": {"min": 0, "max": 170}}}, "workspace.rotation.pitch.max"),
         ({"position": [0, 0, 20], "rotation": {}}, "workspace.rotation.angle: is missing"),
         ({"position": [0, 0]}, "workspace.position"),
@@ -358,8 +354,13 @@ def test_limits_over_a_workspace_need_one(old: str, new: str, message: str) -> N
 
 
 @pytest.mark.slow
-def test_the_shipped_design_violates_nothing_at_many_poses() -> None:
-    proof = solve(load_case("hexapod-workspace")).workspace
+def test_the_shipped_design_violates_nothing_at_many_poses_and_its_proof_is_accepted(cli: Run, tmp_path: Path) -> None:
+    result, target = tmp_path / "result.json", str(tmp_path / "proof.json")
+    solution = solve(load_case("hexapod-workspace"), starts=4)
+    saved(result, json.dumps(solution.to_dict()))
+    output_of(cli("workspace", "hexapod-workspace", "--of", str(result), "--gap", "2e-4", "--proof", target))
+    assert output_of(cli("verify-proof", target)).startswith("holds: 58 of 58 claims")
+    proof = solution.workspace
     assert proof.is_proved
     robot, box = legs_of(proof.judgement.case), pose_box(proof.judgement.workspace)
     rng = np.random.default_rng(10)
@@ -400,7 +401,6 @@ def test_slices_show_where_the_determinant_has_which_sign(case: Case, cli: Run, 
     values = determinants(legs_of(case), pose_box(wide.workspace), points)
     for region, sign in ((Region.REGULAR, -1), (Region.BEYOND, 1)):
         assert (np.sign(values[[each is region for each in tilts.regions]]) == sign).all()
-    # The boxes cover the slice.
     area = np.prod(np.diff(np.tan(tilts.boxes.reshape(-1, 2, 2) / 2), axis=1), axis=2).sum()
     assert area == pytest.approx(np.prod(np.diff(np.tan(tilts.whole / 2), axis=0)))
     picture = tmp_path / "slices.svg"
@@ -418,24 +418,16 @@ def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme:
     rng = np.random.default_rng(11)
     points = box.random(count, rng)
     if extreme:
-        points = np.where(
-            rng.uniform(size=points.shape) < 0.8,
-            np.where(points > 0.5 * (box.lower + box.upper), box.upper, box.lower),
-            points,
-        )
-        points = box.clipped(points)
+        nearest = np.where(points > 0.5 * (box.lower + box.upper), box.upper, box.lower)
+        points = box.clipped(np.where(rng.uniform(size=points.shape) < 0.8, nearest, points))
     start = box.rotations(points)
-    turn, position = start.copy(), points[:, :3].copy()
-    span = position[:, None] + np.einsum("kij,lj->kli", turn, robot.platform) - robot.base
+    turn, position, span = start.copy(), points[:, :3].copy(), spans(robot, box, points)
     lengths = np.linalg.norm(span, axis=2)
     if extreme:
         signs = rng.choice([-1.0, 1.0], (count, 6))
         wanted = lengths + eps / 2 * signs
-        along = np.einsum("kji,klj->kli", turn, span / lengths[:, :, None])
-        base, platform = (
-            robot.base + eps / 4 * signs[:, :, None] * span / lengths[:, :, None],
-            robot.platform - eps / 4 * signs[:, :, None] * along,
-        )
+        along = eps / 4 * signs[:, :, None] * span / lengths[:, :, None]
+        base, platform = robot.base + along, robot.platform - np.einsum("kji,klj->kli", turn, along)
     else:
         wanted = lengths + eps / 2 * rng.uniform(-1, 1, (count, 6))
         directions = rng.normal(size=(2, count, 6, 3))
@@ -450,20 +442,14 @@ def random_errors(robot: Legs, box: PoseBox, eps: float, count: int, *, extreme:
         position += step[:, :3]
         half = np.concatenate([np.full((count, 1), 2.0), step[:, 3:]], axis=1)
         w, x, y, z = half.T / np.linalg.norm(half, axis=1)
-        turn = (
-            np.array(
-                [
-                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-                ]
-            ).transpose(2, 0, 1)
-            @ turn
-        )
+        rows = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        turn = np.array(rows).transpose(2, 0, 1) @ turn
     change = turn @ start.transpose(0, 2, 1)
-    vector = np.stack(
-        [change[:, 2, 1] - change[:, 1, 2], change[:, 0, 2] - change[:, 2, 0], change[:, 1, 0] - change[:, 0, 1]]
-    )
+    vector = np.stack([change[:, i, j] - change[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))])
     return np.linalg.norm(position - points[:, :3], axis=1), np.arcsin(np.linalg.norm(vector, axis=0) / 2)
 
 

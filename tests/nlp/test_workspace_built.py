@@ -11,22 +11,20 @@ import jsonschema
 import numpy as np
 import pytest
 from builders import Run, case_from, edited, saved, soaked
-from hexapods import bounds_of, clearance, hexapod_text, smallest, subject_of, values_of
-from workspace_cases import box_of
+from hexapods import EVERY_LIMIT, bounds_of, clearance, singular_part, smallest, subject_of, values_of
+from workspace_cases import box_of, problem_of, turned
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Limits, RateShare, load_case, load_result, solve
+from screwsynth.nlp import Case, Free, Limits, Outcome, RateShare, Sense, judge_workspace, load_case, load_result, solve
 from screwsynth.nlp.case.limits.joints import JointAngle
 from screwsynth.nlp.case.limits.legs import Actuator, LegLength
-from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.statement.claims import claims_of
 from screwsynth.nlp.proof.statement.machine import Legs, legs_of, workspace_of_case
 from screwsynth.nlp.proof.statement.posed_layout import posed_layout
 from screwsynth.nlp.proof.statement.tolerance import built_model
-from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Goal, Number
 from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme, prove_extreme
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines as EveryMachine
@@ -36,41 +34,9 @@ from screwsynth.nlp.proof.workspace.ranks.loop_boxes import Examined, Examiner, 
 from screwsynth.nlp.proof.workspace.ranks.rank_rule import RankTest
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem, family_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.workspace import WorkspaceResult
 
-#: The machine of LinuxCNC's hexapod kinematics, joints apart, with every limit that errors of joint centres change. The
-#: limits are wide: the numbers that are proved are compared.
-TEXT = (
-    hexapod_text(4, 5, "")
-    + """[tolerance]
-joint_centre = 0.02
-[[task]]
-sense = "max"
-axis = [1, 2, 6]
-point = [3, 1, 12]
-pitch = 0.1
-[limits]
-leg_length = { min = 10, max = 60 }
-actuator = { stroke_max = 30, dead_length = 1 }
-base_joint_angle = 80
-platform_joint_angle = { max = 60, about = "home" }
-home = { position = [0, 0, 20] }
-joint_spacing = { min = 1 }
-footprint = { base = 40, platform = 20 }
-radius_ratio = { min = 0.1, max = 0.9 }
-leg_clearance = { min = 0.5 }
-smallest_singular_value = { min = 0.1, length = 11.5 }
-condition_number = { max = 30, length = 11.5 }
-rate_share = { max = 0.9 }
-actuator_rate = { max = 60 }
-custom = ["x1 - 2*x2 >= 0"]
-[workspace]
-position = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = 19, max = 21 }]
-rotation = { angle = { min = -6, max = 6 } }
-"""
-)
 HOME = np.array([0.0, 0.0, 20.0])
 TOLERANCE = 0.02
 LENGTH = 11.5
@@ -78,7 +44,7 @@ LENGTH = 11.5
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    return case_from(TEXT, "built")
+    return case_from(EVERY_LIMIT, "built")
 
 
 class Machines:
@@ -115,10 +81,6 @@ class Machines:
         self.n = self.d / self.length[:, :, None]
         self.J = np.concatenate([self.n, np.cross(self.arm, self.n)], axis=2)
 
-    def rates(self, twist: FloatArray) -> FloatArray:
-        """Work rates (K, 6)."""
-        return np.asarray(((twist[3:] + np.cross(twist[:3], self.base)) * self.n).sum(axis=2))
-
     def clearance(self, i: int, j: int) -> FloatArray:
         """Distances (K,) of two legs as segments, the least of those between a point of one and the other's ends and
         of the lines where they cross."""
@@ -146,7 +108,7 @@ def numbers(case: Case, robot: Legs, machines: Machines) -> Iterator[tuple[str, 
     home = HOME + robot.platform - robot.base
     home /= np.linalg.norm(home, axis=1, keepdims=True)
     twist = np.asarray(case.tasks[0].twist)
-    squares = machines.rates(twist) ** 2
+    squares = ((twist[3:] + np.cross(twist[:3], machines.base)) * machines.n).sum(axis=2) ** 2
     F = squares.sum(axis=1)
     base = angles(machines.d, np.tile([0.0, 0.0, 1.0], (6, 1)))
     platform = angles(machines.d, np.einsum("kij,lj->kli", machines.turn, home))
@@ -167,10 +129,8 @@ def numbers(case: Case, robot: Legs, machines: Machines) -> Iterator[tuple[str, 
     for i, j in ((0, 1), (0, 2), (1, 4)):
         yield f"leg_clearance limbs {names[i]} and {names[j]}", machines.clearance(i, j)
     yield "F", F
-    ratio = np.linalg.norm(machines.platform[..., :2], axis=(1, 2)) / np.linalg.norm(
-        machines.base[..., :2], axis=(1, 2)
-    )
-    yield "radius_ratio", ratio
+    radii = [np.linalg.norm(plate[..., :2], axis=(1, 2)) for plate in (machines.platform, machines.base)]
+    yield "radius_ratio", radii[0] / radii[1]
 
 
 def built(robot: Legs, errors: FloatArray) -> Legs:
@@ -190,8 +150,7 @@ def machines(case: Case) -> Machines:
 
 def test_no_machine_within_the_tolerance_is_outside_of_a_proven_bound(case: Case, machines: Machines) -> None:
     sampled, seen = dict(numbers(case, legs_of(case), machines)), set()
-    design = build_problem(case, case.model, box_of(case))
-    every = EveryMachine(case, closed_form(case.model), design)
+    every = EveryMachine(case, closed_form(case.model), problem_of(case))
     picked = [name for name in sampled if " 1-" in name or " 2+" in name or " " not in name]
     claims = [each for each in every.symbols.claims(["base_joint_angle"])[1] if each.name in picked]
     for each in (every.extreme(claim, gap=1e-3, jobs=1) for claim in claims):
@@ -227,8 +186,7 @@ def test_bounds_of_clearances_and_singular_values_hold_for_machines_within_the_t
         assert bounds_of(number, box.lower[None], box.upper[None])[0] <= sampled.min()
         # At a point the bound and the value of the worst machine differ by the rest, and by the 2 % of the norm.
         points = box.random(50, rng)
-        at = bounds_of(number, points, points)
-        exact = values_of(number, points)
+        at, exact = bounds_of(number, points, points), values_of(number, points)
         assert (at <= exact + 1e-12).all()
         assert (at >= exact - 0.05 * np.abs(exact)).all()
     for number in spectra:
@@ -264,17 +222,13 @@ def test_errors_of_a_machine_that_is_singular_at_every_pose_have_no_value(case: 
 @pytest.mark.parametrize("kind", list(TurnKind))
 def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: TurnKind) -> None:
     rng = np.random.default_rng(2)
-    angle = Free(-math.radians(45), math.radians(45))
-    turns = Turns(kind, (angle,) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1), (0.6, 0.0, 0.8))
-    box = pose_box(Workspace((Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0)), turns))
-    robot = legs_of(case)._replace(tolerance=0.3)
+    box, robot = pose_box(turned(kind, 45)), legs_of(case)._replace(tolerance=0.3)
     lower = box.random(300, rng)
     upper = np.minimum(lower + (box.upper - box.lower) * rng.uniform(0, 0.05, (300, 1)), box.upper)
     exact = build_problem(case, case.model, box)
     family = family_of(case, built_model(case.model), exact, robot.tolerance)
 
     def examined(meant: Problem) -> Examined:
-        """The boxes, for all machines or for the design."""
         cells = LoopBoxes(lower, upper, 0.5 * (lower + upper), np.ones(len(lower), dtype=bool))
         return Examiner(meant, RankTest(meant.locked, meant.z, meant.start)).examine(cells)
 
@@ -298,9 +252,8 @@ def test_boxes_are_regular_for_machines_within_the_tolerance(case: Case, kind: T
 
 
 def test_a_machine_within_the_tolerance_that_is_singular_refutes(case: Case) -> None:
-    angle = Free(-math.radians(30), math.radians(30))
-    workspace = Workspace((Free(-5.0, 5.0), Free(-5.0, 5.0), Free(15.0, 25.0)), Turns(TurnKind.ANY_AXIS, (angle,)))
-    box, robot = pose_box(workspace), legs_of(case)
+    workspace, robot = turned(TurnKind.ANY_AXIS, 30), legs_of(case)
+    box = pose_box(workspace)
     exact, found = (
         judge_workspace(replace(case, joint_centre_tolerance=t), workspace=workspace, with_limits=False).regularity
         for t in (None, 0.8)
@@ -308,13 +261,8 @@ def test_a_machine_within_the_tolerance_that_is_singular_refutes(case: Case) -> 
     assert exact.outcome is Outcome.PROVED
     assert found.outcome is Outcome.REFUTED
     assert np.linalg.norm(found.errors.vectors, axis=1).max() <= 0.8
-    machine, pose = built(robot, found.errors.vectors), box.pose(found.y)
     assert box.holds(found.y)
-    arm = machine.platform @ pose.rotation.T
-    span = pose.position + arm - machine.base
-    J = np.hstack([span, np.cross(arm, span)]) / np.linalg.norm(span, axis=1, keepdims=True)
-    values = np.linalg.svd(J, compute_uv=False)
-    assert values[-1] < 1e-12 * values[0]
+    assert singular_part(built(robot, found.errors.vectors), box.pose(found.y)) < 1e-12
 
 
 def test_closed_forms_of_the_worst_machine(case: Case) -> None:
@@ -421,7 +369,7 @@ def test_a_limit_is_refined_until_it_is_decided_whatever_the_gap_is(case: Case) 
 
 
 def test_the_command_shows_the_machine_that_refutes(cli: Run, tmp_path: Path) -> None:
-    head, _, tail = edited(TEXT, ("min = 10, max = 60", "min = 10, max = 32")).partition("actuator =")
+    head, _, tail = edited(EVERY_LIMIT, ("min = 10, max = 60", "min = 10, max = 32")).partition("actuator =")
     file, target = saved(tmp_path / "built.toml", head + tail[tail.index("[workspace]") :]), tmp_path / "result.json"
     code, shown, _ = cli("workspace", str(file), "--gap", "0.01", "--all", "--json", str(target))
     assert code == 1, shown
@@ -433,7 +381,6 @@ def test_the_command_shows_the_machine_that_refutes(cli: Run, tmp_path: Path) ->
     assert refuted
     for each in refuted:
         assert max(np.linalg.norm(each.machine.base, axis=1)) == pytest.approx(TOLERANCE)
-    # The digest comes first.
     assert shown.index("verdict") < shown.index("tightest limits") < shown.index("limits over every pose")
     assert "every one whose joint centres are off by at most 0.02 in" in shown
     assert f"the machine that refutes: {refuted[0].name}" in shown
@@ -457,7 +404,6 @@ def test_a_design_is_found_that_keeps_its_limits_for_every_machine() -> None:
     solution = solve(case, starts=4)
     proof = solution.workspace
     assert proof.is_proved
-    # The tolerance costs something.
     assert solution.F < 422.402
     robot = legs_of(proof.judgement.case)
     machines = Machines(robot, pose_box(proof.judgement.workspace), 100_000)

@@ -9,27 +9,21 @@ from workspace_cases import box_of, on_paper, problem_of, root_of
 
 from screwsynth.models import Dimension
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case
-from screwsynth.nlp.case.pose import Rotation
-from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp import Case, Judgement, Outcome, RobotState, Rotation, build_model, formulate, judge_workspace
 from screwsynth.nlp.evidence import state
 from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.evidence.mobility import mobility_of
-from screwsynth.nlp.evidence.state import RobotState
 from screwsynth.nlp.interruption import within
-from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.checker.proof_file import ProofError
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import start_of
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot, motion_matrix
 from screwsynth.nlp.proof.statement.posed_layout import at_one_pose
 from screwsynth.nlp.proof.workspace.home_poses import Homes
-from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank, prove_ranks
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularSearch
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers
 from screwsynth.nlp.proof.workspace.robot.posed_robot import NotJudgedError
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 #: Robots whose platform does not turn.
 TRANSLATIONS = ("3-puu", "3-upu", "delta", "delta-parallelogram", "orthoglide", "tripteron")
@@ -74,7 +68,6 @@ def case_over(
 
 
 def about_home(name: str, part: float, degrees: float, limit: float = 0.0) -> Case:
-    """A robot about its home, in the poses that it can take."""
     away = part * size_of(name)
     position = spans(*((each - away, each + away) for each in build_model(name).home))
     return case_over(name, position, "" if name in TRANSLATIONS else turns(*[(-degrees, degrees)] * 3), limit)

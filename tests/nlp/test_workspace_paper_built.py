@@ -10,17 +10,26 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import Run, case_file, case_from, case_tables, edited, output_of, saved, unbroken, unpacked
+from builders import Run, case_file, case_from, case_tables, edited, ends, output_of, saved, unbroken, unpacked
 from casadi import SX
-from hexapods import HEXAPOD, case_of_legs, hexapod_text
-from workspace_cases import alone, changed, claim, on_paper, problem_of, rejected, root_of, stated, stating, written
+from hexapods import EVERY_LIMIT, HEXAPOD, case_of_legs
+from workspace_cases import (
+    alone,
+    changed,
+    claim,
+    on_paper,
+    problem_of,
+    rejected,
+    root_of,
+    stated,
+    stating,
+    tables_of,
+    written,
+)
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Limits
-from screwsynth.nlp.case.task import Sense
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp import Case, Free, Judgement, Limits, Outcome, Sense, TurnKind, Turns, UncoveredError, Workspace
 from screwsynth.nlp.program.layout import robot_length
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace import check
@@ -31,59 +40,21 @@ from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import Machines
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
-from screwsynth.nlp.proof.workspace.judge import Judgement
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 TOLERANCE, LENGTH, LEG_ERROR = 0.02, 11.5, 0.004
 #: A limit of every kind that errors of joint centres change; the triangle inequality does not decide that on strokes.
-TEXT = (
-    hexapod_text(4, 5, "")
-    + """[tolerance]
-joint_centre = 0.02
-[[task]]
-sense = "max"
-axis = [1, 2, 6]
-point = [3, 1, 12]
-pitch = 0.1
-[limits]
-leg_length = { min = 10, max = 60 }
-actuator = { stroke_max = STROKE, dead_length = 1 }
-base_joint_angle = { max = 30, about = "home" }
-home = { position = [0, 0, 20] }
-joint_spacing = { min = 1 }
-footprint = { base = 40, platform = 20 }
-radius_ratio = { min = 0.1, max = 0.9 }
-leg_clearance = { min = 0.5 }
-smallest_singular_value = { min = 0.5, length = 11.5 }
-condition_number = { max = 10, length = 11.5 }
-rate_share = { max = 0.9 }
-actuator_rate = { max = 60 }
-custom = ["x1 - 2*x2 >= 0"]
-[workspace]
-position = [0.3, { min = -0.3, max = 0.3 }, 20]
-rotation = { axis = [0.6, 0, 0.8], angle = { min = -2, max = 2 } }
-""".replace("STROKE", "0.93")
+TEXT = edited(
+    EVERY_LIMIT[: EVERY_LIMIT.index("[workspace]")],
+    ("stroke_max = 30", "stroke_max = 0.93"),
+    ("base_joint_angle = 80", 'base_joint_angle = { max = 30, about = "home" }'),
+    ('platform_joint_angle = { max = 60, about = "home" }\n', ""),
+    ("min = 0.1, length", "min = 0.5, length"),
+    ("max = 30, length", "max = 10, length"),
 )
-#: A robot with closed forms: its cranks follow from the pose.
-CRANKS = """
-[units]
-length = "m"
-[robot]
-model = "6-rus"
-parameters = { rb = 1.0, rp = 0.6, base_half = 20, platform_half = 43, crank = 0.35, lift = 35, h = 1.1 }
-[pose]
-position = [0, 0, 1.1]
-[tolerance]
-joint_centre = 1e-4
-[[task]]
-sense = "max"
-axis = [1, 2, 6]
-point = [0.3, 0.1, 1.2]
-pitch = 0.1
-[workspace]
-position = [{ min = -0.02, max = 0.02 }, 0, 1.1]
+TEXT += """[workspace]
+position = [0.3, { min = -0.3, max = 0.3 }, 20]
 rotation = { axis = [0.6, 0, 0.8], angle = { min = -2, max = 2 } }
 """
 ASKED = ("platform_joint_angle", "smallest_singular_value", "condition_number")
@@ -214,16 +185,16 @@ def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     assert "have no proof" in reject("smallest_singular_value", "min")
 
 
-def machines_of(text: str) -> tuple[Machines, PoseRoot]:
-    """The machines of a case as the check has them."""
-    case = case_of(text)
+def machines_of(case: Case) -> tuple[Machines, PoseRoot]:
     return Machines(case, closed_form(case.model).model, root_of(case)), root_of(case)
 
 
 @pytest.mark.parametrize("robot", ["hexapod", "6-rus"])
 def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> None:
     """What is shown of terms of second order is at least that of random machines, and little more."""
-    found, root = machines_of(TEXT if robot == "hexapod" else CRANKS)
+    turns = {"axis": [0.6, 0, 0.8], "angle": ends(2)}
+    cranks = tables_of("6-rus", tolerance=1e-4, workspace={"position": [ends(0.02), 0, 1.1], "rotation": turns})
+    found, root = machines_of(case_of() if robot == "hexapod" else case_from(cranks))
     rng, t, symbols = np.random.default_rng(1), found.symbols.tolerance, found.symbols
     m, count = len(symbols.built.names), 400
     reaches, claims = symbols.claims(())
@@ -241,7 +212,6 @@ def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> 
         function = ca.Function("both", [e, z], [number, ca.densify(first)])
         exact, slopes = (np.array(part) for part in function(np.zeros((3 * m, count)), pose.T))
         slopes = slopes.reshape(count, 3 * m)
-        # Machines with errors along the derivatives, too.
         steep = sign * slopes.reshape(count, m, 3)
         steep = t * steep / np.maximum(np.linalg.norm(steep, axis=2, keepdims=True), 1e-300)
         bound = ca.Function("bound", [found.design.table.variables_vector], [found.number(each, 0.0)])
@@ -263,7 +233,7 @@ def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> 
 
 
 def test_a_number_with_a_kink_has_no_terms_of_second_order() -> None:
-    found, _ = machines_of(TEXT)
+    found, _ = machines_of(case_of())
     (some,) = (each for each in found.symbols.claims(())[1] if (each.name, each.sense) == ("F", Sense.MAX))
     for kink in (ca.fabs(some.expression - 1), ca.fmax(some.expression, 1)):
         with pytest.raises(UncoveredError, match="jump"):
@@ -271,7 +241,7 @@ def test_a_number_with_a_kink_has_no_terms_of_second_order() -> None:
 
 
 def test_lengths_of_one_machine_hold_at_two_poses() -> None:
-    found, root = machines_of(TEXT)
+    found, root = machines_of(case_of())
     rng, symbols, t = np.random.default_rng(2), found.symbols, found.symbols.tolerance
     free = np.flatnonzero(root.upper > root.lower)
     poses = rng.uniform(root.lower, root.upper, (2, 6))[:, free]
@@ -453,5 +423,5 @@ def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
 def test_the_shipped_machine_as_it_is_built_is_accepted(cli: Run, tmp_path: Path) -> None:
     case = case_file(tmp_path, case_tables("hexapod-linuxcnc", tolerance={"joint_centre": 0.002}))
     target = tmp_path / "proof.json"
-    output_of(cli("workspace", str(case), "--gap", "0.02", "--time", "200", "--proof", str(target)))
+    output_of(cli("workspace", str(case), "--gap", "0.2", "--time", "200", "--proof", str(target)))
     assert "not on paper" not in output_of(cli("verify-proof", str(target)))

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -13,10 +14,8 @@ from workspace_cases import box_of, claim, gallery_case, on_paper, only, problem
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free
-from screwsynth.nlp.case.loads import Load, Loading, Motion
+from screwsynth.nlp import Case, Extreme, Free, Judgement, Load, Loading, Motion, Outcome, TurnKind, Turns, Workspace
 from screwsynth.nlp.case.source import find_case
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
@@ -24,8 +23,6 @@ from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, show_on_leaves
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
-from screwsynth.nlp.proof.workspace.judge import Judgement
-from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
 from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
@@ -33,7 +30,6 @@ from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.ranks.ranks import not_judged
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
 
 def reachy_case(factor: float, *, one_motor: bool = True, **parameters: float) -> Case:
@@ -255,8 +251,13 @@ def robot_of(name: str) -> Case:
     return replace(case_of_legs(Legs(ring, platform)), loading=LOADING, workspace=Workspace([0.02, 0.0, along], turns))
 
 
-def proof_of(case: Case) -> tuple[dict[tuple[str, str], Extreme], Proof]:
-    """The numbers of actuators alone, and their proof as its file has it."""
+@cache
+def proof_of(name: str) -> tuple[dict[tuple[str, str], Extreme], Proof]:
+    """The numbers of a robot's actuators alone, and their proof as its file has it."""
+    return motors_on_paper(robot_of(name))
+
+
+def motors_on_paper(case: Case) -> tuple[dict[tuple[str, str], Extreme], Proof]:
     record, closed = PaperRecord(), closed_form(case.model)
     box = box_of(case)
     meant = build_problem(case, closed.model, box)
@@ -272,7 +273,7 @@ def proof_of(case: Case) -> tuple[dict[tuple[str, str], Extreme], Proof]:
 def test_a_proof_is_accepted_and_one_with_a_bound_that_a_pose_exceeds_is_not(name: str) -> None:
     """Six freedoms and three; rows of legs and passive joints; closed forms and loops that are followed."""
     case = robot_of(name)
-    motors, proof = proof_of(case)
+    motors, proof = proof_of(name)
     assert len(motors) == 5 * (3 if name in ("delta", "3-rps") else 6)
     assert all(each.outcome is Outcome.PROVED for each in motors.values())
     checked = {(each.name, each.sense): each.bound for each in check_workspace_proof(proof, case).claims}
@@ -292,8 +293,7 @@ def test_a_proof_is_accepted_and_one_with_a_bound_that_a_pose_exceeds_is_not(nam
 
 def test_a_proof_for_other_loads_or_motions_is_rejected() -> None:
     """What a number rests on is the case's: the file has nothing of it."""
-    case = robot_of("legs")
-    proof = proof_of(case)[1]
+    case, proof = robot_of("legs"), proof_of("legs")[1]
     for part in ({"force": (3.0, 1.0, -11.0)}, {"point": (0.0, -0.2, 0.1)}, {"any_force": 3.0}, {"any_moment": 0.4}):
         with pytest.raises(ProofError, match=r"actuator_force .* could not be shown"):
             check_workspace_proof(proof, replace(case, loading=LOADING._replace(loads=(replace(CUT, **part),))))
@@ -306,7 +306,7 @@ def test_numbers_under_a_load_are_not_those_under_another() -> None:
     """Their trees are the same, and so would be their bounds."""
     small = {"force": (0.3, 0.1, -1.0), "any_force": 0.2, "any_moment": 0.01}
     case = replace(robot_of("legs"), loading=Loading((replace(CUT, name="light", **small), CUT)))
-    proof = proof_of(case)[1]
+    proof = motors_on_paper(case)[1]
     light = [each for each in proof.claims if each.name.startswith("actuator_force") and each.name.endswith("light")]
     assert len(light) == 12
     heavy = tuple(replace(each, name=each.name.replace("light", "cut")) for each in light)
@@ -318,8 +318,7 @@ def test_numbers_under_a_load_are_not_those_under_another() -> None:
 
 
 def test_boxes_of_numbers_are_of_one_assembly(monkeypatch: pytest.MonkeyPatch) -> None:
-    case = robot_of("3-rps")
-    proof = proof_of(case)[1]
+    case, proof = robot_of("3-rps"), proof_of("3-rps")[1]
 
     def apart(*_: object) -> None:
         raise ProofError("the same assembly")

@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +16,11 @@ from numpy.typing import NDArray
 from path_cases import delta_angles
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import Case, Solution, load_case, pareto, solve
-from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.errors import CaseError
-from screwsynth.nlp.front.data import front_result
+from screwsynth.nlp import Case, CaseError, Outcome, Solution, build_model, front_result, load_case, pareto, solve
 from screwsynth.nlp.output.fronttable import front_words
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.slices.slice_limits import KEPT, UNDECIDED
 from screwsynth.nlp.proof.workspace.slices.slices import Region, Slice, slices_of
-from screwsynth.nlp.proof.workspace.verdict import Outcome
-from screwsynth.nlp.solver.semi_infinite import WorkspaceProof
 
 NOTICE = "the limits are taken at the stated pose alone, not over the workspace"
 
@@ -52,6 +48,11 @@ def tripod_case(rb: object = 1.0, rp: object = 0.6, height: object = 1.1, **tabl
 #: Free dimensions of it, and a range of heights.
 FREE = {"rb": {"min": 0.7, "max": 1.5}, "rp": {"min": 0.4, "max": 1.0}, "height": {"min": 1.0, "max": 1.2}}
 OVER = {"over": "workspace"}
+
+
+@cache
+def exact_design() -> Solution:
+    return solve(tripod_case(**FREE, limits=OVER))
 
 
 def number(case: Case, name: str) -> float:
@@ -87,11 +88,6 @@ def tripod(case: Case, roll: FloatArray, pitch: FloatArray, z: FloatArray) -> tu
     return np.stack(lengths, axis=1) - math.hypot(rb - rp, 1.1), yaw
 
 
-def proof_of(solution: Solution) -> WorkspaceProof:
-    assert solution.workspace is not None
-    return solution.workspace
-
-
 def drawn(each: Slice, rng: np.random.Generator) -> tuple[FloatArray, NDArray[np.int16], list[Region]]:
     """A random point (B, 2) of each box, the limit there, and the region."""
     points = each.boxes[:, :2] + rng.uniform(size=(len(each.boxes), 2)) * (each.boxes[:, 2:] - each.boxes[:, :2])
@@ -111,7 +107,7 @@ def assert_beyond(found: Slice, limit: NDArray[np.int16], values: FloatArray) ->
 
 def test_a_design_of_a_delta_is_exchanged_until_it_is_proved() -> None:
     solution = solve(delta(0.25, {"min": 0.7, "max": 1.3}, **OVER))
-    proof = proof_of(solution)
+    proof = solution.workspace
     assert proof.is_proved
     assert len(proof.history) > 1
     names = {each.name for each in proof.poses}
@@ -130,8 +126,7 @@ def test_a_design_of_a_delta_is_exchanged_until_it_is_proved() -> None:
 
 @pytest.mark.slow
 def test_a_design_of_a_robot_with_loops_is_exchanged_until_it_is_proved() -> None:
-    solution = solve(tripod_case(**FREE, limits=OVER))
-    proof = proof_of(solution)
+    proof = exact_design().workspace
     assert proof.is_proved
     assert proof.first.is_regular
     assert len(proof.poses) >= 1
@@ -214,7 +209,7 @@ def test_a_design_of_three_legs_keeps_its_strokes_over_the_workspace() -> None:
     task = {"sense": "max", "axis": [0, 1, 2], "point": [0, 0, 50], "pitch": 2}
     given = {"pose": {"position": [0, 0, 50]}, "workspace": {"position": [0, 0, ends(3, 50)]}}
     case = case_of(robot, **given, task=[task], limits=OVER | {"actuator": {"stroke_max": 5.5}})
-    proof = proof_of(solve(case))
+    proof = solve(case).workspace
     assert proof.is_proved
     # Without rotation the platform's joints stay above those of the base by the difference of the radii.
     stroke = np.diff(np.hypot(number(proof.judgement.case, "base_radius") - 25, [47, 53]))[0]
@@ -223,9 +218,8 @@ def test_a_design_of_three_legs_keeps_its_strokes_over_the_workspace() -> None:
 
 @pytest.mark.slow
 def test_a_design_of_a_robot_with_loops_is_proved_for_every_machine_within_a_tolerance() -> None:
-    proof, exact = (
-        proof_of(solve(tripod_case(**FREE, limits=OVER, tolerance=each))) for each in ({"joint_centre": 0.0005}, None)
-    )
+    proof = solve(tripod_case(**FREE, limits=OVER, tolerance={"joint_centre": 0.0005})).workspace
+    exact = exact_design().workspace
     assert proof.is_proved
     errors = [each.errors for each in proof.poses if each.errors is not None]
     assert errors

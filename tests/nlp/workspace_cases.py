@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import case_tables, ends
 
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Judgement, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
@@ -40,6 +41,33 @@ pitch = inf
 position = [{ min = -0.01, max = 0.01 }, { min = -0.01, max = 0.01 }, { min = 1.1, max = 1.11 }]
 rotation = { roll = { min = -1, max = 1 }, pitch = { min = -1, max = 1 }, yaw = { min = -1, max = 1 } }
 """
+
+
+#: Dimensions of robots.
+ROBOTS = {
+    "3-rps": {"rb": 1.0, "rp": 0.6, "h": 1.1},
+    "6-rus": {"rb": 1.0, "rp": 0.6, "base_half": 20, "platform_half": 43, "crank": 0.35, "lift": 35, "h": 1.1},
+    "6-ups": {"rb": 1.0, "rp": 0.45, "base_half": 60, "platform_half": 5, "h": 1.1},
+    "three-upu": {"base_radius": 1.0, "platform_radius": 0.6},
+}
+
+
+def tables_of(
+    name: str, sides: float = 0.05, rise: float = 0.02, turn: float = 5.0, tolerance: float = 1e-3, **tables: object
+) -> dict[str, Any]:
+    """Tables of a robot over a box about home, by its half sides, half its height and angles."""
+    height = tables.pop("height", 1.1)
+    about = {name: ends(turn) for name in ("roll", "pitch", "yaw")}
+    place = {"position": [ends(sides), ends(sides), ends(rise, height)]}
+    task = {"sense": "max", "axis": [1, 2, 6], "point": [0.3, 0.1, 1.2], "pitch": 0.1}
+    given = {
+        "units": {"length": "m"}, "pose": {"position": [0, 0, height]},
+        "tolerance": {"joint_centre": tolerance} if tolerance else None,
+        "task": [task], "workspace": place | ({"rotation": about} if turn else {}),
+        "limits": {"actuator_rate": {"max": 5}} if name == "three-upu" else None,
+    }  # fmt: skip
+    couples = {"axes": "snu", "characteristic_length": 0.5} if name == "three-upu" else {}
+    return case_tables({"model": name, "parameters": ROBOTS[name]} | couples, **given | tables)
 
 
 def turned(kind: TurnKind, degrees: float) -> Workspace:
@@ -108,7 +136,6 @@ def rank_of(case: Case, *given: Any) -> RankClaim:  # noqa: ANN401 - a tolerance
 def written(
     case: Case, text: str = "", *, quantities: tuple[str, ...] = (), leg_error: float = 0.0, **options: object
 ) -> tuple[Judgement, Proof]:
-    """A judgement and its proof."""
     record, asked = PaperRecord(), {"quantities": quantities, "leg_error": leg_error}
     judged = judge_workspace(case, paper=record, **asked, **options)
     return judged, paper_of(judged, record, text, **asked)
@@ -121,13 +148,11 @@ def on_paper(case: Case, text: str = "", **options: object) -> tuple[Judgement, 
 
 
 def stated(proof: Proof) -> Premises:
-    """The premises of a proof about a workspace."""
     assert isinstance(proof.premises, Premises)
     return proof.premises
 
 
 def stating(proof: Proof, **values: object) -> Proof:
-    """The proof with other values in its premises."""
     return replace(proof, premises=replace(stated(proof), **values))
 
 
@@ -167,7 +192,6 @@ def only(proof: Proof, name: str, sense: str | None = None, **values: object) ->
 
 
 def rejected(proof: Proof, case: Case) -> str:
-    """The reason for which the check rejects a proof."""
     with pytest.raises(ProofError) as caught:
         check_workspace_proof(proof, case, leg_error=stated(proof).leg_error)
     return str(caught.value)
