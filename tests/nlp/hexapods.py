@@ -3,7 +3,7 @@
 import numpy as np
 
 from screwsynth.models import FloatArray, hexapod
-from screwsynth.nlp import Case, Task
+from screwsynth.nlp import Case, Free, Task, TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import within
 from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.tolerance import built_model
@@ -97,6 +97,20 @@ def subject_of(robot: Legs, box: PoseBox, shortest: float = 0.0) -> Subject:
 def clearance(robot: Legs, box: PoseBox, one: int, other: int) -> Clearance:
     """The distance of two legs."""
     return Clearance(subject_of(robot, box).problem, robot, (one, other))
+
+
+def random_legs(rng: np.random.Generator, tolerance: float = 0.0) -> Legs:
+    base, platform = (
+        np.column_stack([rng.uniform(-size, size, (6, 2)), rng.uniform(-1, 1, 6)]) for size in (10.0, 6.0)
+    )
+    return Legs(base, platform, tolerance)
+
+
+def random_workspace(rng: np.random.Generator, kind: TurnKind, size: float) -> Workspace:
+    """Rotations up to an angle, and positions within four times as many units of length about a random one."""
+    turns = (Free(-size, size),) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1)
+    place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in rng.uniform((-3, -3, 9), (3, 3, 15)))
+    return Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8)))
 
 
 def singular_part(robot: Legs, pose: PoseNumbers) -> float:

@@ -13,6 +13,7 @@ from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.poses_csv import read_poses
 
+Floats = tuple[float, ...]
 #: Joints of LinuxCNC's hexapod in inches, its legs, and its pose.
 BASE, PLATFORM = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
 LEGS = ("1-", "1+", "2-", "2+", "3-", "3+")

@@ -401,9 +401,7 @@ def test_a_box_that_collapses_to_a_corner_is_examined_there() -> None:
 
 
 @pytest.mark.parametrize("limit", [40.0, 3.0])
-def test_a_solve_has_half_of_the_time_of_a_certificate_and_the_proof_has_the_rest(
-    monkeypatch: pytest.MonkeyPatch, limit: float
-) -> None:
+def test_a_solve_has_half_of_the_time_of_a_certificate(monkeypatch: pytest.MonkeyPatch, limit: float) -> None:
     seen: list[float] = []
 
     def solve_and_look(*given: Any, **named: Any) -> ProgramSolution:  # noqa: ANN401 - those of the function

@@ -11,25 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.models import Dimension, Model, hexapod, stewart_gough, three_upu
-from screwsynth.nlp import (
-    Case,
-    Free,
-    LegLength,
-    Limits,
-    Rotation,
-    Search,
-    Task,
-    certify,
-    evaluate,
-    formulate,
-    result_of,
-    solve,
-)
+from screwsynth.nlp import Case, Free, LegLength, Limits, Rotation, Search, Task, certify, formulate, solve
+from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output.report.exploration import surroundings
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import slices_of
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.program.sampling import starting_points
+from screwsynth.nlp.results.result import result_of
 
 Array = NDArray[np.float64]
 

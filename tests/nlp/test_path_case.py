@@ -11,21 +11,12 @@ import numpy as np
 import pytest
 from builders import DOCS, Array, Run, case_from, case_of, docs_script, output_of, refusal_of, saved, shipped_tables
 from measures import circle_joints
-from path_cases import BASE, PLATFORM, turns_of
+from path_cases import BASE, PLATFORM, Floats, turns_of
 
-from screwsynth.nlp import (
-    CaseError,
-    PathFile,
-    PathOptions,
-    certify,
-    check_path,
-    json_data,
-    load_case,
-    load_result,
-    solve,
-)
+from screwsynth.nlp import CaseError, PathFile, certify, check_path, json_data, load_case, load_result, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.toml import toml_document
+from screwsynth.nlp.path.options import PathOptions
 from screwsynth.nlp.path.path import Kind, Poses, ProgrammedPath
 from screwsynth.nlp.path.reader import path_of_case, read_path
 from screwsynth.nlp.results.schema import result_schema
@@ -253,7 +244,7 @@ def at_place(place: Sequence[float], poses: Poses) -> Poses:
         (STRAIGHT, (1.0, 2, 3, 0.3, -0.2, 1)),
     ],
 )
-def test_a_path_in_another_place(tmp_path: Path, text: str, place: tuple[float, ...]) -> None:
+def test_a_path_in_another_place(tmp_path: Path, text: str, place: Floats) -> None:
     saved(tmp_path / "part.ngc", text)
     units = load_case("hexapod-linuxcnc").units
     names = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 from threading import Event
 
@@ -10,7 +11,19 @@ import pytest
 from builders import Array, Run, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from path_cases import HOME, delta_angles, extreme, halved, hexapod, lengths_at, program, robot_of, table, turns_of
+from path_cases import (
+    HOME,
+    Floats,
+    delta_angles,
+    extreme,
+    halved,
+    hexapod,
+    lengths_at,
+    program,
+    robot_of,
+    table,
+    turns_of,
+)
 
 from screwsynth.nlp import Outcome, PathOptions, ProgrammedPath, Sense, Units, interruption, judge_workspace
 from screwsynth.nlp.path.gcode import read_program
@@ -48,7 +61,7 @@ def sampled_lengths(path: ProgrammedPath) -> Array:
     st.floats(0, 1),
 )
 def test_boxes_of_pieces_hold_their_points(
-    ends: tuple[float, ...], plane: tuple[int, str], arc: tuple[float, ...], halves: list[bool], part: float
+    ends: Floats, plane: tuple[int, str], arc: Floats, halves: list[bool], part: float
 ) -> None:
     (code, letters), (radius, angle, sweep, turns) = plane, arc
     first, second = {17: "XY", 18: "ZX", 19: "YZ"}[code]
@@ -162,6 +175,14 @@ def test_a_singular_pose_is_crossed_and_all_of_a_line_is_singular() -> None:
     assert whole.outcome is Outcome.REFUTED
 
 
+def bisected(low: float, high: float, is_low: Callable[[float], bool]) -> tuple[float, float]:
+    """Two numbers next to each other, the first of which is low and the second not."""
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_low(middle) else (low, middle)
+    return low, high
+
+
 def triangle(radius: float, azimuth: float) -> Array:
     angles = np.radians(azimuth) + 2 * np.pi / 3 * np.arange(3)
     return radius * np.stack([np.cos(angles), np.sin(angles)], 1)
@@ -185,22 +206,17 @@ def test_a_singular_pose_is_touched_between_samples_without_a_change_of_sign() -
     # Singular poses without a turn lie on a circle, and this line is a tangent far from legs without length.
     low, high = 0.0, -3.0
     assert extreme_at(low)[1] * extreme_at(high)[1] < 0
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if extreme_at(middle)[1] * extreme_at(low)[1] > 0 else (low, middle)
+    low = bisected(low, high, lambda x: extreme_at(x)[1] * extreme_at(0.0)[1] > 0)[0]
     y, _ = extreme_at(low)
     values = rpr_determinant(low, np.linspace(y - 0.1234, y + 0.2, 324))
     assert (values > 0).all() or (values < 0).all()
-    # A line near by crosses twice within 0.4 mm, between two of the samples at each millimetre.
-    near, far = low, 0.0
 
+    # A line near by crosses twice within 0.4 mm, between two of the samples at each millimetre.
     def roots(x: float) -> Array:
         return np.sort(np.roots(np.polyfit([-1.0, 0.0, 1.0], rpr_determinant(x, np.array([-1.0, 0.0, 1.0])), 2)))
 
     far = low + 1e-3 if np.isreal(roots(low + 1e-3)).all() else low - 1e-3
-    for _ in range(80):
-        middle = 0.5 * (near + far)
-        near, far = (near, middle) if np.isreal(roots(middle)).all() and np.ptp(roots(middle)) > 4e-4 else (middle, far)
+    far = bisected(low, far, lambda x: not np.isreal(roots(x)).all() or np.ptp(roots(x)) <= 4e-4)[1]
     one, other = roots(far)
     assert other - one == pytest.approx(4e-4, rel=1e-3)
     begin = 0.5 * (one + other) - 0.1235

@@ -12,7 +12,7 @@ import pytest
 from builders import Array, Run, commands_in, output_of, refusal_of, saved, turn_about
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from path_cases import hexapod, leg_lengths, program, robot_of, table
+from path_cases import Floats, hexapod, leg_lengths, program, robot_of, table
 
 from screwsynth.nlp import Case, InputError, Load, Loading, Outcome, ProgrammedPath, TurnKind
 from screwsynth.nlp.path.frame import PathFrame
@@ -74,9 +74,7 @@ def vector(q: Quaternion, turns: PathTurns, divisor: int | None) -> Quaternion:
     return [a / relative[0] for a in relative[1:]]
 
 
-def path_of(
-    knots: Array, order: str = "rpy", between: Between = Between.ANGLES, place: tuple[float, ...] = ()
-) -> ProgrammedPath:
+def path_of(knots: Array, order: str = "rpy", between: Between = Between.ANGLES, place: Floats = ()) -> ProgrammedPath:
     """A path that turns through angles (n, 3), radians, in a frame turned by roll, pitch and yaw."""
     count = len(knots) - 1
     moved = np.hstack([np.arange(count + 1.0)[:, None], np.zeros((count + 1, 2)), knots])
@@ -110,10 +108,10 @@ CLOSE = st.tuples(*[st.floats(-2.0, 2.0)] * 3) | st.tuples(*[st.floats(-20.0, 20
 @example((0.4, 0.0, 0.0), (-0.3, 0.0, 0.0), "rpy", (0.9, 0.0, 0.0), 3, None)
 @example((0.0, 0.3, 3.0), (19.0, -0.2, 7.0), "rpy", (0.0, 0.5, 0.0), 9, None)
 def test_ranges_hold_exact_rotations(
-    start: tuple[float, ...],
-    end: tuple[float, ...],
+    start: Floats,
+    end: Floats,
     how: str,
-    place: tuple[float, ...],
+    place: Floats,
     halvings: int,
     data: st.DataObject | None,
 ) -> None:
@@ -167,9 +165,7 @@ def test_ranges_hold_exact_rotations(
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("is_placed", [False, True])
-def test_a_turn_about_one_axis_leaves_other_coordinates_exactly_zero(
-    between: Between, axis: int, *, is_placed: bool
-) -> None:
+def test_a_turn_about_one_axis_leaves_others_exactly_zero(between: Between, axis: int, *, is_placed: bool) -> None:
     knots = np.zeros((4, 3))
     knots[:, axis] = 0.1, 0.7, -0.4, 1.2
     place = tuple(0.5 * (k == axis) for k in range(3)) if is_placed else ()
@@ -180,7 +176,7 @@ def test_a_turn_about_one_axis_leaves_other_coordinates_exactly_zero(
 
 
 def test_one_reference_is_near_all_rotations_of_a_path() -> None:
-    def reference(knots: list[tuple[float, ...]], **how: object) -> tuple[int, ...]:
+    def reference(knots: list[Floats], **how: object) -> tuple[int, ...]:
         return turns_of_path(path_of(np.radians(knots), **how)).reference
 
     assert isinstance(turns_of_path(path_of(np.radians([(0, 0, 0), (140, -140, 140)]))), Tangents)
@@ -213,7 +209,7 @@ def test_one_reference_is_near_all_rotations_of_a_path() -> None:
 @pytest.mark.parametrize("place", [(), (0.5, -0.8, 2.0), (0.0, 1.1, 0.0)])
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize("order", ["rpy", "xzy"])
-def test_velocities_hold_those_of_small_turns(between: Between, order: str, place: tuple[float, ...]) -> None:
+def test_velocities_hold_those_of_small_turns(between: Between, order: str, place: Floats) -> None:
     rng = np.random.default_rng(3)
     near = rng.uniform(-0.8, 0.8, (40, 3))
     for knots in (near, near + np.arange(40)[:, None] * [0.0, 0.3, 1.9]):
@@ -292,9 +288,7 @@ def outcomes(judged: PathJudgement) -> list[tuple[str, Outcome]]:
 
 
 @pytest.mark.parametrize("longest", [33.0, 36.0])
-def test_both_rules_of_roll_pitch_and_yaw_give_the_same_verdicts(
-    longest: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_both_rules_of_roll_pitch_and_yaw_agree(longest: float, monkeypatch: pytest.MonkeyPatch) -> None:
     case = replace(hexapod({"min": 17, "max": longest}), loading=Loading((Load("cut", (3.0, 1.0, -9.0)),)))
     path = replace(table(case, WAY), durations=np.array([4.0, 3.0]))
     own = judge_path(case, path)

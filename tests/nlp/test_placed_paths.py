@@ -15,7 +15,7 @@ from builders import Array, Run, case_file, case_from, output_of, saved, shipped
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
-from path_cases import BASE, LEGS, PLATFORM, delta_angles, extreme, halved, hexapod, turns_of
+from path_cases import BASE, LEGS, PLATFORM, Floats, delta_angles, extreme, halved, hexapod, turns_of
 
 from screwsynth.nlp import Case, Outcome, Sense, TurnKind, load_case
 from screwsynth.nlp.path.options import Between
@@ -88,7 +88,7 @@ def arc_of(numbers: Sequence[float], plane: int, heights: tuple[float, float], a
     st.lists(st.booleans(), max_size=50),
 )
 def test_boxes_hold_exact_positions_of_arcs_in_tilted_planes(
-    place: tuple[float, ...], arc: tuple[float, ...], plane: int, heights: tuple[float, float], halves: list[bool]
+    place: Floats, arc: Floats, plane: int, heights: tuple[float, float], halves: list[bool]
 ) -> None:
     """Positions of 40 digits are in the boxes; these are no wider than the way, and rounding."""
     path = placed(arc_of(arc, plane, heights, np.zeros((2, 3))), place)
@@ -129,9 +129,7 @@ def test_boxes_hold_exact_positions_of_arcs_in_tilted_planes(
     st.tuples(*[st.just(0.0) | st.floats(-9, 9)] * 6),
     st.lists(st.booleans(), max_size=50),
 )
-def test_boxes_hold_exact_positions_of_lines_with_turns(
-    place: tuple[float, ...], ends: tuple[float, ...], halves: list[bool]
-) -> None:
+def test_boxes_hold_exact_positions_of_lines_with_turns(place: Floats, ends: Floats, halves: list[bool]) -> None:
     knots = np.array([[*ends[:3], 0, 0, 0], [*ends[3:], 0.4, -0.3, 0.2]])
     columns = np.array([3], dtype=np.int32), np.array([Kind.LINE], dtype=np.uint8), np.array([2.0])
     own = ProgrammedPath(
@@ -157,9 +155,7 @@ def test_boxes_hold_exact_positions_of_lines_with_turns(
 
 @settings(deadline=None, max_examples=60)
 @given(st.tuples(*[ANGLES] * 3), st.tuples(*[ANGLES] * 3))
-def test_a_path_that_does_not_turn_has_its_exact_roll_pitch_and_yaw(
-    place: tuple[float, ...], angles: tuple[float, ...]
-) -> None:
+def test_a_path_that_does_not_turn_has_its_exact_roll_pitch_and_yaw(place: Floats, angles: Floats) -> None:
     """Tangents of half of roll, pitch and yaw, from the exact rotation matrix."""
     path = placed(arc_of((0.0, 0.0, 2.0, 0.0, 0.0, 1.0), 18, (0.0, 1.0), np.array([angles, angles])), (1, 2, 3, *place))
     turns = turns_of_path(path)
@@ -217,9 +213,7 @@ def range_of(judged: PathJudgement, name: str) -> tuple[float, float]:
         ),
     ],
 )
-def test_legs_along_a_placed_path_are_those_of_dense_samples(
-    tmp_path: Path, text: str, place: tuple[float, ...]
-) -> None:
+def test_legs_along_a_placed_path_are_those_of_dense_samples(tmp_path: Path, text: str, place: Floats) -> None:
     case = case_at(tmp_path, text, place)
     path, own = path_of_case(case), path_of_case(case_at(tmp_path, text, (0.0,) * 6))
     assert path.frame is not None

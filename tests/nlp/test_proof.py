@@ -318,6 +318,8 @@ def test_leg_clearance_is_covered_and_its_proof_holds() -> None:
     assert "bounded" in rejected(proof, case, bound=proof.bound * (1 - 3e-3))
 
 
+#: A case with its proof.
+Proved = tuple[Case, Proof]
 #: Largest memory beyond that of the check of an honest proof, MB: the budget of trees, the file, and blocks of boxes.
 ROOM = 450
 UNPROVED = {"name": "n", "sense": "", "reason": "open"}
@@ -345,13 +347,13 @@ print(ended.returncode, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss /
 
 
 @pytest.fixture(scope="module")
-def optimum() -> tuple[Case, Proof]:
+def optimum() -> Proved:
     file = read_case(ROTATION)
     return file.case, proof_of(certify(file.case, gap=1e-4, with_proof=True), file.text)
 
 
 @pytest.fixture(scope="module")
-def workspace() -> tuple[Case, Proof]:
+def workspace() -> Proved:
     case = case_from(MACHINE, "machine")
     return case, paper_proof(case, MACHINE, gap=0.1)[1]
 
@@ -382,7 +384,7 @@ def with_trees(proof: Proof, nodes: bytes, **others: object) -> dict[str, Any]:
     return content
 
 
-def test_memory_is_bounded(tmp_path: Path, optimum: tuple[Case, Proof], workspace: tuple[Case, Proof]) -> None:
+def test_memory_is_bounded(tmp_path: Path, optimum: Proved, workspace: Proved) -> None:
     """Twelve claims whose trees unpack to 128 MB each; a tree that is nothing but deep; one with a million leaves."""
     status, honest, err = checked(tmp_path / "honest.json", json.loads(workspace[1].as_text()))
     assert (status, err) == (0, "")
@@ -413,7 +415,7 @@ def test_a_file_that_is_no_proof_or_has_no_end_is_refused(cli: Run, tmp_path: Pa
     refusal_of(cli("verify-proof", file), file, fault)
 
 
-def test_all_trees_of_a_file_have_one_budget(workspace: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_trees_of_a_file_have_one_budget(workspace: Proved, monkeypatch: pytest.MonkeyPatch) -> None:
     case, proof = workspace
     text, size = proof.as_text(), sum(len(each.tree) for each in proof.claims)
     monkeypatch.setattr(packed, "LARGEST_TREES", size)
@@ -425,16 +427,14 @@ def test_all_trees_of_a_file_have_one_budget(workspace: tuple[Case, Proof], monk
         check_workspace_proof(read_proof(text, "proof.json"), case)
 
 
-def test_no_proof_is_written_that_is_too_large_to_be_read(
-    optimum: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_proof_is_written_that_is_too_large_to_be_read(optimum: Proved, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(proof_file, "LARGEST_TREES", len(optimum[1].claims[0].tree) - 1)
     with pytest.raises(ProofError, match="the trees of the proof have"):
         optimum[1].as_text()
 
 
 def test_a_tree_that_is_read_in_blocks_shows_the_same(
-    optimum: tuple[Case, Proof], workspace: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch
+    optimum: Proved, workspace: Proved, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (claim,), nlp = optimum[1].claims, program_of(optimum[0], Statement())
     whole, poses = check_proof(claim, nlp), check_workspace_proof(workspace[1], workspace[0])
@@ -458,9 +458,7 @@ def test_boxes_with_closed_loops_are_not_kept_without_end(monkeypatch: pytest.Mo
         check_workspace_proof(proof, case)
 
 
-def test_what_a_case_does_not_claim_is_refused_packed(
-    workspace: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_case_does_not_claim_is_refused_packed(workspace: Proved, monkeypatch: pytest.MonkeyPatch) -> None:
     def unpacked(_: PackedTree) -> bytes:
         raise AssertionError
 
@@ -492,7 +490,7 @@ def test_what_a_case_does_not_claim_is_refused_packed(
     ],
 )
 def test_lists_and_texts_without_end_are_refused(
-    cli: Run, tmp_path: Path, workspace: tuple[Case, Proof], change: Callable[[dict[str, Any]], None], fault: str
+    cli: Run, tmp_path: Path, workspace: Proved, change: Callable[[dict[str, Any]], None], fault: str
 ) -> None:
     content = json.loads(workspace[1].as_text())
     change(content)

@@ -10,18 +10,8 @@ import pytest
 from builders import case_of, starter
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import (
-    Case,
-    Nlp,
-    ProgramSolution,
-    Search,
-    Task,
-    formulate,
-    generate_c,
-    load_case,
-    shipped_cases,
-    solve,
-)
+from screwsynth.nlp import Case, Nlp, ProgramSolution, Search, Task, formulate, load_case, shipped_cases, solve
+from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.evidence.kkt import FEASIBLE, STATIONARY, linearise, multipliers
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.program.sampling import starting_points

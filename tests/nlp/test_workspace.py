@@ -19,6 +19,8 @@ from hexapods import (
     case_of_legs,
     clearance,
     hexapod_text,
+    random_legs,
+    random_workspace,
     singular_part,
     smallest,
     subject_of,
@@ -143,16 +145,8 @@ def test_random_robots_are_never_called_regular_where_the_determinant_changes_it
     rng = np.random.default_rng(3)
     outcomes = []
     for _ in range(120):
-        robot = Legs(
-            np.column_stack([rng.uniform(-10, 10, (6, 2)), rng.uniform(-1, 1, 6)]),
-            np.column_stack([rng.uniform(-6, 6, (6, 2)), rng.uniform(-1, 1, 6)]),
-        )
-        kind = list(TurnKind)[int(rng.integers(3))]
-        size = float(rng.uniform(0.02, 0.5))
-        turns = (Free(-size, size),) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1)
-        near = rng.uniform((-3, -3, 9), (3, 3, 15))
-        place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
-        box = pose_box(Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8))))
+        robot, kind = random_legs(rng), list(TurnKind)[int(rng.integers(3))]
+        box = pose_box(random_workspace(rng, kind, float(rng.uniform(0.02, 0.5))))
         found = regular(robot, box, most_boxes=3000)
         outcomes.append(found.outcome)
         corners = box.clipped(box.random(30, rng) + rng.choice([-1, 1], (30, 6)) * (box.upper - box.lower))

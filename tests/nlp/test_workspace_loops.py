@@ -13,13 +13,12 @@ from numpy.typing import ArrayLike
 from workspace_cases import problem_of, rank_of
 
 from screwsynth.models import FloatArray, homogenised, robot, three_upu
-from screwsynth.nlp import Case, Free, Limits, Outcome, Task, TurnKind, Turns, Workspace, judge_workspace
+from screwsynth.nlp import Case, Free, Limits, Outcome, Sense, Task, TurnKind, Turns, Workspace, judge_workspace
 from screwsynth.nlp.case.limits.clearance import LegClearance, LinkClearance
 from screwsynth.nlp.case.limits.legs import Actuator
 from screwsynth.nlp.case.limits.limit import Limit
 from screwsynth.nlp.case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from screwsynth.nlp.case.robots import build_model
-from screwsynth.nlp.case.task import Sense
 from screwsynth.nlp.evidence.closing import closed_in_place
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.proof.statement.posed_layout import extreme_program

@@ -11,7 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import Run, case_from, edited, output_of, refusal_of, saved, unbroken, unpacked
-from hexapods import HEXAPOD, case_of_legs, clearance, hexapod_text, subject_of, values_of
+from hexapods import (
+    HEXAPOD,
+    case_of_legs,
+    clearance,
+    hexapod_text,
+    random_legs,
+    random_workspace,
+    subject_of,
+    values_of,
+)
 from workspace_cases import alone, changed, claim, exact_rows, on_paper, rejected, stating, turned
 
 from screwsynth.models import FloatArray, three_upu
@@ -247,15 +256,8 @@ def test_random_machines_are_accepted() -> None:
     rng = np.random.default_rng(5)
     accepted = 0
     while accepted < 12:
-        machine = Legs(
-            np.column_stack([rng.uniform(-10, 10, (6, 2)), rng.uniform(-1, 1, 6)]),
-            np.column_stack([rng.uniform(-6, 6, (6, 2)), rng.uniform(-1, 1, 6)]),
-        )
-        kind, size = list(TurnKind)[accepted % 3], float(rng.uniform(0.1, 0.3))
-        turns = (Free(-size, size),) * (3 if kind is TurnKind.ROLL_PITCH_YAW else 1)
-        near = rng.uniform((-3, -3, 9), (3, 3, 15))
-        place = tuple(Free(float(c - 4 * size), float(c + 4 * size)) for c in near)
-        workspace = Workspace(place, Turns(kind, turns, (0.6, 0.0, 0.8)))
+        machine = random_legs(rng)
+        workspace = random_workspace(rng, list(TurnKind)[accepted % 3], float(rng.uniform(0.1, 0.3)))
         record = TreeRecord()
         problem = build_problem(case_of_legs(machine), HEXAPOD, pose_box(workspace))
         found = prove_rank(problem, problem.locked, most_boxes=3000, recorder=record)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from builders import Run, case_file, case_from, case_tables, edited, ends, output_of, saved, unbroken, unpacked
 from casadi import SX
-from hexapods import EVERY_LIMIT, HEXAPOD, case_of_legs
+from hexapods import EVERY_LIMIT, HEXAPOD, case_of_legs, random_legs
 from workspace_cases import (
     alone,
     changed,
@@ -66,7 +66,7 @@ def case_of(text: str = TEXT) -> Case:
 
 @pytest.fixture(scope="module")
 def both() -> tuple[Judgement, Proof]:
-    return written(case_of(), TEXT, quantities=ASKED, leg_error=LEG_ERROR, gap=0.02, jobs=1)
+    return written(case_of(), TEXT, quantities=ASKED, leg_error=LEG_ERROR, gap=0.1, jobs=1)
 
 
 @pytest.fixture(scope="module")
@@ -277,10 +277,8 @@ class Machine:
 
     def __init__(self, seed: int, tolerance: float, count: int) -> None:
         rng = np.random.default_rng(seed)
-        base, platform = (
-            np.column_stack([rng.uniform(-size, size, (6, 2)), rng.uniform(-1, 1, 6)]) for size in (10.0, 6.0)
-        )
-        self.exact, box = Legs(base, platform, tolerance), pose_box(self.WORKSPACE)
+        self.exact, box = random_legs(rng, tolerance), pose_box(self.WORKSPACE)
+        base, platform, _ = self.exact
         self.y = box.random(1, rng)[0]
         pose = box.pose(self.y)
         self.position, self.rotation = pose.position, pose.rotation

@@ -31,6 +31,8 @@ from screwsynth.nlp.proof.workspace.ranks.ranks import not_judged
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 
+Proved = tuple[Case, Proof]
+
 
 def reachy_case(factor: float, *, one_motor: bool = True, **parameters: float) -> Case:
     """Reachy Mini's head over a part of its documented rotations, with the limits of its first motor, or of all."""
@@ -46,12 +48,12 @@ def reachy_case(factor: float, *, one_motor: bool = True, **parameters: float) -
 
 
 @pytest.fixture(scope="module")
-def reachy() -> tuple[Case, Proof]:
+def reachy() -> Proved:
     case = reachy_case(0.45)
     return case, on_paper(case, gap=0.1, with_objective=False)[1]
 
 
-def test_reachy_mini_is_on_paper(reachy: tuple[Case, Proof]) -> None:
+def test_reachy_mini_is_on_paper(reachy: Proved) -> None:
     case, proof = reachy
     assert {(each.name, each.reason) for each in proof.unproved} == {("F", "it was not judged")}
     checked = check_workspace_proof(proof, case)
@@ -62,7 +64,7 @@ def test_reachy_mini_is_on_paper(reachy: tuple[Case, Proof]) -> None:
     assert all(each.limit is not None and each.bound is not None for each in checked.claims[1:])
 
 
-def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, Proof]) -> None:
+def test_reachy_mini_tampered_with_is_rejected(reachy: Proved) -> None:
     case, proof = reachy
     tree = claim(proof, "regular").unpacked()
     assert "ends" in rejected(only(proof, "regular", tree=tree[:-1]), case)
@@ -171,7 +173,7 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
 
 
 def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
-    reachy: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch
+    reachy: Proved, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, proof = reachy
     case = reachy_case(1.0)
