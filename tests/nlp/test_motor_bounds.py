@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from test_motor_proofs import CUT, robot_of
+from workspace_cases import CUT, robot_of
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form

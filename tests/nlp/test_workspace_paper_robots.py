@@ -1,20 +1,32 @@
 """Proofs on paper of robots that are not six straight legs, and of motors: what the check accepts, and what not."""
 
-import math
 from dataclasses import replace
 from functools import cache
 
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from, shipped_tables, soaked, turn_about
-from hexapods import case_of_legs
+from builders import case_from, shipped_tables, soaked
 from measures import scaled
-from workspace_cases import box_of, claim, gallery_case, on_paper, only, problem_of, rank_of, rejected, root_of, stating
+from workspace_cases import (
+    CUT,
+    LOADING,
+    box_of,
+    claim,
+    gallery_case,
+    on_paper,
+    only,
+    problem_of,
+    rank_of,
+    rejected,
+    robot_of,
+    root_of,
+    stating,
+)
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Extreme, Free, Judgement, Load, Loading, Motion, Outcome, TurnKind, Turns, Workspace
+from screwsynth.nlp import Case, Extreme, Judgement, Loading, Motion, Outcome
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
@@ -22,7 +34,7 @@ from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, show_on_leaves
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
-from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
 from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
@@ -230,27 +242,6 @@ def test_claims_name_the_assemblies_of_their_numbers(name: str, reached: bool, w
     # Unknowns that are still variables may have any value; those in closed form have home's.
     unknowns = [k for at_pose in found.layout.places.unknowns for k in at_pose]
     assert len(unknowns) == {"6-sps": 0, "6-rus": 0 if reached else 6, "planar-3-prr": 5, "3-rps": 6}[name]
-
-
-CUT = Load("cut", (3.0, 1.0, -10.0), point=(0.0, 0.1, 0.1), any_force=2.0, any_moment=0.1)
-LOADING = Loading((CUT,), Motion(1.0, 0.5))
-
-
-def robot_of(name: str) -> Case:
-    """A robot over a small box: six straight legs, with or without a tolerance, or one of the gallery."""
-    about, along = Turns(TurnKind.AXIS, (Free(-0.05, 0.05),), (0.0, 0.6, 0.8)), Free(0.98, 1.02)
-    if not name.startswith("legs"):
-        case = replace(gallery_case(name, 0.006, 1), loading=LOADING)
-        still = Workspace(workspace_of_case(case).position, Turns(TurnKind.AXIS, (0.0,)))
-        return replace(case, workspace=still) if name == "delta" else case
-    angles = np.radians([-5, 5, 115, 125, 235, 245])
-    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
-    platform = 0.5 * np.roll(ring, 1, axis=0) @ turn_about([0, 0, 1], math.radians(-60)).T
-    if name.endswith("tolerance"):
-        case = case_of_legs(Legs(ring, platform, 1e-3))
-        return replace(case, loading=LOADING, workspace=Workspace([0.02, 0.0, along], about))
-    turns = Turns(TurnKind.ANY_AXIS, (Free(-0.1, 0.1),))
-    return replace(case_of_legs(Legs(ring, platform)), loading=LOADING, workspace=Workspace([0.02, 0.0, along], turns))
 
 
 @cache

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import case_tables, ends
+from builders import case_tables, ends, turn_about
+from hexapods import case_of_legs
 
 from screwsynth.models.joints.closedform import closed_form
 from screwsynth.nlp import Case, Free, Judgement, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
+from screwsynth.nlp.case.loads import Load, Loading, Motion
 from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, read_proof
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
@@ -52,6 +54,11 @@ ROBOTS = {
 }
 
 
+#: A load, and the motion of cases about actuators.
+CUT = Load("cut", (3.0, 1.0, -10.0), point=(0.0, 0.1, 0.1), any_force=2.0, any_moment=0.1)
+LOADING = Loading((CUT,), Motion(1.0, 0.5))
+
+
 def tables_of(
     name: str, sides: float = 0.05, rise: float = 0.02, turn: float = 5.0, tolerance: float = 1e-3, **tables: object
 ) -> dict[str, Any]:
@@ -86,6 +93,23 @@ def gallery_case(name: str, part: float = 0.02, degrees: float = 5.0, seed: int 
     place = [Free(each - part * size, each + part * size) for each in model.home]
     workspace = Workspace(place, Turns(TurnKind.ROLL_PITCH_YAW, (Free(-angle, angle),) * 3))
     return Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])], workspace=workspace)
+
+
+def robot_of(name: str) -> Case:
+    """A robot over a small box: six straight legs, with or without a tolerance, or one of the gallery."""
+    about, along = Turns(TurnKind.AXIS, (Free(-0.05, 0.05),), (0.0, 0.6, 0.8)), Free(0.98, 1.02)
+    if not name.startswith("legs"):
+        case = replace(gallery_case(name, 0.006, 1), loading=LOADING)
+        still = Workspace(workspace_of_case(case).position, Turns(TurnKind.AXIS, (0.0,)))
+        return replace(case, workspace=still) if name == "delta" else case
+    angles = np.radians([-5, 5, 115, 125, 235, 245])
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(6)], axis=1)
+    platform = 0.5 * np.roll(ring, 1, axis=0) @ turn_about([0, 0, 1], math.radians(-60)).T
+    if name.endswith("tolerance"):
+        case = case_of_legs(Legs(ring, platform, 1e-3))
+        return replace(case, loading=LOADING, workspace=Workspace([0.02, 0.0, along], about))
+    turns = Turns(TurnKind.ANY_AXIS, (Free(-0.1, 0.1),))
+    return replace(case_of_legs(Legs(ring, platform)), loading=LOADING, workspace=Workspace([0.02, 0.0, along], turns))
 
 
 def exact_rows(robot: Legs, kind: TurnKind, axis: Sequence[float], y: Sequence[Fraction]) -> list[list[Fraction]]:
