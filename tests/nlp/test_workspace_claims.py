@@ -216,7 +216,7 @@ IMPOSSIBLE = ("actuator_angle = { min = -75, max = 75 }", "actuator_angle = { mi
 
 def test_a_box_that_stays_open_leaves_time_for_smaller_ones() -> None:
     case = case_from(HORNS)
-    found = largest_scale(case, time_limit=2)
+    found = largest_scale(case, time_limit=4)
     assert found.factor > 0.15
     assert found.factor < found.failed <= 1
     smaller = scaled(case.workspace, found.factor)
