@@ -48,6 +48,8 @@ EACH_KIND = (
 FEW_KINDS = ("3-rps", "6-rus", "delta-parallelogram", "five-bar")
 #: Six shipped cases of different kinds: leg layouts, limits, several tasks, several poses, closed loops.
 FEW_CASES = ("camera-mount", "flight-simulator", "haptic-device", "paper-4.1-helical", "paper-4.4-max", "reachy-mini")
+#: The task of cases of which no other motion matters: a push upwards.
+PUSH_UP = {"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}
 #: The command line in this process: exit status, standard output, standard error.
 Run = Callable[..., tuple[int, str, str]]
 # Six legs with one free height. Of unit forces along z, x and y the sums of squares are F of the translations along
@@ -75,6 +77,11 @@ starts = 2
 def soaked(values: Iterable[Any], kept: Collection[Any]) -> list[Any]:
     """Parameter values of a test. Values that are not in ``kept`` run in ``make soak`` only."""
     return [each if each in kept else pytest.param(each, marks=pytest.mark.soak) for each in values]
+
+
+def ends(half: float, middle: float = 0.0) -> dict[str, float]:
+    """A range of a case about a middle."""
+    return {"min": middle - half, "max": middle + half}
 
 
 def case_from(given: str | Mapping[str, Any], name: str = "case") -> Case:

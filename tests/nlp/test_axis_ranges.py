@@ -3,45 +3,24 @@
 import itertools
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
-from builders import Array, case_from, output_of, refusal_of, rows_of, shipped_tables, starter_tables
-from measures import circle_joints
+from builders import Array, Run, case_from, case_of, case_tables, ends, output_of, refusal_of, rows_of
+from path_cases import BASE, LEGS, PLATFORM, lengths_at, robot_of
 
-from screwsynth.nlp import Case, InputError, Outcome, json_data, load_result
-from screwsynth.nlp.proof.workspace.axis_ranges import AxisRange, axis_ranges
+from screwsynth.nlp import AxisRange, Case, InputError, Outcome, axis_ranges, json_data, load_result
 from screwsynth.nlp.results.axisranges import AxisRangesResult
 from screwsynth.nlp.results.schema import result_schema
 
-Run = Callable[..., tuple[int, str, str]]
-BASE, PLATFORM = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
-NAMES = ["1-", "1+", "2-", "2+", "3-", "3+"]
-
 
 def hexapod(**limits: object) -> Case:
-    """LinuxCNC's hexapod with these limits."""
-    return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": limits})
-
-
-def lengths(poses: Array) -> Array:
-    """Lengths (N, 6) of the hexapod's legs at poses (N, 6) of position, roll, pitch and yaw."""
-    (a, b, c), (d, e, f) = np.cos(poses[:, 3:]).T, np.sin(poses[:, 3:]).T
-    rows = [
-        [c * b, c * e * d - f * a, c * e * a + f * d],
-        [f * b, f * e * d + c * a, f * e * a - c * d],
-        [-e, b * d, b * a],
-    ]
-    turns = np.moveaxis(np.array(rows), 2, 0)
-    spans = poses[:, None, :3] + np.einsum("nij,kj->nki", turns, PLATFORM) - BASE
-    return np.asarray(np.linalg.norm(spans, axis=2))
+    return case_of("hexapod-linuxcnc", limits=limits)
 
 
 def moved(start: Array, axis: int, values: Array) -> Array:
-    """The pose with one of its coordinates at other values."""
     poses = np.tile(start, (len(values), 1))
     poses[:, axis] = values
     return poses
@@ -76,7 +55,7 @@ def test_every_axis_of_a_hexapod_keeps_its_legs_to_the_end_and_no_farther() -> N
     for each in found.axes:
         axis = places[each.axis]
         assert each.lower.value < each.at == here[axis] < each.upper.value
-        inside = lengths(moved(here, axis, np.linspace(each.lower.value, each.upper.value, 20_001)))
+        inside = lengths_at(moved(here, axis, np.linspace(each.lower.value, each.upper.value, 20_001)))
         assert inside.min() >= 24
         assert inside.max() <= 38
         for end in (each.lower, each.upper):
@@ -84,7 +63,7 @@ def test_every_axis_of_a_hexapod_keeps_its_legs_to_the_end_and_no_farther() -> N
                 assert abs(end.value - each.at) == pytest.approx(found.most[axis // 3])
                 continue
             limited += 1
-            beyond = lengths(moved(here, axis, np.array([end.failed])))[0, NAMES.index(end.stop.name.split()[-1])]
+            beyond = lengths_at(moved(here, axis, np.array([end.failed])))[0, LEGS.index(end.stop.name.split()[-1])]
             assert beyond > 38 if end.stop.extreme.sense.value == "max" else beyond < 24
             assert beyond == pytest.approx(end.stop.value, abs=1e-9)
     assert limited > 3
@@ -98,7 +77,7 @@ def test_every_axis_of_a_hexapod_keeps_its_legs_to_the_end_and_no_farther() -> N
                 poses[:, places[each.axis]] += part * (
                     each.lower.value - each.at + u * (each.upper.value - each.lower.value)
                 )
-            return lengths(poses)
+            return lengths_at(poses)
 
         inside = box(pair.factor, rng.uniform(size=(4000, 2)))
         corners = np.array(list(itertools.product([0, 1], repeat=2)))
@@ -122,10 +101,8 @@ def test_a_turn_ends_where_the_platform_is_singular() -> None:
 
 
 def test_a_translational_robot_slides_and_does_not_turn() -> None:
-    tables = starter_tables("three-upu")
-    tables["robot"]["parameters"]["base_radius"] = 50
-    case = case_from(tables | {"pose": {"position": [0, 0, 50]}, "limits": {"leg_length": {"min": 40, "max": 70}}})
-    found = axis_ranges(case)
+    case = robot_of("three-upu", {"leg_length": {"min": 40, "max": 70}}, base_radius=50)
+    found = axis_ranges(case, [0, 0, 50, 0, 0, 0])
     assert [each.axis for each in found.axes] == ["x", "y", "z"]
     z = found.axes[2]
     assert z.lower.value == pytest.approx(math.sqrt(40**2 - 25**2), abs=1e-6 * found.most[0])
@@ -137,7 +114,7 @@ def test_ranges_of_strokes_are_cut_on_both_sides() -> None:
     (z,) = axis_ranges(hexapod(**limits), axes=["z"], most=(8, 1)).axes
 
     def stroke(ends: tuple[float, float]) -> float:
-        return float(np.ptp(lengths(moved(np.array([0, 0, 20, 0, 0, 0.0]), 2, np.array(ends))), axis=0).max())
+        return float(np.ptp(lengths_at(moved(np.array([0, 0, 20, 0, 0, 0.0]), 2, np.array(ends))), axis=0).max())
 
     assert stroke((12, 28)) > 6
     assert 5.98 < stroke((z.lower.value, z.upper.value)) <= 6 < stroke((z.lower.failed, z.upper.failed))
@@ -147,15 +124,11 @@ def test_ranges_of_strokes_are_cut_on_both_sides() -> None:
 
 
 def test_ranges_do_not_depend_on_the_unit_of_length() -> None:
-    tables = shipped_tables("hexapod-linuxcnc")
-    tables["limits"] = {"leg_length": {"min": 17, "max": 43}}
-    inches = axis_ranges(case_from(tables), [1, 2, 21, 0, 0.1, 0], axes=["x", "pitch"])
-    robot = tables["robot"] | {"parameters": {"x1": 26500, "x2": 11543, "x3": 0, "x4": 5}}
-    scaled = tables | {"units": {"length": "mm"}, "robot": robot, "pose": {"position": [0, 0, 20000]}}
-    scaled["limits"] = {"leg_length": {"min": 17000, "max": 43000}}
-    scaled["workspace"] = tables["workspace"] | {"position": [0, 0, 20000]}
-    scaled.pop("expect", None)
-    other = axis_ranges(case_from(scaled), [1000, 2000, 21000, 0, 0.1, 0], axes=["x", "pitch"])
+    inches = axis_ranges(hexapod(leg_length={"min": 17, "max": 43}), [1, 2, 21, 0, 0.1, 0], axes=["x", "pitch"])
+    tables = case_tables("hexapod-linuxcnc", units={"length": "mm"}, limits={"leg_length": ends(13000, 30000)})
+    tables["robot"]["parameters"] = {"x1": 26500, "x2": 11543, "x3": 0, "x4": 5}
+    tables["pose"]["position"] = tables["workspace"]["position"] = [0, 0, 20000]
+    other = axis_ranges(case_from(tables), [1000, 2000, 21000, 0, 0.1, 0], axes=["x", "pitch"])
     assert other.most == pytest.approx((1000 * inches.most[0], inches.most[1]))
     for one, two, scale in zip(inches.axes, other.axes, (1000, 1), strict=True):
         for end in ("lower", "upper"):
@@ -167,7 +140,7 @@ def test_ranges_do_not_depend_on_the_unit_of_length() -> None:
 
 def test_ranges_are_the_same_a_third_of_a_turn_farther() -> None:
     case, most = hexapod(leg_length={"min": 24, "max": 38}), (30, 0.5)
-    starts = [(4, 0, 20, 0, 0, 0), (4 * math.cos(math.radians(120)), 4 * math.sin(math.radians(120)), 20, 0, 0, 0)]
+    starts = [(4 * math.cos(turn), 4 * math.sin(turn), 20, 0, 0, 0) for turn in (0, 2 * math.pi / 3)]
     one, other = (axis_ranges(case, start, axes=["z", "yaw"], most=most).axes for start in starts)
     for a, b in zip(one, other, strict=True):
         assert (a.lower.value, a.upper.value) == pytest.approx((b.lower.value, b.upper.value), abs=1e-9)
@@ -175,9 +148,9 @@ def test_ranges_are_the_same_a_third_of_a_turn_farther() -> None:
 
 def test_a_pose_beyond_a_limit_has_no_ranges_and_says_which() -> None:
     found = axis_ranges(hexapod(leg_length={"min": 17, "max": 30}), [5, 0, 20, 0, 0, 0])
-    legs = lengths(np.array([[5, 0, 20, 0, 0, 0.0]]))[0]
+    legs = lengths_at(np.array([[5, 0, 20, 0, 0, 0.0]]))[0]
     assert {each.name: each.value for each in found.stops} == pytest.approx(
-        {f"leg_length limb {name}": length for name, length in zip(NAMES, legs, strict=True) if length > 30}
+        {f"leg_length limb {name}": length for name, length in zip(LEGS, legs, strict=True) if length > 30}
     )
     assert found.axes == found.pairs == ()
     singular = axis_ranges(hexapod(), [0, 0, 20, 0, 0, math.pi / 2])
@@ -185,9 +158,7 @@ def test_a_pose_beyond_a_limit_has_no_ranges_and_says_which() -> None:
 
 
 def test_dependent_coordinates_move_with_those_that_the_robot_chooses() -> None:
-    tables = starter_tables("3-rps")
-    tables["robot"]["parameters"]["rb"] = 1.0
-    case = case_from(tables)
+    case = robot_of("3-rps", rb=1.0)
     found = axis_ranges(case, [*map(float, case.model.home), 0, 0, 0], most=(0.01, 0.01))
     assert [each.axis for each in found.axes] == ["z", "roll", "pitch"]
     assert found.others == ("x", "y", "yaw")
@@ -195,27 +166,22 @@ def test_dependent_coordinates_move_with_those_that_the_robot_chooses() -> None:
 
 
 def test_what_is_no_pose_is_refused() -> None:
-    case = hexapod()
-    for start, words in (
-        ((0, 0, 20), "six finite"),
-        ((0, 0, 20, 0, 2.6, 0), "pitch = 148.969 deg: must be within 148"),
+    case, free = hexapod(), case_of("hexapod-linuxcnc", pose={"position": [0, 0, {"min": 1, "max": 2}]})
+    for given, options, words in (
+        (case, {"start": (0, 0, 20)}, "six finite"),
+        (case, {"start": (0, 0, 20, 0, 2.6, 0)}, "pitch = 148.969 deg: must be within 148"),
+        (case, {"axes": ["jaw"]}, "axis 'jaw'"),
+        (case, {"most": (1, 0)}, "positive"),
+        (free, {}, "free"),
     ):
         with pytest.raises(InputError, match=words):
-            axis_ranges(case, start)
-    with pytest.raises(InputError, match="axis 'jaw'"):
-        axis_ranges(case, axes=["jaw"])
-    with pytest.raises(InputError, match="positive"):
-        axis_ranges(case, most=(1, 0))
-    with pytest.raises(InputError, match="free"):
-        axis_ranges(
-            case_from(shipped_tables("hexapod-linuxcnc") | {"pose": {"position": [0, 0, {"min": 1, "max": 2}]}})
-        )
+            axis_ranges(given, **options)
 
 
 def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     out, table = tmp_path / "ranges.json", tmp_path / "ranges.csv"
-    given = ("path", "hexapod-linuxcnc", "--range", "--start", "1,0,20,0,0,10", "--most", "3,5")
-    shown = output_of(cli(*given, "--json", str(out), "--csv", str(table)))
+    command = ("path", "hexapod-linuxcnc", "--range", "--json", str(out), "--start")
+    shown = output_of(cli(*command, "1,0,20,0,0,10", "--most", "3,5", "--csv", str(table)))
     assert len(shown.splitlines()) <= 25
     assert "1, 0, 20 in; roll, pitch, yaw 0, 0, 10 deg" in shown
     result = json.loads(out.read_text())
@@ -228,20 +194,21 @@ def test_the_command_shows_ranges_and_pairs(cli: Run, tmp_path: Path) -> None:
     assert [each["factor"] for each in result["pairs"]] == [1.0] * 15
     axes = table.read_text().partition("\n\n")[0].partition("\n")[2]
     assert [row["limited below by"] for row in rows_of(axes)] == ["the largest range"] * 6
-    status, shown, _ = cli(
-        "path", "hexapod-linuxcnc", "--range", "--start", "0,0,50,0,0,0", "--json", str(tmp_path / "none.json")
-    )
+    status, shown, _ = cli(*command, "0,0,50,0,0,0")
     assert status == 1
-    none = json.loads((tmp_path / "none.json").read_text())
+    none = json.loads(out.read_text())
     jsonschema.validate(none, result_schema())
     assert none["faults"]
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--of", str(out)), "is no result of solve or evaluate")
     assert "leg_length limb 3+ above 43 in: 54.63139 in" in shown
-    refusal_of(cli("path", "hexapod-linuxcnc"), "the table [path], or the file of a path")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--along", "a.ngc"), "--along: is not for --range")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--unit", "mm"), "--unit: is not for --range")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--along", "a.ngc", "--most", "1,1"), "--most: needs --range")
-    refusal_of(cli("path", "hexapod-linuxcnc", "--range", "--most", "1,-1"), "--most 1,-1: must be two positive")
+    for options, words in (
+        ("", "the table [path], or the file of a path"),
+        (f"--range --of {out}", "is no result of solve or evaluate"),
+        ("--range --along a.ngc", "--along: is not for --range"),
+        ("--range --unit mm", "--unit: is not for --range"),
+        ("--along a.ngc --most 1,1", "--most: needs --range"),
+        ("--range --most 1,-1", "--most 1,-1: must be two positive"),
+    ):
+        refusal_of(cli("path", "hexapod-linuxcnc", *options.split()), words)
     free = cli("path", "paper-4.1-helical", "--range")
     refusal_of(free, "paper-4.1-helical", "pose: has free numbers", "state it with --start")
 

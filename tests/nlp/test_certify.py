@@ -1,32 +1,52 @@
-"""The search of the whole box: the reference, soundness on random problems, and every trap that was met."""
+"""The search of the whole box: the reference, soundness on random problems, every trap that was met, and its time."""
 
 import json
 import math
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from, shipped_tables
+from builders import EACH_KIND, Array, case_from, case_tables, shipped_tables, turn_about
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy_engine import bounding, first_pass, quadratic_models, tangent_bounds
 from numpy_engine.bounding import NumpyEngine
 
-from screwsynth.models import stewart_gough
-from screwsynth.nlp import Case, Free, Rotation, Sense, Solution, Task, certify, formulate, load_case, solve
+from screwsynth.models import Dimension, Model, hexapod, robot_function, stewart_gough
+from screwsynth.nlp import Case, Free, Limits, Rotation, Sense, Solution, Task, certify, formulate, load_case, solve
+from screwsynth.nlp.case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.evidence.closing import closed_start
+from screwsynth.nlp.evidence.kkt import close_equations, linearise
+from screwsynth.nlp.evidence.state import loops_are_closed
+from screwsynth.nlp.interruption import seconds_left
 from screwsynth.nlp.program.epigraph import formulate_worst
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.proof.boxes import optimum
 from screwsynth.nlp.proof.boxes.engine import Engine, Examination, Verdict, search_tape
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
-from screwsynth.nlp.proof.statement.standard_form import StandardForm, standard_form
+from screwsynth.nlp.proof.checker.check import check_proof
+from screwsynth.nlp.proof.statement import standard_form as statement
+from screwsynth.nlp.proof.statement.standard_form import Kind, StandardForm, is_in_home_mode, standard_form
 from screwsynth.nlp.results.evidence import certificate_data
 from screwsynth.nlp.results.jsondata import json_data
+from screwsynth.nlp.solver import certified
+from screwsynth.nlp.solver.certified import proof_of
+from screwsynth.nlp.solver.multistart import ProgramSolution, solve_program
+
+AXIS_Z = "paper-4.1-helical-axis-z"
+
+
+@cache
+def solved(name: str, starts: int = 4) -> Solution:
+    """The solution of a shipped case, which tests share."""
+    return solve(load_case(name), starts=starts)
 
 
 def upu(sense: str = "max") -> Case:
@@ -96,7 +116,7 @@ def test_the_kernel_agrees_with_the_reference_box_by_box(case: Case) -> None:
 
 @pytest.mark.parametrize("name", ["paper-4.2-rotation", "paper-4.2-translation"])
 def test_one_box_is_enough_for_a_flat_optimum(name: str) -> None:
-    solution = solve(load_case(name), starts=2)
+    solution = solved(name)
     proved = certify_program(solution.nlp, solution.x, claimed=solution.F)
     assert (proved.status, proved.boxes, proved.engine) == (CertificateStatus.PROVED, 1, "c")
     assert proved.gap <= 1e-9
@@ -202,7 +222,7 @@ def test_nan_in_a_bound_does_not_close_a_box() -> None:
 
 def test_nothing_outside_the_box_is_taken_for_a_better_point() -> None:
     """Trap: a solver that widens bounds returns values above the true maximum."""
-    solution = solve(load_case("paper-4.2-translation"), starts=4)
+    solution = solved("paper-4.2-translation")
     assert (solution.x >= solution.nlp.lower).all()
     assert (solution.x <= solution.nlp.upper).all()
     outside = solution.nlp.upper + 1e-6 * solution.nlp.scale
@@ -211,16 +231,11 @@ def test_nothing_outside_the_box_is_taken_for_a_better_point() -> None:
     assert "outside of the limits" in found.statement
 
 
-def test_an_incumbent_that_is_too_good_is_refused() -> None:
-    solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
+def test_an_incumbent_that_is_too_good_is_refused_and_one_that_is_beaten_replaced() -> None:
+    solution = solved(AXIS_Z)
     found = certify_program(solution.nlp, solution.x, claimed=solution.F * (1 + 1e-3))
-    assert found.status is CertificateStatus.REFUSED
+    assert (found.status, found.boxes) == (CertificateStatus.REFUSED, 0)
     assert f"{solution.F:.10g}" in found.statement
-    assert found.boxes == 0
-
-
-def test_an_incumbent_that_is_beaten_is_replaced() -> None:
-    solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
     found = certify_program(solution.nlp, solution.nlp.centre)
     assert found.status is CertificateStatus.PROVED
     assert found.was_beaten
@@ -236,37 +251,26 @@ def test_an_empty_feasible_set_is_a_proof_of_its_own() -> None:
     assert json_data(certificate_data(found))["bound"] is None
 
 
-@pytest.mark.parametrize(("value", "status"), [(1.0, CertificateStatus.PROVED), (300.0, CertificateStatus.REFUSED)])
-def test_f_is_above_a_value_on_the_whole_box_or_a_point_shows_otherwise(
-    value: float, status: CertificateStatus
-) -> None:
-    nlp = formulate(load_case("paper-4.1-helical-axis-z"))
-    least = replace(nlp, sense=type(nlp.sense)("min"))
-    found = certify_program(least, above=value)
-    assert found.status is status
-    if status is CertificateStatus.PROVED:
-        assert found.bound > value
-    else:
-        assert found.x is not None
-        assert nlp.evaluate(found.x)[0] <= value
-
-
-def test_above_needs_a_minimisation() -> None:
+def test_f_is_above_a_value_on_the_whole_box_or_a_point_shows_otherwise() -> None:
+    nlp = formulate(load_case(AXIS_Z))
+    least = replace(nlp, sense=Sense.MIN)
+    found = certify_program(least, above=1.0)
+    assert found.status is CertificateStatus.PROVED
+    assert found.bound > 1
+    found = certify_program(least, above=300.0)
+    assert found.status is CertificateStatus.REFUSED
+    assert nlp.evaluate(found.x)[0] <= 300
     with pytest.raises(ValueError, match="min"):
-        certify_program(formulate(load_case("paper-4.1-helical")), above=0.0)
+        certify_program(nlp, above=0.0)
 
 
-def test_stopping_early_still_gives_a_bound_that_holds() -> None:
-    solution = solve(load_case("paper-4.1-helical"), starts=4)
+def test_a_search_that_stops_early_or_is_interrupted_gives_the_bound_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    solution = solved("paper-4.1-helical")
     found = certify_program(solution.nlp, solution.x, gap=1e-9, time_limit=0.15)
     assert found.status is CertificateStatus.INCOMPLETE
     assert found.bound >= solution.F
     assert found.open > 0
     assert "stopped after" in found.statement
-
-
-def test_an_interrupt_gives_the_bound_reached(monkeypatch: pytest.MonkeyPatch) -> None:
-    solution = solve(load_case("paper-4.1-helical"), starts=4)
     examine, calls = Engine.examine, []
 
     def interrupted(self: Engine, *arguments: object) -> Examination:
@@ -283,24 +287,14 @@ def test_an_interrupt_gives_the_bound_reached(monkeypatch: pytest.MonkeyPatch) -
     assert "interrupted" in found.statement
 
 
-def test_a_case_with_nothing_free_is_its_own_bound() -> None:
-    nlp = formulate(load_case("paper-4.4-snu"))
-    found = certify_program(nlp)
-    assert found.status is CertificateStatus.PROVED
-    assert found.boxes == 0
+def test_a_case_with_nothing_free_is_its_own_bound_at_several_poses_too() -> None:
+    found = certify_program(formulate(load_case("paper-4.4-snu")))
+    assert (found.status, found.boxes) == (CertificateStatus.PROVED, 0)
     assert found.bound == found.incumbent
-
-
-def test_the_worst_of_several_poses_of_a_case_with_nothing_free_is_its_own_bound() -> None:
-    tables = shipped_tables("hexapod-linuxcnc")
-    for table in ("limits", "workspace", "tolerance"):
-        tables.pop(table, None)
-    moved = [[0, 0, 0], [0, 0, 1], [1, 0, 1]]
-    alone = []
-    for translation in moved:
-        tables["pose"]["displacements"] = [{"translation": translation}]
-        alone.append(solve(case_from(tables)).F)
-    tables["pose"]["displacements"] = [{"translation": translation} for translation in moved]
+    tables = case_tables("hexapod-linuxcnc", limits=None, workspace=None)
+    moved = [{"translation": each} for each in ([0, 0, 0], [0, 0, 1], [1, 0, 1])]
+    alone = [solve(case_from(tables | {"pose": tables["pose"] | {"displacements": [each]}})).F for each in moved]
+    tables["pose"]["displacements"] = moved
     tables["combine"] = {"over_poses": "worst"}
     certified = certify(case_from(tables), with_proof=True)
     certificate = certified.tasks[0]
@@ -313,7 +307,7 @@ def test_the_worst_of_several_poses_of_a_case_with_nothing_free_is_its_own_bound
 
 
 def test_the_worst_case_of_several_tasks_is_bounded_by_the_tasks_themselves() -> None:
-    base = load_case("paper-4.1-helical-axis-z")
+    base = load_case(AXIS_Z)
     other = Task((0.1, 0.3, 1.0, 2.0, -1.0, 0.4), "max", "other")  # type: ignore[arg-type]
     case = replace(base, tasks=[base.tasks[0], other])
     nlp = formulate_worst(case, [1.0, 1.0], [400.0, 400.0], 400.0)
@@ -342,7 +336,7 @@ def test_no_function_has_a_negative_weight() -> None:
 
 
 def test_progress_and_history_shrink_to_the_gap() -> None:
-    solution = solve(load_case("paper-4.1-helical-axis-z"), starts=4)
+    solution = solved(AXIS_Z)
     seen: list[tuple[float, float, float, int, int]] = []
     found = certify_program(solution.nlp, solution.x, progress=lambda *row: seen.append(row))
     assert seen
@@ -404,3 +398,176 @@ def test_a_box_that_collapses_to_a_corner_is_examined_there() -> None:
     assert len(solution.evidence.active) == solution.nlp.n
     proved = certify_program(solution.nlp, solution.x, claimed=solution.F, gap=1e-6)
     assert proved.status is CertificateStatus.PROVED
+
+
+@pytest.mark.parametrize("limit", [40.0, 3.0])
+def test_a_solve_has_half_of_the_time_of_a_certificate(monkeypatch: pytest.MonkeyPatch, limit: float) -> None:
+    seen: list[float] = []
+
+    def solve_and_look(*given: Any, **named: Any) -> ProgramSolution:  # noqa: ANN401 - those of the function
+        seen.append(seconds_left())
+        return solve_program(*given, **named)
+
+    monkeypatch.setattr(certified, "solve_program", solve_and_look)
+    found = certify(load_case("paper-4.1-helical"), time_limit=limit, jobs=1)
+    assert seen == [pytest.approx(0.5 * limit)]
+    assert found.certificates[0].boxes > 0
+
+
+TWIST = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
+
+
+def at_home(model: Model, part: float = 0.05) -> Case:
+    """A robot at home with its first two lengths free by a part of theirs."""
+    parameters: dict[str, float | Free] = {item.name: item.typical[0] for item in model.parameters}
+    for item in [each for each in model.parameters if each.dimension is Dimension.LENGTH][:2]:
+        parameters[item.name] = Free((1 - part) * item.typical[0], (1 + part) * item.typical[0])
+    return Case(model, parameters, model.home, [Task(TWIST, "max")])  # type: ignore[arg-type]
+
+
+FEW = ("planar-3-rpr", "6-rus", "five-bar")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [FEW, pytest.param([each for each in EACH_KIND if each not in FEW], marks=pytest.mark.soak)],
+    ids=["few", "others"],
+)
+def test_what_replaces_unknowns_closes_the_loops_in_homes_mode(names: tuple[str, ...]) -> None:
+    rng = np.random.default_rng(1)
+    for name in names:
+        nlp = formulate(at_home(robot_function(name)()))
+        nlp = replace(nlp, in_home_mode=any(each.is_mode for each in nlp.program.model.signs))
+        form = standard_form(nlp)
+        if not nlp.in_home_mode:
+            assert form.n == nlp.n
+            continue
+        assert form.n <= 2, name
+        for point in rng.uniform(form.lower, form.upper, (4, form.n)):
+            x = form.program_variables(point)
+            assert loops_are_closed(nlp, x), name
+            assert linearise(nlp, x).violation < 1e-12, name
+            assert form.keeps_signs(x), name
+            assert is_in_home_mode(nlp, x) is True
+            assert form.value_at(point) == pytest.approx(nlp.evaluate(x).F, rel=1e-12)
+            np.testing.assert_array_equal(form.point_of(x), point)
+            x[nlp.program.places.unknowns[0][0]] += 0.01
+            assert not form.keeps_signs(x), name
+
+
+def test_boxes_that_became_too_small_before_a_better_point_was_known_are_searched_again() -> None:
+    found = certify_program(replace(formulate(at_home(robot_function("3-spr")())), in_home_mode=True), gap=1e-2)
+    assert (found.status, found.open) == (CertificateStatus.PROVED, 0)
+
+
+def test_bounds_are_those_of_the_search_with_unknowns(monkeypatch: pytest.MonkeyPatch) -> None:
+    solution = solve(at_home(robot_function("6-rus")()), starts=2)
+    nlp = replace(solution.nlp, in_home_mode=True)
+    own = certify_program(nlp, solution.x, claimed=solution.F)
+    monkeypatch.setattr(statement, "without_unknowns", lambda form: form)
+    every = certify_program(nlp, solution.x, claimed=solution.F)
+    assert own.status is every.status is CertificateStatus.PROVED
+    assert solution.F <= own.bound <= 1.00011 * solution.F
+    assert own.bound == pytest.approx(every.bound, rel=2e-4)
+    assert 20 * own.boxes < every.boxes
+    np.testing.assert_allclose(own.x, every.x, atol=1e-6)
+
+
+def test_roots_that_meet_in_the_box_stay_unknowns() -> None:
+    nlp = replace(formulate(at_home(robot_function("planar-3-rrr")(), 0.5)), in_home_mode=True)
+    form = standard_form(nlp)
+    # One unknown of each limb has two solutions; the other follows from it.
+    assert form.n == nlp.n - 3
+    assert sum(each.is_equation for each in form.conditions) == 3
+    start = closed_start(nlp)
+    assert form.keeps_signs(start)
+    np.testing.assert_allclose(form.program_variables(form.point_of(start)), start, atol=1e-9)
+    own = list(nlp.program.places.unknowns[0][:2])
+    folded = []
+    for turn in np.linspace(-2, 2, 9):
+        for other in np.linspace(-3, 3, 7):
+            point = start.copy()
+            point[own] += [turn, other]
+            point = close_equations(nlp, point)
+            if loops_are_closed(nlp, point) and np.abs(point - start)[own].min() > 0.1:
+                folded.append(form.keeps_signs(point))
+    assert folded
+    assert not any(folded)
+
+
+def test_a_proof_without_unknowns_is_checked() -> None:
+    case = at_home(robot_function("planar-3-rpr")())
+    found = certify(case, starts=2, with_proof=True)
+    assert found.certificate.status is CertificateStatus.PROVED
+    assert found.certificate.boxes < 100
+    (proof,) = proof_of(found, "").claims
+    assert check_proof(proof, found.certificate.nlp).leaves > 1
+
+
+def hexapod_with(limit: SmallestSingularValue | ConditionNumber) -> Case:
+    """A hexapod with its pose free by far, and a limit on singular values."""
+    parameters = {}
+    for k, angle in enumerate(np.radians([-10, 10, 110, 130, 230, 250])):
+        for name, radius, turn in (("base", 26.5, angle), ("platform", 11.5, angle + np.radians(50 if k % 2 else -50))):
+            parameters[f"{name}_{k + 1}"] = [radius * np.cos(turn), radius * np.sin(turn), 0.0]
+    position = [Free(-10.0, 10.0), Free(-10.0, 10.0), Free(12.0, 28.0)]
+    rotation = Rotation(axis=None, angle=Free(-0.7, 0.7))
+    return Case(hexapod(), parameters, position, [Task(TWIST, "min")], rotation=rotation, limits=Limits(limit))  # type: ignore[arg-type]
+
+
+def conditions_at(form: StandardForm, points: Array) -> tuple[Array, Array]:
+    """Values of all conditions at points, and which of them follow from the limit."""
+    values = ca.Function("h", [form.x], [form.expressions]).map(len(points))(points.T).full().T
+    return values[:, len(form.functions) :], np.array([each.kind is Kind.FOLLOWS for each in form.conditions])
+
+
+def test_minors_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
+    limit = SmallestSingularValue(0.8, 10.0)
+    form = standard_form(formulate(hexapod_with(limit)))
+    points = np.random.default_rng(0).uniform(form.lower, form.upper, (400, 6)) * [1, 1, 1, 0.5, 0.5, 0.5]
+    h, follows = conditions_at(form, points)
+    assert follows.sum() == 22
+    (k,) = [i for i, each in enumerate(form.conditions) if each.name == limit.key]
+    kept = h[:, k] <= 0
+    assert 20 < kept.sum() < 380
+    assert np.all(h[kept][:, follows] <= 0)
+    assert np.mean((h[~kept][:, follows] > 0).any(axis=1)) > 0.7
+    # Boxes around poses that are far from keeping the limit: the estimate excludes none of them.
+    bad = points[np.argsort(-h[:, k])[:4]].T
+    half = np.array([[0.3], [0.3], [0.3], [0.015], [0.015], [0.015]])
+    alone = [each for each in form.conditions if each.name != limit.key]
+    excluded, by_reference = (
+        engine(replace(form, conditions=tuple(alone)), 1).examine(bad - half, bad + half, -np.inf).verdict
+        for engine in (Engine, NumpyEngine)
+    )
+    assert (excluded == Verdict.INFEASIBLE).all()
+    np.testing.assert_array_equal(by_reference, excluded)
+    estimate = tuple(each for each in form.conditions if each.kind is not Kind.FOLLOWS)
+    by_estimate = Engine(replace(form, conditions=estimate), 1).examine(bad - half, bad + half, -np.inf).verdict
+    assert not (by_estimate == Verdict.INFEASIBLE).any()
+
+
+def condition_number(case: Case, position: Array, turn: Array, length: float) -> float:
+    """The condition number of unit forces along six legs, moments about the platform's origin in parts of a length.
+
+    The turn is the vector part of its quaternion.
+    """
+    angle = 2 * np.arcsin(np.linalg.norm(turn))
+    arms = np.array([case.parameters[f"platform_{k}"] for k in range(1, 7)]) @ turn_about(turn, angle).T
+    legs = position + arms - np.array([case.parameters[f"base_{k}"] for k in range(1, 7)])
+    forces = legs / np.linalg.norm(legs, axis=1)[:, None]
+    return float(np.linalg.cond(np.hstack([forces, np.cross(arms, forces) / length])))
+
+
+def test_minors_of_condition_numbers_exclude_wide_boxes_and_nothing_that_keeps_the_limit() -> None:
+    most, length = 4.0, 10.0
+    case = hexapod_with(ConditionNumber(most, length))
+    form = standard_form(formulate(case))
+    points = np.random.default_rng(0).uniform(form.lower, form.upper, (2000, 6))
+    h, follows = conditions_at(form, points)
+    h = h[:, follows]
+    numbers = np.array([condition_number(case, each[:3], each[3:], length) for each in points])
+    kept = numbers <= most
+    assert 100 < kept.sum() < 1900
+    assert np.all(h[kept] <= 0)
+    assert np.mean((h[numbers > 2 * most] > 0).any(axis=1)) > 0.5

@@ -16,49 +16,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders import PUSH_UP, ends
 
 from screwsynth.nlp import Extreme, Judgement, Outcome
 
 BENCH = Path(__file__).parents[2] / "bench" / "soundness"
 SAMPLES = 300
-TASK = {"name": "task", "sense": "max", "axis": [0, 0, 1], "pitch": math.inf}
 
 
-def ends(half: float, middle: float = 0.0) -> dict[str, float]:
-    """Ends about a middle."""
-    return {"min": middle - half, "max": middle + half}
+def tilts(half: float) -> dict[str, Any]:
+    return {"roll": ends(half), "pitch": ends(half)}
 
 
 #: Of each robot its home, the position and rotation of a workspace, its independent coordinates, and a limit.
 ROBOTS: dict[str, tuple[list[float], list[Any], dict[str, Any], Sequence[str], dict[str, Any]]] = {
-    "ankle": (
-        [0, 0, 0.132442],
-        [0, 0, 0.132442],
-        {"roll": ends(5), "pitch": ends(5)},
-        ("roll", "pitch"),
-        {"actuator_angle": ends(12.5)},
-    ),
-    "3-rps": (
-        [0, 0, 1.1],
-        [0, 0, ends(0.01, 1.1)],
-        {"roll": ends(6), "pitch": ends(6)},
-        ("z", "roll", "pitch"),
-        {"actuator_length": ends(0.12)},
-    ),
-    "exechon": (
-        [0, 0, 1.0],
-        [0, 0, ends(0.02, 1.0)],
-        {"roll": ends(4), "pitch": ends(4)},
-        ("z", "roll", "pitch"),
-        {"actuator_length": ends(0.1)},
-    ),
-    "five-bar-scara": (
-        [0, 270, 0],
-        [ends(60), ends(40, 270), 0],
-        {},
-        ("x", "y"),
-        {"actuator_angle": ends(34)},
-    ),
+    "ankle": ([0, 0, 0.132442], [0, 0, 0.132442], tilts(5), ("roll", "pitch"), {"actuator_angle": ends(12.5)}),
+    "3-rps": ([0, 0, 1.1], [0, 0, ends(0.01, 1.1)], tilts(6), ("z", "roll", "pitch"), {"actuator_length": ends(0.12)}),
+    "exechon": ([0, 0, 1], [0, 0, ends(0.02, 1)], tilts(4), ("z", "roll", "pitch"), {"actuator_length": ends(0.1)}),
+    "five-bar-scara": ([0, 270, 0], [ends(60), ends(40, 270), 0], {}, ("x", "y"), {"actuator_angle": ends(34)}),
 }
 
 
@@ -70,13 +45,12 @@ def bench() -> ModuleType:
 
 
 def asked(bench: ModuleType, name: str, *, position: Any = None, limits: Any = None, **rotation: Any) -> Any:
-    """A workspace of a robot, some of it stated otherwise."""
     home, place, turns, chosen, allowed = ROBOTS[name]
     file = f"{name}.toml"
     tables: dict[str, Any] = {
         "robot": ({"model": name} if name in ("3-rps", "exechon") else {"file": file}) | {"parameters": {}},
         "pose": {"position": home},
-        "task": [TASK],
+        "task": [PUSH_UP | {"name": "task"}],
         "limits": allowed if limits is None else limits,
         "workspace": {"position": position or place} | ({"rotation": turns | rotation} if turns | rotation else {}),
     }
@@ -117,8 +91,7 @@ def test_what_follows_is_proved_about_all_samples(bench: ModuleType, name: str) 
     for each in follows:
         low, high = (extreme(bench, found, each, sense) for sense in ("min", "max"))
         width = np.ptp(known[each])
-        assert low.limit is None
-        assert high.limit is None
+        assert low.limit is high.limit is None
         # Bounds hold all samples, and are not much wider than these.
         assert known[each][0] - 0.2 * width < low.bound <= known[each][0] + 1e-9 * width
         assert known[each][1] - 1e-9 * width <= high.bound < known[each][1] + 0.2 * width

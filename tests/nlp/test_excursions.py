@@ -1,55 +1,37 @@
 """Workspaces about the pose of a case: the box in world coordinates, solves in which it moves, and refusals."""
 
+import copy
 import itertools
 import json
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, output_of, refusal_of, saved, turn_about, unbroken
+from builders import PUSH_UP, Array, Run, case_file, case_from, ends, output_of, refusal_of, turn_about, unbroken
 from measures import circle_joints
+from path_cases import turns_of
 
-from screwsynth.nlp import Case, CaseError, case_text, compare, judge_workspace, solve
-from screwsynth.nlp.case.toml import toml_document
+from screwsynth.nlp import Case, CaseError, Solution, case_text, compare, judge_workspace, solve
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
 from screwsynth.nlp.proof.workspace.robot.pose_box import PoseNumbers, pose_box
 from screwsynth.nlp.solver.frames import pose_of
-from screwsynth.nlp.solver.solution import Solution
 
-#: A motion base with a free height, whose platform is to be moved and turned about its middle.
-BASE = """
-[units]
-length = "m"
-[robot]
-model = "stewart-gough"
-layout = "octahedral"
-[robot.parameters]
-x1 = { min = 0.4, max = 0.9 }
-x2 = 0.4
-x3 = 15
-x4 = 25
-[pose]
-position = [0, 0, { min = 0.5, max = 1.4 }]
-[[task]]
-sense = "max"
-axis = [1, 0, 0]
-pitch = inf
-[limits]
-leg_length = { min = 0.7, max = 1.2 }
-over = "workspace"
-[workspace]
-about = "pose"
-position = [{ min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }, { min = -0.1, max = 0.1 }]
-rotation = { roll = { min = -10, max = 10 }, pitch = { min = -10, max = 10 } }
-[solve]
-starts = 4
-"""
 LEGS = (0.7, 1.2)
-SMALL = {"min": -0.04, "max": 0.04}
+BASE: dict[str, Any] = {
+    "units": {"length": "m"},
+    "robot": {
+        "model": "stewart-gough", "layout": "octahedral",
+        "parameters": {"x1": {"min": 0.4, "max": 0.9}, "x2": 0.4, "x3": 15, "x4": 25},
+    },
+    "pose": {"position": [0, 0, {"min": 0.5, "max": 1.4}]},
+    "task": [{"sense": "max", "axis": [1, 0, 0], "pitch": math.inf}],
+    "limits": {"leg_length": {"min": 0.7, "max": 1.2}, "over": "workspace"},
+    "workspace": {"about": "pose", "position": [ends(0.1)] * 3, "rotation": {"roll": ends(10), "pitch": ends(10)}},
+    "solve": {"starts": 4},
+}  # fmt: skip
 #: Ten corners of the box: two signs of z for four of x and y, and a turn with each; then turns alone.
 CORNERS = [
     *((x, y, z, math.copysign(10, x * z), 0.0) for x, y, z in itertools.product((-0.1, 0.1), repeat=3)),
@@ -57,32 +39,38 @@ CORNERS = [
 ]
 
 
-def tables(**changes: object) -> dict[str, Any]:
-    """Tables of the motion base, with others in the place of some."""
-    return tomllib.loads(BASE) | changes
+def tables(*, about: str | None = "pose", **changes: object) -> dict[str, Any]:
+    """Tables of the motion base, with others in the place of some, and the workspace about the pose or the world."""
+    found = copy.deepcopy(BASE) | changes
+    if about is None:
+        del found["workspace"]["about"]
+    return found
 
 
 def lengths_at(design: Case, excursions: list[tuple[float, ...]]) -> Array:
     """Lengths (N, 6) of the legs of a design at excursions about its pose: a position, roll and pitch in degrees."""
-    values = {name: float(np.ravel(design.components(name))[0]) for name in ("x1", "x2", "x3", "x4")}  # type: ignore[arg-type]
-    base, platform = circle_joints(values)
-    middle = np.array([float(each) for each in design.position])  # type: ignore[arg-type]
-    turns = [turn_about((0, 1, 0), math.radians(p)) @ turn_about((1, 0, 0), math.radians(r)) for *_, r, p in excursions]
-    at = zip(excursions, turns, strict=True)
-    return np.array([np.linalg.norm(middle + each[:3] + platform @ R.T - base, axis=1) for each, R in at])
+    base, platform = circle_joints({name: float(design.components(name)[0]) for name in ("x1", "x2", "x3", "x4")})
+    at = np.array(excursions)
+    turns = turns_of(np.radians(np.pad(at[:, 3:], ((0, 0), (0, 1)))))
+    spans = (
+        (at[:, :3] + np.array(design.position, dtype=float))[:, None] + np.einsum("nij,kj->nki", turns, platform) - base
+    )
+    return np.asarray(np.linalg.norm(spans, axis=2))
 
 
 def design_of(solution: Solution) -> Case:
-    """The design over the workspace of a solution."""
-    assert solution.workspace is not None
     assert solution.workspace.is_proved
     return solution.workspace.judgement.case
+
+
+def numbers_of(solution: Solution) -> dict[str, float]:
+    own = solution.outcomes[0].own
+    return dict(zip((each.name for each in own.nlp.program.variables), own.x.tolist(), strict=True))
 
 
 def test_the_workspace_moves_with_a_free_pose() -> None:
     solution = solve(case_from(tables()))
     design = design_of(solution)
-    # Limits hold at a dense sample, and one is reached.
     rng = np.random.default_rng(0)
     inside = rng.uniform([-0.1, -0.1, -0.1, -10, -10], [0.1, 0.1, 0.1, 10, 10], (20_000, 5))
     corners = itertools.product((-0.1, 0.1), (-0.1, 0.1), (-0.1, 0.1), (-10, 10), (-10, 10))
@@ -90,32 +78,23 @@ def test_the_workspace_moves_with_a_free_pose() -> None:
     assert LEGS[0] <= lengths.min() <= LEGS[0] * (1 + 2e-3)
     assert lengths.max() <= LEGS[1]
     # The proof is about the box at the pose of the solution, and so are poses of the exchange.
-    height = float(design.position[2])  # type: ignore[arg-type]
-    assert (
-        height
-        == solution.outcomes[0].own.x[
-            [each.name for each in solution.outcomes[0].own.nlp.program.variables].index("p_z")
-        ]
-    )
+    height = float(design.position[2])
+    assert height == numbers_of(solution)["p_z"]
     proof = solution.workspace
-    assert proof is not None
-    ends = proof.judgement.workspace.position[2]
-    assert (ends.lower, ends.upper) == pytest.approx((height - 0.1, height + 0.1), rel=1e-12)  # type: ignore[union-attr]
+    heights = proof.judgement.workspace.position[2]
+    assert (heights.lower, heights.upper) == pytest.approx((height - 0.1, height + 0.1), rel=1e-12)
     box = pose_box(proof.judgement.workspace)
     for binding in proof.poses:
         assert np.abs(binding.pose.position - [0, 0, height]).max() <= 0.1 + 1e-9
-        assert box.coordinates(binding.pose) == pytest.approx(
-            np.clip(box.coordinates(binding.pose), box.lower, box.upper)
-        )
+        y = box.coordinates(binding.pose)
+        assert y == pytest.approx(np.clip(y, box.lower, box.upper))
     # In world coordinates no height of a few gives a better design, and the nearest ones give nearly as good ones.
     best = []
     for z in (height - 0.02, height, height + 0.02):
-        fixed = tables(pose={"position": [0, 0, z]})
-        spans = [{"min": middle - 0.1, "max": middle + 0.1} for middle in (0, 0, z)]
-        fixed["workspace"] = {"position": spans, "rotation": fixed["workspace"]["rotation"]}
+        fixed = tables(about=None, pose={"position": [0, 0, z]})
+        fixed["workspace"]["position"] = [ends(0.1, middle) for middle in (0, 0, z)]
         found = solve(case_from(fixed))
         best.append(found.F if found.status.is_answer else -math.inf)
-    assert solution.F is not None
     assert max(best) <= solution.F * (1 + 1e-4)
     assert best[1] == pytest.approx(solution.F, rel=1e-4)
 
@@ -135,12 +114,9 @@ def test_the_workspace_says_as_much_as_ten_of_its_poses_tied_by_hand_and_more() 
     lengths = lengths_at(design, [(0.0,) * 5, *CORNERS])
     assert LEGS[0] <= lengths.min()
     assert lengths.max() <= LEGS[1]
-    assert solution.F is not None
-    assert ten.F is not None
     assert 0.9 * ten.F < solution.F <= ten.F
     # Ten poses leave out the one at which their design breaks a limit.
-    own = ten.outcomes[0].own
-    numbers = dict(zip((each.name for each in own.nlp.program.variables), own.x.tolist(), strict=True))
+    numbers = numbers_of(ten)
     held = tables(pose={"position": [0, 0, numbers["pose1_p_z"]]})
     held["robot"]["parameters"]["x1"] = numbers["x1"]
     judged = judge_workspace(case_from(held), with_objective=False)
@@ -150,27 +126,18 @@ def test_the_workspace_says_as_much_as_ten_of_its_poses_tied_by_hand_and_more() 
 
 def test_a_robot_whose_loops_decide_numbers_of_the_pose() -> None:
     """Of a 3-RPS x, y and yaw follow from height, roll and pitch: in the exchange they are further variables."""
-    spans = {"about": "pose", "position": [SMALL, SMALL, {"min": -0.05, "max": 0.05}]}
-    turns = {name: {"min": -10, "max": 10} for name in ("roll", "pitch", "yaw")}
-    given = {
-        "robot": {"model": "3-rps", "parameters": {"rb": {"min": 0.8, "max": 1.2}, "rp": 0.6, "h": 1.1}},
-        "pose": {"position": [0, 0, {"min": 0.9, "max": 1.4}]},
-        "task": [{"sense": "max", "axis": [0, 0, 1], "pitch": math.inf}],
-        "limits": {"leg_length": {"min": 1.0, "max": 1.4}, "over": "workspace"},
-        "workspace": spans | {"rotation": turns},
-        "solve": {"starts": 4},
-    }
-    case = case_from(given)
-    solution = solve(case)
-    assert len(design_of(solution).position) == 3
-    # Constraints at further poses lowered F, and the same robot with the workspace in world coordinates is as good.
-    assert solution.workspace is not None
+    turns = {name: ends(10) for name in ("roll", "pitch", "yaw")}
+    given = tables(
+        robot={"model": "3-rps", "parameters": {"rb": ends(0.2, 1), "rp": 0.6, "h": 1.1}}, task=[PUSH_UP],
+        pose={"position": [0, 0, {"min": 0.9, "max": 1.4}]}, limits={"leg_length": ends(0.2, 1.2), "over": "workspace"},
+        workspace={"about": "pose", "position": [ends(0.04), ends(0.04), ends(0.05)], "rotation": turns},
+    )  # fmt: skip
+    solution = solve(case_from(given))
+    position = list(design_of(solution).position)
+    assert len(position) == 3
     assert len(solution.workspace.history) > 1
-    fixed = dict(given, pose={"position": list(design_of(solution).position)})
-    fixed["workspace"] = json.loads(json.dumps(given["workspace"]))
-    del fixed["workspace"]["about"]
-    height = float(design_of(solution).position[2])  # type: ignore[arg-type]
-    fixed["workspace"]["position"][2] = {"min": height - 0.05, "max": height + 0.05}
+    place = [ends(0.04), ends(0.04), ends(0.05, position[2])]
+    fixed = given | {"pose": {"position": position}, "workspace": {"position": place, "rotation": turns}}
     assert pytest.approx(solution.F, rel=1e-3) == solve(case_from(fixed)).F
 
 
@@ -216,32 +183,30 @@ def test_the_box_in_world_coordinates_is_that_of_all_excursions(
 
 
 def _stated(case: Case) -> tuple[Array, Array, float]:
-    """Rotation matrix, axis and angle of the stated pose."""
-    axis, angle = np.array(case.rotation.axis, dtype=float), float(case.rotation.angle)  # type: ignore[arg-type]
+    axis, angle = np.array(case.rotation.axis, dtype=float), float(case.rotation.angle)
     return turn_about(axis, angle), axis, angle
 
 
+def _names(rotation: dict[str, Any]) -> tuple[str, ...]:
+    return ("angle",) if "angle" in rotation else ("roll", "pitch", "yaw")
+
+
 def _ends(rotation: dict[str, Any], name: str) -> tuple[float, float]:
-    """Ends of an angle, radians."""
     stated = rotation.get(name, 0.0)
     low, high = (stated["min"], stated["max"]) if isinstance(stated, dict) else (stated, stated)
     return math.radians(low), math.radians(high)
 
 
 def _turn(rotation: dict[str, Any], angles: list[float], axis: Array) -> Array:
-    """The rotation of an excursion."""
-    if "roll" in rotation or "pitch" in rotation or "yaw" in rotation:
-        roll, pitch, yaw = angles
-        return turn_about((0, 0, 1), yaw) @ turn_about((0, 1, 0), pitch) @ turn_about((1, 0, 0), roll)
+    if len(angles) == 3:
+        return turns_of(np.array([angles]))[0]
     return turn_about(rotation.get("axis", axis), angles[0])
 
 
 def _random_turn(rotation: dict[str, Any], rng: np.random.Generator) -> Array:
-    """The rotation of a random excursion."""
-    names = ("roll", "pitch", "yaw") if "angle" not in rotation else ("angle",)
     if not rotation:
         return np.eye(3)
-    return _turn(rotation, [rng.uniform(*_ends(rotation, name)) for name in names], rng.normal(size=3))
+    return _turn(rotation, [rng.uniform(*_ends(rotation, name)) for name in _names(rotation)], rng.normal(size=3))
 
 
 def _is_end(E: Array, rotation: dict[str, Any]) -> bool:
@@ -250,11 +215,8 @@ def _is_end(E: Array, rotation: dict[str, Any]) -> bool:
         return bool(np.abs(E - np.eye(3)).max() < 1e-12)
     if "axis" not in rotation and "angle" in rotation:
         return True
-    names = ("roll", "pitch", "yaw") if "angle" not in rotation else ("angle",)
-    found = [
-        _turn(rotation, list(each), np.zeros(3))
-        for each in zip(*(_ends(rotation, name) for name in names), strict=True)
-    ]
+    both = zip(*(_ends(rotation, name) for name in _names(rotation)), strict=True)
+    found = [_turn(rotation, list(each), np.zeros(3)) for each in both]
     # A pose that is turned about the opposite axis turns the ends round.
     return any(np.abs(E - each).max() < 1e-12 for each in found)
 
@@ -301,33 +263,25 @@ def test_what_is_no_box_in_world_coordinates_is_refused(changes: dict[str, Any],
 
 
 def test_a_free_pose_is_refused_where_one_machine_is_judged(tmp_path: Path, cli: Run) -> None:
-    file = saved(tmp_path / "base.toml", BASE)
-    words = (
-        "pose.position[2]: is free, and the workspace is about the pose: give it with --set p_z=..., or a result with"
-    )
-    refusal_of(cli("workspace", str(file), "--set", "x1=0.8"), words)
-    code, out, err = cli("workspace", str(file), "--set", "x1=0.8", "--set", "p_z=0.8", "--time", "5")
-    assert (code, err) == (1, "")
-    assert "refuted" in out
-    turned = tables(pose={"position": [0, 0, 1], "rotation": {"angle": {"min": -10, "max": 10}}})
+    words = "pose.position[2]: is free, and the workspace is about the pose: give it with --set p_z=..., or a result"
+    command = ("workspace", str(case_file(tmp_path, BASE)), "--set", "x1=0.8")
+    refusal_of(cli(*command), f"{words} with")
+    code, out, err = cli(*command, "--set", "p_z=0.8", "--time", "5")
+    assert (code, err, "refuted" in out) == (1, "", True)
+    turned = tables(pose={"position": [0, 0, 1], "rotation": {"angle": ends(10)}})
     del turned["workspace"]["rotation"]
-    free = saved(tmp_path / "turned.toml", toml_document(turned))
-    refusal_of(cli("workspace", str(free), "--set", "x1=0.8"), "pose.rotation.angle: is free")
+    case_file(tmp_path, turned)
+    refusal_of(cli(*command), "pose.rotation.angle: is free")
 
 
 def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path, cli: Run) -> None:
-    file, result, proof = (
-        saved(tmp_path / "base.toml", BASE),
-        str(tmp_path / "result.json"),
-        str(tmp_path / "proof.json"),
-    )
+    file, result, proof = case_file(tmp_path, BASE, "base.toml"), str(tmp_path / "result"), str(tmp_path / "proof")
     assert cli("solve", str(file), "--json", result)[::2] == (0, "")
     height = json.loads(Path(result).read_text(encoding="utf-8"))["pose"]["position"][2]
     pictures = [str(tmp_path / name) for name in ("slices.svg", "pose.svg", "page.html")]
     drawn = [word for pair in zip(("--plot", "--plot-pose", "--html"), pictures, strict=True) for word in pair]
-    out = output_of(
-        cli("workspace", str(file), "--of", result, "--proof", proof, *drawn, "--quantity", "condition_number")
-    )
+    words = ("--of", result, "--proof", proof, *drawn, "--quantity", "condition_number")
+    out = output_of(cli("workspace", str(file), *words))
     assert "everything is proved for every pose" in unbroken(out)
     assert f"about  the pose (0, 0, {height:.5g})" in unbroken(out)
     assert all(Path(each).stat().st_size > 1000 for each in pictures)
@@ -339,12 +293,11 @@ def test_all_commands_take_the_workspace_at_the_pose_of_a_result(tmp_path: Path,
     assert high >= height + 0.1
     code, _, err = cli("verify-proof", proof, str(file), "--of", result, "--set", "p_z=0.8")
     assert (code, err) == (1, "rejected: the proof is for another workspace than this case's\n")
-    assert "scale  1" in output_of(cli("workspace", str(file), "--of", result, "--scale", "--time", "20"))
+    assert "scale  1" in output_of(cli("workspace", str(file), "--of", result, "--scale", "--time", "8"))
     assert cli("path", str(file), "--range", "--of", result, "--time", "3")[::2] in ((0, ""), (1, ""))
     output_of(cli("codegen", str(file), "--out", str(tmp_path / "c"), "--no-measure"))
     assert cli("evaluate", str(file), "--of", result)[0] == 0
-    # A result of a case with another name has the pose too.
-    other = saved(tmp_path / "other.toml", BASE)
+    other = case_file(tmp_path, BASE, "other.toml")
     code, out, err = cli("workspace", str(other), "--of", result)
     assert (code, err) == (0, f"--of {result}: has the dimensions and the pose of the case 'base'\n")
 
@@ -353,9 +306,8 @@ def test_robots_are_compared_over_workspaces_about_their_own_poses() -> None:
     found = compare(case_from(tables(limits={"leg_length": {"min": 0.5, "max": 1.5}})), ["case", "6-pus"], jobs=1)
     for entry in found.entries:
         assert entry.judgement is not None, entry.workspace_fault
-        (height,) = (float(each) for each in entry.judgement.case.position[2:])  # type: ignore[arg-type]
-        ends = entry.judgement.workspace.position[2]
-        assert (ends.lower + ends.upper) / 2 == pytest.approx(height)  # type: ignore[union-attr]
+        heights = entry.judgement.workspace.position[2]
+        assert (heights.lower + heights.upper) / 2 == pytest.approx(float(entry.judgement.case.position[2]))
 
 
 def test_the_schema_has_the_origin(cli: Run) -> None:
@@ -389,8 +341,7 @@ def notice_of(given: dict[str, Any]) -> str:
 
 @pytest.mark.parametrize("words", HELD)
 def test_a_workspace_that_does_not_hold_the_pose_is_said_before_the_search(words: str) -> None:
-    given = tables(**HELD[words])
-    del given["workspace"]["about"]
+    given = tables(about=None, **HELD[words])
     notice = notice_of(given)
     offer = '; write about = "pose" in [workspace] if its numbers are excursions about the pose'
     assert notice.startswith("the workspace does not hold the pose: " + words if words else "")
@@ -401,8 +352,7 @@ def test_a_workspace_that_does_not_hold_the_pose_is_said_before_the_search(words
 
 
 def test_of_several_poses_one_in_the_workspace_is_enough() -> None:
-    given = tables(pose=[{"position": [0, 0, 0]}, {"position": [0, 0, 2]}])
-    del given["workspace"]["about"]
+    given = tables(about=None, pose=[{"position": [0, 0, 0]}, {"position": [0, 0, 2]}])
     assert not notice_of(given)
     given["pose"][0]["position"][2] = 1
     notice = "the workspace does not hold the poses: z is -0.1 to 0.1 m, and the pose has 1 m"
@@ -410,18 +360,18 @@ def test_of_several_poses_one_in_the_workspace_is_enough() -> None:
 
 
 def test_a_workspace_elsewhere_is_no_mistake_of_excursions(tmp_path: Path, cli: Run) -> None:
-    text = BASE.replace('about = "pose"\n', "").replace("{ min = -0.1, max = 0.1 }]", "{ min = 0.7, max = 0.8 }]")
-    text = text.replace("{ min = 0.5, max = 1.4 }", "1.2").replace("x1 = { min = 0.4, max = 0.9 }", "x1 = 0.8")
+    given = tables(about=None, pose={"position": [0, 0, 1.2]})
+    given["workspace"]["position"][2], given["robot"]["parameters"]["x1"] = {"min": 0.7, "max": 0.8}, 0.8
     notice = "the workspace does not hold the pose: z is 0.7 to 0.8 m, and the pose has 1.2 m"
-    assert notice_of(tomllib.loads(text)) == notice
-    file = saved(tmp_path / "elsewhere.toml", text.replace('over = "workspace"\n', ""))
-    assert cli("workspace", str(file), "--time", "1")[2] == ""
+    assert notice_of(given) == notice
+    del given["limits"]["over"]
+    assert cli("workspace", str(case_file(tmp_path, given)), "--time", "1")[2] == ""
 
 
 def test_the_commands_say_it_and_nothing_else_on_standard_error(tmp_path: Path, cli: Run) -> None:
     """A point without a finite value gave a warning of NumPy, and the evidence of a stationary point."""
-    text = BASE.replace('about = "pose"\n', "").replace("starts = 4", "starts = 1").replace("min = 0.7,", "min = 0.75,")
-    file = saved(tmp_path / "world.toml", text)
+    limits = {"leg_length": {"min": 0.75, "max": 1.2}, "over": "workspace"}
+    file = case_file(tmp_path, tables(about=None, solve={"starts": 1}, limits=limits))
     said = "the workspace does not hold the pose: z is -0.1 to 0.1 m, and the pose has 0.5 to 1.4 m; write about"
     for command in (("solve",), ("workspace", "--set", "x1=0.7", "--time", "2")):
         code, out, err = cli(command[0], str(file), *command[1:])

@@ -14,26 +14,23 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from
-from hexapods import smallest
+from builders import PUSH_UP, case_of, ends
+from hexapods import HEXAPOD, case_of_legs, smallest
 from limb_cases import machine, poses
+from workspace_cases import problem_of
 
 import screwsynth.nlp
-from screwsynth.models import FloatArray, hexapod
+from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Nlp, Task, load_case, solve, sweep
-from screwsynth.nlp.case.limits.limits import Limits
-from screwsynth.nlp.case.pose import Free
-from screwsynth.nlp.case.robots import build_model
+from screwsynth.nlp import Case, Free, Limits, Nlp, build_model, certify, formulate, load_case, solve, sweep
 from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
 from screwsynth.nlp.interruption import STOPPED, is_requested, one_call
-from screwsynth.nlp.program.formulation import formulate
 from screwsynth.nlp.proof.boxes.optimum import OptimumRule
 from screwsynth.nlp.proof.certificate import branch_and_bound
 from screwsynth.nlp.proof.certificate.branch_and_bound import certify_program
 from screwsynth.nlp.proof.certificate.certificate import CertificateStatus
 from screwsynth.nlp.proof.enclosure.forms import Forms
-from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.workspace import scale
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.bound_search import Bounds, Goal, Number, smallest_values
@@ -42,11 +39,10 @@ from screwsynth.nlp.proof.workspace.numbers.extremes import goal_of
 from screwsynth.nlp.proof.workspace.numbers.machines import Machines
 from screwsynth.nlp.proof.workspace.ranks import ranks
 from screwsynth.nlp.proof.workspace.ranks.ranks import prove_rank
-from screwsynth.nlp.proof.workspace.robot.pose_box import PoseBox, pose_box
+from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import Problem, build_problem
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 from screwsynth.nlp.proof.workspace.verdict import Outcome, RankVerdict
-from screwsynth.nlp.solver.certified import certify
 
 ROOT = Path(screwsynth.nlp.__file__).parent
 #: The code whose instructions are counted: all of the searches, or their loops alone, where most mistakes would be.
@@ -107,26 +103,14 @@ def from_regularity(found: RankVerdict) -> Claim:
 
 
 @cache
-def legs_and_box() -> tuple[Legs, PoseBox]:
+def six_legs_problem() -> Problem:
     """Six legs that are singular in a small part of the workspace, without change of sign: a touching determinant."""
     rng = np.random.default_rng(0)
-    turns = Turns(TurnKind.ANY_AXIS, (Free(0.0, 0.5),))
-    box = pose_box(Workspace((Free(-1.0, 1.0), Free(-1.0, 1.0), Free(3.0, 4.0)), turns))
-    return Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3))), box
-
-
-@cache
-def six_legs_problem() -> Problem:
-    (base, platform, _), box = legs_and_box()
-    model = hexapod()
-    given = {
-        f"{name}_{i + 1}": part[i].tolist() for name, part in (("base", base), ("platform", platform)) for i in range(6)
-    }
-    return build_problem(Case(model, given, [0.0, 0.0, 0.0], [Task([0, 0, 0, 0, 0, 1])]), model, box)
+    box = pose_box(Workspace((Free(-1, 1), Free(-1, 1), Free(3, 4)), Turns(TurnKind.ANY_AXIS, (Free(0.0, 0.5),))))
+    return build_problem(case_of_legs(Legs(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))), HEXAPOD, box)
 
 
 def regular(*, most_boxes: int | None = None, progress: Callable[..., None] | None = None) -> RankVerdict:
-    """The verdict on the rank of the rows of these legs."""
     problem = six_legs_problem()
     return prove_rank(problem, problem.locked, most_boxes=most_boxes, progress=progress)
 
@@ -137,9 +121,7 @@ def six_legs() -> Claim:
 
 @cache
 def any_robot() -> Problem:
-    case = workspace_case("6-rss", "", width=0.5, turn=30)
-    assert case.workspace is not None
-    return build_problem(case, closed_form(case.model).model, pose_box(workspace_of_case(case)))
+    return problem_of(workspace_case("6-rss", width=0.5, turn=30))
 
 
 def any_rank() -> Claim:
@@ -147,31 +129,22 @@ def any_rank() -> Claim:
     return from_regularity(prove_rank(problem, problem.locked, most_boxes=130))
 
 
-def workspace_case(name: str, limits: str, width: float, turn: float, tolerance: float | None = None) -> Case:
-    """A robot of the gallery about its home."""
-    home = build_model(name).home
-    text = f"""
-[robot]
-model = "{name}"
-[robot.parameters]
-{"".join(f"{item.name} = {item.typical[0]}{chr(10)}" for item in build_model(name).parameters)}
-[pose]
-position = {list(home)}
-[[task]]
-sense = "max"
-axis = [0, 0, 1]
-point = [0, 0, 0]
-pitch = 0.1
-[limits]
-{limits}
-"""
-    case = case_from(text, name)
+def workspace_case(name: str, width: float, turn: float, tolerance: float | None = None, **limits: object) -> Case:
+    model = build_model(name)
+    home, numbers = model.home, {item.name: item.typical[0] for item in model.parameters}
+    task = PUSH_UP | {"point": [0, 0, 0], "pitch": 0.1}
+    robot, pose = {"model": name, "parameters": numbers}, {"position": list(home)}
+    case = case_of(robot, pose=pose, task=[task], limits=limits or None)
     size, is_planar, angle = max(abs(each) for each in home) or 1.0, name.startswith("planar"), math.radians(turn)
     half = (width * size, width * size, 0.0 if is_planar else width * size)
     place = tuple(Free(at - by, at + by) if by else at for at, by in zip(home, half, strict=True))
     angles = tuple(Free(-angle, angle) if angle and (k == 2 or not is_planar) else 0.0 for k in range(3))
     turns = Turns(TurnKind.ROLL_PITCH_YAW, angles)
     return replace(case, workspace=Workspace(place, turns), joint_centre_tolerance=tolerance)
+
+
+def every_machine(case: Case) -> Machines:
+    return Machines(case, closed_form(case.model), problem_of(case))
 
 
 class Bowl(Number):
@@ -198,18 +171,14 @@ def bowl() -> Claim:
 
 @cache
 def planar() -> Case:
-    return workspace_case("planar-3-rpr", "actuator_length = { min = -0.5, max = 0.01 }", 0.05, 5)
+    return workspace_case("planar-3-rpr", 0.05, 5, actuator_length={"min": -0.5, "max": 0.01})
 
 
 def loops() -> Claim:
-    case = planar()
-    closed = closed_form(case.model)
-    alone = Machines(case, closed, build_problem(case, closed.model, pose_box(workspace_of_case(case))))
+    alone = every_machine(planar())
     claims = [each for each in alone.symbols.claims(())[1] if each.key.endswith("max")]
-    found = smallest_values(
-        Expressions(alone.family, ca.vertcat(*map(alone.number, claims))),
-        [goal_of(each, part=0.2) for each in claims],
-    )
+    numbers = Expressions(alone.family, ca.vertcat(*map(alone.number, claims)))
+    found = smallest_values(numbers, [goal_of(each, part=0.2) for each in claims])
     assert found
     assert all(each.bound <= each.value for each in found)
     return Claim(
@@ -221,9 +190,7 @@ def loops() -> Claim:
 
 @cache
 def family() -> Problem:
-    case = workspace_case("6-rus", "", 0.02, 2, tolerance=1e-3)
-    closed = closed_form(case.model)
-    return Machines(case, closed, build_problem(case, closed.model, pose_box(workspace_of_case(case)))).family
+    return every_machine(workspace_case("6-rus", 0.02, 2, tolerance=1e-3)).family
 
 
 def machines() -> Claim:
@@ -305,7 +272,6 @@ each_search = pytest.mark.parametrize("search", SEARCHES, ids=lambda each: each.
 @each_search
 def test_an_interrupted_search_claims_no_more_than_a_complete_one(search: Search) -> None:
     assert interrupted(search, KeyboardInterrupt, LOOPS, 32 if search in QUICK else 3, 0) > 0
-    # Other errors are answered by no search.
     assert interrupted(search, MemoryError, LOOPS, 1, 1) == 0
 
 
@@ -332,30 +298,13 @@ def interrupting(calls: int, real: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-def octahedral(x1: str = "12", over: str = "", longest: str = "31") -> Case:
+def octahedral(x1: object = 12, longest: float = 31, **limits: object) -> Case:
     """Six legs that are regular, and whose longest length is too large, over a small workspace."""
-    text = f"""
-[robot]
-model = "stewart-gough"
-[robot.parameters]
-x1 = {x1}
-x2 = 8
-x3 = 4
-x4 = 9
-[pose]
-position = [0, 0, 30]
-[[task]]
-sense = "max"
-axis = [2, 2, 1]
-point = [2, 3, 6]
-pitch = 1
-[limits]
-{over}
-leg_length = {{ min = 20, max = {longest} }}
-[workspace]
-position = [{{ min = -2, max = 2 }}, {{ min = -2, max = 2 }}, {{ min = 28, max = 32 }}]
-"""
-    return case_from(text, "octahedral")
+    task = {"sense": "max", "axis": [2, 2, 1], "point": [2, 3, 6], "pitch": 1}
+    limits |= {"leg_length": {"min": 20, "max": longest}}
+    robot, place = {"x1": x1, "x2": 8, "x3": 4, "x4": 9}, {"position": [ends(2), ends(2), ends(2, 30)]}
+    given = {"pose": {"position": [0, 0, 30]}, "task": [task], "limits": limits, "workspace": place}
+    return case_of({"model": "stewart-gough", "parameters": robot}, **given)
 
 
 def test_a_judgement_keeps_what_is_proved_before_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -394,10 +343,11 @@ def test_an_interrupted_scale_is_no_larger(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_an_interrupted_exchange_of_poses_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
+    case = octahedral(ends(1, 12), 40, over="workspace")
+    whole = solve(case, starts=1)
     assert whole.workspace.is_proved
     monkeypatch.setattr(OptimumRule, "examine", interrupting(2, OptimumRule.examine))
-    found = solve(octahedral(x1="{ min = 11, max = 13 }", over='over = "workspace"', longest="40"), starts=1)
+    found = solve(case, starts=1)
     assert not found.workspace.is_proved
     assert STOPPED in {each.reason for each in found.workspace.judgement.extremes}
     assert len(found.workspace.history) <= len(whole.workspace.history)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from builders import Array
-from test_motor_proofs import CUT, robot_of
+from workspace_cases import CUT, robot_of
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from builders import Array, commands_in, rows_of, saved, soaked, turn_about
 from hexapods import case_of_legs
-from test_workspace_claims import at_home
 from typer.testing import CliRunner
+from workspace_cases import gallery_case as at_home
 
 from screwsynth.models import three_upu
 from screwsynth.nlp import Case, Free, Rotation, Task, load_case

@@ -11,25 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from screwsynth.models import Dimension, Model, hexapod, stewart_gough, three_upu
-from screwsynth.nlp import (
-    Case,
-    Free,
-    LegLength,
-    Limits,
-    Rotation,
-    Search,
-    Task,
-    certify,
-    evaluate,
-    formulate,
-    result_of,
-    solve,
-)
+from screwsynth.nlp import Case, Free, LegLength, Limits, Rotation, Search, Task, certify, formulate, solve
+from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output.report.exploration import surroundings
 from screwsynth.nlp.output.report.report import report_of
 from screwsynth.nlp.output.report.slices import slices_of
 from screwsynth.nlp.program.nlp import Nlp
 from screwsynth.nlp.program.sampling import starting_points
+from screwsynth.nlp.results.result import result_of
 
 Array = NDArray[np.float64]
 
@@ -42,7 +31,6 @@ WORSE = 1e-4
 
 
 def random_case(seed: int) -> Case:
-    """Return a random robot with narrow ranges, in a random unit of length."""
     numbers = np.random.default_rng(seed)
     unit = 10.0 ** numbers.uniform(-6, 6)
     width = float(numbers.choice(WIDTHS))
@@ -78,7 +66,6 @@ def random_case(seed: int) -> Case:
 
 
 def narrow(value: float, width: float, numbers: np.random.Generator) -> float | Free:
-    """Return a range about a number; the number alone where it is zero."""
     half = abs(value) * width * numbers.uniform(0.3, 1)
     return Free(value - half, value + half) if half > 0 else value
 
@@ -92,7 +79,6 @@ def limits_through_the_box(case: Case, numbers: np.random.Generator) -> Limits:
 
 
 def robot_lengths(nlp: Nlp, x: Array) -> Array:
-    """Return the lengths of the legs at a point."""
     expressions = ca.vertcat(*[ca.norm_2(leg.span) for leg in nlp.program.robot.legs])
     return np.asarray(ca.Function("l", [nlp.program.x, nlp.program.p], [expressions])(x, nlp.arguments)).ravel()
 
@@ -148,7 +134,6 @@ def best_by_another_search(nlp: Nlp, starts: int, seed: int) -> float | None:
 
 
 def descended(shares: Shares, s: Array, weights: Array, stiffness: float) -> Array:
-    """Return the end of projected gradient steps on the augmented Lagrangian in the cube."""
     value, slope, *_ = shares.lagrangian(s, weights, stiffness)
     length, recent = 1.0 / max(float(np.linalg.norm(slope)), 1e-300), [value]
     for _ in range(300):

@@ -15,12 +15,10 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, refusal_of, saved, shipped_tables, turn_about
+from builders import Array, Run, case_file, case_from, ends, refusal_of, saved, shipped_tables, turn_about
 from measures import circle_joints
 
-from screwsynth.nlp import Case, CaseError, certify, json_data, load_case, load_result, round_design, solve
-from screwsynth.nlp.case.toml import toml_document
-from screwsynth.nlp.proof.workspace.verdict import Outcome
+from screwsynth.nlp import Case, CaseError, Outcome, certify, json_data, load_case, load_result, round_design, solve
 from screwsynth.nlp.results.result import result_of
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.solution import Solution
@@ -29,16 +27,11 @@ LIFT = {"name": "lift", "sense": "max", "axis": [0, 0, 1], "pitch": math.inf}
 TURN = {"name": "turn", "sense": "max", "axis": [0, 0, 1], "point": [0, 0, 0], "pitch": 0}
 #: Its largest F at the stated pose is that of the widest base, and its largest worst F that of one in between.
 TILT = {"name": "tilt", "sense": "max", "axis": [1, 0, 0], "point": [0, 0, 10], "pitch": 0}
-TWISTS = {
-    "lift": np.array([0, 0, 0, 0, 0, 1.0]),
-    "turn": np.array([0, 0, 1.0, 0, 0, 0]),
-    "tilt": np.array([1.0, 0, 0, 0, 10, 0]),
-}
+TWISTS = {"lift": np.eye(6)[5], "turn": np.eye(6)[2], "tilt": np.array([1.0, 0, 0, 0, 10, 0])}
 RADII = np.linspace(15, 35, 401)
 #: Poses of the box, its corners among them, and stated ones.
-POSITIONS = [
-    np.array(each) for each in itertools.product((-4, -2, 0, 2, 4), (-4, -2, 0, 2, 4), (17, 18.5, 20, 21.5, 23))
-]
+SIDES = (-4, -2, 0, 2, 4)
+POSITIONS = [np.array(each) for each in itertools.product(SIDES, SIDES, (17, 18.5, 20, 21.5, 23))]
 TURNS = np.radians(np.linspace(-10, 10, 5))
 HOME, HIGHER = (np.array([0.0, 0, 20]), 0.0), (np.array([1.0, 0, 22]), 0.0)
 BOX = [(position, turn) for position in POSITIONS for turn in TURNS]
@@ -46,14 +39,12 @@ LEGS = {"min": 20, "max": 38}
 
 
 def tables_of(tasks: Sequence[dict[str, Any]] = (LIFT,), **keys: object) -> dict[str, Any]:
-    """Tables of a case whose limits hold over the box."""
     tables = shipped_tables("hexapod-linuxcnc")
     tables["robot"]["parameters"]["x1"] = {"min": 15, "max": 35}
     tables["task"] = [dict(task) for task in tasks]
     tables["limits"] = {"over": "workspace", "leg_length": LEGS}
-    ends = {"min": -4, "max": 4}
-    turn = {"axis": [0, 0, 1], "angle": {"min": -10, "max": 10}}
-    tables["workspace"] = {"position": [ends, ends, {"min": 17, "max": 23}], "rotation": turn}
+    turn = {"axis": [0, 0, 1], "angle": ends(10)}
+    tables["workspace"] = {"position": [ends(4), ends(4), ends(3, 20)], "rotation": turn}
     return tables | {"solve": {"starts": 3}} | keys
 
 
@@ -74,13 +65,11 @@ def rates_squared(radii: Array, poses: Sequence[tuple[Array, float]], task: str)
 
 
 def kept() -> Array:
-    """Whether designs keep the limits on their legs at every pose of the grid."""
     lengths = np.linalg.norm(spans(RADII, BOX)[1], axis=3)
     return np.asarray((lengths.min(axis=(1, 2)) >= LEGS["min"]) & (lengths.max(axis=(1, 2)) <= LEGS["max"]))
 
 
 def radius_of(solution: Solution) -> float:
-    """Radius of the base of a solution."""
     return float(solution.x[[each.name for each in solution.outcomes[0].own.nlp.program.variables].index("x1")])
 
 
@@ -88,7 +77,6 @@ def proved_over_workspace(case: Case) -> Solution:
     """The solution of a case, whose proof over the workspace holds, and whose legs keep their limits on the grid."""
     solution = solve(case)
     assert solution.status.is_answer
-    assert solution.workspace is not None
     assert solution.workspace.is_proved
     lengths = np.linalg.norm(spans(np.array([radius_of(solution)]), BOX)[1], axis=3)
     assert LEGS["min"] <= lengths.min() <= lengths.max() <= LEGS["max"]
@@ -111,7 +99,6 @@ def test_the_worst_f_over_a_workspace_is_the_best_of_a_grid_of_designs_and_prove
     inside = zip(rng.uniform([-4, -4, 17], [4, 4, 23], (5000, 3)), rng.uniform(TURNS[0], TURNS[-1], 5000), strict=True)
     least = rates_squared(np.array([radius_of(solution)]), [*inside, *BOX], "tilt").min()
     data = result_of(solution).objective  # type: ignore[union-attr]
-    assert data is not None
     assert data.value is not None
     assert (data.over, data.minimise) == ("workspace", None)
     assert least * (1 - 2e-3) <= data.value <= least
@@ -128,7 +115,6 @@ def test_the_largest_f_over_a_workspace_is_minimised_and_bounded() -> None:
     solution, certificate = certified.solution, certified.certificate
     worst = np.where(kept(), rates_squared(RADII, BOX, "tilt").max(axis=1), np.inf)
     assert pytest.approx(worst.min(), rel=5e-3) == solution.F
-    assert certificate is not None
     assert certificate.bound <= worst.min()
     assert certificate.bound >= solution.F * (1 - 6e-3)
     again = case_from(case.to_toml())
@@ -143,7 +129,6 @@ def test_the_worst_f_of_a_point_is_f_there() -> None:
         solve(case_from(tables_of([TILT], workspace=near, **keys)))
         for keys in ({}, {"objective": {"over": "workspace"}})
     )
-    assert other.workspace is not None
     assert other.workspace.is_proved
     assert pytest.approx(one.F, rel=1e-5) == other.F
     assert radius_of(other) == pytest.approx(radius_of(one), abs=1e-3)
@@ -158,7 +143,6 @@ def test_several_tasks_are_combined_as_on_a_grid(method: str) -> None:
     scaled = 2 * np.array(weights) / sum(weights)
     value = scaled @ F if method == "weighted-sum" else (F / scaled[:, None]).min(axis=0)
     best = int(np.where(kept(), value, -np.inf).argmax())
-    assert solution.combination is not None
     assert solution.combination.value == pytest.approx(value[best], rel=3e-3)
     assert radius_of(solution) == pytest.approx(RADII[best], abs=0.1)
     # Each task by itself keeps the limits over the workspace too, and so loses by the combination alone.
@@ -189,43 +173,31 @@ def test_several_stated_poses_have_limits_over_a_workspace(over_poses: str) -> N
 def test_f_along_a_path_is_its_worst_too_and_tasks_are_combined_along_it(tmp_path: Path) -> None:
     text = "G20\nG94 F60\nG1 X-4 Y0 Z18\nG1 X4 Y3 Z22\nM2\n"
     path = {"file": str(saved(tmp_path / "line.ngc", text))}
-    ends = np.array([-4.0, 0, 18]), np.array([4.0, 3, 22])
-    along = [(ends[0] + s * (ends[1] - ends[0]), 0.0) for s in np.linspace(0, 1, 41)]
+    along = [(position, 0.0) for position in np.linspace((-4.0, 0, 18), (4.0, 3, 22), 41)]
     tables = tables_of([TILT], path=path, limits={"over": "path", "leg_length": {"min": 10, "max": 60}})
     worst = rates_squared(RADII, along, "tilt").min(axis=1)
     solution = solve(case_from(tables | {"objective": {"over": "path"}}))
-    assert solution.path is not None
     assert solution.path.is_proved
     assert pytest.approx(worst.max(), rel=2e-3) == solution.F
     assert "along the path, to be as large as possible" in solution.table()
     tasks = [LIFT | {"weight": 100}, TURN]
     both = solve(case_from(tables | {"task": tasks, "combine": {"method": "weighted-sum"}}))
     value = np.array([200, 2]) / 101 @ [rates_squared(RADII, [HOME], name)[:, 0] for name in ("lift", "turn")]
-    assert both.path is not None
     assert both.path.is_proved
-    assert both.combination is not None
     assert both.combination.value == pytest.approx(value.max(), rel=1e-3)
 
 
 def test_results_of_several_tasks_have_the_proof(tmp_path: Path) -> None:
     """A robot with loops, of which the exchange adds variables, too: pages and tables are of the design alone."""
     tables = tables_of([LIFT, TURN], combine={"method": "worst-case"}, limits={"over": "workspace"})
-    tables["robot"] = {
-        "model": "3-rps",
-        "parameters": {"rb": {"min": 0.7, "max": 1.5}, "rp": {"min": 0.4, "max": 1.0}, "h": 1.1},
-    }
-    tables["units"] = {"length": "m"}
-    tables["pose"] = {"position": [{"min": -0.2, "max": 0.2}, {"min": -0.2, "max": 0.2}, 1.1]}
-    tables["pose"]["rotation"] = {"axis": [1, 0, 0], "angle": 0}
-    tables["task"] = [
-        TILT | {"axis": [1, 0, 0], "point": [0, 0, 1]},
-        TILT | {"axis": [0, 1, 0], "point": [0, 0, 1.1], "name": "other"},
-    ]
-    tables["limits"]["actuator_length"] = {"min": -0.2, "max": 0.2}
-    ends, turn = {"min": -0.2, "max": 0.2}, {"min": -10, "max": 10}
-    rotation = {"roll": turn, "pitch": turn, "yaw": {"min": -5, "max": 5}}
-    tables["workspace"] = {"position": [ends, ends, {"min": 1.0, "max": 1.2}], "rotation": rotation}
-    solution = solve(case_from(tables | {"solve": {"starts": 1}}))
+    sizes = {"rb": {"min": 0.7, "max": 1.5}, "rp": {"min": 0.4, "max": 1.0}, "h": 1.1}
+    tables["robot"] = {"model": "3-rps", "parameters": sizes}
+    tables["pose"] = {"position": [ends(0.2), ends(0.2), 1.1], "rotation": {"axis": [1, 0, 0], "angle": 0}}
+    tables["task"] = [TILT | {"point": [0, 0, 1]}, TILT | {"axis": [0, 1, 0], "point": [0, 0, 1.1], "name": "other"}]
+    tables["limits"]["actuator_length"] = ends(0.2)
+    rotation = {"roll": ends(10), "pitch": ends(10), "yaw": ends(5)}
+    tables["workspace"] = {"position": [ends(0.2), ends(0.2), ends(0.1, 1.1)], "rotation": rotation}
+    solution = solve(case_from(tables | {"units": {"length": "m"}, "solve": {"starts": 1}}))
     shown, written = solution.table(), solution.to_dict()
     assert "proved: regular and within the limits at every pose" in shown
     assert "where a pose of the workspace became a constraint" in shown
@@ -239,24 +211,22 @@ def test_what_cannot_be_combined_over_a_workspace_is_refused(cli: Run, tmp_path:
     worst = {"objective": {"over": "workspace"}}
     poses = [{"position": [0, 0, 20]}, {"position": [0, 0, 21]}]
     both = {"combine": {"method": "weighted-sum"}}
+    average = "combine.method = \"average\": must be 'weighted-sum' or 'worst-case' where limits hold"
     for keys, words in [
-        (
-            tables_of([LIFT, TURN]),
-            "combine.method = \"average\": must be 'weighted-sum' or 'worst-case' where limits hold",
-        ),
+        (tables_of([LIFT, TURN]), average),
         (tables_of([LIFT, TURN], **both, **worst), 'objective.over = "workspace": is for a case with one [[task]]'),
         (tables_of(limits={}, **worst), 'objective.over = "workspace": needs limits that hold there too'),
         (tables_of(objective={"over": "path"}), 'objective.over = "path": needs limits that hold there too'),
         (tables_of(objective={}), "objective.minimise: is missing: give minimise, over, or both"),
         (tables_of(pose=poses, **worst), "combine.over_poses = \"sum\": must be 'worst' beside objective.over"),
     ]:
-        refusal_of(cli("solve", str(saved(tmp_path / "case.toml", toml_document(keys)))), words)
+        refusal_of(cli("solve", str(case_file(tmp_path, keys))), words)
     path = {"file": "path.csv", "place": {"x": {"min": -1, "max": 1}}}
     along = tables_of([LIFT, TURN], limits={"over": "path"}, path=path, **both)
     with pytest.raises(CaseError, match=r"path\.place: must be fixed where several tasks are combined"):
         solve(case_from(along))
     # A bound from poses of the workspace has no proof file.
-    over = str(saved(tmp_path / "over.toml", toml_document(tables_of([TILT], **worst))))
+    over = str(case_file(tmp_path, tables_of([TILT], **worst)))
     refusal_of(cli("certify", over, "--proof", str(tmp_path / "x.proof")), "proof")
     assert load_case(over).at_stated_poses().worst_everywhere is False
 

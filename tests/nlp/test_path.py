@@ -12,13 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from measures import exponential
 
-from screwsynth.nlp import InputError
+from screwsynth.nlp import InputError, Units, read_path
 from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.path import Kind, ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
-from screwsynth.nlp.path.reader import read_path
-from screwsynth.nlp.units import Units
 
 MM = Units("mm")
 #: Begins where all axes are 0, so that each line makes a segment.

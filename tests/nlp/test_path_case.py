@@ -2,37 +2,26 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import casadi as ca
 import jsonschema
 import numpy as np
 import pytest
-from builders import DOCS, Array, case_from, docs_script, output_of, refusal_of, saved, shipped_tables, turn_about
+from builders import DOCS, Array, Run, case_from, case_of, docs_script, output_of, refusal_of, saved, shipped_tables
 from measures import circle_joints
+from path_cases import BASE, PLATFORM, Floats, turns_of
 
-from screwsynth.nlp import (
-    CaseError,
-    PathFile,
-    PathOptions,
-    certify,
-    check_path,
-    json_data,
-    load_case,
-    load_result,
-    read_path,
-    round_design,
-    solve,
-)
+from screwsynth.nlp import CaseError, PathFile, certify, check_path, json_data, load_case, load_result, solve
 from screwsynth.nlp.case.source import find_case
 from screwsynth.nlp.case.toml import toml_document
-from screwsynth.nlp.path.path import Kind, Poses
-from screwsynth.nlp.path.reader import path_of_case
+from screwsynth.nlp.path.options import PathOptions
+from screwsynth.nlp.path.path import Kind, Poses, ProgrammedPath
+from screwsynth.nlp.path.reader import path_of_case, read_path
 from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.solver.rounding import round_design
 from screwsynth.nlp.solver.status import Status
-
-Run = Callable[..., tuple[int, str, str]]
 
 #: An arc of a quarter, in a program's own coordinates.
 PROGRAM = "G20\nG55 G0 X1 Y0 Z20\nG94 F60\nG3 X0 Y1 I-1 A5\nM2\n"
@@ -105,7 +94,7 @@ def test_other_commands_read_a_case_with_a_path_that_is_not_there(cli: Run, tmp_
 )
 def test_faults_of_the_table_are_told(keys: dict[str, object], words: str) -> None:
     with pytest.raises(CaseError) as error:
-        case_from(shipped_tables("hexapod-linuxcnc") | {"path": keys})
+        case_of("hexapod-linuxcnc", path=keys)
     assert words in str(error.value).replace('"', "'")
 
 
@@ -115,7 +104,7 @@ def test_a_path_is_written_as_it_was_stated() -> None:
         "offsets": {"G59.1": [0.5, 0, 0, 0, 0, 90]},
     }  # fmt: skip
     for keys in (stated, {"file": "part.csv"}):
-        case = case_from(shipped_tables("hexapod-linuxcnc") | {"path": keys})
+        case = case_of("hexapod-linuxcnc", path=keys)
         assert case.path == PathFile(**keys)
         assert case_from(case.to_toml()).path == case.path
 
@@ -174,24 +163,30 @@ def design_along(folder: Path, **keys: object) -> dict[str, object]:
 
 def legs_along(radius: Array, positions: Array, rotations: Array) -> Array:
     """Lengths (R, N, 6) of the legs of hexapods with bases of these radii at poses, from the joints alone."""
-    _, platform = circle_joints({"x1": 1.0, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     base = np.array([circle_joints({"x1": each, "x2": 11.5, "x3": 0.0, "x4": 0.1})[0] for each in radius])
-    tips = positions[:, None, :] + np.einsum("nij,kj->nki", rotations, platform)
+    tips = positions[:, None, :] + np.einsum("nij,kj->nki", rotations, PLATFORM)
     return np.asarray(np.linalg.norm(tips[None] - base[:, None], axis=3))
+
+
+def poses_along(path: ProgrammedPath, count: int) -> Poses:
+    return path.poses_at(np.repeat(np.arange(len(path)), count), np.tile(np.linspace(0, 1, count), len(path)))
+
+
+def are_kept(radius: Array, poses: Poses, longest: float) -> Array:
+    """Whether hexapods with bases of these radii have legs of 25 in to a longest length at all poses."""
+    lengths = legs_along(radius, *poses).reshape(len(radius), -1)
+    return np.asarray((lengths.min(axis=1) >= 25) & (lengths.max(axis=1) <= longest))
 
 
 def test_a_design_keeps_its_limits_along_a_path_and_is_the_best_of_a_grid(tmp_path: Path) -> None:
     case = case_from(design_along(tmp_path))
     solution = solve(case)
     path = path_of_case(case)
-    k, s = np.repeat(np.arange(len(path)), 501), np.tile(np.linspace(0, 1, 501), len(path))
     radius = np.linspace(15, 35, 801)
-    lengths = legs_along(radius, *path.poses_at(k, s)).reshape(len(radius), -1)
-    kept = radius[(lengths.min(axis=1) >= 25) & (lengths.max(axis=1) <= 40)]
+    kept = radius[are_kept(radius, poses_along(path, 501), 40)]
     # The narrowest base has the largest F: 6 (20 in / length of a leg)^2.
     home = legs_along(kept[:1], np.array([[0.0, 0, 20]]), np.eye(3)[None])[0, 0, 0]
     assert solution.status is Status.OPTIMAL
-    assert solution.path is not None
     assert solution.path.is_proved
     (found,) = solution.path.judgement.case.components("x1")
     assert found > kept[0] - (radius[1] - radius[0])
@@ -232,7 +227,7 @@ STRAIGHT, QUARTER = LINE.replace(" A4", ""), "G20\nG94 F60\nG1 X3 Y0 Z0\nG3 X0 Y
 
 def at_place(place: Sequence[float], poses: Poses) -> Poses:
     """Poses with a frame that is moved and turned by roll, pitch and yaw."""
-    R = turn_about((0, 0, 1), place[5]) @ turn_about((0, 1, 0), place[4]) @ turn_about((1, 0, 0), place[3])
+    R = turns_of(np.array([place[3:]]))[0]
     return Poses(poses.positions @ R.T + np.array(place[:3]), np.einsum("ij,njk->nik", R, poses.rotations))
 
 
@@ -249,16 +244,13 @@ def at_place(place: Sequence[float], poses: Poses) -> Poses:
         (STRAIGHT, (1.0, 2, 3, 0.3, -0.2, 1)),
     ],
 )
-def test_a_path_in_another_place(tmp_path: Path, text: str, place: tuple[float, ...]) -> None:
+def test_a_path_in_another_place(tmp_path: Path, text: str, place: Floats) -> None:
     saved(tmp_path / "part.ngc", text)
     units = load_case("hexapod-linuxcnc").units
     names = ("x", "y", "z", "roll", "pitch", "yaw")
-    keys = {
-        name: math.degrees(each) if k > 2 else each for k, (name, each) in enumerate(zip(names, place, strict=True))
-    }
-    case = case_from(shipped_tables("hexapod-linuxcnc") | {"path": {"file": str(tmp_path / "part.ngc"), "place": keys}})
+    keys = dict(zip(names, (*place[:3], *np.degrees(place[3:]).tolist()), strict=True))
+    case = case_of("hexapod-linuxcnc", path={"file": str(tmp_path / "part.ngc"), "place": keys})
     again = case_from(case.to_toml()).path
-    assert again is not None
     assert again.place == pytest.approx(place, abs=1e-15)
     path, own = path_of_case(case), read_path(tmp_path / "part.ngc", units)
     s = np.linspace(0, 1, 33)
@@ -266,7 +258,6 @@ def test_a_path_in_another_place(tmp_path: Path, text: str, place: tuple[float, 
     found, expected = path.poses_at(k, s), at_place(place, own.poses_at(k, s))
     assert found.positions == pytest.approx(expected.positions, abs=1e-12)
     assert found.rotations == pytest.approx(expected.rotations, abs=1e-12)
-    # So are the symbolic poses.
     s_symbol = ca.SX.sym("s")
     pose = ca.Function("pose", [s_symbol], list(path[0].expressions(s_symbol)))
     for row in range(0, 33, 8):
@@ -285,11 +276,8 @@ def test_a_free_turn_has_ends_that_are_covered(tmp_path: Path) -> None:
 def test_values_and_round_numbers_keep_limits_along_a_path(tmp_path: Path) -> None:
     tables = design_along(tmp_path)
     case = case_from(tables)
-    path = path_of_case(case)
-    k, s = np.repeat(np.arange(len(path)), 201), np.tile(np.linspace(0, 1, 201), len(path))
     radius = np.arange(15.0, 35.0)
-    lengths = legs_along(radius, *path.poses_at(k, s)).reshape(len(radius), -1)
-    kept = radius[(lengths.min(axis=1) >= 25) & (lengths.max(axis=1) <= 40)]
+    kept = radius[are_kept(radius, poses_along(path_of_case(case), 201), 40)]
     # The narrowest base has the largest F; the whole number below that of the best design breaks a limit.
     before = solve(case)
     rounded = round_design(before, 1)
@@ -299,7 +287,6 @@ def test_values_and_round_numbers_keep_limits_along_a_path(tmp_path: Path) -> No
     assert rounded.keeps_limits
     tables["robot"]["parameters"]["x1"] = {"values": [kept[2], kept[0] - 1, kept[1]]}
     chosen = solve(case_from(tables))
-    assert chosen.path is not None
     assert chosen.path.is_proved
     assert chosen.path.judgement.case.components("x1") == (kept[1],)
 
@@ -314,14 +301,9 @@ def test_the_place_of_a_path_and_the_design_are_the_best_of_a_grid(cli: Run, tmp
     shown = " ".join(output_of(cli("solve", str(case), "--json", str(out))).split())
     result = json.loads(out.read_text())
     path = read_path(tmp_path / "line.ngc", load_case(str(case)).units)
-    s, radius, shift = np.linspace(0, 1, 41), np.linspace(18, 30, 121), np.linspace(-10, 10, 201)
-    poses = path.poses_at(np.zeros(len(s), dtype=np.intp), s)
-    kept = np.zeros((len(radius), len(shift)), dtype=bool)
-    for k, x in enumerate(shift):
-        lengths = legs_along(radius, *at_place((x, 1, 18, 0, 0, 0), poses)).reshape(len(radius), -1)
-        kept[:, k] = (lengths.min(axis=1) >= 25) & (lengths.max(axis=1) <= 32)
-    home = legs_along(radius, np.array([[0.0, 0, 20]]), np.eye(3)[None])[:, 0, 0]
-    kept &= ((home >= 25) & (home <= 32))[:, None]
+    radius, shift, poses = np.linspace(18, 30, 121), np.linspace(-10, 10, 201), poses_along(path, 41)
+    kept = np.array([are_kept(radius, at_place((x, 1, 18, 0, 0, 0), poses), 32) for x in shift]).T
+    kept &= are_kept(radius, Poses(np.array([[0.0, 0, 20]]), np.eye(3)[None]), 32)[:, None]
     best = int(np.argmax(kept.any(axis=1)))
     assert best > 0
     assert result["path"]["proved"]
@@ -354,19 +336,16 @@ def test_the_least_force_over_the_places_of_a_path_is_that_of_a_grid(tmp_path: P
     found = certify(case, gap=1e-3)
     proof = found.solution.path
     assert found.solution.status is Status.OPTIMAL
-    assert proof is not None
     assert proof.is_proved
 
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
-    s = np.linspace(0, 1, 41)
-    own = read_path(tmp_path / "line.ngc", case.units).poses_at(np.zeros(len(s), dtype=np.intp), s)
+    own = poses_along(read_path(tmp_path / "line.ngc", case.units), 41)
 
     def largest(x: float) -> float:
         """Largest force of a leg along the path in its place, by the balance of forces and moments."""
         sizes = []
         for position, rotation in zip(*at_place((x, 0, 19, 0, 0, math.radians(20)), own), strict=True):
-            arms = platform @ rotation.T
-            along = position + arms - base
+            arms = PLATFORM @ rotation.T
+            along = position + arms - BASE
             along /= np.linalg.norm(along, axis=1)[:, None]
             wrenches = np.hstack([along, np.cross(arms, along)])
             sizes.append(np.abs(np.linalg.solve(wrenches.T, np.array([*push, 0, 0, 0]))).max())
@@ -379,6 +358,4 @@ def test_the_least_force_over_the_places_of_a_path_is_that_of_a_grid(tmp_path: P
     assert math.isclose(found.solution.F, forces[best], rel_tol=3e-3)
     assert abs(proof.place[0] - grid[best]) < 0.2
     assert largest(proof.place[0]) < forces[best] * (1 + 2e-3)
-    # The bound is one of every place.
-    assert found.certificate is not None
     assert 0.99 * forces[best] < found.certificate.bound < forces[best]

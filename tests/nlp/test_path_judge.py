@@ -8,38 +8,33 @@ from threading import Event
 
 import numpy as np
 import pytest
-from builders import Array, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
+from builders import Array, Run, case_from, output_of, refusal_of, saved, shipped_tables, starter_tables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from measures import circle_joints
+from path_cases import (
+    HOME,
+    Floats,
+    delta_angles,
+    extreme,
+    halved,
+    hexapod,
+    lengths_at,
+    program,
+    robot_of,
+    table,
+    turns_of,
+)
 
-from screwsynth.nlp import Case, Outcome, interruption, judge_workspace
-from screwsynth.nlp.case.task import Sense
+from screwsynth.nlp import Outcome, PathOptions, ProgrammedPath, Sense, Units, interruption, judge_workspace
 from screwsynth.nlp.path.gcode import read_program
-from screwsynth.nlp.path.options import PathOptions
-from screwsynth.nlp.path.path import ProgrammedPath
-from screwsynth.nlp.path.poses_csv import read_poses
-from screwsynth.nlp.proof.workspace.numbers.extremes import Extreme
-from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, covered, judge_path
-from screwsynth.nlp.units import Units
+from screwsynth.nlp.proof.workspace.path_judge import covered, judge_path
 
-Run = Callable[..., tuple[int, str, str]]
 #: Points of each segment at which machines are measured.
 SAMPLES = np.linspace(0, 1, 4001)
 #: A line with turns, a helix of two turns, an arc in each other plane and a dwell; about (0, 0, 20) in.
 TOUR = (
     "G94 F60\nG1 X3 Y0 Z21 A2 C-3\nG3 X3 Y0 Z22 I-3 J0 P2 A0\nG18 G2 X0 Z25 K3 I0\nG4 P1\nG19 G3 Y3 Z22 J0 K-3 B4\nM2"
 )
-
-
-def program(text: str, units: Units, start: tuple[float, ...]) -> ProgrammedPath:
-    return read_program(text.split("\n"), "part.ngc", units, PathOptions(start=start))
-
-
-def table(case: Case, *rows: tuple[float, ...]) -> ProgrammedPath:
-    """A path through rows of x, y, z, roll, pitch, yaw."""
-    text = "\n".join(["x,y,z,roll,pitch,yaw", *(",".join(repr(float(each)) for each in row) for row in rows)])
-    return read_poses(text, "poses.csv", case.units, PathOptions())
 
 
 def points_of(path: ProgrammedPath, k: int, s: Array) -> Array:
@@ -53,32 +48,8 @@ def points_of(path: ProgrammedPath, k: int, s: Array) -> Array:
     return found
 
 
-def turn(points: Array) -> Array:
-    """Rotations Rz(C) Ry(B) Rx(A) (N, 3, 3)."""
-    (a, b, c), (d, e, f) = np.cos(points[:, 3:]).T, np.sin(points[:, 3:]).T
-    rows = [
-        [c * b, c * e * d - f * a, c * e * a + f * d],
-        [f * b, f * e * d + c * a, f * e * a - c * d],
-        [-e, b * d, b * a],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
-
-
-def lengths(points: Array) -> Array:
-    """Lengths (N, 6) of the hexapod's legs in closed form."""
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
-    spans = points[:, None, :3] + np.einsum("nij,kj->nki", turn(points), platform) - base
-    return np.asarray(np.linalg.norm(spans, axis=2))
-
-
-def extreme(judged: PathJudgement, name: str, sense: Sense) -> Extreme:
-    (found,) = (each for each in judged.extremes if (each.name, each.sense) == (name, sense))
-    return found
-
-
-def hexapod(limits: str = "") -> Case:
-    """LinuxCNC's hexapod, whose legs have these limits."""
-    return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": {"leg_length": limits} if limits else {}})
+def sampled_lengths(path: ProgrammedPath) -> Array:
+    return np.concatenate([lengths_at(points_of(path, k, SAMPLES)) for k in range(len(path))])
 
 
 @settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -90,11 +61,7 @@ def hexapod(limits: str = "") -> Case:
     st.floats(0, 1),
 )
 def test_boxes_of_pieces_hold_their_points(
-    ends: tuple[float, ...],
-    plane: tuple[int, str],
-    arc: tuple[float, float, float, int],
-    halves: list[bool],
-    part: float,
+    ends: Floats, plane: tuple[int, str], arc: Floats, halves: list[bool], part: float
 ) -> None:
     (code, letters), (radius, angle, sweep, turns) = plane, arc
     first, second = {17: "XY", 18: "ZX", 19: "YZ"}[code]
@@ -106,12 +73,9 @@ def test_boxes_of_pieces_hold_their_points(
     words += [f"{x}{value:.12f}" for x, value in zip("ABC", ends[9:], strict=True)]
     text = f"G21 G94 F60\nG{code} G3 {' '.join(words)} P{turns}\nG1 X{ends[3]:.9f} A{ends[6]:.9f}\nM2"
     start = (*ends[:3], *ends[6:9])
-    path = program(text, Units("mm"), start)
+    path = read_program(text.split("\n"), "part.ngc", Units("mm"), PathOptions(start=start))
     cover = covered(path, 1.0)[0]
-    low, high = 0.0, 1.0
-    for is_upper in halves:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if is_upper else (low, middle)
+    low, high = halved(halves)
     for k in range(len(path)):
         lower, upper = cover.boxes(np.array([[k, low, high]]))
         s = np.array([low, high, min(max(low + part * (high - low), low), high)])
@@ -127,11 +91,11 @@ def test_boxes_of_pieces_hold_their_points(
 
 
 def test_legs_of_a_hexapod_on_lines_arcs_and_helices_are_those_of_dense_samples() -> None:
-    case = case_from({**shipped_tables("hexapod-linuxcnc"), "limits": {}})
-    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    case = hexapod()
+    path = program(case, TOUR, HOME)
     judged = judge_path(case, path, gap=1e-3)
     assert judged.is_proved
-    sampled = np.concatenate([lengths(points_of(path, k, SAMPLES)) for k in range(len(path))])
+    sampled = sampled_lengths(path)
     names = [each.name for each in judged.extremes if each.sense is Sense.MIN]
     assert len(names) == 6
     for k, name in enumerate(names):
@@ -140,23 +104,22 @@ def test_legs_of_a_hexapod_on_lines_arcs_and_helices_are_those_of_dense_samples(
             assert sign * (found.bound - end) > -1e-9
             assert sign * (found.bound - end) < 2e-3 * end
             at = points_of(path, found.place.segment, np.array([found.place.parameter]))
-            assert lengths(at)[0, k] == pytest.approx(found.reached, rel=1e-12)
+            assert lengths_at(at)[0, k] == pytest.approx(found.reached, rel=1e-12)
 
 
 def test_a_limit_is_refuted_in_the_first_line_that_leaves_it() -> None:
     case = hexapod({"min": 17, "max": 33.5})
-    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    path = program(case, TOUR, HOME)
     judged = judge_path(case, path)
-    beyond = [lengths(points_of(path, k, SAMPLES)).max(axis=1) > 33.5 for k in range(len(path))]
+    beyond = [lengths_at(points_of(path, k, SAMPLES)).max(axis=1) > 33.5 for k in range(len(path))]
     segment = next(k for k, each in enumerate(beyond) if each.any())
     first = min(each.place for each in judged.faults.values())
     assert first.segment == segment
     assert first.parameter == pytest.approx(SAMPLES[np.argmax(beyond[segment])], abs=SAMPLES[1])
     lengths_alone = [each for each in judged.extremes if each.name.startswith("leg_length")]
     of_longest = [each for each in lengths_alone if each.sense is Sense.MAX]
-    sampled = np.concatenate([lengths(points_of(path, k, SAMPLES)) for k in range(len(path))])
+    sampled = sampled_lengths(path)
     assert [each.outcome is Outcome.REFUTED for each in of_longest] == (sampled.max(axis=0) > 33.5).tolist()
-    # Without time nothing is proved.
     stopped = judge_path(hexapod({"max": 50}), path, time_limit=0)
     assert {each.outcome for each in (*stopped.ranks, *stopped.extremes)} == {Outcome.OPEN}
     assert not stopped.is_proved
@@ -166,7 +129,7 @@ def test_an_interrupted_judgement_keeps_what_is_proved(monkeypatch: pytest.Monke
     requested = Event()
     monkeypatch.setattr(interruption, "_requested", requested)
     case = hexapod({"min": 17, "max": 43})
-    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
+    path = program(case, TOUR, HOME)
     judged = judge_path(case, path, progress=lambda step: requested.set() if step == "limits" else None)
     assert [each.outcome for each in judged.ranks] == [Outcome.PROVED]
     assert {(each.outcome, each.reason) for each in judged.extremes} == {(Outcome.OPEN, interruption.STOPPED)}
@@ -175,13 +138,12 @@ def test_an_interrupted_judgement_keeps_what_is_proved(monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize(("part", "outcome"), [(1.0001, Outcome.PROVED), (0.9999, Outcome.REFUTED)])
 def test_a_stroke_is_the_longest_length_less_the_shortest_at_any_two_points(part: float, outcome: Outcome) -> None:
-    tables = shipped_tables("hexapod-linuxcnc")
-    case = case_from(tables | {"limits": {}})
-    path = program(TOUR, case.units, (0, 0, 20, 0, 0, 0))
-    sampled = np.concatenate([lengths(points_of(path, k, SAMPLES)) for k in range(len(path))])
+    case = hexapod()
+    path = program(case, TOUR, HOME)
+    sampled = sampled_lengths(path)
     most = float(np.ptp(sampled, axis=0).max())
     limits = {"leg_length": {"min": 17, "max": 43}, "actuator": {"stroke_max": part * most}}
-    judged = judge_path(case_from(tables | {"limits": limits}), path)
+    judged = judge_path(hexapod(limits=limits), path)
     strokes = [each for each in judged.extremes if each.name.startswith("actuator.stroke_max")]
     assert strokes[int(np.argmax(np.ptp(sampled, axis=0)))].outcome is outcome
     assert judged.is_proved == (part > 1)
@@ -192,10 +154,10 @@ def test_a_stroke_is_the_longest_length_less_the_shortest_at_any_two_points(part
 @pytest.mark.parametrize("yaw", [0.0, 30.0])
 def test_a_path_along_one_coordinate_or_none(text: str, yaw: float) -> None:
     case = hexapod({"min": 17, "max": 43})
-    path = program(f"G94 F60\n{text}\nM2", case.units, (0, 0, 20, 0, 0, yaw))
+    path = program(case, f"G94 F60\n{text}\nM2", (0, 0, 20, 0, 0, yaw))
     judged = judge_path(case, path)
     assert judged.is_proved
-    sampled = lengths(points_of(path, 0, SAMPLES))
+    sampled = lengths_at(points_of(path, 0, SAMPLES))
     for k, found in enumerate(each for each in judged.extremes if each.sense is Sense.MIN):
         assert 17 <= found.bound <= sampled[:, k].min() + 1e-9
 
@@ -203,12 +165,22 @@ def test_a_path_along_one_coordinate_or_none(text: str, yaw: float) -> None:
 def test_a_singular_pose_is_crossed_and_all_of_a_line_is_singular() -> None:
     # The octahedral platform is singular where it is turned by a right angle.
     case = hexapod()
-    crossed = judge_path(case, table(case, (0, 0, 20, 0, 0, 50), (0, 0, 20, 0, 0, 60), (1, 0, 21, 0, 0, 110))).ranks[0]
+    crossed = judge_path(case, table(case, [(0, 0, 20, 0, 0, 50), (0, 0, 20, 0, 0, 60), (1, 0, 21, 0, 0, 110)])).ranks[
+        0
+    ]
     assert crossed.outcome is Outcome.REFUTED
     assert crossed.place.segment == 1
     assert crossed.place.parameter == pytest.approx(0.6, abs=1e-9)
-    whole = judge_path(case, table(case, (0, 0, 20, 0, 0, 90), (1, 0, 21, 0, 0, 90))).ranks[0]
+    whole = judge_path(case, table(case, [(0, 0, 20, 0, 0, 90), (1, 0, 21, 0, 0, 90)])).ranks[0]
     assert whole.outcome is Outcome.REFUTED
+
+
+def bisected(low: float, high: float, is_low: Callable[[float], bool]) -> tuple[float, float]:
+    """Two numbers next to each other, the first of which is low and the second not."""
+    for _ in range(80):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_low(middle) else (low, middle)
+    return low, high
 
 
 def triangle(radius: float, azimuth: float) -> Array:
@@ -224,9 +196,7 @@ def rpr_determinant(x: float, y: Array) -> Array:
 
 
 def test_a_singular_pose_is_touched_between_samples_without_a_change_of_sign() -> None:
-    tables = starter_tables("planar-3-rpr")
-    tables["robot"]["parameters"]["rb"] = 1.0
-    case = case_from(tables | {"limits": {}})
+    case = robot_of("planar-3-rpr", rb=1.0)
 
     def extreme_at(x: float) -> tuple[float, float]:
         """The y at which the determinant, a quadratic along a line, is extreme, and its value there."""
@@ -236,32 +206,27 @@ def test_a_singular_pose_is_touched_between_samples_without_a_change_of_sign() -
     # Singular poses without a turn lie on a circle, and this line is a tangent far from legs without length.
     low, high = 0.0, -3.0
     assert extreme_at(low)[1] * extreme_at(high)[1] < 0
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if extreme_at(middle)[1] * extreme_at(low)[1] > 0 else (low, middle)
+    low = bisected(low, high, lambda x: extreme_at(x)[1] * extreme_at(0.0)[1] > 0)[0]
     y, _ = extreme_at(low)
     values = rpr_determinant(low, np.linspace(y - 0.1234, y + 0.2, 324))
     assert (values > 0).all() or (values < 0).all()
-    # A line near by crosses twice within 0.4 mm, between two of the samples at each millimetre.
-    near, far = low, 0.0
 
+    # A line near by crosses twice within 0.4 mm, between two of the samples at each millimetre.
     def roots(x: float) -> Array:
         return np.sort(np.roots(np.polyfit([-1.0, 0.0, 1.0], rpr_determinant(x, np.array([-1.0, 0.0, 1.0])), 2)))
 
     far = low + 1e-3 if np.isreal(roots(low + 1e-3)).all() else low - 1e-3
-    for _ in range(80):
-        middle = 0.5 * (near + far)
-        near, far = (near, middle) if np.isreal(roots(middle)).all() and np.ptp(roots(middle)) > 4e-4 else (middle, far)
+    far = bisected(low, far, lambda x: not np.isreal(roots(x)).all() or np.ptp(roots(x)) <= 4e-4)[1]
     one, other = roots(far)
     assert other - one == pytest.approx(4e-4, rel=1e-3)
     begin = 0.5 * (one + other) - 0.1235
     values = rpr_determinant(far, begin + 1e-3 * np.arange(324))
     assert (values > 0).all() or (values < 0).all()
-    twice = judge_path(case, table(case, (far, begin, 0, 0, 0, 0), (far, begin + 0.323, 0, 0, 0, 0))).ranks[0]
+    twice = judge_path(case, table(case, [(far, begin, 0, 0, 0, 0), (far, begin + 0.323, 0, 0, 0, 0)])).ranks[0]
     assert twice.outcome is Outcome.REFUTED
     assert np.abs(roots(far) - twice.pose.position[1]).min() < 1e-8
     judged = [
-        judge_path(case, table(case, (x, y - 0.1234, 0, 0, 0, 0), (x, y + 0.2, 0, 0, 0, 0)))
+        judge_path(case, table(case, [(x, y - 0.1234, 0, 0, 0, 0), (x, y + 0.2, 0, 0, 0, 0)]))
         for x in (low, low + 1e-4, low - 1e-4)
     ]
     touched, *beside = (each.ranks[0] for each in judged)
@@ -272,20 +237,13 @@ def test_a_singular_pose_is_touched_between_samples_without_a_change_of_sign() -
 
 
 def test_cranks_of_a_delta_are_those_of_its_closed_form() -> None:
-    tables = starter_tables("delta")
-    tables["robot"]["parameters"]["rb"] = rb = 0.164
-    case = case_from(tables | {"limits": {"actuator_angle": {"max": 60}}})
+    case = robot_of("delta", {"actuator_angle": {"max": 60}}, rb=0.164)
     rows = [(0, 0, -1.2), (0.1, 0.05, -1.1), (-0.2, 0.1, -1.0), (-0.2, 0.1, -1.0005)]
-    path = table(case, *((*row, 0, 0, 0) for row in rows))
+    path = table(case, [(*row, 0, 0, 0) for row in rows])
     judged = judge_path(case, path)
     assert judged.is_proved
     p = np.concatenate([points_of(path, k, SAMPLES) for k in range(3)])[:, :3]
-    for k in range(3):
-        c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
-        # From the motor to the joints on the platform, in the limb's frame: |v - 0.524 (cos t, 0, -sin t)| = 1.244.
-        v = np.stack([c * p[:, 0] + s * p[:, 1] + 0.044 - rb, c * p[:, 1] - s * p[:, 0], p[:, 2]], 1)
-        reach, size = ((v**2).sum(1) + 0.524**2 - 1.244**2) / (2 * 0.524), np.hypot(v[:, 0], v[:, 2])
-        angles = np.arctan2(-v[:, 2], v[:, 0]) - np.arccos(reach / size) - math.radians(20)
+    for k, angles in enumerate(delta_angles(p).T):
         for sense, end in ((Sense.MIN, angles.min()), (Sense.MAX, angles.max())):
             found = extreme(judged, f"actuator_angle limb {k + 1}", sense)
             assert sense.sign * (found.bound - end) > -1e-9
@@ -294,19 +252,15 @@ def test_cranks_of_a_delta_are_those_of_its_closed_form() -> None:
 
 @pytest.mark.parametrize(("turn", "far"), [(0, (0.1, 0.01)), (12, (0.1, 0.01)), (12, (0.1, 0)), (12, (0.1, 0.1))])
 def test_a_delta_does_not_turn_along_a_path(turn: float, far: tuple[float, float]) -> None:
-    tables = starter_tables("delta")
-    tables["robot"]["parameters"] |= {"rb": 0.164, "arm": 0.2, "rod": 0.9}
-    case = case_from(tables | {"limits": {"actuator_angle": {"min": -60, "max": 60}}})
-    judged = judge_path(case, table(case, (0, 0, -0.95, 0, 0, turn), (*far, -0.95, 0, 0, turn)))
+    case = robot_of("delta", {"actuator_angle": {"min": -60, "max": 60}}, rb=0.164, arm=0.2, rod=0.9)
+    judged = judge_path(case, table(case, [(0, 0, -0.95, 0, 0, turn), (*far, -0.95, 0, 0, turn)]))
     assert judged.is_proved == (turn == 0)
 
 
 def test_a_path_out_of_reach_is_refuted_and_no_rank_is() -> None:
-    tables = starter_tables("delta")
-    tables["robot"]["parameters"]["rb"] = 0.164
-    case = case_from(tables | {"limits": {}})
+    case = robot_of("delta", rb=0.164)
     # Arms and rods are 1.768 long together.
-    judged = judge_path(case, table(case, (0, 0, -1.1, 0, 0, 0), (0, 0, -1.2, 0, 0, 0), (0, 0, -3, 0, 0, 0)))
+    judged = judge_path(case, table(case, [(0, 0, -1.1, 0, 0, 0), (0, 0, -1.2, 0, 0, 0), (0, 0, -3, 0, 0, 0)]))
     reaches = [each for each in judged.extremes if each.name.startswith("reach")]
     assert {each.outcome for each in reaches} == {Outcome.REFUTED}
     assert {each.place.segment for each in reaches} == {1}
@@ -314,14 +268,12 @@ def test_a_path_out_of_reach_is_refuted_and_no_rank_is() -> None:
 
 
 def test_slides_of_a_robot_with_loops_are_followed_along_its_path() -> None:
-    tables = starter_tables("planar-3-prr")
-    tables["robot"]["parameters"]["rb"] = 1.0
-    case = case_from(tables | {"limits": {"actuator_length": {"min": -0.3, "max": 0.3}}})
-    path = table(case, (0, 0, 0, 0, 0, 0), (0.1, 0.05, 0, 0, 0, 5), (0.1, 0.1, 0, 0, 0, -5))
+    case = robot_of("planar-3-prr", {"actuator_length": {"min": -0.3, "max": 0.3}}, rb=1.0)
+    path = table(case, [(0, 0, 0, 0, 0, 0), (0.1, 0.05, 0, 0, 0, 5), (0.1, 0.1, 0, 0, 0, -5)])
     judged = judge_path(case, path)
     assert judged.is_proved
     points = np.concatenate([points_of(path, k, SAMPLES) for k in range(2)])
-    hinges = points[:, None, :2] + np.einsum("nij,kj->nki", turn(points)[:, :2, :2], triangle(0.35, 60))
+    hinges = points[:, None, :2] + np.einsum("nij,kj->nki", turns_of(points[:, 3:])[:, :2, :2], triangle(0.35, 60))
     for k in range(3):
         c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
         a, b = c * hinges[:, k, 0] + s * hinges[:, k, 1], c * hinges[:, k, 1] - s * hinges[:, k, 0]
@@ -334,8 +286,8 @@ def test_slides_of_a_robot_with_loops_are_followed_along_its_path() -> None:
             assert sense.sign * (end - found.reached) > -1e-9
     # The third slide is beyond this limit long before its largest value: the first point is found there too.
     assert slides.max() > 0.25
-    short = case_from(tables | {"limits": {"actuator_length": {"max": 0.1}}})
-    back = table(case, (0, 0, 0, 0, 0, 0), (0.1, 0.05, 0, 0, 0, 5), (0.1, 0.1, 0, 0, 0, -5), (0, 0, 0, 0, 0, 0))
+    short = robot_of("planar-3-prr", {"actuator_length": {"max": 0.1}}, rb=1.0)
+    back = table(case, [(0, 0, 0, 0, 0, 0), (0.1, 0.05, 0, 0, 0, 5), (0.1, 0.1, 0, 0, 0, -5), (0, 0, 0, 0, 0, 0)])
     faults = judge_path(short, back).faults
     ((name, _), fault), first = *faults.items(), int(np.argmax(slides > 0.1))
     assert name == "actuator_length limb 3"
@@ -356,7 +308,7 @@ def test_every_limit_of_a_case_is_a_claim(tolerance: float | None) -> None:
     }  # fmt: skip
     if tolerance:
         tables["tolerance"] = {"joint_centre": tolerance}
-    judged = judge_path(case_from(tables), table(hexapod(), (0, 0, 20, 0, 0, 0), (0.5, 0, 20.5, 0, 2, 0)))
+    judged = judge_path(case_from(tables), table(hexapod(), [HOME, (0.5, 0, 20.5, 0, 2, 0)]))
     expected = judge_workspace(judged.case, workspace=judged.case.workspace, time_limit=0, with_objective=False)
     limited = {(each.name, each.sense, each.limit) for each in expected.extremes if each.limit is not None}
     assert limited == {(each.name, each.sense, each.limit) for each in judged.extremes if each.limit is not None}
@@ -388,15 +340,15 @@ def test_the_command_writes_a_result_and_says_how_it_ended(cli: Run, tmp_path: P
 @pytest.mark.parametrize("turn", [1e-8, 1e-6])
 def test_a_turn_that_is_too_small_for_ranks_is_one_all_the_same(turn: float) -> None:
     """A Delta cannot turn, however little: a path that turns it stays open, and over a workspace its angle is 0."""
-    tables = starter_tables("delta")
+    tables = starter_tables("delta") | {"limits": {}}
     tables["robot"]["parameters"] |= {"rb": 0.164, "arm": 0.2, "rod": 0.9}
-    case = case_from(tables | {"limits": {}})
-    judged = judge_path(case, table(case, (0, 0, -0.95, 0, 0, 0), (0.1, 0.01, -0.95, 0, 0, turn)))
+    case = case_from(tables)
+    judged = judge_path(case, table(case, [(0, 0, -0.95, 0, 0, 0), (0.1, 0.01, -0.95, 0, 0, turn)]))
     assert not judged.is_proved
     position = [{"min": -0.05, "max": 0.05}, 0, {"min": -0.96, "max": -0.94}]
     for most in (turn, 0.1):
         turns = {"axis": [0, 0, 1], "angle": {"min": -most, "max": most}}
-        case = case_from(tables | {"limits": {}, "workspace": {"position": position, "rotation": turns}})
+        case = case_from(tables | {"workspace": {"position": position, "rotation": turns}})
         found = judge_workspace(case, time_limit=1 if most == turn else 60, with_objective=False)
         # Bounds tell nothing as small as rounding.
         assert not found.is_refuted

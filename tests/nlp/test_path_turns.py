@@ -3,26 +3,21 @@
 import itertools
 import json
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal, localcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, case_from, commands_in, output_of, refusal_of, saved, shipped_tables, starter_tables
+from builders import Array, Run, commands_in, output_of, refusal_of, saved, turn_about
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from measures import circle_joints
+from path_cases import Floats, hexapod, leg_lengths, program, robot_of, table
 
-from screwsynth.nlp import Case, InputError, Outcome
-from screwsynth.nlp.case.loads import Load, Loading
-from screwsynth.nlp.case.workspace import TurnKind
+from screwsynth.nlp import Case, InputError, Load, Loading, Outcome, ProgrammedPath, TurnKind
 from screwsynth.nlp.path.frame import PathFrame
-from screwsynth.nlp.path.gcode import read_program
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.orientation import ORDERS
-from screwsynth.nlp.path.path import ProgrammedPath
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.proof.workspace import path_judge
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, judge_path
@@ -30,7 +25,6 @@ from screwsynth.nlp.proof.workspace.robot.long_turns import LongTurns, turns_of_
 from screwsynth.nlp.proof.workspace.robot.path_turns import LinearAngles, PathTurns, Tangents
 from screwsynth.nlp.proof.workspace.robot.pose_box import UNTURNED
 
-Run = Callable[..., tuple[int, str, str]]
 Quaternion = list[Decimal]
 SAMPLES = np.linspace(0, 1, 2001)
 
@@ -80,9 +74,7 @@ def vector(q: Quaternion, turns: PathTurns, divisor: int | None) -> Quaternion:
     return [a / relative[0] for a in relative[1:]]
 
 
-def path_of(
-    knots: Array, order: str = "rpy", between: Between = Between.ANGLES, place: tuple[float, ...] = ()
-) -> ProgrammedPath:
+def path_of(knots: Array, order: str = "rpy", between: Between = Between.ANGLES, place: Floats = ()) -> ProgrammedPath:
     """A path that turns through angles (n, 3), radians, in a frame turned by roll, pitch and yaw."""
     count = len(knots) - 1
     moved = np.hstack([np.arange(count + 1.0)[:, None], np.zeros((count + 1, 2)), knots])
@@ -116,10 +108,10 @@ CLOSE = st.tuples(*[st.floats(-2.0, 2.0)] * 3) | st.tuples(*[st.floats(-20.0, 20
 @example((0.4, 0.0, 0.0), (-0.3, 0.0, 0.0), "rpy", (0.9, 0.0, 0.0), 3, None)
 @example((0.0, 0.3, 3.0), (19.0, -0.2, 7.0), "rpy", (0.0, 0.5, 0.0), 9, None)
 def test_ranges_hold_exact_rotations(
-    start: tuple[float, ...],
-    end: tuple[float, ...],
+    start: Floats,
+    end: Floats,
     how: str,
-    place: tuple[float, ...],
+    place: Floats,
     halvings: int,
     data: st.DataObject | None,
 ) -> None:
@@ -173,9 +165,7 @@ def test_ranges_hold_exact_rotations(
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("is_placed", [False, True])
-def test_a_turn_about_one_axis_leaves_other_coordinates_exactly_zero(
-    between: Between, axis: int, *, is_placed: bool
-) -> None:
+def test_a_turn_about_one_axis_leaves_others_exactly_zero(between: Between, axis: int, *, is_placed: bool) -> None:
     knots = np.zeros((4, 3))
     knots[:, axis] = 0.1, 0.7, -0.4, 1.2
     place = tuple(0.5 * (k == axis) for k in range(3)) if is_placed else ()
@@ -186,7 +176,7 @@ def test_a_turn_about_one_axis_leaves_other_coordinates_exactly_zero(
 
 
 def test_one_reference_is_near_all_rotations_of_a_path() -> None:
-    def reference(knots: list[tuple[float, ...]], **how: object) -> tuple[int, ...]:
+    def reference(knots: list[Floats], **how: object) -> tuple[int, ...]:
         return turns_of_path(path_of(np.radians(knots), **how)).reference
 
     assert isinstance(turns_of_path(path_of(np.radians([(0, 0, 0), (140, -140, 140)]))), Tangents)
@@ -219,7 +209,7 @@ def test_one_reference_is_near_all_rotations_of_a_path() -> None:
 @pytest.mark.parametrize("place", [(), (0.5, -0.8, 2.0), (0.0, 1.1, 0.0)])
 @pytest.mark.parametrize("between", Between)
 @pytest.mark.parametrize("order", ["rpy", "xzy"])
-def test_velocities_hold_those_of_small_turns(between: Between, order: str, place: tuple[float, ...]) -> None:
+def test_velocities_hold_those_of_small_turns(between: Between, order: str, place: Floats) -> None:
     rng = np.random.default_rng(3)
     near = rng.uniform(-0.8, 0.8, (40, 3))
     for knots in (near, near + np.arange(40)[:, None] * [0.0, 0.3, 1.9]):
@@ -240,9 +230,7 @@ def test_velocities_hold_those_of_small_turns(between: Between, order: str, plac
 
 
 def about(axis: Array, angles: Array) -> Array:
-    """Rotations (n, 3, 3) about a unit axis, by the series of Rodrigues."""
-    K = np.cross(np.eye(3), axis)
-    return np.eye(3) + np.sin(angles)[:, None, None] * K + (1 - np.cos(angles))[:, None, None] * (K @ K)
+    return np.array([turn_about(axis, angle) for angle in angles])
 
 
 def angled(start: Array, end: Array, order: str) -> tuple[Array, Array]:
@@ -261,30 +249,6 @@ def turned(start: Array, end: Array) -> tuple[Array, Array]:
     return start[:3] + SAMPLES[:, None] * (end - start)[:3], about(axis, SAMPLES * angle) @ first
 
 
-def hexapod(limits: str | dict[str, float] = "") -> Case:
-    """LinuxCNC's hexapod, whose legs have these limits."""
-    return case_from(shipped_tables("hexapod-linuxcnc") | {"limits": {"leg_length": limits} if limits else {}})
-
-
-def lengths(poses: tuple[Array, Array]) -> Array:
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
-    positions, rotations = poses
-    return np.asarray(np.linalg.norm(positions[:, None] + np.einsum("nij,kj->nki", rotations, platform) - base, axis=2))
-
-
-def table(case: Case, rows: Array, between: Between | None = None) -> ProgrammedPath:
-    """A path through rows of x, y, z, roll, pitch, yaw, in degrees."""
-    text = "\n".join(["x,y,z,roll,pitch,yaw", *(",".join(map(repr, row)) for row in rows.tolist())])
-    return read_poses(text, "poses.csv", case.units, PathOptions(between=between))
-
-
-def program(case: Case, rows: Array, order: str) -> ProgrammedPath:
-    words = [" ".join(f"{x}{value!r}" for x, value in zip("XYZABC", row, strict=True)) for row in rows.tolist()]
-    return read_program(
-        ["F60", *(f"G1 {each}" for each in words), "M2"], "p.ngc", case.units, PathOptions(angles=order)
-    )
-
-
 WAY = np.array([(0, 0, 20, 0, 0, 0), (2, 1, 21, 12, -8, 20), (-1, 2, 19, -15, 10, -25.0)])
 #: The same about half a turn about x of the platform, with the plates inside out.
 OVER = WAY + np.array([0, 0, 0, 170, 0, 0])
@@ -293,24 +257,30 @@ OVER = WAY + np.array([0, 0, 0, 170, 0, 0])
 @pytest.mark.parametrize(("how", "rows"), [("slerp", WAY), ("xyz", WAY), ("yzx", WAY), ("rpy", OVER), ("slerp", OVER)])
 def test_legs_are_those_of_dense_samples(how: str, rows: Array) -> None:
     case = hexapod()
-    path = table(case, rows, Between.SLERP) if how == "slerp" else program(case, rows, how)
+    path = table(case, rows, between=Between.SLERP) if how == "slerp" else lines(case, rows, how)
     judged = judge_path(case, path)
     radians = np.hstack([rows[:, :3], np.radians(rows[:, 3:])])
     pairs = list(itertools.pairwise(radians))
     order = "zyx" if how == "rpy" else how
-    sampled = np.concatenate([lengths(turned(*each) if how == "slerp" else angled(*each, order)) for each in pairs])
+    sampled = np.concatenate(
+        [leg_lengths(*(turned(*each) if how == "slerp" else angled(*each, order))) for each in pairs]
+    )
     found = [each for each in judged.extremes if each.name.startswith("leg_length limb")]
     assert len(found) == 12
     for k, each in enumerate(found):
         end = each.sense.sign * (each.sense.sign * sampled[:, k // 2]).max()
         assert each.sense.sign * (each.bound - end) > -1e-9
         assert each.bound == pytest.approx(end, rel=2e-3)
-        # The pose that reaches it is one of the path.
-        here = lengths((each.pose.position[None], each.pose.rotation[None]))[0, k // 2]
+        here = leg_lengths(each.pose.position[None], each.pose.rotation[None])[0, k // 2]
         assert here == pytest.approx(each.reached, rel=1e-12)
         s = each.place.parameter
         near = sampled[each.place.segment * len(SAMPLES) + round(s * 2000), k // 2]
         assert near == pytest.approx(each.reached, abs=0.05)
+
+
+def lines(case: Case, rows: Array, order: str) -> ProgrammedPath:
+    words = [" ".join(f"{x}{value!r}" for x, value in zip("XYZABC", row, strict=True)) for row in rows.tolist()]
+    return program(case, "\n".join(["F60", *(f"G1 {each}" for each in words), "M2"]), angles=order)
 
 
 def outcomes(judged: PathJudgement) -> list[tuple[str, Outcome]]:
@@ -318,9 +288,7 @@ def outcomes(judged: PathJudgement) -> list[tuple[str, Outcome]]:
 
 
 @pytest.mark.parametrize("longest", [33.0, 36.0])
-def test_both_rules_of_roll_pitch_and_yaw_give_the_same_verdicts(
-    longest: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_both_rules_of_roll_pitch_and_yaw_agree(longest: float, monkeypatch: pytest.MonkeyPatch) -> None:
     case = replace(hexapod({"min": 17, "max": longest}), loading=Loading((Load("cut", (3.0, 1.0, -9.0)),)))
     path = replace(table(case, WAY), durations=np.array([4.0, 3.0]))
     own = judge_path(case, path)
@@ -333,23 +301,22 @@ def test_both_rules_of_roll_pitch_and_yaw_give_the_same_verdicts(
         same = other.faults[claim]
         assert same.place.segment == fault.place.segment
         assert same.place.parameter == pytest.approx(fault.place.parameter, abs=1e-9)
-    # Forces, speeds and powers too.
     assert len(own.extremes) == 12 + 6 * (1 + 2 + 2)
     for one, also in zip(own.extremes, other.extremes, strict=True):
         assert one.reached == pytest.approx(also.reached, rel=2e-3, abs=1e-3)
 
 
 def test_every_number_is_the_same_in_all_coordinates(monkeypatch: pytest.MonkeyPatch) -> None:
-    tables = shipped_tables("hexapod-linuxcnc")
-    tables["limits"] = {"base_joint_angle": {"max": 60}, "platform_joint_angle": {"max": 80}}
-    tables["load"] = [{"name": "push", "force": [1, 2, -10]}]
-    case = case_from(tables)
+    limits = {"base_joint_angle": {"max": 60}, "platform_joint_angle": {"max": 80}}
+    case = hexapod(limits=limits, load=[{"name": "push", "force": [1, 2, -10]}])
     # Where yaw alone varies, both motions are the same.
     path = table(case, np.array([(0, 0, 20, 0, 0, -20), (1, 1, 21, 0, 0, 25.0)]))
-    every = [turns_of_path(path), turns_of_path(replace(path, between=Between.SLERP))]
-    every.append(LinearAngles(path.knots[:, 3:], path.order, (8, 1, -2, 3)))
     judged = []
-    for turns in every:
+    for turns in (
+        turns_of_path(path),
+        turns_of_path(replace(path, between=Between.SLERP)),
+        LinearAngles(path.knots[:, 3:], path.order, (8, 1, -2, 3)),
+    ):
         monkeypatch.setattr(path_judge, "turns_of_path", lambda _, turns=turns: turns)
         judged.append(judge_path(case, path))
     own, *others = judged
@@ -370,20 +337,17 @@ def test_every_number_is_the_same_in_all_coordinates(monkeypatch: pytest.MonkeyP
 def test_a_singular_pose_is_crossed_or_touched_by_turns(between: Between) -> None:
     # The octahedral platform is singular where it is turned by a right angle.
     case = hexapod()
-    rows = np.array([(0, 0, 20, 0, 0, 70), (0, 0, 20, 0, 0, 110.0)])
-    crossed = judge_path(case, table(case, rows, between)).ranks[0]
-    assert crossed.outcome is Outcome.REFUTED
+    crossed, touched = (
+        judge_path(case, table(case, [(0, 0, 20, 0, 0, yaw) for yaw in yaws], between=between)).ranks[0]
+        for yaws in ((70, 110), (60, 90, 80))
+    )
+    assert crossed.outcome is touched.outcome is Outcome.REFUTED
     assert crossed.place.parameter == pytest.approx(0.5, abs=1e-9)
-    rows = np.array([(0, 0, 20, 0, 0, 60), (0, 0, 20, 0, 0, 90), (0, 0, 20, 0, 0, 80.0)])
-    touched = judge_path(case, table(case, rows, between)).ranks[0]
-    assert touched.outcome is Outcome.REFUTED
     assert math.degrees(touched.pose.angle) == pytest.approx(90, abs=1e-5)
 
 
 def test_a_planar_robot_turns_by_slerp() -> None:
-    tables = starter_tables("planar-3-rpr")
-    tables["robot"]["parameters"]["rb"] = 1.0
-    case = case_from(tables | {"limits": {}})
+    case = robot_of("planar-3-rpr", rb=1.0)
     text = "x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0,0\n0.1,0.05,0,0.96,0,0,0.28\n0,0.1,0,0.8,0,0,0.6"
     path = read_poses(text, "q.csv", case.units, PathOptions())
     assert path.between is Between.SLERP

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from decimal import Decimal, localcontext
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, case_from, saved, shipped_tables, starter_tables, turn_about
+from builders import Array, Run, case_file, case_from, output_of, saved, shipped_tables, starter_tables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from measures import circle_joints
+from path_cases import BASE, LEGS, PLATFORM, Floats, delta_angles, extreme, halved, hexapod, turns_of
 
-from screwsynth.nlp import Case, load_case
-from screwsynth.nlp.case.task import Sense
-from screwsynth.nlp.case.toml import toml_document
-from screwsynth.nlp.case.workspace import TurnKind
+from screwsynth.nlp import Case, Outcome, Sense, TurnKind, load_case
 from screwsynth.nlp.path.options import Between
 from screwsynth.nlp.path.orientation import ORDERS
 from screwsynth.nlp.path.path import Kind, ProgrammedPath
@@ -27,9 +25,7 @@ from screwsynth.nlp.path.placing import placed
 from screwsynth.nlp.path.reader import path_of_case
 from screwsynth.nlp.proof.workspace.path_judge import PathJudgement, covered, judge_path
 from screwsynth.nlp.proof.workspace.robot.long_turns import turns_of_path
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
-Run = Callable[..., tuple[int, str, str]]
 Matrix = list[list[Decimal]]
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 #: A quarter of a circle and a helix in tilted planes, a line with a turn, in inches; all motions have times.
@@ -58,13 +54,11 @@ def product(A: Matrix, B: Matrix) -> Matrix:
 
 
 def turned(angles: Sequence[float]) -> Matrix:
-    """Exact rotation of roll, pitch and yaw."""
     roll, pitch, yaw = map(Decimal, angles)
     return product(product(about(2, yaw), about(1, pitch)), about(0, roll))
 
 
 def moved(place: Sequence[float], point: Sequence[Decimal]) -> list[Decimal]:
-    """Exact position in the world of a point of a frame."""
     R = turned(place[3:])
     return [
         Decimal(t) + sum((a * b for a, b in zip(row, point, strict=True)), Decimal(0))
@@ -94,15 +88,12 @@ def arc_of(numbers: Sequence[float], plane: int, heights: tuple[float, float], a
     st.lists(st.booleans(), max_size=50),
 )
 def test_boxes_hold_exact_positions_of_arcs_in_tilted_planes(
-    place: tuple[float, ...], arc: tuple[float, ...], plane: int, heights: tuple[float, float], halves: list[bool]
+    place: Floats, arc: Floats, plane: int, heights: tuple[float, float], halves: list[bool]
 ) -> None:
     """Positions of 40 digits are in the boxes; these are no wider than the way, and rounding."""
     path = placed(arc_of(arc, plane, heights, np.zeros((2, 3))), place)
     cover = covered(path, 1.0)[0]
-    low, high = 0.0, 1.0
-    for is_upper in halves:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if is_upper else (low, middle)
+    low, high = halved(halves)
     lower, upper = (each[0].tolist() for each in cover.boxes(np.array([[0, low, high]])))
     slow, fast = (each[0].tolist() for each in cover.derivatives(np.array([[0, low, high]])))
     first, second, radius, growth, angle, sweep = map(Decimal, path.arcs[0].tolist())
@@ -138,9 +129,7 @@ def test_boxes_hold_exact_positions_of_arcs_in_tilted_planes(
     st.tuples(*[st.just(0.0) | st.floats(-9, 9)] * 6),
     st.lists(st.booleans(), max_size=50),
 )
-def test_boxes_hold_exact_positions_of_lines_with_turns(
-    place: tuple[float, ...], ends: tuple[float, ...], halves: list[bool]
-) -> None:
+def test_boxes_hold_exact_positions_of_lines_with_turns(place: Floats, ends: Floats, halves: list[bool]) -> None:
     knots = np.array([[*ends[:3], 0, 0, 0], [*ends[3:], 0.4, -0.3, 0.2]])
     columns = np.array([3], dtype=np.int32), np.array([Kind.LINE], dtype=np.uint8), np.array([2.0])
     own = ProgrammedPath(
@@ -149,10 +138,7 @@ def test_boxes_hold_exact_positions_of_lines_with_turns(
     path = placed(own, place)
     if path.frame is None:
         return
-    low, high = 0.0, 1.0
-    for is_upper in halves:
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if is_upper else (low, middle)
+    low, high = halved(halves)
     cover = covered(path, 1.0)[0]
     lower, upper = (each[0].tolist() for each in cover.boxes(np.array([[0, low, high]])))
     slow, fast = (each[0].tolist() for each in cover.derivatives(np.array([[0, low, high]])))
@@ -169,9 +155,7 @@ def test_boxes_hold_exact_positions_of_lines_with_turns(
 
 @settings(deadline=None, max_examples=60)
 @given(st.tuples(*[ANGLES] * 3), st.tuples(*[ANGLES] * 3))
-def test_a_path_that_does_not_turn_has_its_exact_roll_pitch_and_yaw(
-    place: tuple[float, ...], angles: tuple[float, ...]
-) -> None:
+def test_a_path_that_does_not_turn_has_its_exact_roll_pitch_and_yaw(place: Floats, angles: Floats) -> None:
     """Tangents of half of roll, pitch and yaw, from the exact rotation matrix."""
     path = placed(arc_of((0.0, 0.0, 2.0, 0.0, 0.0, 1.0), 18, (0.0, 1.0), np.array([angles, angles])), (1, 2, 3, *place))
     turns = turns_of_path(path)
@@ -193,35 +177,28 @@ def test_a_path_that_does_not_turn_has_its_exact_roll_pitch_and_yaw(
 
 
 def matrix(place: Sequence[float]) -> Array:
-    return np.asarray(
-        turn_about((0, 0, 1), place[5]) @ turn_about((0, 1, 0), place[4]) @ turn_about((1, 0, 0), place[3])
-    )
+    return np.asarray(turns_of(np.array([place[3:]]))[0])
 
 
 def case_at(folder: Path, text: str, place: Sequence[float], **keys: object) -> Case:
     """LinuxCNC's hexapod with a program in a place, angles in degrees."""
     saved(folder / "part.ngc", text)
     names = ("x", "y", "z", "roll", "pitch", "yaw")
-    tables = shipped_tables("hexapod-linuxcnc") | {"limits": {}} | keys
     table = {"file": str(folder / "part.ngc"), "place": dict(zip(names, place, strict=True))}
-    return case_from(tables | {"path": table})
+    return hexapod(**keys, path=table)
 
 
 def legs(own: ProgrammedPath, place: Sequence[float], count: int = 401) -> Array:
     """Lengths (N, 6) of the legs of LinuxCNC's hexapod at points of a path in its frame, from the joints alone."""
-    base, platform = circle_joints({"x1": 26.5, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     k, s = np.repeat(np.arange(len(own)), count), np.tile(np.linspace(0, 1, count), len(own))
     poses, R = own.poses_at(k, s), matrix(place)
-    tips = poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, platform)
-    return np.asarray(np.linalg.norm(tips @ R.T + np.array(place[:3]) - base, axis=2))
+    tips = poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, PLATFORM)
+    return np.asarray(np.linalg.norm(tips @ R.T + np.array(place[:3]) - BASE, axis=2))
 
 
 def range_of(judged: PathJudgement, name: str) -> tuple[float, float]:
-    ends = {each.sense: each.bound for each in judged.extremes if each.name == name}
-    return ends[Sense.MIN], ends[Sense.MAX]
-
-
-LIMBS = ("1-", "1+", "2-", "2+", "3-", "3+")
+    low, high = (extreme(judged, name, sense).bound for sense in (Sense.MIN, Sense.MAX))
+    return low, high
 
 
 @pytest.mark.parametrize(
@@ -236,9 +213,7 @@ LIMBS = ("1-", "1+", "2-", "2+", "3-", "3+")
         ),
     ],
 )
-def test_legs_along_a_placed_path_are_those_of_dense_samples(
-    tmp_path: Path, text: str, place: tuple[float, ...]
-) -> None:
+def test_legs_along_a_placed_path_are_those_of_dense_samples(tmp_path: Path, text: str, place: Floats) -> None:
     case = case_at(tmp_path, text, place)
     path, own = path_of_case(case), path_of_case(case_at(tmp_path, text, (0.0,) * 6))
     assert path.frame is not None
@@ -246,22 +221,15 @@ def test_legs_along_a_placed_path_are_those_of_dense_samples(
     found = legs(own, radians)
     judged = judge_path(case, path)
     assert judged.ranks[0].outcome is Outcome.PROVED
-    for k, name in enumerate(LIMBS):
+    for k, name in enumerate(LEGS):
         low, high = range_of(judged, f"leg_length limb {name}")
         assert found[:, k].min() * (1 - 2e-3) <= low <= found[:, k].min() + 1e-9
         assert found[:, k].max() * (1 + 2e-3) >= high >= found[:, k].max() - 1e-9
     # Speeds are those of differences of lengths between samples; each segment has a time.
     sampled = np.abs(np.diff(found.reshape(len(own), -1, 6), axis=1)) / (own.durations[:, None, None] / 400)
-    for k, name in enumerate(LIMBS):
-        speed = range_of_speed(judged, name)
+    for k, name in enumerate(LEGS):
+        speed = extreme(judged, f"actuator_speed actuator {name}", Sense.MAX).bound
         assert sampled[:, :, k].max() * (1 - 1e-6) <= speed <= sampled[:, :, k].max() * 1.01
-
-
-def range_of_speed(judged: PathJudgement, name: str) -> float:
-    (found,) = (
-        each.bound for each in judged.extremes if each.name.startswith("actuator_speed") and each.name.endswith(name)
-    )
-    return found
 
 
 def test_a_delta_follows_an_arc_in_a_tilted_plane(tmp_path: Path) -> None:
@@ -271,7 +239,7 @@ def test_a_delta_follows_an_arc_in_a_tilted_plane(tmp_path: Path) -> None:
     words = " ".join(f"{letter}{angle:.12f}" for letter, angle in zip("ABC", back, strict=True))
     saved(tmp_path / "arc.ngc", f"G21\nG94 F60000\nG1 X200 Y0 Z0 {words}\nG3 X-200 Y0 Z50 I-200\nM2\n")
     tables = starter_tables("delta")
-    tables["robot"]["parameters"]["rb"] = rb = 0.164
+    tables["robot"]["parameters"]["rb"] = 0.164
     place = {"x": 0.02, "y": -0.03, "z": -1.1, "roll": 15, "pitch": -10, "yaw": 30}
     case = case_from(tables | {"limits": {}, "path": {"file": str(tmp_path / "arc.ngc"), "place": place}})
     path = path_of_case(case)
@@ -281,11 +249,7 @@ def test_a_delta_follows_an_arc_in_a_tilted_plane(tmp_path: Path) -> None:
     turn = np.linspace(0, math.pi, 4001)
     own = np.stack([0.2 * np.cos(turn), 0.2 * np.sin(turn), 0.05 * turn / math.pi], axis=1)
     p = own @ R + [0.02, -0.03, -1.1]
-    for k in range(3):
-        c, s = math.cos(2 * math.pi / 3 * k), math.sin(2 * math.pi / 3 * k)
-        v = np.stack([c * p[:, 0] + s * p[:, 1] + 0.044 - rb, c * p[:, 1] - s * p[:, 0], p[:, 2]], 1)
-        reach, size = ((v**2).sum(1) + 0.524**2 - 1.244**2) / (2 * 0.524), np.hypot(v[:, 0], v[:, 2])
-        angles = np.arctan2(-v[:, 2], v[:, 0]) - np.arccos(reach / size) - math.radians(20)
+    for k, angles in enumerate(delta_angles(p).T):
         low, high = range_of(judged, f"actuator_angle limb {k + 1}")
         assert angles.min() - 2e-3 <= low <= angles.min() + 1e-9
         assert angles.max() + 2e-3 >= high >= angles.max() - 1e-9
@@ -300,27 +264,25 @@ def test_rolls_and_pitches_of_a_path_and_the_design_are_the_best_of_a_grid(cli: 
     place = {"x": 1.0, "y": 1.0, "z": 19.0, "roll": free, "pitch": free}
     tables |= {"limits": {"over": "path", "leg_length": {"min": 21, "max": 30}}, "solve": {"starts": 3}}
     tables["path"] = {"file": str(saved(tmp_path / "part.ngc", text)), "place": place}
-    case, out = saved(tmp_path / "case.toml", toml_document(tables)), tmp_path / "out.json"
-    code, shown, error = cli("solve", str(case), "--json", str(out))
-    assert code == 0, (shown, error)
+    case, out = case_file(tmp_path, tables), tmp_path / "out.json"
+    output_of(cli("solve", str(case), "--json", str(out)))
     result = json.loads(out.read_text())
     assert result["path"]["proved"]
     own = path_of_case(load_case(str(case), {f"path.place.{name}": 0.0 for name in ("x", "y", "z", "roll", "pitch")}))
     radius, grid = np.linspace(15, 35, 161), np.linspace(-12, 12, 49)
     k, s = np.repeat(np.arange(len(own)), 41), np.tile(np.linspace(0, 1, 41), len(own))
     poses = own.poses_at(k, s)
-    bases = [circle_joints({"x1": each, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)}) for each in radius]
+    bases = [circle_joints({"x1": each, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})[0] for each in radius]
 
     def kept(roll: float, pitch: float) -> Array:
-        """Whether designs keep their limits at all samples."""
         R = matrix((0, 0, 0, *np.radians([roll, pitch, 0])))
-        tips = (poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, bases[0][1])) @ R.T + [1, 1, 19]
-        lengths = np.linalg.norm(tips[None] - np.array([base for base, _ in bases])[:, None], axis=3)
+        tips = (poses.positions[:, None] + np.einsum("nij,kj->nki", poses.rotations, PLATFORM)) @ R.T + [1, 1, 19]
+        lengths = np.linalg.norm(tips[None] - np.array(bases)[:, None], axis=3)
         return np.asarray((lengths.min(axis=(1, 2)) >= 21) & (lengths.max(axis=(1, 2)) <= 30))
 
     every = np.array([[kept(roll, pitch) for pitch in grid] for roll in grid])
-    home = np.array([20, 0, 0])[::-1] + bases[0][1]
-    at_home = np.array([np.linalg.norm(home - base, axis=1)[0] for base, _ in bases])
+    home = np.array([0, 0, 20]) + PLATFORM
+    at_home = np.array([np.linalg.norm(home - base, axis=1)[0] for base in bases])
     every &= (at_home >= 21) & (at_home <= 30)
     best = int(np.argmax(every.any(axis=(0, 1))))
     untilted = int(np.argmax(every[24, 24])) if every[24, 24].any() else len(radius)
@@ -328,16 +290,15 @@ def test_rolls_and_pitches_of_a_path_and_the_design_are_the_best_of_a_grid(cli: 
     # The grid has steps of half a degree, and the solve none.
     assert radius[best] * (1 - 2e-2) < result["parameters"]["x1"] < radius[best] * (1 + 5e-3)
     assert kept_design(result, poses.positions, poses.rotations)
-    code, shown, error = cli("path", str(case), "--of", str(out))
-    assert code == 0, (shown, error)
+    output_of(cli("path", str(case), "--of", str(out)))
 
 
 def kept_design(result: dict[str, Any], positions: Array, rotations: Array) -> bool:
     """Return whether the design of a result keeps its limits at the samples, in the place of the result."""
-    base, platform = circle_joints({"x1": result["parameters"]["x1"], "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
+    base, _ = circle_joints({"x1": result["parameters"]["x1"], "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})
     place = result["path"]["place"]
     R = matrix((0, 0, 0, *np.radians([place["roll"], place["pitch"], 0])))
-    tips = (positions[:, None] + np.einsum("nij,kj->nki", rotations, platform)) @ R.T + [1, 1, 19]
+    tips = (positions[:, None] + np.einsum("nij,kj->nki", rotations, PLATFORM)) @ R.T + [1, 1, 19]
     lengths = np.linalg.norm(tips - base, axis=2)
     return bool(lengths.min() >= 21 - 1e-6 and lengths.max() <= 30 + 1e-6)
 
@@ -350,7 +311,7 @@ def test_rows_of_actuators_have_poses_in_the_world(cli: Run, tmp_path: Path) -> 
     for text, is_proved in ((PLAIN, True), (PROGRAM, False)):
         saved(tmp_path / "part.ngc", text)
         tables["path"] = {"file": str(tmp_path / "part.ngc"), "place": table}
-        case, rows = saved(tmp_path / "case.toml", toml_document(tables)), tmp_path / "rows.csv"
+        case, rows = case_file(tmp_path, tables), tmp_path / "rows.csv"
         code, shown, error = cli("path", str(case), "--csv", str(rows), "--within", "0.02")
         assert (code == 0) == is_proved, (shown, error)
         head, *lines = rows.read_text().splitlines()

@@ -1,6 +1,5 @@
 """Starts that the search in C screens: nothing is lost, Ipopt has the last word, and threads change nothing."""
 
-import tomllib
 from collections import Counter
 from dataclasses import replace
 from functools import partial
@@ -8,45 +7,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import case_from, starter_tables
+from builders import case_of, starter
 
 from screwsynth.models import FloatArray
-from screwsynth.nlp import (
-    Case,
-    Nlp,
-    ProgramSolution,
-    Search,
-    SolverResult,
-    StartStatus,
-    Status,
-    StopReason,
-    Task,
-    formulate,
-    generate_c,
-    load_case,
-    solve,
-)
-from screwsynth.nlp.case.reader import find_case
+from screwsynth.nlp import Case, Nlp, ProgramSolution, Search, Task, formulate, load_case, shipped_cases, solve
+from screwsynth.nlp.embedding.codegen import generate_c
 from screwsynth.nlp.evidence.kkt import FEASIBLE, STATIONARY, linearise, multipliers
 from screwsynth.nlp.program.formulation import formulate_each
 from screwsynth.nlp.program.sampling import starting_points
 from screwsynth.nlp.screening import screening
 from screwsynth.nlp.screening.screening import can_screen, extension, screen
 from screwsynth.nlp.solver import screened
+from screwsynth.nlp.solver.interface import SolverResult, StopReason
 from screwsynth.nlp.solver.ipopt import Confirmation, constraint_sizes, ipopt
 from screwsynth.nlp.solver.multistart import solve_program
 from screwsynth.nlp.solver.solve import solve_programs
+from screwsynth.nlp.solver.starts import StartStatus
+from screwsynth.nlp.solver.status import Status
 
 pytestmark = pytest.mark.skipif(extension() is None, reason="no C compiler when the package was installed")
 
-SHIPPED = sorted(path.stem for path in find_case("paper-4.1-helical").parent.glob("*.toml"))
 #: Cases that a fast run compares: several optima, a ball, limits, connected optima, loops, poses.
 FEW = ("camera-mount", "drilling-spindle", "haptic-device", "paper-4.1-helical", "paper-4.2-rotation", "paper-4.4-max")
-
-
-def starter(name: str, starts: int) -> Case:
-    case = case_from(starter_tables(name), name)
-    return replace(case, search=replace(case.search, starts=starts))
 
 
 def programs(case: Case, *, screen: bool, jobs: int | None = 1) -> list[ProgramSolution]:
@@ -79,13 +61,16 @@ def test_screening_loses_no_optimum(name: str) -> None:
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("name", [name for name in SHIPPED if name not in {"hexapod-workspace", "paper-4.4-snu"}])
+@pytest.mark.parametrize(
+    "name", [name for name in shipped_cases() if name not in {"hexapod-workspace", "paper-4.4-snu"}]
+)
 def test_screening_loses_no_optimum_of_a_shipped_case(name: str) -> None:
     compare(load_case(name))
 
 
 def test_loops_are_closed_by_the_search_too() -> None:
-    compare(starter("3-rps", 8))
+    case = starter("3-rps")
+    compare(replace(case, search=replace(case.search, starts=8)))
 
 
 @pytest.mark.slow
@@ -207,11 +192,8 @@ def test_without_the_extension_or_casadis_function_ipopt_searches(monkeypatch: p
 
 
 def test_the_case_file_has_the_switch() -> None:
-    text = find_case("paper-4.3").read_text(encoding="utf-8")
     assert load_case("paper-4.3").search.screen
-    tables = tomllib.loads(text)
-    tables.setdefault("solve", {})["screen"] = False
-    case = case_from(tables, "x")
+    case = case_of("paper-4.3", solve={"screen": False})
     assert not case.search.screen
     assert "screen = false" in case.to_toml()
     assert not case.search.but(4, 1).screen

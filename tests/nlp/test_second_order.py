@@ -15,8 +15,6 @@ from screwsynth.nlp.proof.enclosure.tape import Tape, compile_tape
 from screwsynth.nlp.proof.statement.standard_form import Condition, StandardForm, standard_form
 
 flint = pytest.importorskip("flint")
-
-
 balls = pytest.importorskip("balls")
 
 

@@ -10,85 +10,51 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from, output_of, unbroken, unpacked
+from builders import Run, case_file, case_from, case_tables, edited, ends, output_of, saved, unbroken, unpacked
 from casadi import SX
-from hexapods import hexapod_text
+from hexapods import EVERY_LIMIT, HEXAPOD, case_of_legs, random_legs
+from workspace_cases import (
+    alone,
+    changed,
+    claim,
+    on_paper,
+    problem_of,
+    rejected,
+    root_of,
+    stated,
+    stating,
+    tables_of,
+    written,
+)
 
-import screwsynth.cases
-from screwsynth.models import FloatArray, hexapod
+from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Limits, Task
-from screwsynth.nlp.case.task import Sense
-from screwsynth.nlp.case.workspace import TurnKind, Turns, Workspace
-from screwsynth.nlp.errors import UncoveredError
+from screwsynth.nlp import Case, Free, Judgement, Limits, Outcome, Sense, TurnKind, Turns, UncoveredError, Workspace
 from screwsynth.nlp.program.layout import robot_length
-from screwsynth.nlp.proof.checker.proof_file import Premises, Proof, ProofClaim, ProofError, Unproved, read_proof
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
 from screwsynth.nlp.proof.checker.workspace import check
 from screwsynth.nlp.proof.checker.workspace.motion_matrix import PosedRobot
 from screwsynth.nlp.proof.checker.workspace.number_claims import SecondOrderClaim, SingularClaim, change_of_jacobian
 from screwsynth.nlp.proof.checker.workspace.pose_boxes import PoseRoot, pose_root
 from screwsynth.nlp.proof.checker.workspace.ranks import RankClaim, rank_claim
 from screwsynth.nlp.proof.checker.workspace.statement import Machines
-from screwsynth.nlp.proof.statement.machine import Legs, workspace_of_case
+from screwsynth.nlp.proof.statement.machine import Legs
 from screwsynth.nlp.proof.statement.tolerance import Directions, length_of_one_machine, second_order_name
-from screwsynth.nlp.proof.workspace.judge import Judgement, judge_workspace
 from screwsynth.nlp.proof.workspace.numbers.searched import Subject, searched_extremes
-from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
-from screwsynth.nlp.proof.workspace.proof_writer import paper_of
 from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
-from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
-from screwsynth.nlp.proof.workspace.verdict import Outcome
 
-Run = Callable[..., tuple[int, str, str]]
 TOLERANCE, LENGTH, LEG_ERROR = 0.02, 11.5, 0.004
-HEXAPOD = hexapod()
 #: A limit of every kind that errors of joint centres change; the triangle inequality does not decide that on strokes.
-TEXT = (
-    hexapod_text(4, 5, "")
-    + """[tolerance]
-joint_centre = 0.02
-[[task]]
-sense = "max"
-axis = [1, 2, 6]
-point = [3, 1, 12]
-pitch = 0.1
-[limits]
-leg_length = { min = 10, max = 60 }
-actuator = { stroke_max = STROKE, dead_length = 1 }
-base_joint_angle = { max = 30, about = "home" }
-home = { position = [0, 0, 20] }
-joint_spacing = { min = 1 }
-footprint = { base = 40, platform = 20 }
-radius_ratio = { min = 0.1, max = 0.9 }
-leg_clearance = { min = 0.5 }
-smallest_singular_value = { min = 0.5, length = 11.5 }
-condition_number = { max = 10, length = 11.5 }
-rate_share = { max = 0.9 }
-actuator_rate = { max = 60 }
-custom = ["x1 - 2*x2 >= 0"]
-[workspace]
-position = [0.3, { min = -0.3, max = 0.3 }, 20]
-rotation = { axis = [0.6, 0, 0.8], angle = { min = -2, max = 2 } }
-""".replace("STROKE", "0.93")
+TEXT = edited(
+    EVERY_LIMIT[: EVERY_LIMIT.index("[workspace]")],
+    ("stroke_max = 30", "stroke_max = 0.93"),
+    ("base_joint_angle = 80", 'base_joint_angle = { max = 30, about = "home" }'),
+    ('platform_joint_angle = { max = 60, about = "home" }\n', ""),
+    ("min = 0.1, length", "min = 0.5, length"),
+    ("max = 30, length", "max = 10, length"),
 )
-#: A robot with closed forms: its cranks follow from the pose.
-CRANKS = """
-[units]
-length = "m"
-[robot]
-model = "6-rus"
-parameters = { rb = 1.0, rp = 0.6, base_half = 20, platform_half = 43, crank = 0.35, lift = 35, h = 1.1 }
-[pose]
-position = [0, 0, 1.1]
-[tolerance]
-joint_centre = 1e-4
-[[task]]
-sense = "max"
-axis = [1, 2, 6]
-point = [0.3, 0.1, 1.2]
-pitch = 0.1
-[workspace]
-position = [{ min = -0.02, max = 0.02 }, 0, 1.1]
+TEXT += """[workspace]
+position = [0.3, { min = -0.3, max = 0.3 }, 20]
 rotation = { axis = [0.6, 0, 0.8], angle = { min = -2, max = 2 } }
 """
 ASKED = ("platform_joint_angle", "smallest_singular_value", "condition_number")
@@ -98,58 +64,14 @@ def case_of(text: str = TEXT) -> Case:
     return case_from(text, "machine")
 
 
-def written(text: str = TEXT, quantities: tuple[str, ...] = ASKED, **options: Any) -> tuple[Judgement, Proof]:  # noqa: ANN401
-    record = PaperRecord()
-    judged = judge_workspace(case_of(text), quantities=quantities, gap=0.02, jobs=1, paper=record, **options)
-    leg_error = options.get("leg_error", 0.0)
-    return judged, paper_of(judged, record, text, quantities=quantities, leg_error=leg_error)
-
-
 @pytest.fixture(scope="module")
 def both() -> tuple[Judgement, Proof]:
-    return written(leg_error=LEG_ERROR)
+    return written(case_of(), TEXT, quantities=ASKED, leg_error=LEG_ERROR, gap=0.1, jobs=1)
 
 
 @pytest.fixture(scope="module")
 def proof(both: tuple[Judgement, Proof]) -> Proof:
     return both[1]
-
-
-def stated(proof: Proof) -> Premises:
-    assert isinstance(proof.premises, Premises)
-    return proof.premises
-
-
-def stating(proof: Proof, **values: Any) -> Proof:  # noqa: ANN401
-    """The proof with other values in its premises."""
-    return replace(proof, premises=replace(stated(proof), **values))
-
-
-def rejected(proof: Proof, text: str = TEXT) -> str:
-    with pytest.raises(ProofError) as caught:
-        check.check_workspace_proof(proof, case_of(text), leg_error=stated(proof).leg_error)
-    return str(caught.value)
-
-
-def claim(proof: Proof, name: str, sense: str = "") -> ProofClaim:
-    return next(each for each in (*proof.claims, *proof.lemmas) if (each.name, each.sense) == (name, sense))
-
-
-def changed(proof: Proof, name: str, sense: str, **values: Any) -> Proof:  # noqa: ANN401
-    """The proof with other values in one of its claims, or lemmas."""
-    old = claim(proof, name, sense)
-    claims, lemmas = (
-        tuple(replace(each, **values) if each is old else each for each in part)
-        for part in (proof.claims, proof.lemmas)
-    )
-    return replace(proof, claims=claims, lemmas=lemmas)
-
-
-def alone(proof: Proof, *names: str) -> Proof:
-    """The proof with these claims alone; it says of the others that they have none."""
-    kept = tuple(each for each in proof.claims if each.name in names)
-    others = (Unproved(each.name, each.sense, "left out") for each in proof.claims if each.name not in names)
-    return replace(proof, claims=kept, unproved=(*proof.unproved, *others))
 
 
 def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Proof]) -> None:
@@ -203,10 +125,9 @@ def test_another_tolerance_is_rejected(proof: Proof) -> None:
     larger = TEXT.replace("joint_centre = 0.02", "joint_centre = 0.06")
     without = TEXT.replace("[tolerance]\njoint_centre = 0.02\n", "")
     for text in (larger, TEXT.replace("joint_centre = 0.02", "joint_centre = 0.01"), without):
-        assert "within another tolerance" in rejected(proof, text)
+        assert "within another tolerance" in rejected(proof, case_of(text))
     # Another number in the file is no way around: bounds are those of the machines of the case.
     longest = claim(proof, "leg_length limb 2-", "max").bound
-    assert longest is not None
     reject = rejections(stating(proof, joint_centre=0.06), larger)
     names = ("leg_length limb 2-", "F", "rate_share limb 1-", "base_joint_angle limb 1-", "radius_ratio")
     for name in (*names, "actuator.stroke_max limb 2+"):
@@ -222,12 +143,10 @@ def value_of(name: str, sense: str, number: float) -> float:
     """The bound in a file that reads as a number."""
     sign = 1.0 if sense == "max" else -1.0
     kind = name.partition(" ")[0]
-    if kind == "leg_length":
+    if kind in ("leg_length", "actuator_rate"):
         number = number**2
     elif kind == "base_joint_angle":
         number = -math.cos(number)
-    elif kind == "actuator_rate":
-        number = number**2
     return number if kind == "leg_clearance" else sign * number
 
 
@@ -251,7 +170,6 @@ def test_bounds_that_a_machine_violates_are_rejected(both: tuple[Judgement, Proo
 
 def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     name, rest = "actuator.stroke_max limb 2+", claim(proof, second_order_name("F"), "max")
-    assert rest.bound is not None
     smaller = replace(rest, bound=0.5 * rest.bound)
     kept = tuple(each for each in proof.lemmas if each is not rest and not each.name.startswith(name))
     assert "other expressions" in rejections(replace(proof, lemmas=(*kept, smaller)))("F", "max")
@@ -267,16 +185,16 @@ def test_other_lemmas_and_directions_are_rejected(proof: Proof) -> None:
     assert "have no proof" in reject("smallest_singular_value", "min")
 
 
-def machines_of(text: str) -> tuple[Machines, PoseRoot]:
-    """The machines of a case as the check has them."""
-    case, root = case_of(text), pose_root(workspace_of_case(case_of(text)))
-    return Machines(case, closed_form(case.model).model, root), root
+def machines_of(case: Case) -> tuple[Machines, PoseRoot]:
+    return Machines(case, closed_form(case.model).model, root_of(case)), root_of(case)
 
 
 @pytest.mark.parametrize("robot", ["hexapod", "6-rus"])
 def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> None:
     """What is shown of terms of second order is at least that of random machines, and little more."""
-    found, root = machines_of(TEXT if robot == "hexapod" else CRANKS)
+    turns = {"axis": [0.6, 0, 0.8], "angle": ends(2)}
+    cranks = tables_of("6-rus", tolerance=1e-4, workspace={"position": [ends(0.02), 0, 1.1], "rotation": turns})
+    found, root = machines_of(case_of() if robot == "hexapod" else case_from(cranks))
     rng, t, symbols = np.random.default_rng(1), found.symbols.tolerance, found.symbols
     m, count = len(symbols.built.names), 400
     reaches, claims = symbols.claims(())
@@ -294,7 +212,6 @@ def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> 
         function = ca.Function("both", [e, z], [number, ca.densify(first)])
         exact, slopes = (np.array(part) for part in function(np.zeros((3 * m, count)), pose.T))
         slopes = slopes.reshape(count, 3 * m)
-        # Machines with errors along the derivatives, too.
         steep = sign * slopes.reshape(count, m, 3)
         steep = t * steep / np.maximum(np.linalg.norm(steep, axis=2, keepdims=True), 1e-300)
         bound = ca.Function("bound", [found.design.table.variables_vector], [found.number(each, 0.0)])
@@ -316,7 +233,7 @@ def test_numbers_hold_for_random_machines_and_are_nearly_reached(robot: str) -> 
 
 
 def test_a_number_with_a_kink_has_no_terms_of_second_order() -> None:
-    found, _ = machines_of(TEXT)
+    found, _ = machines_of(case_of())
     (some,) = (each for each in found.symbols.claims(())[1] if (each.name, each.sense) == ("F", Sense.MAX))
     for kink in (ca.fabs(some.expression - 1), ca.fmax(some.expression, 1)):
         with pytest.raises(UncoveredError, match="jump"):
@@ -324,7 +241,7 @@ def test_a_number_with_a_kink_has_no_terms_of_second_order() -> None:
 
 
 def test_lengths_of_one_machine_hold_at_two_poses() -> None:
-    found, root = machines_of(TEXT)
+    found, root = machines_of(case_of())
     rng, symbols, t = np.random.default_rng(2), found.symbols, found.symbols.tolerance
     free = np.flatnonzero(root.upper > root.lower)
     poses = rng.uniform(root.lower, root.upper, (2, 6))[:, free]
@@ -360,10 +277,8 @@ class Machine:
 
     def __init__(self, seed: int, tolerance: float, count: int) -> None:
         rng = np.random.default_rng(seed)
-        base, platform = (
-            np.column_stack([rng.uniform(-size, size, (6, 2)), rng.uniform(-1, 1, 6)]) for size in (10.0, 6.0)
-        )
-        self.exact, box = Legs(base, platform, tolerance), pose_box(self.WORKSPACE)
+        self.exact, box = random_legs(rng, tolerance), pose_box(self.WORKSPACE)
+        base, platform, _ = self.exact
         self.y = box.random(1, rng)[0]
         pose = box.pose(self.y)
         self.position, self.rotation = pose.position, pose.rotation
@@ -379,15 +294,8 @@ class Machine:
         self.J = np.concatenate([self.n, np.cross(self.arm, self.n)], axis=2)
 
 
-def case_with(legs: Legs) -> Case:
-    """A case about six legs with these joint centres and their tolerance."""
-    given = {f"{plate}_{i + 1}": getattr(legs, plate)[i].tolist() for plate in ("base", "platform") for i in range(6)}
-    task = Task([0, 0, 0, 0, 0, 1])
-    return Case(HEXAPOD, given, [0.0, 0.0, 0.0], [task], joint_centre_tolerance=legs.tolerance or None)
-
-
 def regular(legs: Legs, root: PoseRoot, tolerance: float = 0.0) -> RankClaim:
-    return rank_claim(case_with(legs), HEXAPOD, root, "regular", tolerance)
+    return rank_claim(case_of_legs(legs), HEXAPOD, root, "regular", tolerance)
 
 
 def test_changes_of_rows_hold_those_of_machines() -> None:
@@ -407,7 +315,7 @@ def test_changes_of_rows_hold_those_of_machines() -> None:
         squares = 1 + y[:, 3:] ** 2
         scale = {TurnKind.AXIS: squares[:, 0], TurnKind.ROLL_PITCH_YAW: squares.prod(axis=1)}
         s = scale.get(kind, squares.sum(axis=1) - 2)[:, None, None]
-        case = case_with(some.exact)
+        case = case_of_legs(some.exact)
         length = robot_length(case)
 
         def rows(base: FloatArray, arm: FloatArray) -> FloatArray:
@@ -430,7 +338,7 @@ def test_no_claim_is_shown_where_a_machine_violates_it() -> None:
     root, t, shown, kept, singular = pose_root(Machine.WORKSPACE), 0.1, 0, 0, 0
     for seed in range(30):
         some = Machine(seed, t, 800)
-        at, robot = (some.y[None], some.y[None]), PosedRobot(case_with(some.exact), HEXAPOD, root)
+        at, robot = (some.y[None], some.y[None]), PosedRobot(case_of_legs(some.exact), HEXAPOD, root)
         values = np.linalg.svd(some.J / [1, 1, 1, LENGTH, LENGTH, LENGTH], compute_uv=False)
         least, condition = values[:, -1], values[:, 0] / values[:, -1]
         change = change_of_jacobian(some.exact, t, LENGTH, 0.999 * float(some.length[0].min()) - 2 * t)
@@ -459,11 +367,9 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
     head = TEXT[: TEXT.index("[limits]")].replace("joint_centre = 0.02", "joint_centre = 0.8")
     text = head + "[workspace]\nposition = [{min=-5,max=5}, {min=-5,max=5}, {min=15,max=25}]\n"
     text += "rotation = {angle={min=-30,max=30}}\n"
-    judged, given = written(text, (), with_limits=False)
+    judged, given = on_paper(case_of(text), text, gap=0.02, jobs=1, with_limits=False)
     assert judged.regularity.errors is not None
-    (found,) = check.check_workspace_proof(
-        read_proof(given.as_text(), "again"), case_of(text), leg_error=stated(given).leg_error
-    ).claims
+    (found,) = check.check_workspace_proof(given, case_of(text)).claims
     assert found.is_refuted
     assert found.by_machine
     design, machine = claim(given, "regular").sides
@@ -475,23 +381,21 @@ def test_a_singular_machine_within_the_tolerance_is_on_paper() -> None:
         ((design, machine[:-3]), "no two poses"),
         ((design[:6], machine), "no two poses"),
     ):
-        assert fault in rejected(changed(given, "regular", "", sides=sides), text)
+        assert fault in rejected(changed(given, "regular", sides=sides), case_of(text))
     smaller = text.replace("joint_centre = 0.8", "joint_centre = 0.1")
-    assert "more than the tolerance" in rejected(stating(given, joint_centre=0.1), smaller)
+    assert "more than the tolerance" in rejected(stating(given, joint_centre=0.1), case_of(smaller))
 
 
 def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Path) -> None:
-    file, target = tmp_path / "machine.toml", tmp_path / "proof.json"
+    target = tmp_path / "proof.json"
     head, _, tail = TEXT.partition("actuator =")
-    file.write_text(head + tail[tail.index("[workspace]") :], encoding="utf-8")
-    code, out, err = cli("workspace", str(file), "--gap", "0.3", "--proof", str(target))
-    assert (code, err) == (0, ""), out
+    file = saved(tmp_path / "machine.toml", head + tail[tail.index("[workspace]") :])
+    output_of(cli("workspace", str(file), "--gap", "0.3", "--proof", str(target)))
     out = unbroken(output_of(cli("verify-proof", str(target), str(file))))
     assert "for every machine whose joint centres are off by at most 0.02 in" in out
     content = json.loads(target.read_text(encoding="utf-8"))
-    content["case"] = content["case"].replace("joint_centre = 0.02", "joint_centre = 0.002")
-    target.write_text(json.dumps(content), encoding="utf-8")
-    code, _, err = cli("verify-proof", str(target))
+    content["case"] = edited(content["case"], ("joint_centre = 0.02", "joint_centre = 0.002"))
+    code, _, err = cli("verify-proof", str(saved(target, json.dumps(content))))
     assert code == 1
     assert err.startswith("rejected: the proof is for machines within another tolerance")
 
@@ -499,26 +403,23 @@ def test_the_commands_say_which_machines_a_proof_is_about(cli: Run, tmp_path: Pa
 def test_asked_singular_values_of_the_exact_machine_are_on_paper() -> None:
     head, _, tail = TEXT.replace("[tolerance]\njoint_centre = 0.02\n", "").partition("actuator =")
     text = head + tail[tail.index("[workspace]") :]
-    judged, given = written(text, ASKED[1:], with_objective=False)
+    judged, given = written(case_of(text), text, quantities=ASKED[1:], gap=0.02, jobs=1, with_objective=False)
     reject = rejections(given, text)
     for name, sense, extreme in zip(ASKED[1:], ("min", "max"), judged.extremes[-2:], strict=True):
-        checked = check.check_workspace_proof(
-            alone(given, name), case_of(text), leg_error=stated(given).leg_error
-        ).claims[0]
+        checked = check.check_workspace_proof(alone(given, name), case_of(text)).claims[0]
         assert (checked.name, checked.sense) == (name, sense) == (extreme.name, extreme.sense.value)
         assert checked.bound == pytest.approx(extreme.bound, rel=1e-5)
         assert "could not be shown" in reject(name, sense, bound=extreme.reached * (1.01 if sense == "min" else 0.99))
     # Without a length of legs above the errors nothing is known of other machines, and none of the two is proved.
     case = case_of()
-    subject = Subject(case, case.model, build_problem(case, case.model, pose_box(judged.workspace)))
+    subject = Subject(case, case.model, problem_of(case))
     for extreme in searched_extremes(replace(subject, case=replace(case, limits=Limits())), ASKED[1:], gap=0.1):
         assert (extreme.outcome, "too large" in extreme.reason) == (Outcome.OPEN, True)
 
 
 @pytest.mark.slow
 def test_the_shipped_machine_as_it_is_built_is_accepted(cli: Run, tmp_path: Path) -> None:
-    case, target = tmp_path / "case.toml", tmp_path / "proof.json"
-    text = (Path(screwsynth.cases.__file__).parent / "hexapod-linuxcnc.toml").read_text(encoding="utf-8")
-    case.write_text(text.replace("[[task]]", "[tolerance]\njoint_centre = 0.002\n\n[[task]]"), encoding="utf-8")
-    output_of(cli("workspace", str(case), "--gap", "0.02", "--time", "200", "--proof", str(target)))
+    case = case_file(tmp_path, case_tables("hexapod-linuxcnc", tolerance={"joint_centre": 0.002}))
+    target = tmp_path / "proof.json"
+    output_of(cli("workspace", str(case), "--gap", "0.2", "--time", "200", "--proof", str(target)))
     assert "not on paper" not in output_of(cli("verify-proof", str(target)))

@@ -1,105 +1,71 @@
-"""Proofs on paper of robots that are not six straight legs: what the check accepts, and what it must not."""
+"""Proofs on paper of robots that are not six straight legs, and of motors: what the check accepts, and what not."""
 
-import math
 from dataclasses import replace
-from pathlib import Path
+from functools import cache
 
 import casadi as ca
 import numpy as np
 import pytest
-from builders import case_from
+from builders import case_from, shipped_tables, soaked
+from measures import scaled
+from workspace_cases import (
+    CUT,
+    LOADING,
+    box_of,
+    claim,
+    gallery_case,
+    on_paper,
+    only,
+    problem_of,
+    rank_of,
+    rejected,
+    robot_of,
+    root_of,
+    stating,
+)
 
 from screwsynth.models import FloatArray
 from screwsynth.models.joints.closedform import closed_form
-from screwsynth.nlp import Case, Free, Task, TurnKind, Turns, Workspace, build_model, judge_workspace
-from screwsynth.nlp.proof.checker.proof_file import (
-    Premises,
-    Proof,
-    ProofClaim,
-    ProofError,
-    Unproved,
-    read_proof,
-    workspace_numbers,
-)
+from screwsynth.nlp import Case, Extreme, Judgement, Loading, Motion, Outcome
+from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof, workspace_numbers
 from screwsynth.nlp.proof.checker.tree import Node, node_bytes
 from screwsynth.nlp.proof.checker.workspace.check import check_workspace_proof
-from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, pose_root, show_on_leaves
-from screwsynth.nlp.proof.checker.workspace.ranks import rank_claim
+from screwsynth.nlp.proof.checker.workspace.closed_loops import Assembly
+from screwsynth.nlp.proof.checker.workspace.pose_boxes import _PoseRule, show_on_leaves
 from screwsynth.nlp.proof.checker.workspace.statement import robot_claims
 from screwsynth.nlp.proof.statement.machine import workspace_of_case
+from screwsynth.nlp.proof.workspace.numbers.machines import Machines
+from screwsynth.nlp.proof.workspace.numbers.searched import Subject, motor_extremes
 from screwsynth.nlp.proof.workspace.paper_record import PaperRecord
 from screwsynth.nlp.proof.workspace.proof_writer import paper_of
+from screwsynth.nlp.proof.workspace.ranks.ranks import not_judged
 from screwsynth.nlp.proof.workspace.ranks.singular_pose import SingularPose
-from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box
 from screwsynth.nlp.proof.workspace.robot.posed_robot import build_problem
 
-CASES = Path(__file__).parents[2] / "cases"
-OTHERS = [f"stewart_{k} =" for k in range(2, 7)]
+Proved = tuple[Case, Proof]
 
 
-def reachy_text(factor: float) -> str:
-    """Reachy Mini's head over a part of its documented rotations."""
-    text = (CASES / "reachy-mini-envelope.toml").read_text(encoding="utf-8").replace("robots/", f"{CASES}/robots/")
-    for end in (40, 65):
-        text = text.replace(f"min = -{end}, max = {end} }}", f"min = {-factor * end}, max = {factor * end} }}")
-    return text
-
-
-def gallery_case(name: str, part: float, degrees: float, seed: int | None = None) -> Case:
-    """A robot of the gallery about its home, with its typical dimensions or random ones near them."""
-    model = build_model(name)
-    rng = np.random.default_rng(seed)
-    factors = {item.name: 1.0 if seed is None else rng.uniform(0.95, 1.05) for item in model.parameters}
-    values = {item.name: item.typical[0] * factors[item.name] for item in model.parameters}
-    size = max(abs(each) for each in (*model.home, *values.values()))
-    angle = math.radians(degrees)
-    place = [Free(each - part * size, each + part * size) for each in model.home]
-    workspace = Workspace(place, Turns(TurnKind.ROLL_PITCH_YAW, (Free(-angle, angle),) * 3))
-    return Case(model, values, list(model.home), [Task([0, 0, 0, 0, 0, 1])], workspace=workspace)
-
-
-def proof_of(case: Case, text: str = "", *, with_objective: bool = False) -> Proof:
-    """The proof, without F, which takes longest."""
-    record = PaperRecord()
-    judged = judge_workspace(case, gap=0.1, with_objective=with_objective, paper=record)
-    return read_proof(paper_of(judged, record, text).as_text(), "again")
-
-
-def claim(proof: Proof, name: str) -> ProofClaim:
-    return next(each for each in proof.claims if each.name == name)
-
-
-def changed(proof: Proof, name: str, **values: object) -> Proof:
-    """The proof of one claim alone, tampered with."""
-    own = replace(claim(proof, name), **values)  # type: ignore[arg-type]
-    others = tuple(
-        Unproved(*key, "left out") for each in proof.claims if (key := (each.name, each.sense)) != (name, own.sense)
-    )
-    return replace(proof, claims=(own,), unproved=(*proof.unproved, *others))
-
-
-def rejected(proof: Proof, case: Case) -> str:
-    with pytest.raises(ProofError) as caught:
-        check_workspace_proof(proof, case)
-    return str(caught.value)
-
-
-def one_motor(text: str) -> str:
-    """The text with the limits of the first motor alone."""
-    return "".join(line for line in text.splitlines(keepends=True) if not line.startswith(tuple(OTHERS)))
-
-
-def reachy_case(text: str) -> Case:
-    return case_from(text, "head")
+def reachy_case(factor: float, *, one_motor: bool = True, **parameters: float) -> Case:
+    """Reachy Mini's head over a part of its documented rotations, with the limits of its first motor, or of all."""
+    tables = shipped_tables("reachy-mini-envelope")
+    tables["robot"]["file"] = str(find_case("reachy-mini-envelope").parent / tables["robot"]["file"])
+    tables["robot"]["parameters"] |= parameters
+    turns = tables["workspace"]["rotation"]
+    tables["workspace"]["rotation"] = scaled(turns, factor)
+    if one_motor:
+        for k in range(2, 7):
+            del tables["limits"]["joint"][f"stewart_{k}"]
+    return case_from(tables, "head")
 
 
 @pytest.fixture(scope="module")
-def reachy() -> tuple[Case, Proof]:
-    text = one_motor(reachy_text(0.45))
-    return reachy_case(text), proof_of(reachy_case(text), text)
+def reachy() -> Proved:
+    case = reachy_case(0.45)
+    return case, on_paper(case, gap=0.1, with_objective=False)[1]
 
 
-def test_reachy_mini_is_on_paper(reachy: tuple[Case, Proof]) -> None:
+def test_reachy_mini_is_on_paper(reachy: Proved) -> None:
     case, proof = reachy
     assert {(each.name, each.reason) for each in proof.unproved} == {("F", "it was not judged")}
     checked = check_workspace_proof(proof, case)
@@ -110,30 +76,28 @@ def test_reachy_mini_is_on_paper(reachy: tuple[Case, Proof]) -> None:
     assert all(each.limit is not None and each.bound is not None for each in checked.claims[1:])
 
 
-def test_reachy_mini_tampered_with_is_rejected(reachy: tuple[Case, Proof]) -> None:
+def test_reachy_mini_tampered_with_is_rejected(reachy: Proved) -> None:
     case, proof = reachy
     tree = claim(proof, "regular").unpacked()
-    assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
-    assert "not outside" in rejected(changed(proof, "regular", tree=bytes([Node.OUTSIDE])), case)
+    assert "ends" in rejected(only(proof, "regular", tree=tree[:-1]), case)
+    assert "not outside" in rejected(only(proof, "regular", tree=bytes([Node.OUTSIDE])), case)
     moved = node_bytes(Node.CUT, tree[1], value=2.0) + tree[10:]
-    assert "outside of it" in rejected(changed(proof, "regular", tree=moved), case)
-    assert "no two poses" in rejected(changed(proof, "regular", reason="singular"), case)
+    assert "outside of it" in rejected(only(proof, "regular", tree=moved), case)
+    assert "no two poses" in rejected(only(proof, "regular", reason="singular"), case)
     bound = claim(proof, "reach limb stewart_1").bound
-    assert bound is not None
     # Programs maximise: a reach of at least b is a bound of -b.
-    assert "reach limb stewart_1" in rejected(changed(proof, "reach limb stewart_1", bound=bound - 0.2), case)
+    assert "reach limb stewart_1" in rejected(only(proof, "reach limb stewart_1", bound=bound - 0.2), case)
     # A limit on a motor alone has the loops as conditions: the closed forms need the reach of all limbs.
-    assert "other expressions" in rejected(changed(proof, "joint.stewart_1 joint stewart_1:1"), case)
-    other = reachy_case(one_motor(reachy_text(0.45)).replace("rc = 0.062", "rc = 0.060"))
-    assert "other expressions" in rejected(changed(proof, "reach limb stewart_1"), other)
+    assert "other expressions" in rejected(only(proof, "joint.stewart_1 joint stewart_1:1"), case)
+    assert "other expressions" in rejected(only(proof, "reach limb stewart_1"), reachy_case(0.45, rc=0.060))
 
 
 @pytest.mark.slow
 def test_reachy_mini_is_on_paper_for_most_of_its_documented_rotations() -> None:
-    text = reachy_text(0.6)
-    proof = proof_of(reachy_case(text), text, with_objective=True)
+    case = reachy_case(0.6, one_motor=False)
+    proof = on_paper(case, gap=0.1)[1]
     assert not proof.unproved
-    assert len(check_workspace_proof(proof, reachy_case(text)).claims) == 21
+    assert len(check_workspace_proof(proof, case).claims) == 21
 
 
 def boxes_about(y: FloatArray, half: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -145,51 +109,35 @@ def boxes_about(y: FloatArray, half: FloatArray, rng: np.random.Generator) -> tu
 
 @pytest.mark.parametrize(
     ("name", "part", "degrees", "seed"),
-    [("6-rus", 0.1, 40, 2), pytest.param("6-ups", 0.4, 70, 1, marks=pytest.mark.soak)],
-)
+    [("6-rus", 0.1, 40, 2), ("3-rps", 0.3, 60, 1), pytest.param("6-ups", 0.4, 70, 1, marks=pytest.mark.soak),
+     pytest.param("planar-3-rrr", 0.3, 60, 2, marks=pytest.mark.soak)],
+)  # fmt: skip
 def test_no_box_with_a_singular_pose_is_shown_to_be_regular(name: str, part: float, degrees: float, seed: int) -> None:
     """The pose is one that Newton's method finds to 1e-10, in a robot with random dimensions."""
     case = gallery_case(name, part, degrees, seed)
-    assert case.workspace is not None
-    root, box = pose_root(workspace_of_case(case)), pose_box(workspace_of_case(case))
-    problem = build_problem(case, closed_form(case.model).model, box)
+    root, problem, shown = root_of(case), problem_of(case), rank_of(case)
     newton, rng = SingularPose(problem, problem.locked), np.random.default_rng(seed)
-    tried = (newton.search(each) for each in box.random(200, rng))
-    y = next(each for each in tried if each is not None)
-    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
     half = 0.5 * (root.upper - root.lower)
-    assert not shown.attempt(*boxes_about(y, half, rng)).holds.any()
-    home = 0.5 * (root.lower + root.upper)
-    assert shown.attempt(*boxes_about(home, 0.1 * half, rng)).holds.mean() > 0.5
-
-
-@pytest.mark.parametrize(
-    ("name", "part", "degrees", "seed"),
-    [("3-rps", 0.3, 60, 1), pytest.param("planar-3-rrr", 0.3, 60, 2, marks=pytest.mark.soak)],
-)
-def test_no_box_with_a_singular_closed_pose_is_shown(name: str, part: float, degrees: float, seed: int) -> None:
-    case = gallery_case(name, part, degrees, seed)
-    assert case.workspace is not None
-    root, box = pose_root(workspace_of_case(case)), pose_box(workspace_of_case(case))
-    problem = build_problem(case, closed_form(case.model).model, box)
-    newton, rng = SingularPose(problem, problem.locked), np.random.default_rng(seed)
-    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
-    half = 0.5 * (root.upper - root.lower)
-    assert shown.attempt(*boxes_about(problem.pose_of(problem.start), 0.05 * half, rng)).holds.mean() > 0.5
-    points = np.broadcast_to(problem.start, (60, len(problem.start))).copy()
-    points[:, list(problem.independent)] += 0.3 * half[list(problem.independent)] * rng.uniform(-1, 1, (60, 3))
-    z = next(each for each in (newton.search(each) for each in points) if each is not None)
-    # The assembly that is singular there, and no other.
-    shown.assembly.start = z
-    assert not shown.attempt(*boxes_about(problem.pose_of(z), half, rng)).holds.any()
+    if not problem.dependent:
+        tried = box_of(case).random(200, rng)
+        home, near = 0.5 * (root.lower + root.upper), 0.1
+    else:
+        home, near, own = problem.pose_of(problem.start), 0.05, list(problem.independent)
+        tried = np.broadcast_to(problem.start, (60, len(problem.start))).copy()
+        tried[:, own] += 0.3 * half[own] * rng.uniform(-1, 1, (60, 3))
+    z = next(each for each in map(newton.search, tried) if each is not None)
+    assert shown.attempt(*boxes_about(home, near * half, rng)).holds.mean() > 0.5
+    if problem.dependent:
+        # The assembly that is singular there, and no other.
+        shown.assembly.start = z
+    assert not shown.attempt(*boxes_about(problem.pose_of(z) if problem.dependent else z, half, rng)).holds.any()
 
 
 @pytest.mark.parametrize("name", ["3-rps", "tricept"])
 def test_closed_loops_are_where_they_are_shown_to_be(name: str) -> None:
     case = gallery_case(name, 0.1, 20, 4)
-    assert case.workspace is not None
-    root = pose_root(workspace_of_case(case))
-    assembly = rank_claim(case, closed_form(case.model).model, root, "regular").assembly
+    root = root_of(case)
+    assembly = rank_of(case).assembly
     own, D = assembly.independent, assembly.dependent
     rng = np.random.default_rng(5)
     half = 0.5 * (root.upper - root.lower)
@@ -212,20 +160,18 @@ def test_closed_loops_are_where_they_are_shown_to_be(name: str) -> None:
 
 def test_robots_with_loops_are_on_paper() -> None:
     case = gallery_case("tricept", 0.02, 5)
-    record = PaperRecord()
-    proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
-    checked = check_workspace_proof(read_proof(proof.as_text(), "again"), case)
+    proof = on_paper(case, with_limits=False)[1]
+    checked = check_workspace_proof(proof, case)
     assert [each.name for each in checked.claims] == ["regular", "constraints regular"]
     tree = claim(proof, "regular").unpacked()
-    assert "ends" in rejected(changed(proof, "regular", tree=tree[:-1]), case)
-    assert "not outside" in rejected(changed(proof, "constraints regular", tree=bytes([Node.OUTSIDE])), case)
+    assert "ends" in rejected(only(proof, "regular", tree=tree[:-1]), case)
+    assert "not outside" in rejected(only(proof, "constraints regular", tree=bytes([Node.OUTSIDE])), case)
 
 
 def test_boxes_with_another_assembly_do_not_belong_together() -> None:
     case = gallery_case("3-rps", 0.03, 6)
-    assert case.workspace is not None
-    root = pose_root(workspace_of_case(case))
-    shown = rank_claim(case, closed_form(case.model).model, root, "regular")
+    root = root_of(case)
+    shown = rank_of(case)
     tree = node_bytes(Node.CUT, 2, value=0.5 * (root.lower[2] + root.upper[2])) + bytes([Node.BOUNDED] * 2)
     show_on_leaves(shown, root, tree)
     shown.finish()
@@ -239,24 +185,20 @@ def test_boxes_with_another_assembly_do_not_belong_together() -> None:
 
 
 def test_the_tree_of_another_workspace_does_not_hide_a_singular_pose(
-    reachy: tuple[Case, Proof], monkeypatch: pytest.MonkeyPatch
+    reachy: Proved, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, proof = reachy
-    case = reachy_case(one_motor(reachy_text(1.0)))
-    assert case.workspace is not None
+    case = reachy_case(1.0)
     monkeypatch.setattr(_PoseRule, "most_pieces", 100)
-    assert isinstance(proof.premises, Premises)
-    other = changed(proof, "regular")
-    other = replace(other, premises=replace(proof.premises, workspace=workspace_numbers(case.workspace)))
+    other = stating(only(proof, "regular"), workspace=workspace_numbers(case.workspace))
     # All claims about limits are named, and none is proved.
     assert "could not be shown" in rejected(other, case)
 
 
 def test_forms_hold_the_entries_and_could_be_no_smaller() -> None:
     case = gallery_case("6-rus", 0.1, 20)
-    assert case.workspace is not None
-    root = pose_root(workspace_of_case(case))
-    entries = rank_claim(case, closed_form(case.model).model, root, "regular")._entries
+    root = root_of(case)
+    entries = rank_of(case)._entries
     rng = np.random.default_rng(3)
     lower, upper = boxes_about(0.5 * (root.lower + root.upper), 0.5 * (root.upper - root.lower), rng)
     c, a, r = entries(lower, upper).forms()
@@ -271,17 +213,14 @@ def test_forms_hold_the_entries_and_could_be_no_smaller() -> None:
 
 def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
     case = gallery_case("6-ups", 0.4, 70, 1)
-    record = PaperRecord()
-    proof = paper_of(judge_workspace(case, with_limits=False, paper=record), record, "")
+    proof = on_paper(case, with_limits=False)[1]
     (found,) = check_workspace_proof(proof, case).claims
     assert found.is_refuted
     first, second = claim(proof, "regular").sides
-    assert "opposite signs" in rejected(changed(proof, "regular", sides=(first, first)), case)
-    assert "not one of the workspace" in rejected(changed(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
+    assert "opposite signs" in rejected(only(proof, "regular", sides=(first, first)), case)
+    assert "not one of the workspace" in rejected(only(proof, "regular", sides=(first, (99.0, *second[1:]))), case)
     small = gallery_case("6-ups", 0.02, 5, 1)
-    assert small.workspace is not None
-    assert isinstance(proof.premises, Premises)
-    other = replace(proof, premises=replace(proof.premises, workspace=workspace_numbers(small.workspace)))
+    other = stating(proof, workspace=workspace_numbers(small.workspace))
     assert "not one of the workspace" in rejected(other, small)
 
 
@@ -297,10 +236,86 @@ def test_a_singular_pose_of_a_robot_without_loops_is_on_paper() -> None:
 )
 def test_claims_name_the_assemblies_of_their_numbers(name: str, reached: bool, words: str) -> None:
     case = gallery_case(name, 0.02, 3)
-    assert case.workspace is not None
     limbs = {f"reach limb {k}" for k in range(1, 7)} if reached else set()
     found = robot_claims(case, case.workspace, limbs)
     assert found.numbers_at == words
     # Unknowns that are still variables may have any value; those in closed form have home's.
     unknowns = [k for at_pose in found.layout.places.unknowns for k in at_pose]
     assert len(unknowns) == {"6-sps": 0, "6-rus": 0 if reached else 6, "planar-3-prr": 5, "3-rps": 6}[name]
+
+
+@cache
+def proof_of(name: str) -> tuple[dict[tuple[str, str], Extreme], Proof]:
+    """The numbers of a robot's actuators alone, and their proof as its file has it."""
+    return motors_on_paper(robot_of(name))
+
+
+def motors_on_paper(case: Case) -> tuple[dict[tuple[str, str], Extreme], Proof]:
+    record, closed = PaperRecord(), closed_form(case.model)
+    box = box_of(case)
+    meant = build_problem(case, closed.model, box)
+    if case.joint_centre_tolerance:
+        meant = Machines(case, closed, meant).family
+    found = tuple(motor_extremes(Subject(case, closed.model, meant), paper=record))
+    judged = Judgement(case, workspace_of_case(case), not_judged(box, "not asked for"), found)
+    proof = read_proof(paper_of(judged, record, "").as_text(), "again")
+    return {(each.name, each.sense.value): each for each in found}, proof
+
+
+@pytest.mark.parametrize("name", soaked(["legs", "legs with a tolerance", "delta", "3-rps"], ["legs", "3-rps"]))
+def test_a_proof_is_accepted_and_one_with_a_bound_that_a_pose_exceeds_is_not(name: str) -> None:
+    """Six freedoms and three; rows of legs and passive joints; closed forms and loops that are followed."""
+    case = robot_of(name)
+    motors, proof = proof_of(name)
+    assert len(motors) == 5 * (3 if name in ("delta", "3-rps") else 6)
+    assert all(each.outcome is Outcome.PROVED for each in motors.values())
+    checked = {(each.name, each.sense): each.bound for each in check_workspace_proof(proof, case).claims}
+    assert checked.keys() == motors.keys()
+    for key, each in motors.items():
+        bound = checked[key]
+        # The check's bound is wider by a part of the gap.
+        assert 0 <= each.sense.sign * (bound - each.bound) <= 0.26 * abs(each.bound - each.reached) + 1e-5 * abs(bound)
+    of_one = [(key, each) for key, each in motors.items() if each.motor is not None and each.motor.place == 1]
+    for key, each in of_one if name == "legs" else of_one[::2]:
+        if each.reached:
+            # A little less than the value at a pose of the workspace; a power of 0 is that of a force of one sign.
+            with_less = only(proof, *key, bound=each.reached - each.sense.sign * 1e-4 * abs(each.reached))
+            with pytest.raises(ProofError, match="could not be shown"):
+                check_workspace_proof(with_less, case)
+
+
+def test_a_proof_for_other_loads_or_motions_is_rejected() -> None:
+    """What a number rests on is the case's: the file has nothing of it."""
+    case, proof = robot_of("legs"), proof_of("legs")[1]
+    for part in ({"force": (3.0, 1.0, -11.0)}, {"point": (0.0, -0.2, 0.1)}, {"any_force": 3.0}, {"any_moment": 0.4}):
+        with pytest.raises(ProofError, match=r"actuator_force .* could not be shown"):
+            check_workspace_proof(proof, replace(case, loading=LOADING._replace(loads=(replace(CUT, **part),))))
+    for motion in (Motion(1.1, 0.5), Motion(1.0, 0.7)):
+        with pytest.raises(ProofError, match=r"actuator_speed .* could not be shown"):
+            check_workspace_proof(proof, replace(case, loading=LOADING._replace(motion=motion)))
+
+
+def test_numbers_under_a_load_are_not_those_under_another() -> None:
+    """Their trees are the same, and so would be their bounds."""
+    small = {"force": (0.3, 0.1, -1.0), "any_force": 0.2, "any_moment": 0.01}
+    case = replace(robot_of("legs"), loading=Loading((replace(CUT, name="light", **small), CUT)))
+    proof = motors_on_paper(case)[1]
+    light = [each for each in proof.claims if each.name.startswith("actuator_force") and each.name.endswith("light")]
+    assert len(light) == 12
+    heavy = tuple(replace(each, name=each.name.replace("light", "cut")) for each in light)
+    assert {each.name for each in heavy} < {each.name for each in proof.claims}
+    check_workspace_proof(proof, case)
+    others = tuple(each for each in proof.claims if (each.name, each.sense) not in {(h.name, h.sense) for h in heavy})
+    with pytest.raises(ProofError, match=r"actuator_force .* cut.* could not be shown"):
+        check_workspace_proof(replace(proof, claims=(*others, *heavy)), case)
+
+
+def test_boxes_of_numbers_are_of_one_assembly(monkeypatch: pytest.MonkeyPatch) -> None:
+    case, proof = robot_of("3-rps"), proof_of("3-rps")[1]
+
+    def apart(*_: object) -> None:
+        raise ProofError("the same assembly")
+
+    monkeypatch.setattr(Assembly, "refuse_apart", apart)
+    with pytest.raises(ProofError, match="the same assembly"):
+        check_workspace_proof(proof, case)
