@@ -1,4 +1,4 @@
-"""Pictures: what is drawn stands where the model says, in true proportion, and files come whole or not at all."""
+"""Pictures: drawn where the model says, in true proportion, with words in clear places."""
 
 import itertools
 import math
@@ -11,18 +11,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import EACH_CASE, EACH_KIND, FEW_CASES, Run, case_from, output_of, refusal_of, saved, soaked
+from builders import EACH_CASE, EACH_KIND, FEW_CASES, Array, Run, case_from, output_of, refusal_of, saved, soaked
 from casadi import SX
 from matplotlib.figure import Figure
 from measures import exponential
 
 from screwsynth.models import Body, Link, Model, Point, PoseSymbols, Scene, force_along, model_names
 from screwsynth.models.catalog import gallery_names
-from screwsynth.nlp import Case, InputError, Solution, Task, evaluate, load_case, plot, result_of, solve
-from screwsynth.nlp.case.robots import build_model, model_options
-from screwsynth.nlp.output.pictures import fonts
+from screwsynth.nlp import Case, InputError, Solution, Task, build_model, evaluate, load_case, plot, result_of, solve
+from screwsynth.nlp.case.robots import model_options
+from screwsynth.nlp.output.pictures import fonts, places
 from screwsynth.nlp.output.pictures.drawing import Drawing, drawing_of_model
 from screwsynth.nlp.output.pictures.figures import figure_of, picture
+from screwsynth.nlp.output.pictures.segments import distances_to_segments, segments_cross, segments_in_boxes
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.pictures.view import clearest_view
 from screwsynth.nlp.results.robottables import robot_table
@@ -379,3 +380,55 @@ def test_a_failed_solve_is_drawn_as_what_it_is() -> None:
 )
 def test_what_cannot_be_drawn_is_told_before_the_work(arguments: tuple[str, ...], fault: str, cli: Run) -> None:
     refusal_of(cli(*arguments), fault)
+
+
+@pytest.fixture
+def segments() -> Array:
+    """Lines (k, 4): askew, level, upright, and points."""
+    found = np.random.default_rng(1).uniform(0.0, 100.0, (60, 4))
+    found[10:20, 3] = found[10:20, 1]
+    found[20:30, 2] = found[20:30, 0]
+    found[30:35, 2:] = found[30:35, :2]
+    return found
+
+
+def test_a_line_is_within_a_box_where_cutting_by_each_side_leaves_a_part(segments: Array) -> None:
+    corners = np.random.default_rng(2).uniform(0.0, 100.0, (50, 2, 2))
+    boxes = np.hstack([corners.min(axis=1), corners.max(axis=1)])
+    expected = [[crosses_box(line[:2], line[2:], tuple(box)) for line in segments] for box in boxes]
+    assert np.array_equal(segments_in_boxes(segments, boxes), expected)
+    assert 0 < np.count_nonzero(expected) < np.size(expected)
+
+
+def test_a_line_that_ends_at_a_side_is_within_the_box_and_a_line_just_beside_it_is_not() -> None:
+    box = np.array([[10.0, 10.0, 20.0, 20.0]])
+    ends = np.array([[0.0, 15, 10, 15], [0, 15, 9.999, 15], [0, 20, 30, 20], [0, 20.001, 30, 20.001], [12, 12, 13, 14]])
+    assert segments_in_boxes(ends, box).tolist() == [[True, False, True, False, True]]
+    assert segments_in_boxes(np.zeros((0, 4)), box).shape == (1, 0)
+
+
+def test_lines_cross_where_they_have_a_point_in_common(segments: Array) -> None:
+    askew, lines = segments[:10], segments[35:]
+    expected = [[cross(line.reshape(2, 2), each.reshape(2, 2)) for each in askew] for line in lines]
+    assert np.array_equal(segments_cross(askew, lines), expected)
+    assert 0 < np.count_nonzero(expected) < np.size(expected)
+
+
+def test_a_point_is_as_far_from_a_line_as_from_its_nearest_point(segments: Array) -> None:
+    points, lines = segments[:30, :2], segments[35:]
+    for line, row in zip(lines, distances_to_segments(points, lines), strict=True):
+        a, b = line[:2], line[2:]
+        for point, found in zip(points, row, strict=True):
+            is_beside = 0 <= (point - a) @ (b - a) <= (b - a) @ (b - a)
+            ends = min(np.linalg.norm(point - a), np.linalg.norm(point - b))
+            assert found == pytest.approx(distance(point, a, b) if is_beside else ends, abs=1e-9)
+
+
+def test_words_stand_at_the_cheapest_of_all_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search ends early, and no place that it leaves out is better: all places at once give the same picture."""
+    drawing = drawing_of_model(build_model("6-ups"))
+    found = []
+    for count in (5, 160, 100_000):
+        monkeypatch.setattr(places, "_AT_ONCE", count)
+        found.append([text.get_position() for text in figure_of([drawing]).axes[0].texts])
+    assert found[0] == found[1] == found[2]

@@ -1,11 +1,10 @@
 """Inverse kinematics of many poses, held against distances, MuJoCo's loops, finite differences and ``evaluate``."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Array, output_of, refusal_of, rows_of, saved, turn_about
+from builders import Array, Run, output_of, refusal_of, rows_of, saved, turn_about
 from measures import circle_joints
 from mujoco_robots import Oracle
 from robot_files import robot_of
@@ -16,7 +15,6 @@ from screwsynth.nlp.evidence.closing import closed_start
 from screwsynth.nlp.proof.statement.machine import joint_centres
 from screwsynth.nlp.units import Units
 
-Run = Callable[..., tuple[int, str, str]]
 TASK = Task(np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2]))
 
 

@@ -1,5 +1,7 @@
 """Sweeps: every row is an answer with evidence, and a killed run loses and doubles nothing."""
 
+import itertools
+import math
 import os
 import signal
 import subprocess
@@ -11,12 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import Run, case_from, refusal_of, rows_of, starter_tables
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from screwsynth.nlp import InputError, examine, formulate, load_case, load_result, solve
 from screwsynth.nlp import sweep as run_in_python
 from screwsynth.nlp.case.reader import read_case
 from screwsynth.nlp.evidence.many import Numbers, _scales, judge_many
-from screwsynth.nlp.output.sweeptable import table_points, write_table
+from screwsynth.nlp.output.pictures.sweeps import sweep_figure, sweep_legend
+from screwsynth.nlp.output.sweeptable import TablePoint, table_points, write_table
 from screwsynth.nlp.results.explorations import SweepResult
 from screwsynth.nlp.sweeps import workers
 from screwsynth.nlp.sweeps.engines import EngineKind, Job
@@ -293,6 +297,63 @@ def test_a_row_group_is_in_memory_at_once(sweep: Callable[..., Sweep], tmp_path:
     assert [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)] == [20_000, 20_000, 5_000]
     assert asked == 44_999
     assert file.read(columns=["x1"]).to_pydict()["x1"] == one.points.values[:, 0].tolist()
+
+
+def test_axes_of_a_sweep_have_units() -> None:
+    case = load_case("hexapod-machining")
+    points = grid(["limits.leg_length.max=32,34", "task.pitch=0.1,0.2"])
+    found = [TablePoint(1.0, "")] * len(points)
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    assert labels[0] == ("limits.leg_length.max, in", "task.pitch, in/rad")
+    points = grid(["x3=1,2", "x1=30,31"])
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in sweep_figure(case, points, found).axes]
+    assert labels[0] == ("x3, deg", "x1, in")
+
+
+def test_regions_of_a_sweep_have_numbers_that_a_legend_explains() -> None:
+    case = load_case("hexapod-machining")
+    points = grid(["x1=26:32:13", "x2=10:13:7"])
+    x1, x2 = (each.ravel() for each in np.meshgrid(*points.axes, indexing="ij"))
+    # Three regions: a half, a quarter, and a quarter without an answer.
+    words = ["leg_length limb 1- max; leg_length limb 1+ max; x3 min" if a < 29 else "x3 min" for a in x1]
+    found = [
+        TablePoint(math.nan if a >= 29 and b > 11.5 else a + b, word) for a, b, word in zip(x1, x2, words, strict=True)
+    ]
+    figure = sweep_figure(case, points, found)
+    FigureCanvasAgg(figure).draw()
+    axes = figure.axes[0]
+    numbers = {text.get_text(): text.get_position() for text in axes.texts if text.get_gid() == "number"}
+    lines = {line.partition(": ")[0]: line.partition(": ")[2] for line in sweep_legend(found)}
+    assert set(numbers) == {"1", "2"}
+    assert lines["Active at every number"] == "x3 min"
+    assert lines["1"] == "also leg_length max (limb 1-, limb 1+)"
+    assert lines["2"] == "no other limit is active"
+    assert lines["Lines"].endswith("Empty: no answer.")
+    assert numbers["1"][0] < 28.75
+    assert numbers["2"][0] > 28.75
+    assert numbers["2"][1] < 11.75
+    for axis, values in zip((axes.get_xticks(), axes.get_yticks()), points.axes, strict=True):
+        assert 5 <= len(axis) <= 9
+        assert set(axis) <= set(values)
+    drawn = figure.get_supxlabel()
+    assert all(line in drawn for line in sweep_legend(found))
+    # The legend stands below the axes, and within the picture.
+    (legend,) = [text for text in figure.texts if text.get_text() == drawn]
+    box = legend.get_window_extent()
+    assert min(box.x0, box.y0) >= 0
+    assert box.x1 <= figure.bbox.x1
+    assert box.y1 <= axes.xaxis.label.get_window_extent().y0
+
+
+def test_numbers_above_a_curve_do_not_cover_each_other() -> None:
+    case = load_case("hexapod-machining")
+    points = grid(["x1=26:32:25"])
+    found = [TablePoint(float(k), "x2 min" if k % 8 < 2 else "x3 min" if k % 8 < 4 else "") for k in range(25)]
+    figure = sweep_figure(case, points, found)
+    FigureCanvasAgg(figure).draw()
+    boxes = [text.get_bbox_patch().get_window_extent() for text in figure.axes[0].texts]
+    assert len(boxes) == 10  # one for each run of equal limits
+    assert not [1 for one, other in itertools.combinations(boxes, 2) if one.overlaps(other)]
 
 
 #: A command that is killed in the middle of a row, in the block of rows whose number comes first.
