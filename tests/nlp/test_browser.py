@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, saved
+from builders import Run, saved, soaked
 from pages import Page, displaced, number, posed, rates_of_lines
 
 
@@ -97,7 +97,7 @@ def test_page_of_another_robot_loads_clean(opened: Callable[..., Any]) -> None:
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
+@pytest.mark.parametrize("case", soaked(["paper-4.1-helical", "hexapod-machining"], ["hexapod-machining"]))
 def test_page_loads_clean_and_its_slider_moves_the_platform(
     opened: Callable[..., Any], page: Callable[..., Page], case: str
 ) -> None:
@@ -172,7 +172,7 @@ def check_view(chrome: Any) -> None:
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize("case", ["paper-4.1-helical", "hexapod-machining"])
+@pytest.mark.parametrize("case", soaked(["paper-4.1-helical", "hexapod-machining"], ["paper-4.1-helical"]))
 def test_a_narrow_view_fills_its_frame_and_names_its_limbs(opened: Callable[..., Any], case: str) -> None:
     chrome = opened(case, 420)
     check_view(chrome)
@@ -237,10 +237,8 @@ def test_the_robot_runs_along_its_path(opened: Callable[..., Any], tmp_path: Pat
     assert len(set(chrome.execute_script(places))) == 1
     check_clean(chrome)
     assert chrome.find_element("id", "travelled").text == view["frames"][view["first"]]["words"]
-    names = chrome.execute_script(
-        "return document.getElementById('view').layout.scene.annotations.map((each) => each.text)"
-    )
-    assert names[-1] == "line 3"
+    names = "return document.getElementById('view').layout.scene.annotations.map((each) => each.text)"
+    assert chrome.execute_script(names)[-1] == "line 3"
     slider = chrome.find_element("id", "travel")
     for index in (0, len(view["frames"]) - 1):
         chrome.execute_script(MOVE, index)
@@ -357,29 +355,17 @@ def test_browser_is_where_ci_installs_it() -> None:
 
 
 CASE = """
-[units]
-length = "cm"
-force = "N"
+units = { length = "cm", force = "N" }
+pose = { position = [0, 0, 20] }
+task = [{ name = "up", sense = "max", axis = [0, 0, 1], pitch = inf }]
+limits = { leg_length = { min = 2, max = 60 } }
+solve = { starts = 2 }
 [robot]
 model = "stewart-gough"
 layout = "aligned"
 parameters = { x1 = { min = 10, max = 13 }, x2 = { min = 3, max = 5 }, x3 = 30, x4 = 20 }
-[pose]
-position = [0, 0, 20]
-[[task]]
-name = "up"
-sense = "max"
-axis = [0, 0, 1]
-pitch = inf
-[limits]
-leg_length = { min = 2, max = 60 }
-[solve]
-starts = 2
 """
-WORKSPACE = """
-[workspace]
-position = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = 19, max = 21 }]
-"""
+WORKSPACE = "[workspace]\nposition = [{ min = -1, max = 1 }, { min = -1, max = 1 }, { min = 19, max = 21 }]\n"
 FIXED = ("--set", "x1=12", "--set", "x2=4")
 PATH = "x,y,z\n0,0,20\n1,0,20\n1,1,21\n"
 #: Number of a page's pictures, those of them that stand side by side, the window's width, and the page's.
@@ -394,7 +380,6 @@ shown.forEach((one, k) => shown.slice(k + 1).forEach((other) => {
   if (!isInside && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2) beside.push(one.outerHTML.slice(0, 60));
 }));
 return [shown.length, beside, innerWidth, document.documentElement.scrollWidth];"""
-NARROW = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": False}
 
 
 @pytest.mark.browser
@@ -412,7 +397,7 @@ def test_panels_stand_below_each_other_on_a_narrow_screen(browser: Any, cli: Run
         "pareto": ("pareto", case, "--goal", "max F", "--goal", "min limits.leg_length.max", "--points", "3", "--html"),
         "compare": ("compare", case, "case", "6-ups", "--html"),
     }
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", NARROW)
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size_of_window(420))
     try:
         for name, command in commands.items():
             page = tmp_path / f"{name}.html"

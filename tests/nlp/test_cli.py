@@ -14,7 +14,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
-from builders import Run, edited, output_of, refusal_of, saved, unbroken
+from builders import EACH_KIND, Run, edited, output_of, refusal_of, saved, soaked, starter_text, unbroken
 
 import screwsynth.cases
 from screwsynth.models import model_names
@@ -397,13 +397,14 @@ def test_a_file_name_that_is_no_text(tmp_path: Path, cli: Run) -> None:
     assert (tmp_path / "result.json").exists() == (code == 0)
 
 
-def test_the_schema_accepts_every_good_case_and_refuses_what_the_reader_refuses(cli: Run) -> None:
+@pytest.mark.parametrize("robots", soaked([EACH_KIND, model_names()], [EACH_KIND]), ids=["kinds", "all"])
+def test_the_schema_accepts_every_good_case_and_no_other(robots: tuple[str, ...], cli: Run) -> None:
     found = strict(output_of(cli("schema")))
     jsonschema.Draft202012Validator.check_schema(found)
     schema = jsonschema.Draft202012Validator(found)
     assert len(shipped_cases()) >= 8
     texts = [(CASES / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_cases()]
-    texts += [cli("new", name)[1] for name in model_names()]
+    texts += map(starter_text, ("stewart-gough", "hexapod", "three-upu", *robots))
     texts += [
         edited(HELICAL, (MOTION, own)) for own in ("axis = [0, 0, 1]\npitch = inf\n", "twist = [0, 0, 1, 0, 0, 0]\n")
     ]
@@ -430,6 +431,7 @@ def test_the_schema_accepts_every_good_case_and_refuses_what_the_reader_refuses(
 def test_a_new_case_solves(model: str, tmp_path: Path, cli: Run) -> None:
     text = output_of(cli("new", model))
     assert text.endswith("\n")
+    assert text == starter_text(model)
     path = saved(tmp_path / "mine.toml", text)
     target = tmp_path / "result.json"
     out = output_of(cli("solve", str(path), "--json", str(target)))

@@ -1,14 +1,12 @@
 """Robots compared on one case: placed, scaled, solved, and told what they lack."""
 
-import csv
-import io
 import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, output_of, refusal_of, saved
+from builders import Run, output_of, refusal_of, rows_of, saved
 from jsonschema import Draft202012Validator
 
 from screwsynth.models import Displacement
@@ -35,21 +33,11 @@ from screwsynth.nlp.results.schema import result_schema
 
 # The twist is about an axis far from the origin, so that a frame that is moved wrongly shows.
 CASE = """
-[units]
-length = "mm"
-[robot]
-model = "stewart-gough"
-parameters = { x1 = 120, x2 = 60, x3 = 10, x4 = 10 }
-[pose]
-position = [30, -20, 150]
-[[task]]
-name = "tilt"
-sense = "max"
-axis = [1, 2, 0]
-point = [200, 10, 90]
-pitch = 3
-[limits]
-leg_length = { min = 20, max = 900 }
+units = { length = "mm" }
+robot = { model = "stewart-gough", parameters = { x1 = 120, x2 = 60, x3 = 10, x4 = 10 } }
+pose = { position = [30, -20, 150] }
+task = [{ name = "tilt", sense = "max", axis = [1, 2, 0], point = [200, 10, 90], pitch = 3 }]
+limits = { leg_length = { min = 20, max = 900 } }
 """
 #: A sum of six squares, beside one by other operations in another order.
 ROUNDING = 1e-9
@@ -109,7 +97,7 @@ def test_a_robot_in_the_place_of_another(path: str, tmp_path: Path, cli: Run) ->
     # The legs of the 6-SPS have lengths, the rods of the Delta have none that could change.
     left_out = {name: [item["key"] for item in each["limits_left_out"]] for name, each in robots.items()}
     assert (left_out["6-sps"], left_out["delta"]) == ([], ["limits.leg_length"])
-    rows = list(csv.DictReader(io.StringIO(files["csv"].read_text())))
+    rows = rows_of(files["csv"].read_text())
     assert [float(row["value"]) for row in rows] == [each["value"] for each in result["robots"]]
     assert "no freedom" in out
     assert files["html"].read_text().count("<h3>") == 3
@@ -166,10 +154,8 @@ def test_dimensions_ranges_and_certificates() -> None:
 
 
 def test_strokes_over_several_poses() -> None:
-    moved = replace(
-        case(), displacements=(Displacement.by(np.eye(3), np.zeros(3)), Displacement.by(np.eye(3), (0, 0, 9)))
-    )
-    found = compare(moved, ["6-sps", "case"], part=0, starts=1)
+    moves = tuple(Displacement.by(np.eye(3), (0, 0, z)) for z in (0, 9))
+    found = compare(replace(case(), displacements=moves), ["6-sps", "case"], part=0, starts=1)
     for entry in found.entries:
         (stroke,) = entry.strokes.values()
         nlp, x = entry.solution.nlp, entry.solution.x
@@ -200,8 +186,7 @@ def test_poses_and_workspaces_stay_where_they_are_in_the_world() -> None:
 
 
 def test_bad_input_is_one_sentence(path: str, tmp_path: Path, cli: Run) -> None:
-    robot = tmp_path / "mine.toml"
-    robot.write_text("name = 1\n")
+    robot = saved(tmp_path / "mine.toml", "name = 1\n")
     taken = tmp_path / "no" / "out.json"
     for arguments, words in (
         (("6-ups",), "needs at least two robots, and 1 is given"),
@@ -229,12 +214,8 @@ def test_robots_that_do_not_keep_every_limit_have_no_rank_and_what_they_lack_is_
     kept = {each["name"]: (each["part"], each["limits_kept"], each["value"]) for each in result["robots"]}
     # The six rods on rails resist the motion more, without all limits but one.
     assert kept["6-pus"][2] > kept["case"][2]
-    assert [(each["name"], each["part"]) for each in result["robots"]] == [
-        ("case", "ranked"),
-        ("6-pus", "limits not kept"),
-        ("delta", "no freedom"),
-        ("6-ups", "no answer"),
-    ]
+    parts = {"case": "ranked", "6-pus": "limits not kept", "delta": "no freedom", "6-ups": "no answer"}
+    assert [(each["name"], each["part"]) for each in result["robots"]] == list(parts.items())
     # Legs given joint by joint have the limits of legs too, but cones that are stated by joint.
     assert [kept[name][1] for name in names] == [1, 1, 7, 5]
     sentences = {each["name"]: " ".join(each["sentences"]) for each in result["robots"]}

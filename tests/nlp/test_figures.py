@@ -30,8 +30,6 @@ from screwsynth.nlp.results.robottables import robot_table
 
 #: Robots whose functions say where their parameters are in a picture; a robot file does not.
 DRAWN_BY_HAND = [name for name in model_names() if name not in gallery_names()]
-
-
 #: Shipped cases with an axis to draw; hexapod-workspace has the robot of hexapod-machining, and takes long to solve.
 PICTURED = [name for name in EACH_CASE if name not in {"paper-4.2", "hexapod-workspace"}]
 
@@ -41,13 +39,10 @@ def drawing(name: str) -> Drawing:
     return drawings_of(solve(load_case(name), starts=4))[0]
 
 
-def test_a_unit_is_as_long_across_as_upwards() -> None:
+def test_the_view_is_a_parallel_projection_without_stretch() -> None:
     axes = figure_of([drawing("paper-4.3")]).axes[0]
     origin, right, up = axes.transData.transform([[0, 0], [1, 0], [0, 1]])
     assert math.dist(origin, right) == pytest.approx(math.dist(origin, up), rel=1e-9)
-
-
-def test_the_view_is_a_parallel_projection_without_stretch() -> None:
     robot = drawing("paper-4.1-helical")
     view = clearest_view(robot)
     across = np.array([view.project(np.eye(3)[i]) - view.project(np.zeros(3)) for i in range(3)]).T
@@ -90,27 +85,25 @@ def test_a_helix_has_the_pitch_of_the_task() -> None:
     assert (along[1] - along[0]) / turns == pytest.approx(motion.pitch, rel=1e-9)
 
 
-@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf"])
-def test_the_same_robot_gives_the_same_bytes(ending: str) -> None:
+def test_the_same_robot_gives_the_same_bytes() -> None:
     robot = drawing("paper-4.1-helical-axis-z")
-    first, second = picture([robot], ending), picture([robot], ending)
-    assert first == second
-    assert first[:4] in (b"\x89PNG", b"<?xm", b"%PDF")
+    for ending, head in ((".png", b"\x89PNG"), (".svg", b"<?xm"), (".pdf", b"%PDF")):
+        first, second = picture([robot], ending), picture([robot], ending)
+        assert first == second
+        assert first.startswith(head)
 
 
-@pytest.mark.parametrize("name", DRAWN_BY_HAND)
-def test_every_parameter_of_a_robot_is_named_in_its_picture(name: str) -> None:
-    model = build_model(name)
-    words = {text.get_text() for text in figure_of([drawing_of_model(model)]).axes[0].texts}
-    assert {parameter.name for parameter in model.parameters} <= words
+def test_every_parameter_of_a_robot_is_named_in_its_picture() -> None:
+    for model in map(build_model, DRAWN_BY_HAND):
+        words = {text.get_text() for text in figure_of([drawing_of_model(model)]).axes[0].texts}
+        assert {parameter.name for parameter in model.parameters} <= words
 
 
 def test_words_do_not_cover_each_other() -> None:
     figure = figure_of([drawing("hexapod-machining")])
     figure.canvas.draw()
     boxes = [text.get_window_extent() for text in figure.axes[0].texts if text.get_text()]
-    for i, one in enumerate(boxes):
-        assert not [other for other in boxes[i + 1 :] if one.overlaps(other)]
+    assert not [1 for one, other in itertools.combinations(boxes, 2) if one.overlaps(other)]
 
 
 def crosses_box(a: np.ndarray, b: np.ndarray, box: tuple[float, float, float, float]) -> bool:
@@ -279,7 +272,7 @@ def test_numbers_in_a_picture_are_those_of_the_table_with_units(name: str) -> No
         assert ":" not in label, "a name that ends in a sign must not stand before a number in one line"
 
 
-def two_links() -> Case:
+def test_a_limb_of_several_links_has_one_label() -> None:
     """A limb of two links, and five limbs of one."""
     pose = PoseSymbols()
     p, points, links, rows = pose.position, [], [], []
@@ -295,11 +288,8 @@ def two_links() -> Case:
     links += [Link("B0", "K", Body.LIMB, limb="0"), Link("K", "A0", Body.LIMB, limb="0")]
     scene = Scene(tuple(points), tuple(links))
     model = Model("two-links", "a limb of two links", (), pose, (0.0, 0.0, 20.0), tuple(rows), scene=scene)
-    return Case(model=model, parameters={}, position=[0, 0, 20], tasks=[Task([0, 0, 1, 1, 2, 3])])
-
-
-def test_a_limb_of_several_links_has_one_label() -> None:
-    assert_labels_are_clear(drawings_of(solve(two_links())))
+    case = Case(model=model, parameters={}, position=[0, 0, 20], tasks=[Task([0, 0, 1, 1, 2, 3])])
+    assert_labels_are_clear(drawings_of(solve(case)))
 
 
 def test_letters_that_no_font_has_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -346,16 +336,11 @@ def test_any_pose_is_drawn_and_the_worst_is_named(tmp_path: Path, cli: Run, thre
         assert ("the worst" in robot.headline) == (values[k] == min(values))
     file = saved(tmp_path / "poses.toml", three_poses("max"))
     output_of(cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "3"))
+    assert "F" in output_of(cli("solve", "paper-4.2", "--starts", "2", "--plot", str(tmp_path / "tasks.png")))
+    assert (tmp_path / "pose.png").read_bytes()[:4] == (tmp_path / "tasks.png").read_bytes()[:4] == b"\x89PNG"
     refusal_of(cli("solve", str(file), "--plot", str(tmp_path / "pose.png"), "--pose", "4"), "--pose 4", "3 poses")
     with pytest.raises(InputError, match="pose 4 does not exist"):
         plot(solution, tmp_path / "pose.png", pose=4)
-
-
-def test_the_command_line_draws(tmp_path: Path, cli: Run) -> None:
-    target = tmp_path / "pose.png"
-    out = output_of(cli("solve", "paper-4.2", "--starts", "2", "--plot", str(target)))
-    assert "F" in out
-    assert target.read_bytes()[:4] == b"\x89PNG"
 
 
 def test_a_failed_solve_is_drawn_as_what_it_is() -> None:
@@ -369,17 +354,14 @@ def test_a_failed_solve_is_drawn_as_what_it_is() -> None:
     assert "not" in robot.headline
 
 
-@pytest.mark.parametrize(
-    ("arguments", "fault"),
-    [
-        (("solve", "paper-4.1-helical", "--plot", "pose.jpg"), ".png"),
-        (("solve", "paper-4.1-helical", "--plot", "/no/such/folder/pose.png"), "cannot be written"),
-        (("models", "--plot", "robot.png"), "name of a robot"),
-        (("models", "stewart-gough", "--plot", "robot"), ".png"),
-    ],
-)
-def test_what_cannot_be_drawn_is_told_before_the_work(arguments: tuple[str, ...], fault: str, cli: Run) -> None:
-    refusal_of(cli(*arguments), fault)
+def test_what_cannot_be_drawn_is_told_before_the_work(cli: Run) -> None:
+    for arguments, fault in (
+        ("solve paper-4.1-helical --plot pose.jpg", ".png"),
+        ("solve paper-4.1-helical --plot /no/such/folder/pose.png", "cannot be written"),
+        ("models --plot robot.png", "name of a robot"),
+        ("models stewart-gough --plot robot", ".png"),
+    ):
+        refusal_of(cli(*arguments.split()), fault)
 
 
 @pytest.fixture

@@ -11,7 +11,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import Run, case_from, edited, output_of, refusal_of, saved, starter_tables, turn_about
+from builders import (
+    EACH_KIND,
+    Run,
+    case_from,
+    edited,
+    output_of,
+    refusal_of,
+    saved,
+    soaked,
+    starter_tables,
+    starter_text,
+    turn_about,
+)
 
 import screwsynth.cases
 from screwsynth.models import model_names, robot_function, stewart_gough
@@ -166,9 +178,10 @@ def test_a_cone_about_home_keeps_what_it_is_about() -> None:
         assert limits[name].about is not None  # type: ignore[attr-defined]
 
 
-def test_the_text_of_tables_reads_as_the_same_tables(cli: Run) -> None:
+@pytest.mark.parametrize("robots", soaked([EACH_KIND, model_names()], [EACH_KIND]), ids=["kinds", "all"])
+def test_the_text_of_tables_reads_as_the_same_tables(robots: tuple[str, ...]) -> None:
     texts = [(CASES / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_cases()]
-    texts += [cli("new", name)[1] for name in model_names()]
+    texts += map(starter_text, robots)
     odd = 'b = [-inf, "q\\"\\u0007\\u007f", []]\n["odd key"]\nc = { "x y" = [{ d = true }, 1e-300] }\ne = {}\n'
     texts.append(f"a = inf\n{odd}")
     for text in texts:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import os
@@ -23,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import reachy
-from builders import Run, case_from, saved
+from builders import Run, case_from, rows_of, saved
 from hexapods import SMALL as SMALL_WORKSPACE
 
 import screwsynth.nlp
@@ -117,9 +116,7 @@ def plain(shown: str) -> str:
 
 @pytest.fixture
 def case(tmp_path: Path) -> str:
-    path = tmp_path / "eight.toml"
-    path.write_text(EIGHT, encoding="utf-8")
-    return str(path)
+    return str(saved(tmp_path / "eight.toml", EIGHT))
 
 
 #: Seconds: imports, set-up, starts. The commands share the set-up, so each has every second moment, in turns.
@@ -138,8 +135,7 @@ def check_interrupted(ended: Ended, folder: Path) -> None:
     """Refuse an end without its sentence, and files that are not whole."""
     assert ended.status == 130, ended
     assert SENTENCE in plain(ended.shown)
-    assert "Traceback" not in ended.shown
-    assert "Exception" not in ended.shown
+    assert not re.search("Traceback|Exception", ended.shown)
     left = {each.name: each for each in folder.iterdir()}
     assert set(left) <= {"eight.toml", "page.html", "out.csv.journal"}
     if "page.html" in left:
@@ -211,8 +207,7 @@ def test_an_interrupted_solve_shows_its_best_answer(case: str, tmp_path: Path) -
     words = plain(ended.shown)
     for word in ("stopped before the end: best F so far = ", "verdict", "evidence", "base_1_x"):
         assert word in words
-    text = result.read_text(encoding="utf-8")
-    assert '"status": "interrupted"' in text
+    assert '"status": "interrupted"' in result.read_text(encoding="utf-8")
 
 
 @watches_threads
@@ -228,38 +223,25 @@ def test_an_interrupted_tradeoff_keeps_what_is_solved(case: str, tmp_path: Path)
     assert 2 <= len(solved) < len(points) == 200
     assert list(points[: len(solved)]) == solved
     assert all(point.F is not None and math.isfinite(point.F) and point.parameters for point in solved)
-    rest = points[len(solved) :]
-    assert {(point.status, point.F, point.tasks, point.parameters) for point in rest} == {
-        (Status.INTERRUPTED, None, (None,), None)
-    }
+    rest = {(point.status, point.F, point.tasks, point.parameters) for point in points[len(solved) :]}
+    assert rest == {(Status.INTERRUPTED, None, (None,), None)}
     words = f"stopped before the end: {len(solved)} of 200 values are solved"
     assert words in plain(ended.shown)
     assert words in files["page"].read_text(encoding="utf-8")
-    rows = list(csv.DictReader(files["csv"].read_text(encoding="utf-8").splitlines()))
+    rows = rows_of(files["csv"].read_text(encoding="utf-8"))
     assert [row["status"] for row in rows] == [point.status.value for point in points]
 
 
 ROOT = str(Path(screwsynth.nlp.__file__).parent)
 
 SMALL = """
+pose = { position = [0, 0, 30] }
+task = [{ sense = "max", axis = [2, 2, 1], point = [2, 3, 6], pitch = 1 }]
+limits = { leg_length = { min = 20, max = 50 } }
+solve = { starts = 2 }
 [robot]
 model = "stewart-gough"
-[robot.parameters]
-x1 = { min = 10, max = 14 }
-x2 = 8
-x3 = 30
-x4 = { min = 5, max = 20 }
-[pose]
-position = [0, 0, 30]
-[[task]]
-sense = "max"
-axis = [2, 2, 1]
-point = [2, 3, 6]
-pitch = 1
-[limits]
-leg_length = { min = 20, max = 50 }
-[solve]
-starts = 2
+parameters = { x1 = { min = 10, max = 14 }, x2 = 8, x3 = 30, x4 = { min = 5, max = 20 } }
 """
 FIXED = SMALL.replace("{ min = 10, max = 14 }", "12").replace("{ min = 5, max = 20 }", "11") + (
     "[workspace]\nposition = [{ min = -0.5, max = 0.5 }, 0, { min = 29, max = 31 }]\n"
@@ -270,17 +252,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "report": ("small.toml", "--out", "out.html"),
     "tradeoff": ("small.toml", "--over", "x2=7:9:3", "--starts", "1", "--json", "out.json", "--csv", "out.csv"),
     "sweep": (
-        "small.toml",
-        "--over",
-        "x2=7,8",
-        "--engine",
-        "ipopt",
-        "--starts",
-        "1",
-        "--jobs",
-        "1",
-        "--out",
-        "out.csv",
+        *("small.toml", "--over", "x2=7,8", "--engine", "ipopt", "--starts", "1", "--jobs", "1", "--out", "out.csv"),
     ),
     "pareto": (
         *("small.toml", "--goal", "max F", "--goal", "min limits.leg_length.max", "--points", "4", "--starts", "1"),
@@ -338,15 +310,9 @@ def key_at_call(n: int) -> Iterator[list[int]]:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     along = "x,y,z\n0,0,29.5\n0.4,0,30\n0,0.1,30.5\n"
-    texts = {
-        "small.toml": SMALL,
-        "fixed.toml": FIXED,
-        "model.xml": reachy.mjcf(),
-        "path.csv": along,
-        "given.csv": "x,y,z\n0,0,30\n",
-    }
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+    texts = {"small.toml": SMALL, "fixed.toml": FIXED, "path.csv": along, "given.csv": "x,y,z\n0,0,30\n"}
+    for name, text in (texts | {"model.xml": reachy.mjcf()}).items():
+        saved(tmp_path / name, text)
     return tmp_path
 
 
@@ -383,9 +349,8 @@ def press(cli: Run, folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest
         with monkeypatch.context() as patch:
             for name in ("_awaited", "_parting", "_written", "_unfinished", "_answers", "_requested"):
                 patch.setattr(interruption, name, type(getattr(interruption, name))())
-            patch.setattr(
-                interruption, "signal", SimpleNamespace(SIGINT=2, getsignal=lambda _: None, default_int_handler=0)
-            )
+            signals = SimpleNamespace(SIGINT=2, getsignal=lambda _: None, default_int_handler=0)
+            patch.setattr(interruption, "signal", signals)
             patch.setattr(interruption.os, "_exit", leave)
             status, err = interruption.INTERRUPTED, ""
             with key_at_call(n) as count, suppress(Left):
@@ -422,9 +387,8 @@ def press_at_moments(name: str, press: Press, folder: Path, moments: int) -> Non
             (folder / path).unlink()
         ended = press(n, name, *COMMANDS[name])
         assert ended.status == interruption.INTERRUPTED, (n, ended.err)
-        assert "screwsynth: interrupted: " in ended.err, (n, ended.err)
-        assert "Traceback" not in ended.err
-        assert "Exception" not in ended.err
+        assert SENTENCE in ended.err, (n, ended.err)
+        assert not re.search("Traceback|Exception", ended.err)
         for path, text in ended.files.items():
             assert text == before[path] if path in before else check_file(path, text) is None
 
@@ -446,7 +410,7 @@ def test_an_interrupted_front_has_no_gap(monkeypatch: pytest.MonkeyPatch) -> Non
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_says_that_it_is_interrupted(name: str, press: Press, folder: Path) -> None:
-    press_at_moments(name, press, folder, 2 if name in ("report", "path") else 4)  # a page takes seconds
+    press_at_moments(name, press, folder, 1 if name in ("report", "path") else 2)  # a page takes seconds
 
 
 CASE = "paper-4.3"
@@ -576,20 +540,15 @@ def test_a_solve_shows_what_it_has_when_the_time_is_over(clock: Clock, cli: Run)
         assert not certify(load_case(CASE)).is_proved
 
 
-@pytest.mark.parametrize(
-    "command", ["solve", "tradeoff", "pareto", "compare", "certify", "workspace", "sweep", "report"]
-)
-def test_a_time_that_is_not_positive_is_refused(command: str, cli: Run) -> None:
-    more = {
-        "tradeoff": ("--over", "x1=10:14:3"),
-        "pareto": ("--goal", "max F:x"),
-        "compare": ("6-ups",),
-        "sweep": ("--over", "x1=10:14:3", "--out", "table.csv"),
-        "report": ("--out", "page.html"),
-    }
-    for text in ("0", "-1", "nan"):
-        status, _, err = cli(command, CASE, *more.get(command, ()), "--time", text)
-        assert (status, err) == (2, f"screwsynth: --time {text}: must be positive\n")
+def test_a_time_that_is_not_positive_is_refused(cli: Run) -> None:
+    for command, *more in (
+        *(("solve",), ("certify",), ("workspace",), ("compare", "6-ups"), ("tradeoff", "--over", "x1=10:14:3")),
+        *(("pareto", "--goal", "max F:x"), ("sweep", "--over", "x1=10:14:3", "--out", "table.csv")),
+        ("report", "--out", "page.html"),
+    ):
+        for text in ("0", "-1", "nan"):
+            ended = cli(command, CASE, *more, "--time", text)
+            assert ended == (2, "", f"screwsynth: --time {text}: must be positive\n")
 
 
 def test_a_sweep_whose_time_is_over_goes_on_later(clock: Clock, tmp_path: Path) -> None:

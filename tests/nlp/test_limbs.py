@@ -81,10 +81,8 @@ def test_a_limb_without_a_feasible_point_makes_the_whole_infeasible() -> None:
     case = load_case("paper-4.4-min")
     nlp = formulate(case)
     # Unit axes whose components are all small do not exist.
-    upper = nlp.upper.copy()
-    upper[:3] = 0.1
-    lower = nlp.lower.copy()
-    lower[:3] = -0.1
+    lower, upper = nlp.lower.copy(), nlp.upper.copy()
+    lower[:3], upper[:3] = -0.1, 0.1
     nlp = replace(nlp, lower=lower, upper=upper)
     recorder = TreeRecord()
     found = certify_program(nlp, gap=1e-2, recorder=recorder)
@@ -162,12 +160,11 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     own_low = low[m:, of] + rng.random(own_size.shape) * (size[m:, of] - own_size)
     own = OwnBoxes(own_low, own_low + own_size, of, int(of[-1]) + 1)
     good = low[m:] + 0.5 * size[m:]
-    models = engine.limb_models(
-        np.concatenate([low[:m, of], own.lower]), np.concatenate([(low + size)[:m, of], own.upper])
-    )
-    at_good = engine.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good]))
+    ends = np.concatenate([low[:m, of], own.lower]), np.concatenate([(low + size)[:m, of], own.upper])
+    good_ends = np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good])
+    models, at_good = engine.limb_models(*ends), engine.limb_models(*good_ends)
     opposite = Engine(replace(limb, functions=(-limb.functions[0],)), shared=m)
-    fall = opposite.limb_models(np.concatenate([low[:m], good]), np.concatenate([(low + size)[:m], good])).L
+    fall = opposite.limb_models(*good_ends).L
     with np.errstate(all="ignore"):
         part = bound_limb(own, good, models, at_good, fall, m)
     assert (part.reached > -np.inf).all()
@@ -189,7 +186,7 @@ def test_the_bounds_of_a_limb_without_its_tilt_hold_at_every_point() -> None:
     reached = values(s, np.repeat(good[:, :, None], points, axis=2)) - tilt
     assert (reached.min(axis=1) >= part.reached - slack).all()
     # A dropped box is worse than the good point at every shared point.
-    assert (above[~kept] <= (values(s, np.repeat(good[:, :, None], points, axis=2)) - tilt)[of][~kept] + slack).all()
+    assert (above[~kept] <= reached[of][~kept] + slack).all()
 
 
 def test_the_common_part_with_tilts_is_bounded_and_contracted() -> None:
@@ -211,16 +208,13 @@ def test_the_common_part_with_tilts_is_bounded_and_contracted() -> None:
     value += best[:, None] + np.einsum("ib,ibp->bp", g, e) + 0.5 * np.einsum("ijb,ibp,jbp->bp", Q, e, e)
     feasible, level = condition <= 0, float(np.quantile(value, 0.7))
     models = Engine(form, 1, m).limb_models(low, low + size, tilts=tilts, threshold=level)
-    slack = 1e-12 * np.abs(value).max()
-    assert (np.where(feasible, value, -np.inf).max(axis=1) <= models.L.bound() + slack).all()
-    inside = ((s >= models.lower[:, :, None]) & (s <= models.upper[:, :, None])).all(axis=0) & models.is_possible[
-        :, None
-    ]
+    bound, best_there = models.L.bound(), np.where(feasible, value, -np.inf).max(axis=1)
+    assert (best_there <= bound + 1e-12 * np.abs(value).max()).all()
+    inside = ((s >= models.lower[:, :, None]) & (s <= models.upper[:, :, None])).all(axis=0)
+    inside &= models.is_possible[:, None]
     assert not (~inside & feasible & (value >= level)).any()
     assert (~inside).any(axis=1).sum() > B // 4
-    assert (
-        models.L.bound() < np.where(feasible, value, -np.inf).max(axis=1) + 0.2 * np.ptp(value, axis=1)
-    ).sum() > B // 4
+    assert (bound < best_there + 0.2 * np.ptp(value, axis=1)).sum() > B // 4
 
 
 def both_searches(seed: int) -> tuple[float, float]:

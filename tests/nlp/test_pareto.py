@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import jsonschema
 import numpy as np
 import pytest
 from builders import TWO_GOALS, Run, edited, output_of, refusal_of, rows_of, saved
@@ -31,6 +32,7 @@ from screwsynth.nlp import (
     tradeoff,
     tradeoff_result,
 )
+from screwsynth.nlp.output.report.designs import changed_words
 from screwsynth.nlp.results.explorations import FrontResult
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.results.tradeoff import TradeoffResult
@@ -92,24 +94,15 @@ def test_goals_without_conflict_have_one_point(case: str, cli: Run) -> None:
 # Six parallel legs along the platform's position p: F of the translation along an axis is 6 p_i^2 / |p|^2, and each leg
 # has the length |p|. Of the points with given F x and F y, the shortest legs are those with the smallest height, so
 # that F x + F y = 6 - 6 * 10^2 / L^2 on the front, and above it is dominated.
-PARALLEL = """
-task = [
-    { name = "x", sense = "max", axis = [1, 0, 0], pitch = inf },
-    { name = "y", sense = "max", axis = [0, 1, 0], pitch = inf },
-]
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-layout = "aligned"
-parameters = { x1 = 12, x2 = 12, x3 = 20, x4 = 20 }
-[pose]
-position = [{ min = 0, max = 20 }, { min = 0, max = 20 }, { min = 10, max = 15 }]
-[limits]
-leg_length = { min = 2, max = 30 }
-[solve]
-starts = 1
-"""
+PARALLEL = edited(
+    TWO_GOALS,
+    ('name = "up", sense = "max", axis = [0, 0, 1]', 'name = "x", sense = "max", axis = [1, 0, 0]'),
+    ('name = "side", sense = "max", axis = [1, 0, 0]', 'name = "y", sense = "max", axis = [0, 1, 0]'),
+    ("x2 = 4, x3 = 30", "x2 = 12, x3 = 20"),
+    ("[0, 0, { min = 5, max = 40 }]", "[{ min = 0, max = 20 }, { min = 0, max = 20 }, { min = 10, max = 15 }]"),
+    ("max = 60", "max = 30"),
+    ("starts = 2", "starts = 1"),
+)
 #: The widest hole may be so many times that of points which are chosen with the exact front known, farthest ones first:
 #: that choice is itself within a factor of two of the best.
 HOLE = 2
@@ -129,8 +122,8 @@ def farthest_first(exact: np.ndarray, count: int) -> np.ndarray:
 
 
 def test_three_goals_on_an_exact_front(tmp_path: Path, cli: Run) -> None:
-    path, files = tmp_path / "parallel.toml", [tmp_path / f"front.{end}" for end in ("csv", "json", "html")]
-    path.write_text(PARALLEL, encoding="utf-8")
+    path = saved(tmp_path / "parallel.toml", PARALLEL)
+    files = [tmp_path / f"front.{end}" for end in ("csv", "json", "html")]
     goals = ("--goal", "max F:x", "--goal", "min limits.leg_length.max", "--goal", "max F:y")
     options = [word for file in files for word in (f"--{file.suffix[1:]}", str(file))]
     code, said, err = cli("pareto", str(path), *goals, "--points", "12", *options)
@@ -189,11 +182,9 @@ def test_bad_goals_are_one_sentence(goals: tuple[str, ...], words: str, case: st
 
 SMALL = """\
 title = "A platform on a column"
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-parameters = { x1 = 12, x2 = 8, x3 = 20, x4 = 8 }
+units = { length = "cm" }
+solve = { starts = 4 }
+robot = { model = "stewart-gough", parameters = { x1 = 12, x2 = 8, x3 = 20, x4 = 8 } }
 [pose]
 position = [0, { min = -5, max = 5 }, { min = 20, max = 50 }]
 rotation = { axis = [0, 0, 1], angle = { min = -25, max = 25 } }
@@ -203,8 +194,6 @@ sense = "max"
 axis = [2, 2, 1]
 point = [2, 3, 6]
 pitch = 1
-[solve]
-starts = 4
 """
 PUSH = '[[task]]\nname = "push"\nsense = "min"\naxis = [1, 0, 3]\npoint = [0, 1, 9]\npitch = 2\n'
 LIMIT = "limits.leg_length.max"
@@ -237,25 +226,15 @@ def test_each_point_is_the_optimum_of_the_case_with_that_value(small: str, cli: 
     assert F[-1] > F[0]
 
 
-@pytest.mark.parametrize(
-    ("over", "unit"),
-    [
-        (f"{LIMIT}=30:30.02:3", "cm"),
-        ("x2=7.99:8.01:3", "cm"),
-        ("x3=19.99:20.01:3", "deg"),
-        ("p_z.max=29.99:30.01:3", "cm"),
-    ],
-)
-def test_the_slope_is_that_of_the_curve(over: str, unit: str, small: str, cli: Run) -> None:
-    found = curve(cli, small, over)
-    first, middle, last = found["points"]
-    difference = (last["F"] - first["F"]) / (last["value"] - first["value"])
-    assert abs(difference) > 1e-3
-    assert middle["slope"] == pytest.approx(difference, rel=1e-4)
-    assert found["unit"] == unit
-
-
-def test_the_slope_of_a_smallest_value_that_is_minimised(small: str, cli: Run, tmp_path: Path) -> None:
+def test_the_slope_is_that_of_the_curve(small: str, cli: Run, tmp_path: Path) -> None:
+    for over in (f"{LIMIT}=30:30.02:3", "x2=7.99:8.01:3", "x3=19.99:20.01:3", "p_z.max=29.99:30.01:3"):
+        found = curve(cli, small, over)
+        first, middle, last = found["points"]
+        difference = (last["F"] - first["F"]) / (last["value"] - first["value"])
+        assert abs(difference) > 1e-3
+        assert middle["slope"] == pytest.approx(difference, rel=1e-4)
+        assert found["unit"] == ("deg" if over.startswith("x3") else "cm")
+    # Of a smallest value that is minimised.
     path = saved(tmp_path / "min.toml", SMALL.replace('"max"', '"min"'))
     for over in ("p_y.min=-4.99:-5.01:3", "p_z.min=30.01:29.99:3", "limits.leg_length.min=30.02:30:3"):
         first, middle, last = curve(cli, str(path), over)["points"]
@@ -264,11 +243,11 @@ def test_the_slope_of_a_smallest_value_that_is_minimised(small: str, cli: Run, t
             assert abs(difference) < 1e-6, "a bound that is not active has no slope"
         else:
             assert middle["slope"] == pytest.approx(difference, rel=1e-4, abs=1e-7)
-    assert small
 
 
 def test_values_without_an_answer(small: str, cli: Run) -> None:
     found = curve(cli, small, f"{LIMIT}=12:32:3", "--starts", "2")
+    jsonschema.validate(found, json.loads(json.dumps(result_schema())))
     assert [point["status"] for point in found["points"]] == ["infeasible", "optimal", "optimal"]
     empty = found["points"][0]
     assert (empty["F"], empty["slope"], empty["tasks"], empty["parameters"]) == (None, None, [None], None)
@@ -283,8 +262,7 @@ def test_values_without_an_answer(small: str, cli: Run) -> None:
 def test_several_tasks(cli: Run, tmp_path: Path) -> None:
     path = tmp_path / "several.toml"
     for method, has_value in (("average", False), ("weighted-sum", True)):
-        text = SMALL.replace("[solve]", f'{PUSH}[combine]\nmethod = "{method}"\n[solve]')
-        path.write_text(text, encoding="utf-8")
+        saved(path, f'{SMALL}{PUSH}[combine]\nmethod = "{method}"\n')
         found = curve(cli, str(path), "x1=11:12:2")
         assert (found["tasks"], found["senses"]) == (["drive", "push"], ["max", "min"])
         for point in found["points"]:
@@ -293,13 +271,7 @@ def test_several_tasks(cli: Run, tmp_path: Path) -> None:
             assert (point["F"] is not None) == has_value
 
 
-def test_the_result_is_of_its_schema(small: str, cli: Run) -> None:
-    jsonschema = pytest.importorskip("jsonschema")
-    jsonschema.validate(curve(cli, small, f"{LIMIT}=12:32:3", "--starts", "2"), json.loads(json.dumps(result_schema())))
-
-
 def test_csv_picture_and_page(small: str, cli: Run, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     files = {kind: tmp_path / f"curve.{kind}" for kind in ("csv", "png", "svg", "html", "json")}
     arguments = ["--csv", str(files["csv"]), "--html", str(files["html"]), "--json", str(files["json"])]
     for kind in ("png", "svg"):
@@ -373,8 +345,7 @@ def test_in_python() -> None:
 
     found = tradeoff(at, [10, 11], name="x1", starts=3)
     assert [point.solution.status for point in found.points] == [Status.OPTIMAL, Status.OPTIMAL]
-    data = json_data(tradeoff_result(found))
-    assert data["over"] == "x1"
+    assert json_data(tradeoff_result(found))["over"] == "x1"
     one = result_of(solve(at(11), starts=3))
     assert json_data(tradeoff_result(found).points[1])["F"] == pytest.approx(json_data(one)["F"])
     with pytest.raises(InputError, match="at least one value"):
@@ -421,28 +392,12 @@ def test_all_designs_have_one_scale(tmp_path: Path, cli: Run) -> None:
     figures = figures_of(page.read_text())
     assert len(figures) == 3
     # The base is the same in all designs, so it has the same place and size in all pictures.
-    bases = [
-        ElementTree.tostring(next(each for each in svg.iter() if each.get("id") == "plate base")) for _, svg in figures
-    ]
-    assert len(set(bases)) == 1
-    # The platform is higher or lower.
-    assert (
-        len(
-            {ElementTree.tostring(next(e for e in svg.iter() if e.get("id") == "plate platform")) for _, svg in figures}
-        )
-        == 3
-    )
+    for plate, count in (("plate base", 1), ("plate platform", 3)):  # the platform is higher or lower
+        drawn = [next(each for each in svg.iter() if each.get("id") == plate) for _, svg in figures]
+        assert len(set(map(ElementTree.tostring, drawn))) == count
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "words"),
-    [
-        (["a"], ["a", "b"], "b becomes active"),
-        (["a", "b"], ["c", "d"], "c, d become active; a, b no longer are"),
-        (["a"], [], "a no longer is"),
-    ],
-)
-def test_changes_of_the_active_set_in_words(before: list[str], after: list[str], words: str) -> None:
-    from screwsynth.nlp.output.report.designs import changed_words  # noqa: PLC0415
-
-    assert changed_words(before, after) == words
+def test_changes_of_the_active_set_in_words() -> None:
+    assert changed_words(["a"], ["a", "b"]) == "b becomes active"
+    assert changed_words(["a", "b"], ["c", "d"]) == "c, d become active; a, b no longer are"
+    assert changed_words(["a"], []) == "a no longer is"

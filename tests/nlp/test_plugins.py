@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import Run, edited, output_of, refusal_of, saved
+from builders import Run, edited, output_of, refusal_of, saved, soaked
 
 from screwsynth.models import AmbiguousModelError, Model, model_names, robot_function, stewart_gough
 from screwsynth.models.catalog import gallery_names
@@ -104,8 +104,8 @@ def hexapod() -> Model:
 '''
 
 CASE = """\
-[units]
-length = "cm"
+units = { length = "cm" }
+task = [{ sense = "max", axis = [0, 1, 2], point = [1, 0, 30], pitch = 2 }]
 [robot]
 model = "tripod"
 legs = 6
@@ -117,11 +117,6 @@ characteristic_length = 5
 parameters = { radius = { min = 8, max = 12 }, small = 6 }
 [pose]
 position = [0, 0, 30]
-[[task]]
-sense = "max"
-axis = [0, 1, 2]
-point = [1, 0, 30]
-pitch = 2
 [solve]
 starts = 3
 """
@@ -136,14 +131,14 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
 
     def put(points: dict[str, str], module: str = MODULE, package: str = "workshop_robots") -> Path:
         site = tmp_path / f"site-{package}"
-        (site / package).mkdir(parents=True)
-        (site / package / "__init__.py").write_text("", encoding="utf-8")
-        (site / package / "robots.py").write_text(module, encoding="utf-8")
         info = site / f"{package}-1.0.dist-info"
+        (site / package).mkdir(parents=True)
         info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8")
+        saved(site / package / "__init__.py", "")
+        saved(site / package / "robots.py", module)
+        saved(info / "METADATA", f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
         lines = [f"{name} = {package}.{target}" for name, target in points.items()]
-        (info / "entry_points.txt").write_text("\n".join(["[screwsynth.models]", *lines, ""]), encoding="utf-8")
+        saved(info / "entry_points.txt", "\n".join(["[screwsynth.models]", *lines, ""]))
         monkeypatch.syspath_prepend(str(site))
         packages.append(package)
         return site
@@ -164,16 +159,12 @@ def case_file(folder: Path, *edits: tuple[str, str]) -> str:
 
 
 @pytest.mark.usefixtures("tripod")
-def test_it_is_listed_behind_the_shipped_ones(cli: Run) -> None:
+def test_it_is_listed_and_shown_with_its_options_and_defaults_as_a_case_writes_them(cli: Run) -> None:
     assert model_names() == ("stewart-gough", "hexapod", "three-upu", *gallery_names(), "tripod")
     assert "tripod" in output_of(cli("models"))
     out = "robot " + output_of(cli("models", "--all")).partition("\nrobot ")[2]
     assert [line.split()[0] for line in out.splitlines() if not line.startswith(" ")] == ["robot", *model_names()]
     assert "legs and a joint" in out
-
-
-@pytest.mark.usefixtures("tripod")
-def test_it_is_shown_with_its_options_and_defaults_as_a_case_writes_them(cli: Run) -> None:
     out = output_of(cli("models", "tripod"))
     for word in ("int", "bool", '"fast", "slow"', "radius", "small", "couple", "joint"):
         assert word in out
@@ -194,6 +185,9 @@ def test_it_is_solved_like_a_shipped_one(tmp_path: Path, cli: Run) -> None:
     assert "(optimal" in out
     assert "couple" in out
     assert json.loads(output_of(cli("evaluate", path, "--set", "radius=9", "--json", "-")))["parameters"]["radius"] == 9
+    text = output_of(cli("new", "tripod"))
+    assert tomllib.loads(text)["robot"]["twisted"] is False
+    assert cli("solve", str(saved(tmp_path / "mine.toml", text)), "--starts", "4")[0] == 0
 
 
 def test_it_is_found_by_a_new_process(tripod: Path, tmp_path: Path) -> None:
@@ -249,14 +243,6 @@ def test_its_options_are_checked_against_its_signature(
     refusal_of(cli("solve", path), "case.toml", key, *words)
 
 
-@pytest.mark.usefixtures("tripod")
-def test_a_new_case_for_it_solves(tmp_path: Path, cli: Run) -> None:
-    text = output_of(cli("new", "tripod"))
-    assert tomllib.loads(text)["robot"]["twisted"] is False
-    path = saved(tmp_path / "mine.toml", text)
-    assert cli("solve", str(path), "--starts", "4")[0] == 0
-
-
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -296,7 +282,7 @@ def test_a_name_that_two_packages_offer(install: Install, tmp_path: Path, cli: R
     assert "first_robots" in " ".join(output_of(cli("models", "--all")).split())
 
 
-def test_an_option_without_a_default(install: Install, tmp_path: Path, cli: Run) -> None:
+def test_an_option_without_a_default_hides_no_other_robot(install: Install, tmp_path: Path, cli: Run) -> None:
     install({"sized": "robots:sized"})
     edits = [('model = "tripod"\nlegs = 6\n', 'model = "sized"\nsize = 6\n'), ("twisted = true\n", "")]
     edits += [('drive = "fast"\n', ""), ("spread = 1.5\n", ""), ('brand = "any"\n', "")]
@@ -304,13 +290,8 @@ def test_an_option_without_a_default(install: Install, tmp_path: Path, cli: Run)
     assert cli("solve", path)[0] == 0
     path = case_file(tmp_path, *edits, ("size = 6\n", ""))
     refusal_of(cli("solve", path), "case.toml", "robot.size", "missing", "'sized'")
-
-
-def test_an_option_without_a_default_does_not_hide_the_other_robots(install: Install, cli: Run) -> None:
-    install({"sized": "robots:sized"})
     out = output_of(cli("models"))
-    for name in ("stewart-gough", "hexapod", "sized"):
-        assert name in out
+    assert all(name in out for name in ("stewart-gough", "hexapod", "sized"))
     assert "must be given" in output_of(cli("models", "sized"))
 
 
@@ -476,18 +457,22 @@ def groups() -> list[tuple[str, ...]]:
     return [tuple(padded[i : i + 4]) for i in range(0, len(padded), 4)]  # type: ignore[misc]
 
 
-@pytest.mark.parametrize("names", groups(), ids="-".join)
-@pytest.mark.parametrize("held", [False, True], ids=["free axis", "held axis"])
-def test_internal_names_as_parameter_names_change_nothing(names: tuple[str, ...], held: bool) -> None:
+#: With the axis held, only the names of a rotation differ.
+KINDS = [(names, held) for names in groups() for held in (False, True)]
+OF_ROTATIONS = [
+    (names, held) for names, held in KINDS if not held or {"axis", "axis_x", "axis_z", "angle"} & set(names)
+]
+
+
+@pytest.mark.parametrize("kind", soaked(KINDS, OF_ROTATIONS), ids=lambda kind: "-".join(kind[0]))
+def test_internal_names_as_parameter_names_change_nothing(kind: tuple[tuple[str, ...], bool]) -> None:
+    names, held = kind
     tasks = [HELICAL, TURN]
     one = case_of(PLAIN, tasks=tasks, held=held)
     other = case_of(names, tasks=tasks, held=held)
-    pairs = [
-        *zip(formulate_each(one), formulate_each(other), strict=True),
-        *((formulate_weighted(c, [1.0, 2.0]), formulate_weighted(d, [1.0, 2.0])) for c, d in [(one, other)]),
-        *((formulate_worst(c, [1.0, 1.0], [300.0, 50.0], 400.0), formulate_worst(d, [1.0, 1.0], [300.0, 50.0], 400.0))
-          for c, d in [(one, other)]),
-    ]  # fmt: skip
+    pairs = list(zip(formulate_each(one), formulate_each(other), strict=True))
+    pairs.append(tuple(formulate_weighted(each, [1.0, 2.0]) for each in (one, other)))
+    pairs.append(tuple(formulate_worst(each, [1.0, 1.0], [300.0, 50.0], 400.0) for each in (one, other)))
     steps = along_screw(HELICAL.twist, [0.0, 0.1, 0.2])
     several = {"displacements": steps, "over_poses": OverPoses.WORST, "tasks": [HELICAL], "held": held}
     pairs.append((formulate(case_of(PLAIN, **several)), formulate(case_of(names, **several))))  # type: ignore[arg-type]
@@ -497,9 +482,8 @@ def test_internal_names_as_parameter_names_change_nothing(names: tuple[str, ...]
             G, h = second.evaluate(x)
             assert F == G
             np.testing.assert_array_equal(g, h)
-        assert len({scalar.name for scalar in (*second.program.variables, *second.program.arguments)}) == len(
-            second.program.variables
-        ) + len(second.program.arguments)
+        scalars = [*second.program.variables, *second.program.arguments]
+        assert len({scalar.name for scalar in scalars}) == len(scalars)
         plain, odd = (sensitivities(nlp, nlp.start) for nlp in (first, second))
         assert [row.derivative for row in plain] == [row.derivative for row in odd]
 

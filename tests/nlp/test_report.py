@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from builders import Run, edited, refusal_of, saved
 from casadi import SX
+from matplotlib.colors import to_hex
 from pages import FEW, Page, displaced, made, number, posed, rates_of_lines
 
 from screwsynth.models import (
@@ -30,6 +31,7 @@ from screwsynth.models import (
 )
 from screwsynth.nlp import Case, Task, evaluate, formulate, load_case, result_of, solve
 from screwsynth.nlp.case.source import find_case
+from screwsynth.nlp.output.pictures.painting import rate_colour_map
 from screwsynth.nlp.output.pictures.style import RATE_COLOURS
 from screwsynth.nlp.output.report import sections
 from screwsynth.nlp.output.report.charts import Curve, Spot, line_chart
@@ -46,24 +48,16 @@ CASES = ("paper-4.1-helical", "paper-4.2", "paper-4.4-max", "hexapod-machining")
 
 IMPOSSIBLE = """\
 title = "Legs of half a metre on a small robot"
-[units]
-length = "cm"
-[robot]
-model = "stewart-gough"
-layout = "aligned"
-parameters = { x1 = 12, x2 = 8, x3 = 30, x4 = 8 }
-[pose]
-position = [0, 0, { min = 20, max = 50 }]
-rotation = { axis = [0, 0, 1], angle = 0 }
+units = { length = "cm" }
+robot = { model = "stewart-gough", layout = "aligned", parameters = { x1 = 12, x2 = 8, x3 = 30, x4 = 8 } }
+pose = { position = [0, 0, { min = 20, max = 50 }], rotation = { axis = [0, 0, 1], angle = 0 } }
+limits = { leg_length = { min = 500 } }
+solve = { starts = 2 }
 [[task]]
 sense = "max"
 axis = [2, 2, 1]
 point = [2, 3, 6]
 pitch = 1
-[limits]
-leg_length = { min = 500 }
-[solve]
-starts = 2
 """
 
 
@@ -264,17 +258,11 @@ def sliding(*shifts: float) -> Case:
     q, pose = SX.sym("q"), PoseSymbols()
     foot, head = ca.vertcat(q, 0, 0), pose.position
     points = Point("F", foot, Body.LIMB), Point("H", head, Body.PLATFORM)
-    model = Model(
-        name="sliding",
-        description="one leg and a loop",
-        parameters=(),
-        pose=pose,
-        home=(0.0, 0.0, 1.0),
-        wrenches=(force_along("1", foot, head - foot),),
-        unknowns=(Unknown("q", q, Dimension.LENGTH, "place of the foot", -10.0, 10.0),),
-        closure=(Closure("loop", q - head[0]),),
-        scene=Scene(points, (Link("F", "H", Body.LIMB, limb="1"),)),
-    )
+    wrenches, loop = (force_along("1", foot, head - foot),), (Closure("loop", q - head[0]),)
+    unknowns = (Unknown("q", q, Dimension.LENGTH, "place of the foot", -10.0, 10.0),)
+    scene = Scene(points, (Link("F", "H", Body.LIMB, limb="1"),))
+    given = {"unknowns": unknowns, "closure": loop, "scene": scene}
+    model = Model("sliding", "one leg and a loop", (), pose, (0.0, 0.0, 1.0), wrenches, **given)
     task = Task([0, 0, 0, 0.6, 0, 0.8])
     steps = tuple(Displacement.by(np.eye(3), np.array([shift, 0.0, 0.0])) for shift in shifts)
     return Case(model=model, parameters={}, position=[1, 0, 2], tasks=[task], displacements=steps)
@@ -377,19 +365,15 @@ def test_contrast() -> None:
 
 
 def test_colours_are_those_of_picture_files() -> None:
-    painting = pytest.importorskip("screwsynth.nlp.output.pictures.painting")
-    colours = pytest.importorskip("matplotlib.colors")
-    drawn = painting.rate_colour_map().resampled(len(RATE_COLOURS))
-    assert [colours.to_hex(drawn(k)) for k in range(len(RATE_COLOURS))] == list(RATE_COLOURS)
+    drawn = rate_colour_map().resampled(len(RATE_COLOURS))
+    assert [to_hex(drawn(k)) for k in range(len(RATE_COLOURS))] == list(RATE_COLOURS)
 
 
-def test_without_plotly(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_plotly_and_the_output_are_checked_first(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("screwsynth.nlp.output.pictures.requirements.find_spec", lambda _: None)
     refusal_of(cli("report", "paper-4.2", "--out", str(tmp_path / "page.html")), "reports need plotly")
     assert not list(tmp_path.iterdir())
-
-
-def test_output_is_checked_before_the_solve(cli: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.undo()
     monkeypatch.setattr(solve_module, "solve", lambda *_, **__: pytest.fail("it was solved"))
     refusal_of(cli("report", "paper-4.1-helical", "--out", str(tmp_path / "none" / "page.html")), "none")
 

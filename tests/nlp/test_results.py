@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders import DOCS, EACH_CASE, FEW_CASES, Run, edited, output_of, refusal_of, saved, soaked
+from builders import DOCS, EACH_CASE, FEW_CASES, Run, edited, output_of, refusal_of, saved, soaked, starter_text
 from jsonschema import Draft202012Validator
 
 import screwsynth.cases
@@ -123,13 +123,12 @@ def test_the_schema_is_one(cli: Run, schema: Json) -> None:
 def test_solves_and_evaluations_keep_to_the_schema(
     name: str, cli: Run, schema: Json, case_path: Callable[[str], str]
 ) -> None:
-    code, out, err = cli("solve", case_path(name), "--starts", "2", "--json", "-")
-    assert (code in (0, 1), err) == (True, "")
-    result = json.loads(out)
-    hold(result, schema, "CombinedResult" if "combined" in result else "SolveResult")
-    code, out, err = cli("evaluate", case_path(name), "--json", "-")
-    assert (code in (0, 1), err) == (True, "")
-    hold(json.loads(out), schema, "EvaluationResult")
+    for command in (("solve", case_path(name), "--starts", "2"), ("evaluate", case_path(name))):
+        code, out, err = cli(*command, "--json", "-")
+        assert (code in (0, 1), err) == (True, "")
+        result = json.loads(out)
+        solved = "CombinedResult" if "combined" in result else "SolveResult"
+        hold(result, schema, solved if command[0] == "solve" else "EvaluationResult")
 
 
 @pytest.mark.parametrize("name", ["paper-4.1-rotation", "paper-4.2", "worst-case", "infeasible", "nothing-free"])
@@ -221,19 +220,10 @@ def test_a_wrong_result_is_refused_with_its_key(change: Callable[[Json], object]
         result_from_json(table, "mine")
 
 
-@pytest.mark.parametrize(
-    ("content", "fault"),
-    [
-        (b"{", "is not valid JSON"),
-        (b"[1]", "must be an object"),
-        (b"{}", "schema: is missing"),
-    ],
-)
-def test_a_file_that_is_no_result_is_refused(content: bytes, fault: str, tmp_path: Path) -> None:
-    file = tmp_path / "result.json"
-    file.write_bytes(content)
-    with pytest.raises(InputError, match=fault):
-        load_result(file)
+def test_a_file_that_is_no_result_is_refused(tmp_path: Path) -> None:
+    for content, fault in (("{", "is not valid JSON"), ("[1]", "must be an object"), ("{}", "schema: is missing")):
+        with pytest.raises(InputError, match=fault):
+            load_result(saved(tmp_path / "result.json", content))
     with pytest.raises(InputError, match="cannot be read"):
         load_result(tmp_path / "none.json")
 
@@ -262,16 +252,8 @@ class Outer(JsonObject):
 
 
 def outer(**changes: object) -> Outer:
-    values: dict[str, Any] = {
-        "numbers": ((1.0, 2.0),),
-        "named": {"x": 3.0},
-        "status": Status.OPTIMAL,
-        "none": None,
-        "null": None,
-        "absent": None,
-        "inner": Inner(b=2.0),
-        "a": 1,
-    }
+    values: dict[str, Any] = {"numbers": ((1.0, 2.0),), "named": {"x": 3.0}, "status": Status.OPTIMAL}
+    values |= {"none": None, "null": None, "absent": None, "inner": Inner(b=2.0), "a": 1}
     return Outer(**values | changes)
 
 
@@ -284,18 +266,17 @@ def test_json_has_the_fields_in_the_order_of_the_type() -> None:
 
 def test_values_are_frozen_and_whole() -> None:
     value = outer()
-    with pytest.raises(AttributeError, match="frozen"):
-        value.a = 2  # type: ignore[misc]
-    with pytest.raises(AttributeError, match="frozen"):
-        del value.a
-    with pytest.raises(TypeError, match="more"):
-        outer(more=1)
-    with pytest.raises(TypeError, match="b"):
-        Inner()  # type: ignore[call-arg]
-    with pytest.raises(TypeError, match="object"):
-        json_data(outer(absent=object()))
-    with pytest.raises(TypeError, match="run time"):
-        type("Text", (JsonObject,), {"__annotations__": {"a": "int"}})
+    for change in (lambda: setattr(value, "a", 2), lambda: delattr(value, "a")):
+        with pytest.raises(AttributeError, match="frozen"):
+            change()
+    for wrong, words in (
+        (lambda: outer(more=1), "more"),
+        (Inner, "b"),
+        (lambda: json_data(outer(absent=object())), "object"),
+        (lambda: type("Text", (JsonObject,), {"__annotations__": {"a": "int"}}), "run time"),
+    ):
+        with pytest.raises(TypeError, match=words):
+            wrong()
     assert "status=<Status.OPTIMAL" in repr(value)
     for module in (parts, data):
         kinds = [each for each in vars(module).values() if isinstance(each, type) and issubclass(each, JsonObject)]
@@ -374,52 +355,31 @@ def test_versions_in_words() -> None:
     assert str(FileVersions("cards", 2).fault(3)).startswith("this screwsynth reads cards of schema 1 and 2; a later")
 
 
-def case_file(folder: Path, version: str, cli: Run) -> tuple[str, str, tuple[str, ...]]:
-    """A case file, as its name, the kind, and the command that reads it."""
-    path = str(saved(folder / "case.toml", f"schema = {version}\n{output_of(cli('new', '3-rps'))}"))
-    return path, "case files", ("evaluate", path)
-
-
-def robot_file(folder: Path, version: str, cli: Run) -> tuple[str, str, tuple[str, ...]]:
-    """A robot file, which a case beside it names."""
-    del cli
-    path = str(saved(folder / "robot.toml", f"schema = {version}\n{DELTA}"))
-    return path, "robot files", ("new", path)
-
-
-def result(folder: Path, version: str, cli: Run) -> tuple[str, str, tuple[str, ...]]:
-    """A result, by which a command takes its dimensions."""
-    path = str(folder / "result.json")
-    cli("solve", SMALL, "--starts", "2", "--json", path)
-    return altered(path, version), "results", ("evaluate", SMALL, "--of", path)
-
-
-def proof(folder: Path, version: str, cli: Run) -> tuple[str, str, tuple[str, ...]]:
-    """A proof of an optimum."""
-    path = str(folder / "proof.json")
-    cli("certify", SMALL, "--starts", "2", "--gap", "0.5", "--proof", path)
-    return altered(path, version), "proofs", ("verify-proof", path)
-
-
-def altered(path: str, version: str) -> str:
-    """The name of a JSON file, in which the version becomes another."""
-    text = Path(path).read_text(encoding="utf-8")
-    assert len(re.findall(r'^ *"schema": 1,$', text, flags=re.MULTILINE)) == 1
-    saved(Path(path), re.sub('"schema": 1,', f'"schema": {version},', text))
-    return path
-
-
-@pytest.mark.parametrize("kind", [case_file, robot_file, result, proof])
+@pytest.mark.parametrize(
+    ("kind", "name", "command"),
+    [
+        ("case files", "case.toml", "evaluate FILE"),
+        ("robot files", "robot.toml", "new FILE"),
+        ("results", "result.json", f"evaluate {SMALL} --of FILE"),
+        ("proofs", "proof.json", "verify-proof FILE"),
+    ],
+)
 def test_a_file_of_another_version_is_refused_by_name(
-    kind: Callable[[Path, str, Run], tuple[str, str, tuple[str, ...]]], tmp_path: Path, cli: Run
+    kind: str, name: str, command: str, tmp_path: Path, cli: Run
 ) -> None:
-    path, words, command = kind(tmp_path, "1", cli)
-    assert cli(*command)[::2] == (0, ""), "the version that is written is read"
+    path = tmp_path / name
+    if name.endswith("toml"):
+        saved(path, f"schema = 1\n{DELTA if kind == 'robot files' else starter_text('3-rps')}")
+    elif kind == "results":
+        cli("solve", SMALL, "--starts", "2", "--json", str(path))
+    else:
+        cli("certify", SMALL, "--starts", "2", "--gap", "0.5", "--proof", str(path))
+    text, arguments = path.read_text(encoding="utf-8"), command.replace("FILE", str(path)).split()
+    (mark,) = re.findall(r'^ *"?schema"?(?:: | = )1\b', text, flags=re.MULTILINE)
+    assert cli(*arguments)[::2] == (0, ""), "the version that is written is read"
     for version, sentence in OTHERS:
-        kind(tmp_path, version, cli)
-        found = refusal_of(cli(*command), sentence.format(kind=words))
-        assert Path(path).name in found
-        assert "schema" in found
+        saved(path, edited(text, (mark, mark[:-1] + version)))
+        refusal_of(cli(*arguments), sentence.format(kind=kind), name, "schema")
 
 
 def test_a_robot_of_another_version_is_refused_in_python_and_within_a_case(tmp_path: Path, cli: Run) -> None:
@@ -455,19 +415,13 @@ def test_a_result_without_its_version_is_none(tmp_path: Path, cli: Run) -> None:
     cli("evaluate", "paper-4.4-min", "--set", "p_z=30", "--json", str(path))
     content = json.loads(path.read_text(encoding="utf-8"))
     del content["schema"]
-    saved(path, json.dumps(content))
-    with pytest.raises(
-        screwsynth.nlp.InputError, match=r"result\.json: is no result of screwsynth: schema: is missing"
-    ):
-        load_result(path)
+    with pytest.raises(InputError, match=r"result\.json: is no result of screwsynth: schema: is missing"):
+        load_result(saved(path, json.dumps(content)))
 
 
-def test_the_page_has_every_kind_of_file_and_its_versions() -> None:
+def test_the_page_has_every_kind_of_file_with_its_versions_and_every_earlier_option() -> None:
     rows = re.findall(r"^\| (.+?) \| `schema`.*? \| (\d+) \| (\d+) \|$", PAGE, flags=re.MULTILINE)
     assert [(words, int(newest), int(oldest)) for words, newest, oldest in rows] == [tuple(kind) for kind in KINDS]
-
-
-def test_the_page_has_every_earlier_option() -> None:
     told = re.findall(r"^\| `(\w+) (--[\w-]+)` \| `?(--[\w-]+|nothing)`? \|$", PAGE, flags=re.MULTILINE)
     known = [(command, old, new or "nothing") for command, names in EARLIER.items() for old, new in names.items()]
     assert told == known
