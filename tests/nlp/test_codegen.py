@@ -63,7 +63,7 @@ def test_shipped_cases_compile_without_a_warning_and_pass_their_tests(
 
 @pytest.mark.slow
 @pytest.mark.skipif("clang" not in COMPILERS, reason="clang is not installed")
-@pytest.mark.parametrize("name", OPTIMISED)
+@pytest.mark.parametrize("name", soaked(OPTIMISED, ("paper-4.1-helical", "camera-mount")))
 def test_what_clang_optimises_passes_the_test_too(name: str, tmp_path: Path, embedded: OfCase) -> None:
     for path in embedded(name).folder.iterdir():
         if path.suffix not in {".o", ".a", ".so"}:
@@ -74,7 +74,9 @@ def test_what_clang_optimises_passes_the_test_too(name: str, tmp_path: Path, emb
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", soaked(CASES, (*FEW_CASES, *OPTIMISED, "reachy-mini-envelope", "peg-in-hole", "paper-4.3"))
+)
 def test_compiled_values_are_those_of_the_program_at_random_points(name: str, embedded: OfCase) -> None:
     embedded(name).compare(find_subject(load_case(name)).nlp, 300)
 
@@ -315,8 +317,8 @@ def test_the_command_writes_what_the_compilers_say(tmp_path: Path, cli: Run) -> 
 
 @pytest.mark.slow
 @pytest.mark.skipif(set(COMPILERS) != {"gcc", "clang"}, reason="gcc and clang are not both installed")
-def test_another_compiler_stays_within_the_room_for_others(tmp_path: Path) -> None:
-    name = "hexapod-workspace"
+@pytest.mark.parametrize("name", soaked(["hexapod-workspace", "paper-4.4-max"], ["paper-4.4-max"]))
+def test_another_compiler_stays_within_the_room_for_others(name: str, tmp_path: Path) -> None:
     where = written(name, tmp_path)
     own = measure(generate_c(load_case(name), ""), identifier(name))[0]
     if own.with_room is None:

@@ -37,7 +37,7 @@ from screwsynth.nlp.solver.multistart import solve_program
 
 FEASIBLE, STATIONARY = 1e-9, 1e-7
 #: Random robots of the test below. A thousand take some minutes and were run by hand.
-ROBOTS = int(os.environ.get("SCREWSYNTH_ROBOTS", "25"))
+ROBOTS = int(os.environ.get("SCREWSYNTH_ROBOTS", "12"))
 
 Embedded = Any
 Embed = Callable[..., Embedded]

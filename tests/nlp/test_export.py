@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from builders import (
     EACH_KIND,
+    FEW_KINDS,
     Array,
     case_from,
     case_of,
@@ -59,6 +60,10 @@ from screwsynth.nlp.formats.writing.mjcf import mjcf_text
 from screwsynth.nlp.formats.writing.urdf import urdf_of
 
 ROBOTS = (*EACH_KIND, *SHIPPED)
+#: Some of them together, and all of them in `make soak`.
+EACH = pytest.mark.parametrize(
+    "names", soaked([FEW := (*FEW_KINDS, "three-upu", "hexapod"), ROBOTS], [FEW]), ids=["few", "all"]
+)
 #: One of each kind of limb and of closing, for tests that build the robot again.
 SOME = ("3-rps", "delta-parallelogram", "three-upu")
 OTHERS = ("delta", "exechon", "spherical-3-rrr", "6-rss", "hexapod")
@@ -100,8 +105,9 @@ def work_rates(J: Array) -> Array:
 
 
 @pytest.mark.parametrize("seed", soaked([0, 1], [1]))
-def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None:
-    for name in ROBOTS:
+@EACH
+def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(names: tuple[str, ...], seed: int) -> None:
+    for name in names:
         nlp, x = placed(name, seed)
         found, state = exported(name, seed), evaluate(nlp, x)
         tree = tree_of(found)
@@ -123,9 +129,10 @@ def test_mujoco_finds_closed_loops_and_the_rows_of_the_result(seed: int) -> None
         assert all(rest.shape[1] == 0 for rest in wrenches.values()), name
 
 
-def test_actuator_rates_in_mujoco_are_those_of_the_result() -> None:
+@EACH
+def test_actuator_rates_in_mujoco_are_those_of_the_result(names: tuple[str, ...]) -> None:
     chi = np.array([0.3, -0.5, 0.7, 0.4, 0.6, -0.2])
-    for name in ROBOTS:
+    for name in names:
         nlp, x = placed(name, 1)
         found = exported(name, 1)
         tree = tree_of(found)
@@ -167,8 +174,9 @@ def test_position_actuators_that_follow_the_rates_move_the_platform_by_the_task(
     assert tree.open <= 1e-8
 
 
-def test_export_import_export_import_keeps_the_rows_of_every_robot(tmp_path: Path) -> None:
-    for name in ROBOTS:
+@EACH
+def test_export_import_export_import_keeps_the_rows_of_every_robot(names: tuple[str, ...], tmp_path: Path) -> None:
+    for name in names:
         nlp, x = placed(name, 1)
         J = work_rates(evaluate(nlp, x).jacobian)
         mechanism = first = exported(name, 1).mechanism
@@ -205,8 +213,9 @@ def test_a_case_of_an_imported_robot_has_the_same_rows_and_is_exported_again(nam
             assert abs(again.F - state.F) <= 1e-10 * state.size
 
 
-def test_urdf_loads_in_mujoco_and_its_loop_frames_coincide() -> None:
-    for name in ROBOTS:
+@EACH
+def test_urdf_loads_in_mujoco_and_its_loop_frames_coincide(names: tuple[str, ...]) -> None:
+    for name in names:
         found = exported(name, 1)
         urdf = urdf_of(found.mechanism)
         # MuJoCo merges links that are fixed to others, unless it is told not to.
